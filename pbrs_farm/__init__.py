@@ -1,26 +1,77 @@
-"""pbrs_farm: houses designed by people in, physically-based pictures with exact labels out."""
+"""pbrs_farm: houses designed by people in, physically-based pictures with exact labels out.
+
+    import pbrs_farm as pf
+
+    home = pf.load("Studio").dress(seed=3)
+    camera = home.cameras("photo", n=1)[0]
+    frame = pf.render(home, camera, layers=["albedo"])
+    frame.colour, frame.depth, frame.instances
+
+Names are imported when they are first used: importing the package itself takes milliseconds.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pbrs_farm.store import Store
-    from pbrs_farm.study.reading.views import Views
+    from pbrs_farm.core.camera import Camera as Camera
+    from pbrs_farm.core.recipe import Recipe as Recipe
+    from pbrs_farm.scene.home import Home as Home
+    from pbrs_farm.scene.home import load as load
+    from pbrs_farm.scene.home import make as make
+    from pbrs_farm.scene.models import Model as Model
+    from pbrs_farm.scene.models import model as model
+    from pbrs_farm.scene.models import models as models
+    from pbrs_farm.scene.pictures import render as render
+    from pbrs_farm.scene.pictures import render_homes as render_homes
+    from pbrs_farm.study.reading.open_views import open_views as open
+    from pbrs_farm.study.reading.views import Frame as Frame
 
 __version__ = "0.1.0"
 
+# Public name -> where it is defined.
+_PUBLIC: Final = {
+    "Camera": "pbrs_farm.core.camera:Camera",
+    "Frame": "pbrs_farm.study.reading.views:Frame",
+    "Home": "pbrs_farm.scene.home:Home",
+    "Model": "pbrs_farm.scene.models:Model",
+    "Recipe": "pbrs_farm.core.recipe:Recipe",
+    "load": "pbrs_farm.scene.home:load",
+    "make": "pbrs_farm.scene.home:make",
+    "model": "pbrs_farm.scene.models:model",
+    "models": "pbrs_farm.scene.models:models",
+    "open": "pbrs_farm.study.reading.open_views:open_views",
+    "render": "pbrs_farm.scene.pictures:render",
+    "render_homes": "pbrs_farm.scene.pictures:render_homes",
+}
 
-def open(place: str | Path | Store) -> Views:
-    """The views of an output folder, or of shards of `pbrs-farm pack`: docs/data.md.
+__all__ = [
+    "Camera",
+    "Frame",
+    "Home",
+    "Model",
+    "Recipe",
+    "__version__",
+    "load",
+    "make",
+    "model",
+    "models",
+    "open",
+    "render",
+    "render_homes",
+]
 
-    place: a folder, file:///folder, s3://bucket/prefix, or a store of pbrs_farm.store. Arrays are
-    read when they are asked for. Raises BadInput where there is no view, StoreFailed where the
-    store does not answer.
-    """
-    # Imported here, so that the package itself loads at once.
-    from pbrs_farm.study.reading.open_views import open_views
 
-    return open_views(place)
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'pbrs_farm' has no attribute {name!r}")
+    module, _, attribute = _PUBLIC[name].partition(":")
+    found = getattr(import_module(module), attribute)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC})

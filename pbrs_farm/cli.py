@@ -28,6 +28,7 @@ MODULES: Final = {
     "looking": ("doctor", "skies", "recipes", "layers", "completion"),
     "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
+    "scattering": ("scatter",),
     "explaining": ("dress", "repair", "cameras"),
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "pack", "classes", "label-sheet"),
@@ -43,7 +44,15 @@ MODULES: Final = {
 
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
 # Modules whose verbs read files of others: the command runs them in a process that may die.
-_OF_STRANGERS: Final = ("making", "explaining", "using", "labelling", "selecting", "submitting")
+_OF_STRANGERS: Final = (
+    "making",
+    "scattering",
+    "explaining",
+    "using",
+    "labelling",
+    "selecting",
+    "submitting",
+)
 
 
 def command() -> int:

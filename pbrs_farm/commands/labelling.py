@@ -7,9 +7,10 @@ from pathlib import Path
 
 from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.plugins import plugins
 
 FORMS = (
-    "coco", "hdf5", "webdataset", "released", "yolo", "nerfstudio", "colmap", "tum", "kitti",
+    "coco", "hdf5", "webdataset", "released", "yolo", "nerfstudio", "colmap", "tum", "kitti", "bop",
 )  # fmt: skip
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
@@ -17,10 +18,11 @@ SPLIT = "by home: train/val/test (default 80/10/10); without it all views are on
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
+    forms = (*FORMS, *plugins("exports"))
     p = verb("export", _export, "finished views in the form another tool reads")
     add = p.add_argument
     add("folder", type=Path)
-    add("--to", required=True, choices=FORMS, help="docs/formats.md describes the forms")
+    add("--to", required=True, choices=forms, help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
     text = "labels by name (`pbrs-farm layers`), default all there are but radiance"

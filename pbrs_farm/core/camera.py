@@ -9,12 +9,13 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.lenses import PINHOLE, Lens, PinholeFaces, faces_of_directions
 
@@ -76,6 +77,23 @@ class Intrinsics:
         )
 
 
+def intrinsics_from_k(size: tuple[int, int], k: Any, hfov_deg: float) -> Intrinsics:
+    """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view."""
+    width, height = (int(v) for v in size)
+    if min(width, height) < 1:
+        raise BadInput("camera", "size", f"{width}x{height} is no size")
+    if k is None:
+        if not 0 < hfov_deg < 175:
+            raise BadInput("camera", "hfov_deg", f"{hfov_deg:g} is not within 0..175")
+        return Intrinsics.from_hfov(width, height, math.radians(hfov_deg))
+    matrix = np.asarray(k, np.float64)
+    shape_fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+    if not shape_fits or min(matrix[0, 0], matrix[1, 1]) <= 0 or abs(matrix[0, 1]) > 1e-9:
+        raise BadInput("camera", "K", "expected 3 x 3 numbers: fx 0 cx, 0 fy cy, 0 0 1")
+    fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    return Intrinsics(width, height, fx, fy, cx, cy)
+
+
 @dataclass(frozen=True, slots=True)
 class CameraBlur:
     """What light alone shows of a camera: an aperture, and motion while the shutter is open."""
@@ -114,6 +132,52 @@ class Camera:
         world_from_camera[:3, 2] = back
         world_from_camera[:3, 3] = eye
         return Camera(intrinsics, world_from_camera)
+
+    @staticmethod
+    def look_at(
+        eye: tuple[float, float, float] | F64,
+        target: tuple[float, float, float] | F64,
+        *,
+        size: tuple[int, int] = (640, 480),
+        hfov_deg: float = 60.0,
+        K: Any = None,
+        up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+    ) -> Camera:
+        """A camera at eye that looks at target, world metres, y up.
+
+        size: (width, height) in pixels. hfov_deg: full horizontal field of view, unless K (3 x 3,
+        pixels of that size, x right, y down) is given. Raises BadInput for a target at the eye, an
+        up vector along the view, or a K that is none.
+
+            >>> Camera.look_at((1, 1.5, 2), (3, 0.8, 2), size=(640, 480), hfov_deg=70)
+        """
+        start, end = np.asarray(eye, np.float64), np.asarray(target, np.float64)
+        towards = end - start
+        across = np.linalg.norm(np.cross(towards, np.asarray(up, np.float64)))
+        if not np.isfinite(towards).all() or across < 1e-9 * max(
+            float(np.linalg.norm(towards)), 1e-9
+        ):
+            raise BadInput("camera", "", "eye, target and up give no direction")
+        return Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, up)
+
+    @staticmethod
+    def from_opencv(
+        world_from_camera: Any,
+        K: Any = None,
+        *,
+        size: tuple[int, int] = (640, 480),
+        hfov_deg: float = 60.0,
+    ) -> Camera:
+        """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
+
+        Raises BadInput for a pose that is no rigid motion.
+        """
+        pose = np.asarray(world_from_camera, np.float64)
+        turn = pose[:3, :3] if pose.shape == (4, 4) else np.zeros((3, 3))
+        is_rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
+        if not is_rigid or not np.isfinite(pose).all():
+            raise BadInput("camera", "world_from_camera", "is no rigid (4, 4) pose")
+        return Camera(intrinsics_from_k(size, K, hfov_deg), pose @ OPENCV_FROM_OPENGL)
 
     @property
     def eye(self) -> F64:

@@ -150,6 +150,17 @@ class LightPart:
     escape: float | None = None  # light output ratio: share that leaves the lamp; None = unmeasured
 
 
+Rows4 = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ModelPose:
+    """Which model an item is an instance of, and where that model's frame lies: a 6-D pose."""
+
+    model: str
+    world_from_model: tuple[Rows4, Rows4, Rows4, Rows4]  # rigid; metres
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Item:
     """A thing with one instance id and one class: a chair, a wall, a room's floor."""
@@ -165,6 +176,7 @@ class Item:
     lights: tuple[LightPart, ...] = ()
     box: Box | None = None  # oriented bounding box; None = the axis-aligned one holds
     tags: tuple[str, ...] = ()  # words of the source: "mirrored", "unmapped", "boundary_of:0_1"
+    pose: ModelPose | None = None  # of what an edit placed
 
     @property
     def bounds(self) -> F64:

@@ -9,6 +9,9 @@ import sys
 from dataclasses import dataclass
 from typing import Final
 
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.plugins import plugins
+
 
 @dataclass(frozen=True, slots=True)
 class Layer:
@@ -36,7 +39,7 @@ def _label(name: str, channels: str, dtype: str, unit: str, nodata: str = "0") -
     return Layer(name, f"{name}.png", channels, dtype, unit, nodata, "truth")
 
 
-def _optional(
+def optional_layer(
     name: str,
     channels: str,
     dtype: str,
@@ -45,12 +48,13 @@ def _optional(
     file: str = "",
     needs: str = "",
 ) -> Layer:
+    """A label that the step `truth` writes when --layers names it, a plugin's too."""
     file = file or f"{name}.png"
     return Layer(name, file, channels, dtype, unit, nodata, "truth", optional=True, needs=needs)
 
 
 def _along_axis(name: str, channels: str, dtype: str, unit: str) -> Layer:
-    return _optional(name, channels, dtype, unit, needs="planar depth")
+    return optional_layer(name, channels, dtype, unit, needs="planar depth")
 
 
 def _between(
@@ -82,11 +86,11 @@ _SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hi
 
 def _behind_glass(name: str, channels: str, dtype: str, nodata: str = "0") -> Layer:
     unit, file = f"as {name}, first hit that is no glass", f"behind_glass/{name}.png"
-    return _optional(f"behind_glass_{name}", channels, dtype, unit, nodata, file)
+    return optional_layer(f"behind_glass_{name}", channels, dtype, unit, nodata, file)
 
 
 # Layers that every view has, and (optional) those written when --layers names them.
-LAYERS: Final[tuple[Layer, ...]] = (
+OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
     _picture("opengl_dl", "opengl_dl"),
     _picture("opengl_il", "opengl_il"),
@@ -112,29 +116,29 @@ LAYERS: Final[tuple[Layer, ...]] = (
     _label("instance", "Y", "uint16", "instance id"),
     _label("boundary", "Y", "uint8", "0 / 255"),
     # Labels that --layers asks for.
-    _optional("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr"),
-    _optional("position", "X Y Z", "float32", "world, m", file="position.exr"),
-    _optional("normal_shading", "RGB", "uint16", "as normal", "as normal"),
-    _optional(
+    optional_layer("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr"),
+    optional_layer("position", "X Y Z", "float32", "world, m", file="position.exr"),
+    optional_layer("normal_shading", "RGB", "uint16", "as normal", "as normal"),
+    optional_layer(
         "normal_world", "RGB", "uint16", "world frame x, y up, z; round((n + 1) 65535 / 2)", "as normal"
     ),
-    _optional("albedo", "RGB", "uint8", "sRGB, diffuse colour"),
-    _optional("material", "Y", "uint16", "material id, table in view.json"),
-    _optional("nyu13", "Y", "uint8", "NYU13 id"),
-    _optional("class_source", "Y", "uint16", "the source's class, table in view.json"),
+    optional_layer("albedo", "RGB", "uint8", "sRGB, diffuse colour"),
+    optional_layer("material", "Y", "uint16", "material id, table in view.json"),
+    optional_layer("nyu13", "Y", "uint8", "NYU13 id"),
+    optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json"),
     # What lies behind panes and glass objects.
-    _optional("glass", "Y", "uint8", "255 = glass or pane hit first"),
+    optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first"),
     _behind_glass("depth", "Y", "uint16"),
     _behind_glass("normal", "RGB", "uint16", "as normal"),
     _behind_glass("semantic", "Y", "uint8"),
     _behind_glass("instance", "Y", "uint16"),
     # Boundaries by their kind.
-    _optional(
+    optional_layer(
         "boundary_occlusion", "Y", "uint8",
         "255 = edge of the nearer surface, 128 = beside it on the farther",
     ),
-    _optional("boundary_semantic", "Y", "uint8", "0 / 255"),
-    _optional(
+    optional_layer("boundary_semantic", "Y", "uint8", "0 / 255"),
+    optional_layer(
         "boundary_crease", "Y", "uint8", "255 = normals turn by more than 30 degrees, no depth gap"
     ),
     # Depth as other works encode or measure it.
@@ -148,6 +152,23 @@ LAYERS: Final[tuple[Layer, ...]] = (
     _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows"),
     _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128"),
 )  # fmt: skip
+
+
+def _of_plugins() -> tuple[Layer, ...]:
+    """The layers of installed plugins, by name: optional, written by the step `truth`."""
+    found = []
+    for name, plugin in plugins("layers").items():
+        layer = plugin.load().layer
+        if layer.name != name or layer.step != "truth" or not layer.optional:
+            raise MachineFailed(
+                f"plugin {plugin.mark}: its layer must be optional, of the step truth, called {name}"
+            )
+        found.append(layer)
+    return tuple(found)
+
+
+LAYERS: Final[tuple[Layer, ...]] = (*OWN_LAYERS, *_of_plugins())
+"""All layers: the package's and those of plugins."""
 
 LAYER: Final = {layer.name: layer for layer in LAYERS}
 

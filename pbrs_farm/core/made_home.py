@@ -8,6 +8,7 @@ from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.plugins import is_plugin, plugin_homes
 
 PREFIX: Final = "made:"
 VERSION: Final = 3
@@ -139,10 +140,15 @@ def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: 
 
 
 def expanded(words: list[str]) -> list[str]:
-    """The words, each that names a range of made homes replaced by one word a home."""
+    """The words, each that names a range of made or plugins' homes replaced by one word a home."""
     found: list[str] = []
     for word in words:
-        found += [home.word for home in made_homes(word)] if is_made(word) else [word]
+        if is_made(word):
+            found += [home.word for home in made_homes(word)]
+        elif is_plugin(word):
+            found += [home.word for home in plugin_homes(word)]
+        else:
+            found.append(word)
     return found
 
 

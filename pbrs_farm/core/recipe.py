@@ -62,6 +62,7 @@ __all__ = [
     "field_paths",
     "recipe_from_json",
     "recipe_from_name",
+    "with_settings",
 ]
 
 
@@ -157,6 +158,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx", "black_modes"),
+    "sky": ("sun_elevation_deg", "sun_azimuth_deg"),
 }
 
 _PHOTO: Mapping[str, Any] = {
@@ -239,6 +241,25 @@ def changed_recipe(
         fields[group] = {**held, **value} if both and held is not None else value
     for path, text in overrides.items():
         _set(fields, path, text)
+    return _validated(fields)
+
+
+def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
+    """The recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe."""
+    if not settings:
+        return recipe
+    # Start from what was set: a preset of a sensor or a lens fills in the rest anew.
+    fields = recipe.model_dump(exclude_unset=True)
+    for path, value in settings.items():
+        group, _, field = path.partition(".")
+        if not field:
+            fields[group] = value
+        elif isinstance(fields.setdefault(group, {}), dict):
+            fields[group][field] = value
+    return _validated(fields)
+
+
+def _validated(fields: Mapping[str, Any]) -> Recipe:
     try:
         return Recipe.model_validate(fields)
     except ValidationError as error:

@@ -8,17 +8,21 @@ from dataclasses import replace
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel, radius_of_angle
 from pbrs_farm.core.lighting import BULB_RADIUS_M
+from pbrs_farm.core.plugins import plugins
+from pbrs_farm.core.shown_text import hint_of_choice
 
 MAX_SAMPLES: Final = 2**20
 """Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
 
 MAX_VIEW_PIXELS: Final = 2**27
 """Of a picture."""
+
+CAMERA_PRESETS: Final = ("paper", "released", "photo")
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -66,6 +70,9 @@ class DressFields(FieldGroup):
     furnish: Literal["none", "empty"] = Field(
         "none", description="rooms that get furniture first: `empty` = those that have none"
     )
+    passes: str = Field(
+        "", max_length=256, description="plugins' passes after our own, ':' between"
+    )
     catalogue: str = Field(
         "", max_length=4096,
         description="libraries beside the furniture package, ':' between; `generated` = no package",
@@ -101,8 +108,10 @@ class RepairFields(FieldGroup):
 class CameraFields(FieldGroup):
     """Camera sampling (paper section 3.1)."""
 
-    preset: Literal["paper", "released", "photo"] = Field(
-        "paper", description="whose rules and score; photo: as people photograph rooms"
+    preset: str = Field(
+        "paper",
+        description="whose rules and score: paper, released; photo: as people photograph rooms; or a"
+        " plugin's",
     )
     n_sectors: int = Field(6, ge=1, le=360, description="of a room, equal angles each")
     cell_m: float = Field(0.25, ge=0.05, le=100, description="edge of the viewpoint grid")
@@ -149,7 +158,9 @@ class CameraFields(FieldGroup):
     coarse_width_px: int = Field(160, gt=0, le=4096)
     coarse_height_px: int = Field(120, gt=0, le=4096)
     per_sector: int = Field(1, ge=1, le=1000)
-    source: Literal["sampled", "stored", "file", "walk", "trajectory"] = "sampled"
+    source: Literal["sampled", "stored", "file", "walk", "trajectory", "given"] = Field(
+        "sampled", description="given: from Python, by pbrs_farm.render"
+    )
     file: str = Field("", description="camera or trajectory file of the user's, for those sources")
     exact: bool = Field(False, description="score every candidate at full size")
     walk_frames: int = Field(150, ge=2, le=100_000, description="walk: views along it")
@@ -160,6 +171,14 @@ class CameraFields(FieldGroup):
     stereo_m: float = Field(
         0.0, ge=0, le=10, description="baseline: a view more to the right of each; 0 = none"
     )
+
+    @field_validator("preset")
+    @classmethod
+    def _preset_is_known(cls, value: str) -> str:
+        known = (*CAMERA_PRESETS, *plugins("cameras"))
+        if value not in known:
+            raise ValueError(f"no preset {value!r}, {hint_of_choice(value, known)}")
+        return value
 
 
 class ImageFields(FieldGroup):
@@ -245,7 +264,17 @@ class SkyFields(FieldGroup):
 
     kind: Literal["sunsky", "panorama"] = "sunsky"
     panoramas: str = Field(
-        "", description="folder of latitude-longitude HDR pictures; empty = `pbrs-farm skies`"
+        "",
+        description="folder of latitude-longitude HDR pictures, or one; empty = `pbrs-farm skies`",
+    )
+    sun_elevation_deg: float | None = Field(
+        None,
+        ge=0,
+        le=90,
+        description="sunsky: above the horizon; none = drawn by the house, 15 to 60",
+    )
+    sun_azimuth_deg: float | None = Field(
+        None, ge=-360, le=360, description="sunsky: from -z towards +x; none = drawn by the house"
     )
 
 

@@ -15,6 +15,7 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.house import House, Source
+from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.built_in import joinery
 from pbrs_farm.dress.clutter import clutter
@@ -73,6 +74,10 @@ def _dressed(draft: Draft, catalogue: Catalogue, fields: DressFields) -> tuple[H
             share = float(getattr(fields, field))
             if share > 0:
                 part(draft, catalogue, style, share)
+        gates = _joined(gates, keep_gates(draft, pieces | draft.used))
+    if fields.passes:
+        for name in fields.passes.split(":"):
+            plugin("passes", name).load()(draft, catalogue, style, 1.0)
         gates = _joined(gates, keep_gates(draft, pieces | draft.used))
     dressed = draft.house()
     credits = _credits(dressed, catalogue)

@@ -162,6 +162,12 @@ def require_lens(view: ChosenView, form: str, *models: str) -> None:
         raise BadInput(f"--to {form}", view.id, what, hint="another --to")
 
 
+def blenderproc_k(k: list[list[float]]) -> list[list[float]]:
+    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel."""
+    (fx, skew, cx), (_zero, fy, cy), last = k
+    return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
+
+
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
     """A view's camera as an export repeats it: K, its lens where it is no pin-hole, its pose."""
     names = ("K", "lens", "depth", "world_from_camera_opencv")

@@ -22,7 +22,16 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import CEILING, FLOOR, NYU40_NAMES, WALL
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
-from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, new_folder, require_lens
+from pbrs_farm.core.plugins import plugins
+from pbrs_farm.export.bop import write_bop
+from pbrs_farm.export.chosen_view import (
+    PICTURES,
+    Choice,
+    ChosenView,
+    blenderproc_k,
+    new_folder,
+    require_lens,
+)
 from pbrs_farm.export.coco import write_coco
 from pbrs_farm.export.sequences import write_colmap, write_kitti, write_nerfstudio, write_tum
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
@@ -123,12 +132,6 @@ def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
         {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose} | lens
     )
     return data
-
-
-def blenderproc_k(k: list[list[float]]) -> list[list[float]]:
-    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel."""
-    (fx, skew, cx), (_zero, fy, cy), last = k
-    return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
 
 
 def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -268,7 +271,13 @@ FORMS: Final[Mapping[str, Writer]] = {
     "colmap": write_colmap,
     "tum": write_tum,
     "kitti": write_kitti,
+    "bop": write_bop,
 }
+
+
+def known_forms() -> tuple[str, ...]:
+    """The forms, those of plugins last."""
+    return (*FORMS, *(name for name in plugins("exports") if name not in FORMS))
 
 
 def export(
@@ -288,8 +297,9 @@ def export(
     Raises BadInput for an unknown form, a folder without finished views, a selection that does not
     exist, or an out that holds something.
     """
-    if form not in FORMS:
-        raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")
+    if form not in known_forms():
+        raise BadInput("--to", form, "no such form", hint=f"of {', '.join(known_forms())}")
+    write = FORMS[form] if form in FORMS else plugins("exports")[form].load()
     # A view is finished when its labels are there.
     views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
     # Leave out views that the selection does not keep.
@@ -305,7 +315,7 @@ def export(
         for split, own in by_split.items():
             part = scratch / split
             part.mkdir(exist_ok=True)
-            n_files += FORMS[form]([ChosenView(v, choice) for v in own], part, choice)
+            n_files += write([ChosenView(v, choice) for v in own], part, choice)
         if form == "yolo":
             n_files += write_data_yaml(scratch, tuple(filter(None, by_split)))
     return len(views), n_files

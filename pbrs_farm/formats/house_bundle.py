@@ -72,6 +72,8 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
     data = {
         name: json_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
     }
+    if item.pose is None:
+        del data["pose"]
     data["surfaces"] = [
         {
             "name": s.name,

@@ -15,9 +15,11 @@ from pydantic import TypeAdapter
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import checked
+from pbrs_farm.core.edits import Edit, edited_id, edits_digest
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import is_made, made_homes
+from pbrs_farm.core.plugins import is_plugin, plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.notes import Notes
@@ -35,7 +37,9 @@ _UNREAD_SUFFIXES: Final = frozenset({
 })  # fmt: skip
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
-SourceKind = Literal["builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object"]
+SourceKind = Literal[
+    "builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object", "plugin", "reader"
+]
 
 
 class SourceRef(Record):
@@ -46,6 +50,7 @@ class SourceRef(Record):
     house.json). companions: digest of all other files that reading opens, "" = none, None = not
     known (named by an earlier version).
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
+    edits: what is changed of the repaired house, in order; its id then ends in `-e<digest>`.
     """
 
     kind: SourceKind
@@ -54,16 +59,32 @@ class SourceRef(Record):
     sha256: str
     companions: str | None = None
     dress_seed: int = 0  # 0 = as it was drawn
+    edits: tuple[Edit, ...] = ()
 
     @property
     def fingerprint(self) -> str:
         """Digest of every file the source reads; without companions that of its own file."""
-        return f"{self.sha256}+{self.companions}" if self.companions else self.sha256
+        known = (self.sha256, self.companions, edits_digest(self.edits))
+        return "+".join(part for part in known if part)
+
+    @property
+    def unedited(self) -> SourceRef:
+        """The same house before its edits."""
+        if not self.edits:
+            return self
+        own = self.house_id.removesuffix(edited_id("", self.edits))
+        return self.model_copy(update={"house_id": own, "edits": ()})
+
+    def edited(self, *edits: Edit) -> SourceRef:
+        """The same house with these edits after its own."""
+        every = (*self.edits, *edits)
+        house_id = edited_id(self.unedited.house_id, every)
+        return self.model_copy(update={"house_id": house_id, "edits": every})
 
 
 def home_id(source: SourceRef) -> str:
     """The id of the source's house as it was drawn, whatever it is dressed by."""
-    return source.house_id.removesuffix(keys.dressed_id("", source.dress_seed))
+    return source.unedited.house_id.removesuffix(keys.dressed_id("", source.dress_seed))
 
 
 def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
@@ -99,6 +120,10 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind = "builtin"
     elif is_made(word):
         kind = "made"
+    elif is_plugin(word):
+        kind = "plugin"
+    elif (reader := _reader_of(path)) is not None:
+        kind, word = "reader", f"{reader}:{real_path(path)}"
     elif not path.exists() and not path.suffix and "/" not in word:
         kind = "example"
     elif path.is_dir() or path.name == "house.json":
@@ -135,6 +160,10 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
         return SourceRef(kind=kind, location=location, house_id=home.id, sha256=home.source.sha256)
     if kind == "made":
         return _made(location)
+    if kind == "plugin":
+        return _of_plugin(location)
+    if kind == "reader":
+        return _of_reader(location, files)
     if kind == "suncg":
         return _suncg(Path(location), files)
     if kind == "object":
@@ -178,6 +207,37 @@ def _made(word: str) -> SourceRef:
     return SourceRef(
         kind="made", location=homes[0].word, house_id=keys.house_id(homes[0].name, homes[0].digest),
         sha256=homes[0].digest, companions=companions,
+    )  # fmt: skip
+
+
+def _of_plugin(word: str) -> SourceRef:
+    """The source of a home that a plugin makes; its package and version are part of it."""
+    homes = plugin_homes(word)
+    if len(homes) != 1:
+        raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
+    (home,) = homes
+    sha = keys.digest(plugin("homes", home.name).mark, home.word)
+    house_id = keys.house_id(f"{home.name}-{home.seed}", sha)
+    return SourceRef(
+        kind="plugin", location=home.word, house_id=house_id, sha256=sha, companions=""
+    )
+
+
+def _reader_of(path: Path) -> str | None:
+    """The plugin that reads what lies at a path, where one says that it does."""
+    if not path.exists():
+        return None
+    return next((n for n, p in plugins("readers").items() if p.load().recognises(path)), None)
+
+
+def _of_reader(location: str, files: SourceFiles) -> SourceRef:
+    """The source of a file that a plugin reads."""
+    name, _, path = location.partition(":")
+    mark = plugin("readers", name).mark
+    house_id = keys.house_id(Path(path).stem, sha := _sha256(Path(path), files))
+    return SourceRef(
+        kind="reader", location=location, house_id=house_id, sha256=sha,
+        companions=keys.sha256(mark.encode()),
     )  # fmt: skip
 
 
@@ -247,6 +307,10 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
         from pbrs_farm.read.suncg.suncg_house import read_suncg
 
         return read_suncg(path.parent.parent, path.name, fields)
+    if source.kind == "reader":
+        name, _, location = source.location.partition(":")
+        house: House = plugin("readers", name).load().read(Path(location), fields)
+        return replace(house, id=home_id(source))
     if source.kind == "gltf":
         from pbrs_farm.read.gltf.scene import read_gltf_file
 
@@ -307,6 +371,9 @@ def check_unchanged(source: SourceRef) -> None:
     is_known = source.companions is not None
     if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):
         return
+    if source.kind in ("plugin", "reader") and now.house_id[:-8] == source.house_id[:-8]:
+        text = f"the plugin of {source.location} here is another one than was asked for"
+        raise MachineFailed(text, hint="install the same version everywhere")
     if source.kind in ("example", "made") or (
         source.kind == "sweethome3d" and now.sha256 == source.sha256
     ):

@@ -14,6 +14,7 @@ from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.camera import Camera, CameraBlur, View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
+from pbrs_farm.core.plugins import plugins
 from pbrs_farm.core.recipe import BlurFields, CameraFields, LensFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.step_cache import camera_file_text
@@ -58,6 +59,13 @@ def with_lens(view: View, lens: LensFields) -> View:
 
 
 def _one_by_one(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:
+    if fields.source == "given":
+        hint = "render them there, or --set cameras.source=sampled"
+        raise BadInput("cameras.source", "given", "these cameras come from Python", hint=hint)
+    if fields.source == "sampled" and fields.preset in plugins("cameras"):
+        sample = plugins("cameras")[fields.preset].load()
+        views = tuple(sample(house, fields, seed, caster))
+        return Sampling(views, _report_of_file(fields, views), ())
     if fields.source == "walk":
         return sample_walk(house, fields, seed, caster.geometry, caster.first_hit)
     if fields.source == "file":

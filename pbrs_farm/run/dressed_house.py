@@ -11,6 +11,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as MADE_VERSION
+from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields, Recipe
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run.dress_catalogue import catalogue_of_words, fetch_packages
@@ -74,9 +75,12 @@ def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
     if not seed and not is_furnished:
         return ""
     # Where the libraries lie is no matter: their content is.
-    fields = recipe.dress.model_dump(mode="json", exclude={"seed", "catalogue", "furnish"})
+    fields = recipe.dress.model_dump(
+        mode="json", exclude={"seed", "catalogue", "furnish", "passes"}
+    )
+    passes = [plugin("passes", name).mark for name in recipe.dress.passes.split(":") if name]
     more = ["furnish", MADE_VERSION] if is_furnished else []
-    return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest, *more)
+    return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest, *more, *passes)
 
 
 def fetch_catalogue(fields: DressFields) -> None:

@@ -111,6 +111,10 @@ class CachedHouse:
             self._views = (cameras_digest, views_from_json(self.store.get(key), key))
         return self._views[1]
 
+    def forget_views(self) -> None:
+        """Read cameras.json again when a view is next asked for."""
+        self._views = None
+
     def close(self) -> None:
         """Free what the GPU or Mitsuba holds."""
         # Drop each cached property by name: scenes before the arrays they refer to.
@@ -177,6 +181,8 @@ def panorama_for_house(recipe: Recipe, house_id: str) -> tuple[str, NDArray[np.f
     from pbrs_farm.transport.scene_tables.sky import choose_panorama
 
     folder = Path(recipe.sky.panoramas) if recipe.sky.panoramas else fetch_skies()
+    if folder.is_file():
+        return folder.name, decode_radiance(_bytes(folder), folder.name)
     if not folder.is_dir():
         hint = "`pbrs-farm skies` fetches four; or --set sky.kind=sunsky"
         raise BadRecipe(f"sky.panoramas: {folder} is no folder of panoramas", hint=hint)

@@ -12,16 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, TypeAlias
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
-from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
-from pbrs_farm.run.output_root import claim_root, finish_house, merge_manifests
+from pbrs_farm.run.output_root import claim_root, finish_root
 from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.early_start import end_untaken
 from pbrs_farm.run.processes.limits import ProcessLimits, is_room_for_two, memory_share_mb
@@ -29,7 +27,6 @@ from pbrs_farm.run.processes.pool import FINISH, RENDER, Pool
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store import StoreSettings, store_from_url
-from pbrs_farm.store.object_store import Store
 
 # Which task of a local run is done next, by which process, and what follows from how it ended.
 #     one process a house:   all steps of the house -> per view: all its steps
@@ -317,7 +314,7 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
         claim_root(store, run.recipe, update=run.update)
         Schedule(run, sources, summary, observe, is_apart=finishes_apart(run)).drive(pool)
         pool.release()
-        _finish_root(store, summary.houses)
+        finish_root(store, summary.houses)
     return summary
 
 
@@ -342,15 +339,6 @@ def finishes_apart(run: Run) -> bool:
     One render process leaves cores idle while it reads, labels, draws and develops.
     """
     return run.n_jobs <= 1 and is_room_for_two() and "light" in plan.view_steps(run.want)
-
-
-def _finish_root(store: Store, houses: Sequence[str]) -> None:
-    for house_id in houses:
-        finish_house(store, house_id)
-    # The root's manifest covers every house of the folder, those of former runs too.
-    below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
-    merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
-    write_attribution(store)
 
 
 def _resolved(run: Run, summary: Summary) -> list[SourceRef]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
@@ -10,6 +11,7 @@ from pbrs_farm.core.recipe import Recipe, differences, recipe_from_json
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.run.attributions import write_attribution
 from pbrs_farm.store.object_store import Store
 
 
@@ -51,6 +53,16 @@ def merge_manifests(store: Store, house_ids: list[str]) -> None:
         if store.head(key) is not None:
             parts.append(store.get(key))
     store.put(keys.MANIFEST, b"".join(parts))
+
+
+def finish_root(store: Store, houses: Iterable[str]) -> None:
+    """Write the manifests of these houses and that of the root, and whose works it shows."""
+    for house_id in houses:
+        finish_house(store, house_id)
+    # The root's manifest covers every house of the folder, those of former runs too.
+    below = [keys.parse_house_key(key) for top in keys.FOLDERS for key in store.list(f"{top}/")]
+    merge_manifests(store, [at.house for at in below if at and at.file == keys.MANIFEST])
+    write_attribution(store)
 
 
 def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:

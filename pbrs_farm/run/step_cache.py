@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.edits import VERSION as EDITS_VERSION
 from pbrs_farm.core.errors import BadInput, StoreFailed
+from pbrs_farm.core.plugins import plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
@@ -127,10 +129,14 @@ def _extra(name: str, work: Work) -> object:
     """What a step depends on beside recipe fields and other steps."""
     if name == "house":
         source = required_source(work)
-        dressing = dressing_digest(source, work.recipe)
-        return [source.fingerprint, dressing] if dressing else source.fingerprint
+        more = [dressing_digest(source, work.recipe), EDITS_VERSION if source.edits else ""]
+        known = [source.fingerprint, *(part for part in more if part)]
+        return known if len(known) > 1 else source.fingerprint
     if name == "truth":
-        return work.layers
+        marks = {layer: p.mark for layer, p in plugins("layers").items()}
+        return [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
+    if name == "cameras" and work.recipe.cameras.preset in plugins("cameras"):
+        return plugins("cameras")[work.recipe.cameras.preset].mark
     if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):
         return keys.sha256(camera_file_text(work.recipe.cameras).encode())
     return None

@@ -9,9 +9,10 @@ import functools
 import platform
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 
@@ -23,7 +24,8 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Room, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
-from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.core.plugins import plugin_homes
+from pbrs_farm.core.recipe import Recipe, with_settings
 from pbrs_farm.formats.cameras_json import cameras_json, illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import Marker, read_marker
@@ -31,7 +33,7 @@ from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.read.source import SourceRef, check_unchanged
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.dress_catalogue import house_of_source
@@ -104,11 +106,22 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     return house, report
 
 
-def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, DressReport | None]:
+def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
     """As repaired_house, with what dressing did; None where the source is not dressed."""
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import RepairReport, repair
 
+    if source.edits:
+        from pbrs_farm.run.edited_house import edited
+
+        key = _made_with(source.unedited, recipe)
+        if _BEFORE_EDITS[0] != key:
+            remember_house(source.unedited, recipe, made_house(source.unedited, recipe))
+        house, report, dressing = _BEFORE_EDITS[1]
+        return edited(house, source, recipe.read), report, dressing
+
+    if source.kind == "plugin":
+        return _house_of_plugin(source, recipe)
     # An object without context has no walls to close.
     doing(source.location, "read")
     house = house_of_source(source, recipe.read)
@@ -121,6 +134,39 @@ def made_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport, 
     house, dressing = dressed(furnished(house, source, recipe), source, recipe)
     doing(source.location, "repair")
     return *repair(house, recipe.repair, occluder_from=occluder_from), dressing
+
+
+def _house_of_plugin(source: SourceRef, recipe: Recipe) -> MadeHouse:
+    """The finished house of the Home that a plugin gives for a seed, under the source's own id."""
+    doing(source.location, "plugin")
+    if source.dress_seed:
+        raise BadInput(source.location, "--dress", "a plugin dresses its homes itself")
+    check_unchanged(source)
+    (named,) = plugin_homes(source.location)
+    home = named.make()
+    groups = {path.partition(".")[0] for path, _value in home.settings}
+    if others := groups - {"read", "dress", "repair"}:
+        text = f"sets recipe fields of {', '.join(sorted(others))}, which belong to the run"
+        raise BadInput(source.location, "", text, hint="fields of read, dress and repair alone")
+    inner = with_settings(recipe, dict(home.settings))
+    house, report, dressing = made_house(home.source, inner)
+    return replace(house, id=source.house_id), report, dressing
+
+
+MadeHouse: TypeAlias = "tuple[House, RepairReport, DressReport | None]"
+
+# The last house before its edits: homes that differ in their edits alone are read once.
+_BEFORE_EDITS: tuple[str, MadeHouse] = ("", None)  # type: ignore[assignment]
+
+
+def remember_house(source: SourceRef, recipe: Recipe, made: MadeHouse) -> None:
+    """Keep what made_house gives of a source without edits for those with."""
+    global _BEFORE_EDITS
+    _BEFORE_EDITS = (_made_with(source, recipe), made)
+
+
+def _made_with(source: SourceRef, recipe: Recipe) -> str:
+    return keys.digest(source, recipe.digest("read", "dress", "repair"))
 
 
 def _cameras(work: Work) -> StepOutput:

@@ -17,6 +17,7 @@ from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Geometry, House, MaterialKind
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lenses import Lens
+from pbrs_farm.core.plugins import plugins
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth, stereo_depth, tof_depth
 from pbrs_farm.truth.optical_flow import (
@@ -175,7 +176,14 @@ def optional_layers(names: Collection[str], inputs: LabelInputs) -> dict[str, ND
     """
     check_lens(names, inputs.camera.intrinsics.lens)
     made = [n for n in names if not LAYER[n].partner or LAYER[n].partner in inputs.to_partners]
-    return {name: _LAYER_FUNCTIONS[name](inputs) for name in made}
+    return {name: _function(name)(inputs) for name in made}
+
+
+def _function(name: str) -> Callable[[LabelInputs], NDArray[Any]]:
+    if name in _LAYER_FUNCTIONS:
+        return _LAYER_FUNCTIONS[name]
+    label: Callable[[LabelInputs], NDArray[Any]] = plugins("layers")[name].load().label
+    return label
 
 
 def check_lens(names: Collection[str], lens: Lens) -> None:

@@ -72,6 +72,7 @@ def view_table(
                 "truncated": is_truncated(item, camera),
                 "box2d": _box2d(slices[instance - 1]),
                 "box3d": _box3d(item),
+                **_pose_facts(item, camera),
             }
         )
     return {**camera_table(camera), "instances": rows}
@@ -89,6 +90,19 @@ def _item_facts(item: Item, nyu40: int) -> dict[str, Any]:
         "class13": NYU13_NAMES[nyu13],
         "source_class": item.source_class,
         "room": item.room_id,
+    }
+
+
+def _pose_facts(item: Item, camera: Camera) -> dict[str, Any]:
+    """The 6-D pose of an item that is a model's instance: nothing of others."""
+    if item.pose is None:
+        return {}
+    world_from_model = np.array(item.pose.world_from_model)
+    camera_from_world = np.linalg.inv(opencv_world_from_camera(camera.world_from_camera))
+    return {
+        "model": item.pose.model,
+        "world_from_model": world_from_model.tolist(),
+        "camera_from_model_opencv": (camera_from_world @ world_from_model).tolist(),
     }
 
 

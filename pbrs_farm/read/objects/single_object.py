@@ -44,14 +44,7 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
     """
     file = model.entry or model.path.name
     notes = Notes(file, strict=fields.strict)
-    with _folder_of(model) as (folder, name):
-        if name.lower().endswith(".obj"):
-            surfaces, library = _obj(folder, name, notes, fields)
-        else:
-            surfaces, library = _gltf(folder, name, notes, fields)
-        sha256 = folder.sha256
-    if not surfaces:
-        raise BadHouse(file, "", "has no triangle")
+    surfaces, library, sha256 = model_surfaces(model, notes, fields)
     # Centre the model on the origin, at its catalogue's size.
     surfaces = _centred(surfaces, model.size_m)
     points = np.concatenate([s.positions for s in surfaces])
@@ -80,6 +73,24 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
         textures=library.textures,
         notes=notes.all(),
     )
+
+
+def model_surfaces(
+    model: ObjectModel, notes: Notes, fields: ReadFields
+) -> tuple[list[Surface], MaterialLibrary, str]:
+    """A model's surfaces in its file's own frame, their materials, and the digest of its files.
+
+    Raises BadHouse for a file that cannot be read or has no triangle.
+    """
+    with _folder_of(model) as (folder, name):
+        if name.lower().endswith(".obj"):
+            surfaces, library = _obj(folder, name, notes, fields)
+        else:
+            surfaces, library = _gltf(folder, name, notes, fields)
+        sha256 = folder.sha256
+    if not surfaces:
+        raise BadHouse(model.entry or model.path.name, "", "has no triangle")
+    return surfaces, library, sha256
 
 
 def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:

@@ -10,6 +10,7 @@ import zlib
 from collections import OrderedDict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -311,6 +312,10 @@ class ShardSet:
     def kept_by(self, run: str) -> frozenset[ViewRef]:
         hint = "pack them with --selection"
         raise BadInput(self.url, "", f"shards know of no selection {run}", hint=hint)
+
+    def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
+        hint = "save frames of the output folder itself"
+        raise BadInput(self.url, "", "shards hold samples, not all files of a view", hint=hint)
 
     def facts(self, ref: ViewRef) -> ViewFacts:
         shard, view = self._at[ref]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Final
 
 from numpy.typing import NDArray
@@ -14,10 +15,13 @@ from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.layers import LAYERS as ALL_LAYERS
+from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.layer_file import layer_from_bytes
+from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.images import array_from_png
-from pbrs_farm.run.output_root import attribution
-from pbrs_farm.store import Store
+from pbrs_farm.run.output_root import attribution, claim_root, finish_root
+from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.reading.png_rows import array_of_rows
 from pbrs_farm.study.reading.stored_layers import (
@@ -32,6 +36,7 @@ from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
 from pbrs_farm.study.reading.views import ViewRef, Views
 
 _TABLE: Final = "view.json"  # written when all else of a view is there
+_CAMERAS: Final = "cameras.json"
 
 
 class StoredRoot:
@@ -127,11 +132,57 @@ class StoredRoot:
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
         return tuple(dict.fromkeys(line for line in lines if line))
 
+    def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
+        to = store_from_url(str(place))
+        recipe = recipe_from_json(self._get(keys.RECIPE), f"{self.url}: {keys.RECIPE}")
+        claim_root(to, recipe, update=False)
+        for ref in refs:
+            copy_view(self._store, to, ref)
+        finish_root(to, dict.fromkeys(ref.house for ref in refs))
+
     def split_of(self, ref: ViewRef, shares: SplitShares | None) -> str:
         return split_of_house(ref.house, shares)
 
     def _get(self, key: str) -> bytes:
         return self._store.get(key)
+
+
+def finished_views(store: Store) -> frozenset[tuple[str, str]]:
+    """(house, view) of every finished view of a store, none where it is empty."""
+    found = _files_of_views(store)
+    return frozenset((ref.house, ref.view) for ref, files in found.items() if _TABLE in files)
+
+
+def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
+    """Copy a view with the files of its house and the markers of both."""
+    for key in of.list(keys.house_key(ref.house)):
+        at = keys.parse_house_key(key)
+        if at is None or at.file == keys.MANIFEST or at.view not in (None, ref.view):
+            continue
+        if at.file != _CAMERAS and at.step != "cameras":
+            to.put(key, of.get(key))
+    _copy_cameras(of, to, ref.house)
+
+
+def _copy_cameras(of: Store, to: Store, house: str) -> None:
+    """cameras.json and its marker; cameras from Python stand beside those that are there."""
+    key, marker_key = keys.house_key(house, _CAMERAS), keys.marker_key(house, "cameras")
+    data, marker = of.get(key), read_marker(of, marker_key)
+    held = to.get(key) if to.head(key) is not None else data
+    if marker is None:
+        raise BadInput(of.url, marker_key, "is missing")
+    if held != data:
+        views = {**views_from_json(held, key), **views_from_json(data, key)}
+        found = [views[name] for name in sorted(views)]
+        data = cameras_json(found, {"source": "given", "n_views": len(found)})
+        files = tuple(
+            file.model_copy(update={"n_bytes": len(data), "sha256": keys.sha256(data)})
+            for file in marker.files
+        )
+        facts = {"views": [[v.id, v.room_id, v.score] for v in found]}
+        marker = marker.model_copy(update={"files": files, "facts": facts})
+    to.put(key, data)
+    to.put(marker_key, marker.json_bytes())
 
 
 def views_of_root(store: Store) -> Views:

@@ -1,18 +1,24 @@
-"""Homes and views of a root or of shards, to choose from and to read one by one. Effects: reads lazily."""
+"""Frames of a root, of memory or of shards, to choose from and to read one by one. Effects: reads lazily."""
 
 from __future__ import annotations
 
+import base64
+import html
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, overload
+from pathlib import Path
+from typing import Any, Final, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares
+from pbrs_farm.core.table import Table
 from pbrs_farm.study.reading.stored_layers import ViewFacts
-from pbrs_farm.study.reading.view_sample import Sample, SampleRequest
+from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
+
+_THUMB_PX: Final = 320  # of a picture in a notebook
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -77,10 +83,18 @@ class ViewSource(Protocol):
         """The split the view's house falls into; shares None: as packed, else 80/10/10."""
         ...
 
+    def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
+        """Write views as an output root has them; BadInput where the source is none."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
-class View:
-    """One view; nothing is read before it is asked for."""
+class Frame:
+    """One view: pictures, labels and the camera, read when they are asked for.
+
+    The same whether `pbrs_farm.render` made it just now or `pbrs_farm.open` found it in a folder, a
+    bucket or shards. Arrays are (H, W) or (H, W, C); pixel (row 0, column 0) is top left.
+    """
 
     ref: ViewRef
     source: ViewSource
@@ -129,14 +143,82 @@ class View:
         """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ..."""
         return self.source.layer(self.ref, name)
 
+    @property
+    def colour(self) -> NDArray[np.uint8]:
+        """(H, W, 3) sRGB of the best mode there is: mlt_il_ol, else mlt_ol, else an OpenGL mode."""
+        if not self.modes:
+            raise BadInput(self.source.url, self.id, "no picture in any mode")
+        return self.picture(next(mode for mode in reversed(MODES) if mode in self.modes))
+
+    def picture(self, mode: str) -> NDArray[np.uint8]:
+        """(H, W, 3) sRGB in a lighting mode; BadInput for one that was not rendered."""
+        if mode not in self.modes:
+            hint = f"of {', '.join(self.modes) or 'none'}"
+            raise BadInput(self.source.url, self.id, f"no picture in {mode}", hint=hint)
+        return np.asarray(self._array("colour", mode), np.uint8)
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """(H, W) metres along the optical axis; 0 = nothing."""
+        return np.asarray(self._array("depth"), np.float32)
+
+    @property
+    def normal(self) -> NDArray[np.float32]:
+        """(H, W, 3) unit, camera axes x right, y down, z forward; 0 = nothing."""
+        return np.asarray(self._array("normal"), np.float32)
+
+    @property
+    def classes(self) -> NDArray[np.uint8]:
+        """(H, W) NYU40 class; 0 = none."""
+        return np.asarray(self._array("class40"), np.uint8)
+
+    @property
+    def instance(self) -> NDArray[np.uint16]:
+        """(H, W) instance id, as in `instances`; 0 = nothing."""
+        return np.asarray(self._array("instance"), np.uint16)
+
+    @property
+    def instances(self) -> Table:
+        """What is seen, a row an instance: class, pixels, boxes, and the pose of placed models."""
+        columns = ("id", "name", "class", "pixels", "visible_fraction", "truncated", "box2d")
+        return Table(columns, self.table["instances"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is wrong but recoverable: a dark room, a camera in no room."""
+        return tuple(self.table.get("warnings", ()))
+
+    def _array(self, name: str, mode: str | None = None) -> NDArray[Any]:
+        mode = mode or (self.modes or (MODES[0],))[0]
+        sample = self.source.read(self.ref, SampleRequest((name,), mode))
+        array: NDArray[Any] = getattr(sample, name)
+        return array
+
+    def save(self, place: str | Path) -> None:
+        """Write the frame into a folder or s3://bucket/prefix, byte for byte as `run` does.
+
+        Frames of several homes and cameras may share a place as long as they share a recipe.
+        Raises BadRecipe where the place holds another recipe, BadInput for a frame of shards.
+        """
+        self.source.save([self.ref], place)
+
+    def __repr__(self) -> str:
+        width, height = self.size
+        return f"<Frame {self.id} {width}x{height}: {', '.join(self.layers)}>"
+
+    def _repr_html_(self) -> str:
+        """The picture of each mode, for a notebook."""
+        cells = "".join(_figure(mode, self.picture(mode)) for mode in self.modes)
+        return f"<div><code>{html.escape(self.id)}</code><br>{cells}</div>"
+
     def sample(self, request: SampleRequest | None = None) -> Sample:
         """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None."""
         return self.source.read(self.ref, request or SampleRequest())
 
 
 @dataclass(frozen=True, slots=True)
-class Views(Sequence[View]):
-    """Views of one source, in the order of their ids.
+class Views(Sequence[Frame]):
+    """Frames of one source, in the order of their ids.
 
     left_out: id -> why, of views that `only` looked at and could not keep.
     """
@@ -146,19 +228,26 @@ class Views(Sequence[View]):
     left_out: dict[str, str]
 
     @overload
-    def __getitem__(self, at: int) -> View: ...
+    def __getitem__(self, at: int) -> Frame: ...
     @overload
     def __getitem__(self, at: slice) -> Views: ...
-    def __getitem__(self, at: int | slice) -> View | Views:
+    def __getitem__(self, at: int | slice) -> Frame | Views:
         if isinstance(at, slice):
             return replace(self, refs=self.refs[at])
-        return View(self.refs[at], self.source)
+        return Frame(self.refs[at], self.source)
 
     def __len__(self) -> int:
         return len(self.refs)
 
-    def __iter__(self) -> Iterator[View]:
-        return (View(ref, self.source) for ref in self.refs)
+    def __iter__(self) -> Iterator[Frame]:
+        return (Frame(ref, self.source) for ref in self.refs)
+
+    def save(self, place: str | Path) -> None:
+        """Write all of them into one place, as Frame.save."""
+        self.source.save(self.refs, place)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} frames of {len(self.homes)} homes in {self.source.url}>"
 
     @property
     def homes(self) -> tuple[str, ...]:
@@ -210,3 +299,13 @@ def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> 
         return f"no view{where}"
     at, why = next(iter(left_out.items()))
     return f"none of {n_found} views{where} has what was asked for: {at}: {why}"
+
+
+def _figure(title: str, rgb: NDArray[np.uint8]) -> str:
+    from pbrs_farm.images import jpeg_from_array
+
+    data = base64.b64encode(jpeg_from_array(rgb)).decode()
+    return (
+        f'<figure style="display:inline-block;margin:4px"><img width="{_THUMB_PX}"'
+        f' src="data:image/jpeg;base64,{data}"><figcaption>{html.escape(title)}</figcaption></figure>'
+    )

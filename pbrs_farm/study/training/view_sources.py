@@ -18,7 +18,7 @@ from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.reading.shard_set import ShardSet
 from pbrs_farm.study.reading.view_sample import SampleRequest
-from pbrs_farm.study.reading.views import View, Views
+from pbrs_farm.study.reading.views import Frame, Views
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_views import (
@@ -35,7 +35,7 @@ from pbrs_farm.study.training_plan import TrainingPlan
 # reads views.
 
 
-Picture = tuple[View, SampleRequest]  # a view in one light
+Picture = tuple[Frame, SampleRequest]  # a view in one light
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -230,7 +230,7 @@ def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
     return lacking
 
 
-def is_held_out(view: View, source: TrainingSource) -> bool:
+def is_held_out(view: Frame, source: TrainingSource) -> bool:
     """The view's home never trains."""
     if source.hold_out is not None:
         return bool({view.ref.house, home_of(view.ref.house)} & source.hold_out)
@@ -240,7 +240,7 @@ def is_held_out(view: View, source: TrainingSource) -> bool:
 def _pictures(
     source: TrainingSource, plan: TrainingPlan, *, held_out: bool, most: int
 ) -> tuple[Picture, ...]:
-    found: list[View] = []
+    found: list[Frame] = []
     homes: set[str] = set()
     for place in source.places:
         views = _finished(open_views(place), source, plan)
@@ -253,7 +253,7 @@ def _pictures(
 
 
 def _in_each_light(
-    views: Sequence[View], source: TrainingSource, plan: TrainingPlan
+    views: Sequence[Frame], source: TrainingSource, plan: TrainingPlan
 ) -> tuple[Picture, ...]:
     requests = [_request(mode, plan) for mode in source.modes]
     return tuple((view, request) for request in requests for view in views)

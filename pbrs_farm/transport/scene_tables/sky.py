@@ -106,10 +106,14 @@ def sky_for_house(
             raise BadRecipe("sky.kind is panorama and no panorama is given", hint=hint)
         rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
         return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
-    # Draw the sun's place by seeds of the house.
+    # Where the recipe does not say it, draw the sun's place by seeds of the house.
     low, high = _SUN_ELEVATION_DEG
     elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
     azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
+    if recipe.sky.sun_elevation_deg is not None:
+        elevation = math.radians(recipe.sky.sun_elevation_deg)
+    if recipe.sky.sun_azimuth_deg is not None:
+        azimuth = math.radians(recipe.sky.sun_azimuth_deg)
     return sunsky(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
 
 

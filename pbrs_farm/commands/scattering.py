@@ -1,0 +1,105 @@
+"""The verb scatter: models of one's own in homes, and cameras that look at them. Effects: those of rendering."""
+
+from __future__ import annotations
+
+import argparse
+
+from pbrs_farm.commands.arguments import (
+    HOME,
+    Verb,
+    add_recipe,
+    at_least,
+    counted,
+    dress_seeds,
+    echo,
+    recipe_of,
+)
+from pbrs_farm.core.errors import BadInput
+
+
+def add_verbs(verb: Verb) -> None:
+    """Add scatter."""
+    p = verb("scatter", _scatter, "put models of your own into a home and look at them")
+    add = p.add_argument
+    add("homes", nargs="+", metavar="HOME", help=HOME)
+    text = "a folder, a file or a pattern of GLB, glTF, OBJ, PLY, STL, OFF; repeatable"
+    add("--models", action="append", required=True, metavar="PATH", help=text)
+    add("--out", required=True, help="output folder or store URL")
+    add("--count", type=int, default=20, metavar="N", help="things a scene (default 20)")
+    add("--scenes", type=int, default=1, metavar="N", help="scenes a home, by seeds from --seed on")
+    add("--views", type=int, default=5, metavar="N", help="views a scene (default 5)")
+    add("--physics", action="store_true", help="drop them and let them come to rest")
+    add("--on", default="", metavar="NAME", help="the furniture or room that takes them")
+    add("--room", default="", metavar="NAME", help="the room whose furniture and floor take them")
+    add("--unit", default="m", help="of the models' files: m, cm, mm, inch (default m)")
+    add("--size-m", type=float, metavar="M", help="the longest side of each model instead")
+    add("--up", default="", help="the models' axis that points up: x, y or z")
+    add("--credit", default="", metavar="TEXT", help="a line that pictures of the models carry")
+    text = "from the eye to what it looks at, metres (default 0.5..1.2)"
+    add("--distance", default="0.5..1.2", metavar="A..B", help=text)
+    text = "share of the model looked at that nothing hides (default 0.5)"
+    add("--visible", type=float, default=0.5, metavar="SHARE", help=text)
+    add("--dress", metavar="SEED", help="dress the home first, by this seed")
+    add("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help="default mlt_il_ol")
+    add("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write too")
+    add_recipe(p, "fast")
+
+
+def _scatter(args: argparse.Namespace) -> int:
+    from pbrs_farm.scene.home import load
+    from pbrs_farm.scene.models import models
+    from pbrs_farm.scene.pictures import render
+    from pbrs_farm.store import store_from_url
+    from pbrs_farm.study.reading.stored_root import finished_views
+
+    for name in ("count", "scenes", "views"):
+        at_least(f"--{name}", getattr(args, name), 1)
+    low, _, high = args.distance.partition("..")
+    distance = _metres(low), _metres(high or low)
+    found = [
+        model
+        for pattern in args.models
+        for model in models(
+            pattern, unit=args.unit, size_m=args.size_m, up=args.up, credit=args.credit
+        )
+    ]
+    recipe = recipe_of(args)
+    size = recipe.image.width_px, recipe.image.height_px
+    seeds = dress_seeds(args.dress)
+    there = finished_views(store_from_url(args.out))
+    n_made = n_kept = 0
+    for word in args.homes:
+        bare = load(word, recipe)
+        for home in [bare.dress(seed) for seed in seeds] or [bare]:
+            for seed in range(recipe.seed, recipe.seed + args.scenes):
+                scene = home.scatter(
+                    found, args.count, on=args.on or None, in_=args.room, seed=seed,
+                    physics=args.physics,
+                )  # fmt: skip
+                cameras = scene.cameras_around(
+                    n=args.views, distance_m=distance, min_visible=args.visible, size=size,
+                    seed=seed,
+                )  # fmt: skip
+                left = [c for c in cameras if (scene.id, c.id) not in there]
+                n_kept += len(cameras) - len(left)
+                # One by one, so that a killed command loses one view at most.
+                for camera in left:
+                    frame = render(scene, camera, modes=args.modes, layers=args.layers)
+                    frame.save(args.out)
+                    n_made += 1
+                    echo(
+                        f"{frame.id}: {sum('model' in row for row in frame.instances)} models seen"
+                    )
+    total = counted(n_made + n_kept, "view")
+    echo(f"{args.out}: {total}, {n_kept} already there; `pbrs-farm export {args.out} --to bop`")
+    return 0
+
+
+def _metres(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < 100:
+        raise BadInput("--distance", text, "expected metres, as 0.5..1.2")
+    return value

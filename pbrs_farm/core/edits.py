@@ -1,0 +1,142 @@
+"""What can be changed of a finished home, as values that travel: frozen, no effects.
+
+An edit names items by their ids and files by path and sha256, so that a worker elsewhere makes the
+same house or says why it cannot. run/edited_house.py carries edits out, in their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import Matrix4
+from pbrs_farm.core.record import Record
+
+Row = tuple[float, float, float, float]
+Rows = tuple[Row, Row, Row, Row]
+Vector = tuple[float, float, float]
+
+
+class ModelRef(Record):
+    """A mesh file and how its coordinates become metres in its own frame."""
+
+    path: str
+    sha256: str  # of the file
+    id: str  # what its instances are called in tables: "mug", "obj_000005"
+    category: str = ""  # source class
+    nyu40: int = 0
+    scale: float = 1.0  # metres of a unit of the file
+    credit: str = ""  # the line that pictures of it must carry
+
+
+class Place(Record):
+    """Add a model at a pose."""
+
+    do: Literal["place"] = "place"
+    item: str  # the new item's id
+    model: ModelRef
+    world_from_model: Rows  # rigid; model coordinates in metres
+
+
+class Remove(Record):
+    """Take items away, and the holes that doors and windows among them cut stay."""
+
+    do: Literal["remove"] = "remove"
+    items: tuple[str, ...]
+
+
+class Move(Record):
+    """Move items rigidly, lamps with their light."""
+
+    do: Literal["move"] = "move"
+    items: tuple[str, ...]
+    world_from_world: Rows
+
+
+class Paint(Record):
+    """Give items one plain colour."""
+
+    do: Literal["paint"] = "paint"
+    items: tuple[str, ...]
+    rgb: Vector  # sRGB, 0..1
+    roughness: float | None = None  # 0..1, None = as it was
+
+
+class Cover(Record):
+    """Cover items with a picture, repeated every scale_m metres."""
+
+    do: Literal["cover"] = "cover"
+    items: tuple[str, ...]
+    path: str
+    sha256: str
+    scale_m: float
+
+
+class SetLight(Record):
+    """Give lamps another flux, and a colour where one is told."""
+
+    do: Literal["light"] = "light"
+    items: tuple[str, ...]
+    lm: float
+    rgb_linear: Vector | None = None
+
+
+class AddLight(Record):
+    """Add a bare bulb, or a spot that shines along a direction."""
+
+    do: Literal["add_light"] = "add_light"
+    item: str
+    position: Vector  # metres, world
+    lm: float
+    rgb_linear: Vector = (1.0, 1.0, 1.0)
+    radius_m: float = 0.0325
+    direction: Vector | None = None  # of a spot
+    cutoff_rad: float = 0.5
+
+
+Edit = Annotated[
+    Place | Remove | Move | Paint | Cover | SetLight | AddLight, Field(discriminator="do")
+]
+
+VERSION: Final = 1
+"""Part of an edited house's digest. Raised when an edit makes another house."""
+
+SUFFIX: Final = "-e"
+"""Before the digest of the edits in an edited house's id."""
+
+
+def edits_digest(edits: Sequence[Edit]) -> str:
+    """Digest of edits in their order, "" of none; where a file lies is no matter, its content is."""
+    if not edits:
+        return ""
+    rows = [edit.model_dump(mode="json") for edit in edits]
+    for row in rows:
+        row.pop("path", None)
+        row.get("model", {}).pop("path", None)
+    return keys.digest(rows)
+
+
+def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
+    """The id of a house with edits: `<house>-e<8 hex>`; its own without any."""
+    return f"{house_id}{SUFFIX}{edits_digest(edits)[:8]}" if edits else house_id
+
+
+def files_of_edits(edits: Sequence[Edit]) -> dict[str, str]:
+    """Path -> sha256 of every file that edits read."""
+    found = {}
+    for edit in edits:
+        if isinstance(edit, Place):
+            found[edit.model.path] = edit.model.sha256
+        elif isinstance(edit, Cover):
+            found[edit.path] = edit.sha256
+    return found
+
+
+def rows_of_matrix(matrix: Matrix4) -> Rows:
+    """A (4, 4) matrix as a record holds it."""
+    a, b, c, d = (tuple(float(x) for x in row) for row in np.asarray(matrix, np.float64))
+    return a, b, c, d  # type: ignore[return-value]

@@ -1,0 +1,125 @@
+"""What other packages add by entry points: homes, readers, layers, cameras, passes, exports.
+
+Effects: looks through the installed packages' metadata; a plugin's code is imported when it is
+first used. Its package and version are part of the digest of the steps that use it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final
+
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.shown_text import hint_of_choice
+
+GROUPS: Final = ("homes", "readers", "layers", "cameras", "passes", "exports")
+"""Of entry points, each `pbrs_farm.<group>`; docs/plugins.md says what each function takes."""
+
+PREFIX: Final = "plugin:"
+"""Of the words that name homes of a plugin: plugin:kitchen,1..100,option=x."""
+
+MAX_HOMES: Final = 1_000_000  # of one word
+_RANGE: Final = re.compile(r"(\d{1,18})(?:\.\.(\d{1,18}))?")
+_HINT: Final = "plugin:NAME,1..100 or plugin:NAME,7,option=x"
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """An installed plugin."""
+
+    group: str
+    name: str
+    package: str
+    version: str
+    entry: EntryPoint
+
+    @property
+    def mark(self) -> str:
+        """What digests and messages know it by."""
+        return f"{self.name} of {self.package} {self.version}"
+
+    def load(self) -> Any:
+        """Its object; MachineFailed where its module cannot be imported."""
+        try:
+            return self.entry.load()
+        except Exception as error:
+            text = f"plugin {self.mark} cannot be loaded: {type(error).__name__}: {error}"
+            raise MachineFailed(text) from error
+
+
+@cache
+def plugins(group: str) -> Mapping[str, Plugin]:
+    """The installed plugins of a group by name; of two of one name the first package's."""
+    found: dict[str, Plugin] = {}
+    for entry in sorted(entry_points(group=f"pbrs_farm.{group}"), key=_order):
+        package = entry.dist.name if entry.dist else "?"
+        version = entry.dist.version if entry.dist else "?"
+        found.setdefault(entry.name, Plugin(group, entry.name, package, version, entry))
+    return found
+
+
+def _order(entry: EntryPoint) -> tuple[str, str]:
+    return entry.name, entry.dist.name if entry.dist else ""
+
+
+def plugin(group: str, name: str) -> Plugin:
+    """The plugin of that name; MachineFailed where none is installed, naming those that are."""
+    known = plugins(group)
+    if name not in known:
+        hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"
+        raise MachineFailed(f"no plugin {name!r} for {group} is installed here", hint=hint)
+    return known[name]
+
+
+# Homes of a plugin: words, each a seed.
+
+
+@dataclass(frozen=True, slots=True)
+class PluginHome:
+    """A home that a plugin makes from a seed."""
+
+    name: str
+    seed: int
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def word(self) -> str:
+        """The word that names this home alone."""
+        return ",".join(
+            [f"{PREFIX}{self.name}", str(self.seed), *(f"{k}={v}" for k, v in self.options)]
+        )
+
+    def make(self) -> Any:
+        """The plugin's Home; MachineFailed where the plugin is not installed.
+
+        An error of the plugin's own stays what it is.
+        """
+        function: Callable[..., Any] = plugin("homes", self.name).load()
+        return function(self.seed, **dict(self.options))
+
+
+def is_plugin(word: str) -> bool:
+    """Whether a word names homes of a plugin."""
+    return word.startswith(PREFIX)
+
+
+def plugin_homes(word: str) -> list[PluginHome]:
+    """The homes that a word names; BadInput for one that is not written like that."""
+    name, *parts = word.removeprefix(PREFIX).split(",")
+    numbers = [part for part in parts if "=" not in part]
+    options = [part.partition("=") for part in parts if "=" in part]
+    match = _RANGE.fullmatch(numbers[0]) if len(numbers) == 1 else None
+    if not name.isidentifier() or match is None:
+        raise BadInput(word, "", "names no homes of a plugin", hint=_HINT)
+    low, high = int(match[1]), int(match[2] or match[1])
+    if not low <= high < low + MAX_HOMES:
+        raise BadInput(word, numbers[0], f"is no range of up to {MAX_HOMES:,} homes", hint=_HINT)
+    for key, _, _value in options:
+        if not key.isidentifier():
+            raise BadInput(word, key, "is no option's name", hint=_HINT)
+    known = tuple((key, value) for key, _, value in options)
+    return [PluginHome(name, seed, known) for seed in range(low, high + 1)]

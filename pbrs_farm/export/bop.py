@@ -1,0 +1,265 @@
+"""BOP: pictures, masks and 6-D poses of placed models, in the layout of the BOP challenge.
+
+    camera.json  models/obj_<6 digits>.ply  models/models_info.json
+    train_pbr/<6 digits>/rgb depth mask mask_visib
+                         scene_camera.json scene_gt.json scene_gt_info.json scene_gt_coco.json
+
+Effects: reads views and their house.glb, writes files. A scene is a house, an image a view. Poses
+are model to camera (x right, y down, z forward) in millimetres; K counts from the centre of the
+first pixel. `mask` is the model alone, as rays at pixel centres meet its triangles.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial.distance import pdist
+
+from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.export.chosen_view import Choice, ChosenView, blenderproc_k, require_lens
+from pbrs_farm.export.coco import compressed_runs
+from pbrs_farm.formats.house_bundle import house_from_bundle
+from pbrs_farm.images import png_from_array
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
+from pbrs_farm.truth.coverage import coverage
+
+_SPLIT: Final = "train_pbr"
+_MM: Final = 1000.0
+_OWN_NUMBER: Final = re.compile(r"obj_0*([1-9]\d{0,5})")
+_VERTEX: Final = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
+_FACE: Final = np.dtype([("n", "u1"), ("corners", "<i4", 3)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Mesh:
+    """A model in its own frame, millimetres."""
+
+    points: F64  # (V, 3)
+    faces: I32  # (F, 3)
+    rgb: NDArray[np.uint8]  # (V, 3)
+
+
+def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """The layout above of views of homes with placed models; the number of files.
+
+    A model called obj_<number> keeps its number, others follow in the order of their names.
+    Raises BadInput where no house of the views holds a placed model, and for a lens that is no
+    pin-hole.
+    """
+    houses = {view.house.id: _house(view) for view in views}
+    meshes: dict[str, _Mesh] = {}
+    for house in houses.values():
+        for item in house.items:
+            if item.pose is not None and item.pose.model not in meshes:
+                meshes[item.pose.model] = _mesh_of(item, house)
+    if not meshes:
+        hint = "place or scatter models first: docs/python.md"
+        raise BadInput("--to bop", "", "no home of these views holds a placed model", hint=hint)
+    numbers = _numbers(sorted(meshes))
+    n_files = _write_models(out / "models", meshes, numbers)
+    scenes: dict[str, list[ChosenView]] = {}
+    for view in views:
+        require_lens(view, "bop")
+        scenes.setdefault(view.house.id, []).append(view)
+    for scene, (house_id, own) in enumerate(scenes.items()):
+        folder = out / _SPLIT / f"{scene:06d}"
+        n_files += _write_scene(folder, own, houses[house_id], numbers)
+    _write_json(out / "camera.json", _camera(views[0]))
+    return n_files + 1
+
+
+def _house(view: ChosenView) -> House:
+    return _house_of(view.entry.folder.parent.parent)
+
+
+@lru_cache(maxsize=1)
+def _house_of(folder: Path) -> House:
+    glb, description = (
+        read_regular(folder / name, MAX_SCENE_BYTES) for name in ("house.glb", "house.json")
+    )
+    return house_from_bundle(glb, description)
+
+
+def _numbers(models: list[str]) -> dict[str, int]:
+    """Model -> its obj_id."""
+    own = {m: int(found[1]) for m in models if (found := _OWN_NUMBER.fullmatch(m))}
+    free = (
+        k for k in range(1, len(models) + max(own.values(), default=0) + 1) if k not in own.values()
+    )
+    return {m: own[m] if m in own else next(free) for m in models}
+
+
+def _mesh_of(item: Item, house: House) -> _Mesh:
+    """The model of a placed item, back in its own frame, a colour a surface."""
+    assert item.pose is not None
+    model_from_world = np.linalg.inv(np.array(item.pose.world_from_model))
+    points, faces, rgb, n = [], [], [], 0
+    for surface in item.surfaces:
+        points.append(surface.positions.astype(np.float64))
+        faces.append(surface.faces + n)
+        n += len(surface.positions)
+        diffuse = np.rint(np.array(house.materials[surface.material].diffuse) * 255)
+        rgb.append(np.tile(diffuse.astype(np.uint8), (len(surface.positions), 1)))
+    world = np.concatenate(points)
+    own = world @ model_from_world[:3, :3].T + model_from_world[:3, 3]
+    return _Mesh(own * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
+
+
+def _write_models(folder: Path, meshes: dict[str, _Mesh], numbers: dict[str, int]) -> int:
+    folder.mkdir(parents=True)
+    info = {}
+    for model, number in sorted(numbers.items(), key=lambda pair: pair[1]):
+        mesh = meshes[model]
+        (folder / f"obj_{number:06d}.ply").write_bytes(_ply(mesh))
+        low, size = mesh.points.min(0), np.ptp(mesh.points, axis=0)
+        info[str(number)] = {
+            "diameter": _diameter(mesh.points), "name": model,
+            **{f"min_{axis}": float(v) for axis, v in zip("xyz", low)},
+            **{f"size_{axis}": float(v) for axis, v in zip("xyz", size)},
+        }  # fmt: skip
+    _write_json(folder / "models_info.json", info)
+    return len(meshes) + 1
+
+
+def _diameter(points: F64) -> float:
+    """The largest distance of two vertices."""
+    try:
+        points = points[ConvexHull(points).vertices]
+    except QhullError:
+        points = np.unique(points, axis=0)[:2000]  # flat: of its vertices themselves
+    return float(pdist(points).max())
+
+
+def _ply(mesh: _Mesh) -> bytes:
+    vertices = np.empty(len(mesh.points), _VERTEX)
+    vertices["xyz"], vertices["rgb"] = mesh.points, mesh.rgb
+    faces = np.empty(len(mesh.faces), _FACE)
+    faces["n"], faces["corners"] = 3, mesh.faces
+    colours = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    head = (
+        "ply\nformat binary_little_endian 1.0\n"
+        f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n{colours}"
+        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    return head.encode() + vertices.tobytes() + faces.tobytes()
+
+
+def _write_scene(
+    folder: Path, views: list[ChosenView], house: House, numbers: dict[str, int]
+) -> int:
+    for name in ("rgb", "depth", "mask", "mask_visib"):
+        (folder / name).mkdir(parents=True)
+    camera: dict[str, Any] = {}
+    poses: dict[str, Any] = {}
+    info: dict[str, Any] = {}
+    coco: dict[str, list[Any]] = {
+        "images": [], "annotations": [],
+        "categories": [{"id": n, "name": m, "supercategory": "bop"} for m, n in numbers.items()],
+    }  # fmt: skip
+    n_files = 0
+    for image, view in enumerate(views):
+        if view.picture is not None:
+            (folder / "rgb" / f"{image:06d}.png").write_bytes(view.data(view.picture))
+            n_files += 1
+        (folder / "depth" / f"{image:06d}.png").write_bytes(view.data("depth"))
+        rows = [row for row in view.facts["instances"] if row.get("model") in numbers]
+        camera[str(image)] = _scene_camera(view)
+        poses[str(image)] = [_pose(row, numbers) for row in rows]
+        info[str(image)] = []
+        size = view.facts["width_px"], view.facts["height_px"]
+        file = f"rgb/{image:06d}.png"
+        coco["images"].append({"id": image, "file_name": file, "width": size[0], "height": size[1]})
+        for k, row in enumerate(rows):
+            alone, seen = _masks(view, house.items[row["id"] - 1], row["id"])
+            for name, mask in (("mask", alone), ("mask_visib", seen)):
+                png = png_from_array(mask.astype(np.uint8) * np.uint8(255))
+                (folder / name / f"{image:06d}_{k:06d}.png").write_bytes(png)
+            facts = _mask_facts(alone, seen, view.array("depth") > 0)
+            info[str(image)].append(facts)
+            coco["annotations"].append({
+                "id": len(coco["annotations"]) + 1, "image_id": image,
+                "category_id": numbers[row["model"]], "iscrowd": 0, "ignore": False,
+                "area": facts["px_count_visib"], "bbox": facts["bbox_visib"],
+                "segmentation": compressed_runs(seen), "width": size[0], "height": size[1],
+            })  # fmt: skip
+        n_files += 1 + 2 * len(rows)
+    files = {
+        "scene_camera": camera,
+        "scene_gt": poses,
+        "scene_gt_info": info,
+        "scene_gt_coco": coco,
+    }
+    for name, document in files.items():
+        _write_json(folder / f"{name}.json", document)
+    return n_files + len(files)
+
+
+def _masks(view: ChosenView, item: Item, instance: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """(H, W) bool where the item is when alone, and where it is seen."""
+    facts = view.facts
+    (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
+    intrinsics = Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy)
+    camera = Camera(intrinsics, np.array(facts["world_from_camera_opengl"]))
+    seen = view.array("instance") == instance
+    return coverage(item, camera) | seen, seen
+
+
+def _mask_facts(alone: NDArray[Any], seen: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:
+    n_all, n_seen = int(alone.sum()), int(seen.sum())
+    return {
+        "bbox_obj": _box(alone), "bbox_visib": _box(seen), "px_count_all": n_all,
+        "px_count_valid": int((alone & valid).sum()), "px_count_visib": n_seen,
+        "visib_fract": n_seen / n_all if n_all else 0.0,
+    }  # fmt: skip
+
+
+def _box(mask: NDArray[Any]) -> list[int]:
+    """x, y, width, height of the mask's pixels; -1 of none, as BOP has it."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    if not len(rows):
+        return [-1, -1, -1, -1]
+    x, y = int(columns[0]), int(rows[0])
+    return [x, y, int(columns[-1]) - x + 1, int(rows[-1]) - y + 1]
+
+
+def _pose(row: dict[str, Any], numbers: dict[str, int]) -> dict[str, Any]:
+    pose = np.array(row["camera_from_model_opencv"])
+    return {
+        "obj_id": numbers[row["model"]],
+        "cam_R_m2c": pose[:3, :3].ravel().tolist(),
+        "cam_t_m2c": (pose[:3, 3] * _MM).tolist(),
+    }
+
+
+def _scene_camera(view: ChosenView) -> dict[str, Any]:
+    camera_from_world = np.linalg.inv(np.array(view.facts["world_from_camera_opencv"]))
+    return {
+        "cam_K": [v for line in blenderproc_k(view.facts["K"]) for v in line],
+        "depth_scale": 1.0,
+        "cam_R_w2c": camera_from_world[:3, :3].ravel().tolist(),
+        "cam_t_w2c": (camera_from_world[:3, 3] * _MM).tolist(),
+    }
+
+
+def _camera(view: ChosenView) -> dict[str, Any]:
+    (fx, _skew, cx), (_zero, fy, cy), _last = blenderproc_k(view.facts["K"])
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    return {
+        "fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height,
+        "depth_scale": 1.0,
+    }  # fmt: skip
+
+
+def _write_json(path: Path, document: Any) -> None:
+    path.write_text(json.dumps(document, indent=1) + "\n")

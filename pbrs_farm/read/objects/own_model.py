@@ -1,0 +1,209 @@
+"""A mesh of the user's own in its own frame, in metres: GLB, glTF, OBJ, PLY, STL, OFF.
+
+Effects: reads the file and its pictures. Colours a vertex become one colour a triangle, kept in a
+small picture, since a surface has one material.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from PIL import Image
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.edits import ModelRef
+from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.house import Material, Surface, Texture, corners_of_surfaces
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.objects.model_folders import ObjectModel
+from pbrs_farm.read.objects.single_object import model_surfaces
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
+
+SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
+MAX_EXTENT_M: Final = 100.0
+"""A model larger than that is a slip of its unit."""
+_MIN_EXTENT_M: Final = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelShape:
+    """A model in its own frame, metres."""
+
+    surfaces: tuple[Surface, ...]  # materials index into materials
+    materials: tuple[Material, ...]
+    textures: dict[str, Texture]
+
+    @property
+    def points(self) -> F64:
+        """(V, 3) vertices of all surfaces."""
+        return np.concatenate([s.positions for s in self.surfaces]).astype(np.float64)
+
+    @property
+    def triangles(self) -> F64:
+        """(F, 3, 3) corners of all triangles."""
+        return corners_of_surfaces(self.surfaces)
+
+    @property
+    def bounds(self) -> F64:
+        """(2, 3) axis-aligned minimum and maximum, metres."""
+        points = self.points
+        return np.array([points.min(0), points.max(0)])
+
+
+@lru_cache(maxsize=256)
+def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
+    """The shape of a model, read once a process.
+
+    Raises BadInput, naming the file: missing, changed since it was named, empty, not finite, larger
+    than 100 m or smaller than .1 mm, with more triangles than the recipe allows.
+    """
+    path = Path(model.path)
+    try:
+        data = read_regular(path, MAX_SCENE_BYTES)
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    if keys.sha256(data) != model.sha256:
+        raise BadInput(path, "", "changed since the home was made", hint="make the home again")
+    shape = _from_trimesh(path, data) if _is_plain(path) else _from_reader(path, model, fields)
+    return _checked(path, _scaled(shape, model.scale), fields)
+
+
+def _is_plain(path: Path) -> bool:
+    return path.suffix.lower() in (".ply", ".stl", ".off")
+
+
+def _from_reader(path: Path, model: ModelRef, fields: ReadFields) -> ModelShape:
+    """glTF and OBJ go through the readers that know materials and hostile files."""
+    own = ObjectModel(model.id, model.id, model.category, model.nyu40, path, path.parent)
+    notes = Notes(path.name, strict=fields.strict)
+    try:
+        surfaces, library, _sha = model_surfaces(own, notes, fields)
+    except BadHouse as error:
+        raise BadInput(path, error.place, error.message.partition(": ")[2] or str(error)) from None
+    return ModelShape(tuple(surfaces), library.materials, library.textures)
+
+
+def _from_trimesh(path: Path, data: bytes) -> ModelShape:
+    import trimesh
+
+    try:
+        resolver = trimesh.resolvers.FilePathResolver(str(path))
+        loaded: Any = trimesh.load(
+            io.BytesIO(data), file_type=path.suffix[1:].lower(), resolver=resolver,
+            force="mesh", process=False,
+        )  # fmt: skip
+        points = np.asarray(loaded.vertices, np.float64)
+        faces = np.asarray(loaded.faces, np.int64)
+    except Exception as error:  # noqa: BLE001  whatever the library meets in a foreign file
+        raise BadInput(path, "", f"cannot be read as a mesh: {type(error).__name__}") from None
+    if not len(points) or not len(faces):
+        raise BadInput(path, "", "has no triangle")
+    if faces.min() < 0 or faces.max() >= len(points):
+        raise BadInput(path, "", "a face names a vertex that does not exist")
+    library = MaterialLibrary(Notes(path.name, strict=False))
+    surface = Surface(path.stem, points.astype(np.float32), faces.astype(np.int32), 0)
+    normals = _normals_of(loaded, data)
+    if normals is not None:
+        surface = replace(surface, normals=normals)
+    surface = _coloured(surface, loaded.visual, library, path)
+    return ModelShape((surface,), library.materials, library.textures)
+
+
+def _normals_of(mesh: Any, data: bytes) -> Any:
+    """Vertex normals where the file has them; None = flat."""
+    if b"property float nx" not in data[:4096] and b"property double nx" not in data[:4096]:
+        return None
+    normals = np.asarray(mesh.vertex_normals, np.float64)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    if (
+        normals.shape != mesh.vertices.shape
+        or not np.isfinite(normals).all()
+        or (length == 0).any()
+    ):
+        return None
+    return (normals / length).astype(np.float32)
+
+
+def _coloured(surface: Surface, visual: Any, library: MaterialLibrary, path: Path) -> Surface:
+    """The surface with its picture, its vertex colours as one, or a plain grey."""
+    picture = getattr(getattr(visual, "material", None), "image", None)
+    uvs = getattr(visual, "uv", None)
+    if picture is not None and uvs is not None and np.isfinite(uvs).all():
+        texture = _texture(library, picture.convert("RGB"), path.stem)
+        material = Material(path.stem, texture_id=texture)
+        return replace(
+            surface, uvs=np.asarray(uvs, np.float32)[:, :2], material=library.index(material)
+        )
+    if getattr(visual, "kind", None) in ("vertex", "face"):
+        return _with_colour_a_face(surface, np.asarray(visual.face_colors)[:, :3], library, path)
+    grey = Material(path.stem, diffuse=(0.7, 0.7, 0.7))
+    return replace(surface, material=library.index(grey))
+
+
+def _with_colour_a_face(
+    surface: Surface, rgb: Any, library: MaterialLibrary, path: Path
+) -> Surface:
+    """Each triangle its own texel: vertices are parted, so that no colour runs into another."""
+    colours, of_face = np.unique(rgb.astype(np.uint8), axis=0, return_inverse=True)
+    if len(colours) == 1:
+        r, g, b = (float(v) / 255 for v in colours[0])
+        return replace(surface, material=library.index(Material(path.stem, diffuse=(r, g, b))))
+    # Blocks of 4 x 4 texels: filtering between texels stays within a colour.
+    side = int(np.ceil(np.sqrt(len(colours))))
+    grid = np.zeros((side * side, 3), np.uint8)
+    grid[: len(colours)] = colours
+    picture = grid.reshape(side, side, 3).repeat(4, 0).repeat(4, 1)
+    row, column = np.divmod(of_face.reshape(-1), side)
+    uv = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
+    corners = surface.faces.reshape(-1)
+    texture = _texture(library, Image.fromarray(picture), path.stem)
+    return replace(
+        surface,
+        positions=surface.positions[corners],
+        normals=None if surface.normals is None else surface.normals[corners],
+        uvs=uv.repeat(3, 0).astype(np.float32),
+        faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        material=library.index(Material(path.stem, texture_id=texture)),
+    )
+
+
+def _texture(library: MaterialLibrary, picture: Image.Image, name: str) -> str:
+    buffer = io.BytesIO()
+    picture.save(buffer, "PNG")
+    loaded = library.texture(name, name=f"{name}.png", place=name, load=buffer.getvalue)
+    if loaded is None:
+        raise BadInput(name, "", "its picture cannot be decoded")
+    return loaded.texture.id
+
+
+def _scaled(shape: ModelShape, scale: float) -> ModelShape:
+    if scale == 1.0:
+        return shape
+    surfaces = tuple(
+        replace(s, positions=(s.positions.astype(np.float64) * scale).astype(np.float32))
+        for s in shape.surfaces
+    )
+    return replace(shape, surfaces=surfaces)
+
+
+def _checked(path: Path, shape: ModelShape, fields: ReadFields) -> ModelShape:
+    if not np.isfinite(shape.points).all():
+        raise BadInput(path, "", "a coordinate is not finite")
+    n_faces = sum(len(s.faces) for s in shape.surfaces)
+    if not n_faces:
+        raise BadInput(path, "", "has no triangle")
+    if n_faces > fields.max_model_triangles:
+        raise BadInput(path, "", f"has {n_faces} triangles", hint="read.max_model_triangles")
+    extent = float(np.ptp(shape.bounds, axis=0).max())
+    if not _MIN_EXTENT_M <= extent <= MAX_EXTENT_M:
+        hint = "is its unit millimetres? pf.model(path, unit='mm'), or size_m=..."
+        raise BadInput(path, "", f"is {extent:g} m large", hint=hint)
+    return shape

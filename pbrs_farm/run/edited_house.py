@@ -1,0 +1,315 @@
+"""A repaired house with its edits carried out, in their order. Effects: reads the files they name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.edits import (
+    AddLight,
+    Cover,
+    Move,
+    Paint,
+    Place,
+    Remove,
+    SetLight,
+    rows_of_matrix,
+)
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import (
+    MAX_INSTANCES,
+    Box,
+    House,
+    Item,
+    ItemKind,
+    LightPart,
+    Material,
+    MaterialKind,
+    ModelPose,
+    Surface,
+)
+from pbrs_farm.core.lighting import LightForm, PowerUnit
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.geometry.solids import sphere
+from pbrs_farm.read.common.material_library import texture_from_bytes
+from pbrs_farm.read.objects.own_model import model_shape
+from pbrs_farm.read.source import SourceRef
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
+
+
+def edited(house: House, source: SourceRef, fields: ReadFields) -> House:
+    """The house of a source's `unedited`, with the source's edits and its id.
+
+    Raises BadInput for an item that the house has not, and for a file that is missing or changed.
+    """
+    for edit in source.edits:
+        house = _ONE[edit.do](house, edit, fields)
+    if len(house.items) > MAX_INSTANCES:
+        raise BadInput(
+            source.house_id, "", f"has {len(house.items)} items, at most {MAX_INSTANCES}"
+        )
+    return replace(house, id=source.house_id)
+
+
+def _place(house: House, edit: Place, fields: ReadFields) -> House:
+    if any(item.id == edit.item for item in house.items):
+        raise BadInput(house.id, edit.item, "there is an item of that id")
+    model, shape = edit.model, model_shape(edit.model, fields)
+    world_from_model = np.array(edit.world_from_model)
+    first = len(house.materials)
+    surfaces = tuple(
+        _moved_surface(replace(s, material=s.material + first), world_from_model)
+        for s in shape.surfaces
+    )
+    low, high = shape.bounds
+    centre = transform_points(world_from_model, ((low + high) / 2)[None])[0]
+    item = Item(
+        id=edit.item,
+        name=model.id,
+        kind=ItemKind.OBJECT,
+        level_id="",
+        surfaces=surfaces,
+        nyu40=model.nyu40,
+        source_class=model.category,
+        box=Box(centre, (high - low) / 2, world_from_model[:3, :3]),
+        pose=ModelPose(model.id, edit.world_from_model),
+    )
+    item = _at_home(house, item)
+    source = house.source
+    if model.credit and model.credit not in source.attribution:
+        lines = "; ".join(line for line in (source.attribution, model.credit) if line)
+        source = replace(source, attribution=lines)
+    return replace(
+        house,
+        items=(*house.items, item),
+        materials=(*house.materials, *shape.materials),
+        textures={**house.textures, **shape.textures},
+        source=source,
+    )
+
+
+def _at_home(house: House, item: Item) -> Item:
+    """The item with the room and the level its middle is in."""
+    x, y, z = item.bounds.mean(0)
+    rooms = [
+        room
+        for room in house.rooms
+        if room.floor_y - 0.2 <= y <= max(room.ceiling_y, room.floor_y) + 0.2
+        and shapely.contains_xy(shapely.Polygon(room.polygon), x, z)
+    ]
+    if rooms:
+        room = max(rooms, key=lambda r: r.floor_y)
+        return replace(item, room_id=room.id, level_id=room.level_id)
+    below = [level for level in house.levels if level.elevation <= y]
+    level = max(below or house.levels, key=lambda one: one.elevation if below else -one.elevation)
+    return replace(item, level_id=level.id)
+
+
+def _remove(house: House, edit: Remove, _fields: ReadFields) -> House:
+    gone = frozenset(edit.items)
+    _found(house, gone)
+    openings = tuple(
+        replace(opening, item_id=None) if opening.item_id in gone else opening
+        for opening in house.openings
+    )
+    kept = tuple(item for item in house.items if item.id not in gone)
+    return replace(house, items=kept, openings=openings)
+
+
+def _move(house: House, edit: Move, _fields: ReadFields) -> House:
+    matrix = np.array(edit.world_from_world)
+    return _changed(house, edit.items, lambda item: _at_home(house, _moved(item, matrix)))
+
+
+def _moved(item: Item, matrix: F64) -> Item:
+    turn = matrix[:3, :3]
+    box, pose = item.oriented_box, item.pose
+    if pose is not None:
+        pose = replace(
+            pose, world_from_model=rows_of_matrix(matrix @ np.array(pose.world_from_model))
+        )
+    return replace(
+        item,
+        surfaces=tuple(_moved_surface(s, matrix) for s in item.surfaces),
+        lights=tuple(_moved_light(light, matrix) for light in item.lights),
+        box=Box(transform_points(matrix, box.centre[None])[0], box.half, turn @ box.axes),
+        pose=pose,
+    )
+
+
+def _moved_surface(surface: Surface, matrix: F64) -> Surface:
+    normals = surface.normals
+    if normals is not None:
+        normals = (normals.astype(np.float64) @ matrix[:3, :3].T).astype(np.float32)
+    positions = transform_points(matrix, surface.positions).astype(np.float32)
+    return replace(surface, positions=positions, normals=normals)
+
+
+def _moved_light(light: LightPart, matrix: F64) -> LightPart:
+    def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
+        return triple(transform_points(matrix, np.array([p]))[0])
+
+    end = light.position_end
+    return replace(
+        light,
+        position=point(light.position),
+        position_end=None if end is None else point(end),
+        direction=triple(matrix[:3, :3] @ np.array(light.direction)),
+    )
+
+
+def _paint(house: House, edit: Paint, _fields: ReadFields) -> House:
+    def painted(material: Material) -> Material:
+        if material.kind not in (MaterialKind.OPAQUE, MaterialKind.SHADE):
+            return material
+        rough = material.roughness if edit.roughness is None else edit.roughness
+        return replace(
+            material, diffuse=edit.rgb, texture_id=None, alpha_cutout=False, roughness=rough,
+            is_default=False,
+        )  # fmt: skip
+
+    return _with_materials(house, edit.items, painted)
+
+
+def _cover(house: House, edit: Cover, _fields: ReadFields) -> House:
+    data = _file(edit.path, edit.sha256)
+    try:
+        texture, _has_holes = texture_from_bytes(data, Path(edit.path).name)
+    except ValueError as error:
+        raise BadInput(edit.path, "", str(error)) from None
+
+    def covered(material: Material) -> Material:
+        if material.kind is not MaterialKind.OPAQUE:
+            return material
+        return replace(
+            material, diffuse=(1.0, 1.0, 1.0), texture_id=texture.id, alpha_cutout=False,
+            normal_texture_id=None, roughness_texture_id=None, is_default=False,
+        )  # fmt: skip
+
+    def laid_out(item: Item) -> Item:
+        return replace(item, surfaces=tuple(_laid_out(s, edit.scale_m) for s in item.surfaces))
+
+    house = replace(house, textures={**house.textures, texture.id: texture})
+    return _with_materials(_changed(house, edit.items, laid_out), edit.items, covered)
+
+
+def _laid_out(surface: Surface, scale_m: float) -> Surface:
+    """The surface with a picture's edge of scale_m, projected along each face's steepest axis."""
+    corners = triangle_corners(surface.positions, surface.faces)
+    axis = np.abs(area_vectors(corners)).argmax(1)
+    # u and v are the two other axes: along x faces z and y, along y x and z, along z x and y.
+    u, v = np.array([2, 0, 0])[axis], np.array([1, 2, 1])[axis]
+    faces = np.arange(len(corners))
+    uvs = np.stack([corners[faces, :, u], corners[faces, :, v]], axis=-1) / scale_m
+    index = surface.faces.reshape(-1)
+    return replace(
+        surface,
+        positions=surface.positions[index],
+        normals=None if surface.normals is None else surface.normals[index],
+        uvs=uvs.reshape(-1, 2).astype(np.float32),
+        faces=np.arange(len(index), dtype=np.int32).reshape(-1, 3),
+    )
+
+
+def _set_light(house: House, edit: SetLight, _fields: ReadFields) -> House:
+    def lit(item: Item) -> Item:
+        if not item.lights:
+            raise BadInput(house.id, item.id, "is no lamp", hint="home.add_light adds one")
+        return replace(item, lights=tuple(_shining(light, edit) for light in item.lights))
+
+    return _changed(house, edit.items, lit)
+
+
+def _shining(light: LightPart, edit: SetLight) -> LightPart:
+    rgb = light.rgb_linear if edit.rgb_linear is None else edit.rgb_linear
+    return replace(light, power=edit.lm, unit=PowerUnit.LUMEN, rgb_linear=rgb)
+
+
+def _add_light(house: House, edit: AddLight, _fields: ReadFields) -> House:
+    if any(item.id == edit.item for item in house.items):
+        raise BadInput(house.id, edit.item, "there is an item of that id")
+    r, g, b = edit.rgb_linear
+    bulb = Material("bulb", MaterialKind.BULB, (r, g, b))
+    spot: dict[str, Any] = {}
+    if edit.direction is not None:
+        spot = {
+            "form": LightForm.SPOT, "direction": edit.direction, "cutoff_rad": edit.cutoff_rad,
+        }  # fmt: skip
+    light = LightPart(
+        edit.position, edit.radius_m, edit.lm, PowerUnit.LUMEN, rgb_linear=edit.rgb_linear,
+        emitting=(0,), **spot,
+    )  # fmt: skip
+    surface = sphere("bulb", np.array(edit.position), edit.radius_m, len(house.materials))
+    item = Item(
+        edit.item, "lamp", ItemKind.LAMP, "", (surface,), nyu40=NYU40_NAMES.index("lamp"), source_class="lamp",
+        lights=(light,),
+    )  # fmt: skip
+    items = (*house.items, _at_home(house, item))
+    return replace(house, items=items, materials=(*house.materials, bulb))
+
+
+def _with_materials(
+    house: House, items: Collection[str], change: Callable[[Material], Material]
+) -> House:
+    """The house whose items have each their materials changed; other items keep theirs."""
+    materials = list(house.materials)
+    index_of: dict[int, int] = {}  # a changed material, for all items of the edit
+
+    def one(surface: Surface) -> Surface:
+        old = surface.material
+        if old not in index_of:
+            changed = change(house.materials[old])
+            index_of[old] = old if changed == house.materials[old] else len(materials)
+            if index_of[old] != old:
+                materials.append(changed)
+        return replace(surface, material=index_of[old])
+
+    changed = _changed(
+        house, items, lambda item: replace(item, surfaces=tuple(map(one, item.surfaces)))
+    )
+    return replace(changed, materials=tuple(materials))
+
+
+def _changed(house: House, ids: Collection[str], change: Callable[[Item], Item]) -> House:
+    wanted = frozenset(ids)
+    _found(house, wanted)
+    return house.with_items(change(item) if item.id in wanted else item for item in house.items)
+
+
+def _found(house: House, ids: Collection[str]) -> None:
+    known = {item.id for item in house.items}
+    for name in ids:
+        if name not in known:
+            raise BadInput(house.id, name, "no such item", hint=did_you_mean(name, sorted(known)))
+
+
+def _file(path: str, sha256: str) -> bytes:
+    try:
+        data = read_regular(Path(path), MAX_DIGEST_BYTES)
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    if keys.sha256(data) != sha256:
+        raise BadInput(path, "", "changed since the home was made", hint="make the home again")
+    return data
+
+
+_ONE: Final[dict[str, Callable[[House, Any, ReadFields], House]]] = {
+    "place": _place,
+    "remove": _remove,
+    "move": _move,
+    "paint": _paint,
+    "cover": _cover,
+    "light": _set_light,
+    "add_light": _add_light,
+}

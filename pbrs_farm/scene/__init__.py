@@ -1,0 +1,1 @@
+"""Homes as values in Python: read, change, look, render. `import pbrs_farm` has the names."""

@@ -1,0 +1,104 @@
+"""Cameras that look at things: around placed models, near enough, with enough of them in sight. No effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.camera import Camera, intrinsics_from_k
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import House, Item, Room
+from pbrs_farm.core.shown_text import shown
+from pbrs_farm.scene.placing import caster_of
+from pbrs_farm.truth.coverage import coverage
+
+_TRIES: Final = 200  # of a camera
+_CLEAR_M: Final = 0.12  # around the eye
+_SMALL: Final = (160, 120)  # pixels that visibility is measured in
+_LEAST_PX: Final = 12  # of a thing in those: fewer say nothing
+
+
+def cameras_around(
+    house: House,
+    items: Sequence[Item],
+    n: int,
+    *,
+    distance_m: tuple[float, float],
+    elevation_deg: tuple[float, float],
+    min_visible: float,
+    size: tuple[int, int],
+    hfov_deg: float,
+    seed: int,
+) -> list[Camera]:
+    """n cameras that look at one of the items each, in a room, clear of everything.
+
+    Each sees min_visible of the item it looks at. Raises BadInput where fewer are found.
+    """
+    rng = np.random.default_rng([seed, 4])
+    found: list[Camera] = []
+    for _ in range(n):
+        camera = _one(house, items, distance_m, elevation_deg, min_visible, size, hfov_deg, rng)
+        if camera is None:
+            names = shown(", ".join(dict.fromkeys(item.name for item in items)))
+            text = f"found {len(found)} of {n} cameras that see {min_visible:g} of {names}"
+            raise BadInput(house.id, "cameras", text, hint="other distances, a lower min_visible")
+        found.append(camera)
+    return found
+
+
+def _one(
+    house: House, items: Sequence[Item], distance_m: tuple[float, float],
+    elevation_deg: tuple[float, float], min_visible: float, size: tuple[int, int],
+    hfov_deg: float, rng: np.random.Generator,
+) -> Camera | None:  # fmt: skip
+    for _ in range(_TRIES):
+        item = items[int(rng.integers(len(items)))]
+        target = item.bounds.mean(0)
+        azimuth, elevation = rng.uniform(0, 2 * math.pi), math.radians(rng.uniform(*elevation_deg))
+        level = math.cos(elevation)
+        away = np.array([level * math.cos(azimuth), math.sin(elevation), level * math.sin(azimuth)])
+        eye = target + rng.uniform(*distance_m) * away
+        # Look a little beside it, so that it is not always in the middle.
+        aim = target + rng.normal(0, 0.15, 3) * np.ptp(item.bounds, axis=0)
+        if not _is_clear(house, eye):
+            continue
+        camera = Camera.look(intrinsics_from_k(size, None, hfov_deg), eye, aim - eye)
+        if _visible(house, item, camera) >= min_visible:
+            return camera
+    return None
+
+
+def _is_clear(house: House, eye: F64) -> bool:
+    """In a room, and nothing within a hand's breadth."""
+    if not any(_is_in(room, eye) for room in house.rooms):
+        return False
+    axes = np.concatenate([np.eye(3), -np.eye(3), _DIAGONALS])
+    t, _face = caster_of(house).first_hit(np.broadcast_to(eye, axes.shape), axes)
+    return bool((t > _CLEAR_M).all())
+
+
+_DIAGONALS: Final = np.array(
+    [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64
+) / math.sqrt(3)
+
+
+def _is_in(room: Room, point: F64) -> bool:
+    x, y, z = point
+    is_within = room.floor_y < y < max(room.ceiling_y, room.floor_y + 0.1)
+    return is_within and bool(shapely.contains_xy(shapely.Polygon(room.polygon), x, z))
+
+
+def _visible(house: House, item: Item, camera: Camera) -> float:
+    """Share of an item's pixels that nothing hides, of those it has when alone and unbounded."""
+    small = camera.with_size(*_SMALL)
+    alone = int(coverage(item, small).sum())
+    if alone < _LEAST_PX:
+        return 0.0
+    number = next(k for k, other in enumerate(house.items, 1) if other is item)
+    seen = int((caster_of(house).item_buffer(small) == number).sum())
+    return seen / alone

@@ -1,0 +1,583 @@
+"""A home that one holds in Python: what stands in it, changes as new homes, cameras, pictures.
+
+Effects: reads what the home is made of when it is first looked at; renders when asked.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.edits import (
+    AddLight,
+    Cover,
+    Edit,
+    Move,
+    Paint,
+    Place,
+    Remove,
+    SetLight,
+    rows_of_matrix,
+)
+from pbrs_farm.core.errors import BadInput, BadRecipe
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import House, Item, Room
+from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
+from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.core.table import Table
+from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.read.source import SourceRef, resolve, variants
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
+from pbrs_farm.run import plan
+from pbrs_farm.sample.camera_report import CameraReport
+from pbrs_farm.scene.models import Model
+from pbrs_farm.scene.rendering import RENDERER, Made
+from pbrs_farm.scene.viewpoints import Viewpoint, Viewpoints, viewpoint_of
+from pbrs_farm.transport.scene_tables.scene_tables import rgb_from_kelvin
+
+if TYPE_CHECKING:
+    from pbrs_farm.repair import RepairReport
+
+ItemLike = str | Item | Iterable[str | Item]
+Vector = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Home:
+    """A home as a value: each change gives a new one, and the old one stays as it was.
+
+    It is read, dressed, repaired and edited when something of it is first asked for, by the same
+    steps as `pbrs-farm run`, and stays in memory for the next call. Its id names all that it is
+    made of: equal homes have equal ids on every machine.
+
+        >>> home = pf.load("Studio").dress(seed=3)
+        >>> home.rooms, home.items.near("table")
+        >>> frame = pf.render(home, home.cameras("photo", n=1)[0])
+    """
+
+    source: SourceRef
+    base: Recipe
+    settings: tuple[tuple[str, Any], ...] = ()  # recipe fields that this home overrides
+
+    @property
+    def id(self) -> str:
+        """Names the home in folders, tables and seeds."""
+        return self.source.house_id
+
+    @cached_property
+    def recipe(self) -> Recipe:
+        """The fields it is made and rendered with."""
+        return with_settings(self.base, dict(self.settings))
+
+    @cached_property
+    def _made(self) -> Made:
+        return RENDERER.house(self.source, self.recipe)
+
+    @property
+    def house(self) -> House:
+        """Its geometry, materials, lamps and rooms as frozen arrays (pbrs_farm.core.house)."""
+        return self._made.house
+
+    @property
+    def report(self) -> RepairReport:
+        """What repair changed and measured."""
+        return self._made.report
+
+    @property
+    def rooms(self) -> Rooms:
+        """Its rooms as a table; home.rooms["Kitchen"] finds one by name or id."""
+        return Rooms(self.house)
+
+    @property
+    def items(self) -> Items:
+        """Everything in it as a table; home.items["table 2"], .near(name), .named("chair*")."""
+        return Items(self.house)
+
+    def __repr__(self) -> str:
+        made = self.__dict__.get("_made")
+        if made is None:
+            return f"<Home {self.id}>"
+        return f"<Home {self.id}: {len(made.house.rooms)} rooms, {len(made.house.items)} items>"
+
+    # What a home is made of: before its first edit.
+
+    def dress(self, seed: int, **fields: Any) -> Home:
+        """The home as people live in it: things, textiles, wear, by a seed (docs/dress.md).
+
+        fields: of the recipe's group `dress`, such as clutter=0.5 or style="loft".
+        Raises BadInput for seed 0 and for a home that has edits already.
+        """
+        if self.source.edits:
+            raise BadInput(self.id, "dress", "a home is dressed before it is edited")
+        if self.source.dress_seed:
+            raise BadInput(self.id, "dress", f"is dressed by seed {self.source.dress_seed} already")
+        if seed < 1:
+            raise BadInput(self.id, "dress", f"seed {seed}", hint="from 1 on")
+        (source,) = variants(self.source, [seed])
+        return replace(self, source=source).set(**{f"dress.{k}": v for k, v in fields.items()})
+
+    def repair(self, **fields: Any) -> Home:
+        """The home made watertight and lit, now; others are repaired when they are first looked at.
+
+        fields: of the recipe's group `repair`, such as lamp_lx=150. The words are in `report`.
+        """
+        home = self.set(**{f"repair.{k}": v for k, v in fields.items()})
+        _ = home.house
+        return home
+
+    def set(self, **fields: Any) -> Home:
+        """The home under other recipe fields: home.set(**{"light.spp": 64}).
+
+        Raises BadRecipe for a field there is not, or a value that does not fit.
+        """
+        if not fields:
+            return self
+        home = replace(self, settings=tuple({**dict(self.settings), **fields}.items()))
+        _ = home.recipe
+        return home
+
+    def sun(self, azimuth: float | None = None, elevation: float | None = None) -> Home:
+        """The home with the sun there, in degrees: azimuth from -z towards +x, elevation 0 to 90."""
+        fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
+        told = {name: value for name, value in fields.items() if value is not None}
+        return self.set(**{"sky.kind": "sunsky", **told})
+
+    def sky(self, panorama: str | Path) -> Home:
+        """The home under a latitude-longitude HDR picture (.hdr or .exr), or one of a folder of them."""
+        if not Path(panorama).exists():
+            raise BadInput(panorama, "", "no such file or folder")
+        return self.set(**{"sky.kind": "panorama", "sky.panoramas": str(Path(panorama).resolve())})
+
+    # Edits.
+
+    def place(
+        self,
+        model: Model,
+        *,
+        on: str | Item | Room | None = None,
+        pose: Any = None,
+        at: Vector | None = None,
+        seed: int = 0,
+        name: str = "",
+    ) -> Home:
+        """The home with one more thing.
+
+        on: what it is put on where there is room for it, by the seed, upright, touching: an item, a
+        name that one or several items have, or a room's floor. pose: (4, 4) world_from_model instead: metres, world y up, the model's own
+        axes; or at: (3,) where the middle of its foot stands, upright. name: of the new item, its
+        model's id and a number without one.
+
+        Raises BadInput where it fits nowhere, for a pose that is no rigid motion, a name that is
+        taken, an item there is not.
+        """
+        from pbrs_farm.scene.placing import free_pose, upright_at
+
+        if sum(given is not None for given in (on, pose, at)) != 1:
+            raise BadInput(self.id, model.id, "place it by one of on=, pose= and at=")
+        if pose is not None:
+            matrix = _rigid(pose, f"pose of {model.id}")
+        elif at is not None:
+            matrix = upright_at(model, np.asarray(at, np.float64), 0.0)
+        else:
+            matrix = free_pose(self.house, model, self._supports_named(on), seed)
+        return self._edited(self._placing(model, matrix, name))
+
+    def scatter(
+        self,
+        models: Sequence[Model],
+        n: int,
+        *,
+        on: str | Item | Room | None = None,
+        in_: str = "",
+        seed: int = 0,
+        physics: bool = False,
+    ) -> Home:
+        """The home with n more things, models in turn by the seed.
+
+        on: an item or room whose surface takes them; in_: a room, on all its tables, shelves and
+        floor; else anywhere in the home. physics: they are dropped and come to rest against each other
+        and the home by rigid-body simulation (extra `physics`); else each stands upright by itself.
+
+        Raises BadInput where less than n fit, MachineFailed where the extra is not installed.
+        """
+        from pbrs_farm.scene.placing import scattered_poses
+
+        if not models or n < 1:
+            raise BadInput(self.id, "scatter", "give at least one model and n >= 1")
+        supports = self._supports(in_) if on is None else self._supports_named(on)
+        if physics:
+            from pbrs_farm.scene.physics import settled_poses
+
+            placed = settled_poses(self.house, models, n, supports, seed)
+        else:
+            placed = scattered_poses(self.house, models, n, supports, seed)
+        edits: list[Edit] = []
+        for model, matrix in placed:
+            edits.append(
+                self._placing(
+                    model, matrix, "", taken=[e.item for e in edits if isinstance(e, Place)]
+                )
+            )
+        return self._edited(*edits)
+
+    def without(self, items: ItemLike) -> Home:
+        """The home without items: ids, names, patterns such as "chair*", or items."""
+        return self._edited(Remove(items=self._ids(items)))
+
+    def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
+        """The home with items moved by (x, y, z) metres and turned about the vertical of their middle."""
+        ids = self._ids(items)
+        bounds = np.array([self.items[one].bounds for one in ids])
+        middle = (np.nanmin(bounds[:, 0], 0) + np.nanmax(bounds[:, 1], 0)) / 2
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotation_y(math.radians(turn_deg))
+        matrix[:3, 3] = middle - matrix[:3, :3] @ middle + np.asarray(by, np.float64)
+        return self._edited(
+            Move(items=ids, world_from_world=rows_of_matrix(_rigid(matrix, "move")))
+        )
+
+    def paint(
+        self, items: ItemLike, colour: str | Sequence[float], roughness: float | None = None
+    ) -> Home:
+        """The home with items in one plain colour: "#c8b8a0", or sRGB in 0..1."""
+        edit = Paint(items=self._ids(items), rgb=_rgb(colour), roughness=roughness)
+        return self._edited(edit)
+
+    def material(self, items: ItemLike, picture: str | Path, scale_m: float = 1.0) -> Home:
+        """The home with items covered by a picture, repeated every scale_m metres."""
+        path = Path(picture)
+        try:
+            data = read_regular(path, MAX_DIGEST_BYTES)
+        except OSError as error:
+            raise BadInput(path, "", fault_of(error)) from None
+        if not scale_m > 0:
+            raise BadInput("material", "scale_m", f"{scale_m} is no length")
+        edit = Cover(
+            items=self._ids(items), path=str(path.resolve()), sha256=keys.sha256(data),
+            scale_m=scale_m,
+        )  # fmt: skip
+        return self._edited(edit)
+
+    def light(self, items: ItemLike, lm: float, kelvin: float | None = None) -> Home:
+        """The home with lamps of another flux in lumen, and another colour where kelvin is given."""
+        rgb = None if kelvin is None else _rgb_of_kelvin(kelvin)
+        return self._edited(SetLight(items=self._ids(items), lm=_flux(lm), rgb_linear=rgb))
+
+    def add_light(
+        self,
+        at: Vector,
+        lm: float,
+        *,
+        kelvin: float = 3000.0,
+        towards: Vector | None = None,
+        angle_deg: float = 60.0,
+        name: str = "",
+    ) -> Home:
+        """The home with one more bulb at (x, y, z), or a spot of a full angle where towards is given."""
+        aim = None if towards is None else np.asarray(towards, np.float64) - np.asarray(at)
+        if aim is not None and not np.linalg.norm(aim) > 0:
+            raise BadInput("add_light", "towards", "is where the light itself is")
+        edit = AddLight(
+            item=name or self._free_name("light", ()), position=triple(np.asarray(at, np.float64)),
+            lm=_flux(lm), rgb_linear=_rgb_of_kelvin(kelvin),
+            direction=None if aim is None else triple(aim / np.linalg.norm(aim)),
+            cutoff_rad=math.radians(angle_deg) / 2,
+        )  # fmt: skip
+        return self._edited(edit)
+
+    def _edited(self, *edits: Edit) -> Home:
+        home = replace(self, source=self.source.edited(*edits))
+        _ = home.house  # what is wrong with an edit is an error where it is made
+        return home
+
+    def _placing(self, model: Model, matrix: F64, name: str, taken: Sequence[str] = ()) -> Place:
+        item = name or self._free_name(model.id, taken)
+        return Place(item=item, model=model.ref, world_from_model=rows_of_matrix(matrix))
+
+    def _free_name(self, stem: str, taken: Sequence[str]) -> str:
+        used = {*(item.id for item in self.house.items), *taken}
+        return next(f"{stem} {k}" for k in range(1, len(used) + 2) if f"{stem} {k}" not in used)
+
+    def _ids(self, items: ItemLike) -> tuple[str, ...]:
+        words = [items] if isinstance(items, str | Item) else list(items)
+        found: dict[str, None] = {}
+        for word in words:
+            if isinstance(word, Item):
+                found[word.id] = None
+            else:
+                found |= dict.fromkeys(item.id for item in self.items.named(word))
+        return tuple(found)
+
+    def _supports_named(self, on: str | Item | Room | None) -> list[Item | Room]:
+        if isinstance(on, Item | Room):
+            return [on]
+        rooms = self.rooms
+        return [rooms[on]] if on is not None and rooms.has(on) else list(self.items.named(on or ""))
+
+    def _supports(self, room: str) -> list[Item | Room]:
+        from pbrs_farm.scene.placing import furniture_of
+
+        rooms = [self.rooms[room]] if room else list(self.house.rooms)
+        return [one for r in rooms for one in (*furniture_of(self.house, r), r)]
+
+    # Looking and rendering.
+
+    def cameras(
+        self, preset: Literal["photo", "paper", "released"] | None = None, n: int = 0, **fields: Any
+    ) -> Viewpoints:
+        """Viewpoints by the rules of a preset, best first in each room; n: so many, spread over rooms.
+
+        fields: of the recipe's group `cameras`, such as hfov_rad=1.2.
+        """
+        told = {"preset": preset, **fields} if preset is not None else fields
+        home = self.set(**{f"cameras.{name}": value for name, value in told.items()})
+        data = RENDERER.sampled(self.source, home.recipe)
+        views = views_from_json(data, "cameras.json")
+        rows = [(view.id, view.room_id, view.score) for view in views.values()]
+        chosen = plan.chosen_views(rows, n, home.recipe)
+        found = [Viewpoint(views[name], home.recipe.cameras) for name in chosen]
+        return Viewpoints(found, CameraReport.model_validate(json.loads(data)["report"]))
+
+    def cameras_around(
+        self,
+        items: ItemLike | None = None,
+        n: int = 1,
+        *,
+        distance_m: tuple[float, float] = (0.5, 1.2),
+        elevation_deg: tuple[float, float] = (15.0, 65.0),
+        min_visible: float = 0.5,
+        size: tuple[int, int] = (640, 480),
+        hfov_deg: float = 50.0,
+        seed: int = 0,
+    ) -> Viewpoints:
+        """n viewpoints that look at items each: at placed models where none are named.
+
+        distance_m and elevation_deg: between which they are drawn. min_visible: the share of the
+        item looked at that nothing may hide. Equal seeds give equal cameras. Raises BadInput where
+        fewer are found.
+        """
+        from pbrs_farm.scene.aiming import cameras_around
+
+        wanted = set(self._ids(items)) if items is not None else None
+        found = [
+            item
+            for item in self.house.items
+            if (item.pose is not None if wanted is None else item.id in wanted)
+        ]
+        if not found:
+            raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
+        cameras = cameras_around(
+            self.house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
+            min_visible=min_visible, size=size, hfov_deg=hfov_deg, seed=seed,
+        )  # fmt: skip
+        return Viewpoints([self.viewpoint(camera) for camera in cameras])
+
+    def viewpoint(self, camera: Camera | Viewpoint) -> Viewpoint:
+        """A camera as a viewpoint of this home, with the room that it is in."""
+        if isinstance(camera, Viewpoint):
+            return camera
+        return viewpoint_of(camera, self.house, self.recipe.cameras)
+
+
+class Rooms(Table):
+    """A home's rooms: rows of id, name, floor area in m2, ceiling height in m, enclosure, items."""
+
+    def __init__(self, house: House) -> None:
+        """house: finished."""
+        self._house = house
+        rows = [
+            {
+                "id": room.id, "name": room.name, "area": round(_area(room), 2),
+                "height": round(room.ceiling_y - room.floor_y, 2), "enclosure": str(room.enclosure),
+                "items": sum(item.room_id == room.id for item in house.items),
+            }
+            for room in house.rooms
+        ]  # fmt: skip
+        super().__init__(("id", "name", "area", "height", "enclosure", "items"), rows)
+
+    def __getitem__(self, at: Any) -> Any:
+        """A room by id or name (a Room), else a row by number."""
+        if not isinstance(at, str):
+            return super().__getitem__(at)
+        found = [r for r in self._house.rooms if at in (r.id, r.name)]
+        found = found or [r for r in self._house.rooms if r.name.lower() == at.lower()]
+        if not found:
+            names = [name for r in self._house.rooms for name in (r.name, r.id)]
+            raise BadInput(self._house.id, at, "no such room", hint=did_you_mean(at, names))
+        return found[0]
+
+    def has(self, name: str) -> bool:
+        """Whether a room has this id or name."""
+        return any(name in (r.id, r.name) for r in self._house.rooms)
+
+
+class Items(Table):
+    """A home's items: rows of instance id, item id, name, class, room, size and middle in metres."""
+
+    def __init__(self, house: House, items: Sequence[Item] | None = None) -> None:
+        """house: finished. items: some of its items; None: all."""
+        self._house = house
+        self._items = tuple(house.items if items is None else items)
+        instance = {item.id: k for k, item in enumerate(house.items, 1)}
+        room_names = {room.id: room.name for room in house.rooms}
+        rows = [_row(item, instance[item.id], room_names) for item in self._items]
+        super().__init__(("instance", "id", "name", "class", "room", "size", "middle"), rows)
+
+    def __getitem__(self, at: Any) -> Any:
+        """An item by id, by a name that one item alone has, or as "table 2"; else a row by number."""
+        if not isinstance(at, str):
+            return super().__getitem__(at)
+        found = [i for i in self._items if i.id == at] or self._same_name(at)
+        stem, _, number = at.rpartition(" ")
+        if not found and number.isdecimal():
+            found = self._same_name(stem)[int(number) - 1 :][: int(number) > 0]
+        if not found:
+            raise self._unknown(at)
+        if len(found) > 1:
+            hint = f'"{at} 1", or an id: {", ".join(item.id for item in found[:5])}'
+            raise BadInput(self._house.id, at, f"{len(found)} items have this name", hint=hint)
+        return found[0]
+
+    def _same_name(self, name: str) -> list[Item]:
+        return [item for item in self._items if item.name.lower() == name.lower()]
+
+    def named(self, pattern: str) -> tuple[Item, ...]:
+        """The items whose id, name or class matches, "chair*" for instance; BadInput where none does."""
+        for key in (_ids, _words):
+            found = tuple(i for i in self._items if any(fnmatchcase(w, pattern) for w in key(i)))
+            if found:
+                return found
+        low = pattern.lower()
+        found = tuple(i for i in self._items if any(fnmatchcase(w.lower(), low) for w in _words(i)))
+        if not found:
+            raise self._unknown(pattern)
+        return found
+
+    def near(self, name: str, within_m: float = 1.5) -> Items:
+        """The items whose box lies within so many metres of an item's, nearest first."""
+        target = self.named(name)[0]
+        low, high = target.bounds
+        found = []
+        for item in self._items:
+            a, b = item.bounds
+            gap = float(np.linalg.norm(np.maximum(0, np.maximum(low - b, a - high))))
+            if item.id != target.id and not item.kind.is_structure and gap <= within_m:
+                found.append((gap, item.id, item))
+        return Items(self._house, [item for _gap, _id, item in sorted(found, key=lambda f: f[:2])])
+
+    def _unknown(self, name: str) -> BadInput:
+        known = dict.fromkeys(w for item in self._items for w in (*_ids(item), *_words(item)))
+        return BadInput(self._house.id, name, "no such item", hint=did_you_mean(name, known))
+
+
+def _ids(item: Item) -> tuple[str, ...]:
+    return (item.id,)
+
+
+def _words(item: Item) -> tuple[str, ...]:
+    return (item.name, NYU40_NAMES[item.nyu40], str(item.kind))
+
+
+def _row(item: Item, instance: int, room_names: Mapping[str, str]) -> dict[str, Any]:
+    low, high = item.bounds
+    return {
+        "instance": instance, "id": item.id, "name": item.name, "class": NYU40_NAMES[item.nyu40],
+        "kind": str(item.kind), "room": room_names.get(item.room_id or "", ""),
+        "size": [round(float(v), 3) for v in high - low],
+        "middle": [round(float(v), 3) for v in (low + high) / 2],
+        "model": item.pose.model if item.pose else "",
+        "world_from_model": item.pose.world_from_model if item.pose else None,
+    }  # fmt: skip
+
+
+def _area(room: Room) -> float:
+    x, z = np.asarray(room.polygon).T
+    return float(abs(np.dot(x, np.roll(z, -1)) - np.dot(z, np.roll(x, -1))) / 2)
+
+
+def _rigid(matrix: Any, place: str) -> F64:
+    found = np.asarray(matrix, np.float64)
+    turn = found[:3, :3] if found.shape == (4, 4) else np.zeros((3, 3))
+    fits = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
+    if not fits or not np.isfinite(found).all() or not np.allclose(found[3], [0, 0, 0, 1]):
+        raise BadInput(place, "", "is no rigid (4, 4) motion: a rotation and metres")
+    return found
+
+
+def _rgb(colour: str | Sequence[float]) -> tuple[float, float, float]:
+    values: list[float] = []
+    if isinstance(colour, str):
+        text = colour.removeprefix("#")
+        if len(text) == 6 and all(c in "0123456789abcdefABCDEF" for c in text):
+            values = [int(text[k : k + 2], 16) / 255 for k in (0, 2, 4)]
+    else:
+        values = [float(v) for v in colour]
+    if len(values) != 3 or not all(0 <= v <= 1 for v in values):
+        raise BadInput("colour", str(colour), 'expected "#rrggbb" or three numbers in 0..1')
+    return values[0], values[1], values[2]
+
+
+def _rgb_of_kelvin(kelvin: float) -> tuple[float, float, float]:
+    if not 1000 <= kelvin <= 20_000:
+        raise BadInput("kelvin", f"{kelvin:g}", "expected 1,000 to 20,000")
+    rgb = rgb_from_kelvin(kelvin)
+    return triple(rgb / rgb.max())
+
+
+def _flux(lm: float) -> float:
+    if not 0 <= lm < 1e7:
+        raise BadInput("lm", f"{lm:g}", "expected 0 to 10,000,000 lumen")
+    return float(lm)
+
+
+def load(home: str | Path, recipe: str | Path | Recipe = "fast", **settings: Any) -> Home:
+    """A home by any word of `pbrs-farm run`.
+
+    home: a .sh3d, .glb or .gltf file, a SUNCG house folder, an example home's name ("Studio"),
+    "builtin", or "made:7". recipe: preview, fast, paper, released, a .toml file or a Recipe.
+    settings: recipe fields to override: pf.load("Studio", **{"light.spp": 64}).
+
+    Nothing but the file's digest is read before the home is looked at. Raises BadHouse for a word
+    that names no home, BadRecipe for a recipe or a field that is none.
+
+        >>> home = pf.load("Studio")
+    """
+    return Home(resolve(str(home)), recipe_of(recipe)).set(**settings)
+
+
+def make(seed: int, rooms: str = "", **options: Any) -> Home:
+    """A home of a seed: drawn, furnished, the same on every machine (docs/homes.md).
+
+    rooms: of bedrooms, "2" or "1..3". options: as of `made:` words, such as area="60..90".
+
+        >>> home = pf.make(7, rooms="1..2").dress(seed=7)
+    """
+    words = {**({"rooms": rooms} if rooms else {}), **options}
+    recipe = words.pop("recipe", "fast")
+    text = ",".join([f"made:{int(seed)}", *(f"{name}={value}" for name, value in words.items())])
+    return Home(resolve(text), recipe_of(recipe))
+
+
+def recipe_of(recipe: str | Path | Recipe) -> Recipe:
+    """A recipe by name, by .toml file, or itself. Raises BadRecipe."""
+    if isinstance(recipe, Recipe):
+        return recipe
+    if str(recipe).endswith(".toml"):
+        from pbrs_farm.formats.recipe_toml import recipe_from_toml
+
+        return recipe_from_toml(Path(recipe), {})
+    if not isinstance(recipe, str):
+        raise BadRecipe(f"{recipe!r} is no recipe")
+    return recipe_from_name(recipe)

@@ -1,0 +1,126 @@
+"""Objects of the user's own: one file, or many by a pattern, checked when they are named. Effects: reads files."""
+
+from __future__ import annotations
+
+import glob
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.edits import ModelRef
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.core.shown_text import hint_of_choice
+from pbrs_farm.read.common.furniture_classes import nyu40_of
+from pbrs_farm.read.objects.own_model import SUFFIXES, ModelShape, model_shape
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
+
+UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
+_UP: Final = {
+    # Columns: what the model's x, y and z axes are where it stands upright, y up.
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]),
+    "x": np.array([[0.0, -1.0, 0], [1.0, 0, 0], [0, 0, 1.0]]),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A mesh that homes can hold many instances of; pose them with `Home.place` and `Home.scatter`."""
+
+    ref: ModelRef
+    up: str = "y"  # the axis of its file that points up when it stands
+
+    @property
+    def id(self) -> str:
+        """What its instances are called in tables and poses."""
+        return self.ref.id
+
+    @property
+    def shape(self) -> ModelShape:
+        """Surfaces, materials and pictures in its own frame, metres; read once a process."""
+        return model_shape(self.ref, ReadFields())
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Extent along x, y and z of its own frame."""
+        x, y, z = np.ptp(self.shape.bounds, axis=0)
+        return float(x), float(y), float(z)
+
+    @property
+    def upright(self) -> F64:
+        """(3, 3) rotation that stands it up in a world with y up."""
+        return _UP[self.up]
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{v:.3g}" for v in self.size_m)
+        return f"<Model {self.id}: {NYU40_NAMES[self.ref.nyu40]}, {size} m>"
+
+
+def model(
+    path: str | Path,
+    *,
+    category: str = "",
+    size_m: float | None = None,
+    unit: str = "m",
+    up: str = "",
+    name: str = "",
+    credit: str = "",
+) -> Model:
+    """An object of your own, to place in homes.
+
+    path: a .glb, .gltf, .obj, .ply, .stl or .off file. category: what it is in a word ("cup"); the
+    NYU40 class follows from it, else from the file's name. size_m: its longest side in metres,
+    whatever its unit; else unit: m, cm, mm or inch a unit of the file. up: the axis that points up,
+    x, y or z; y for glTF and OBJ, z for the others. credit: a line that pictures must carry.
+
+    Raises BadInput, naming the file, for a mesh that is missing, empty, not finite or 900 m large.
+
+        >>> mug = pf.model("mug.glb", category="cup", size_m=0.1)
+    """
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise BadInput(path, "", "no mesh that is read", hint=f"of {', '.join(SUFFIXES)}")
+    if unit not in UNITS:
+        raise BadInput("unit", unit, "no such unit", hint=hint_of_choice(unit, tuple(UNITS)))
+    up = up or ("y" if path.suffix.lower() in (".glb", ".gltf", ".obj") else "z")
+    if up not in _UP:
+        raise BadInput("up", up, "no such axis", hint="of x, y, z")
+    try:
+        data = read_regular(path, MAX_SCENE_BYTES)
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    label = nyu40_of("", category) or nyu40_of("", path.stem) or OTHERPROP
+    known = ModelRef(
+        path=str(path.resolve()), sha256=keys.sha256(data), id=name or keys.slug(path.stem),
+        category=category or path.stem, nyu40=label, scale=UNITS[unit], credit=credit,
+    )  # fmt: skip
+    if size_m is not None:
+        known = known.model_copy(update={"scale": 1e-3})  # so that any unit is small enough to read
+        extent = float(np.ptp(model_shape(known, ReadFields()).bounds, axis=0).max())
+        known = known.model_copy(update={"scale": 1e-3 * size_m / extent})
+    found = Model(known, up)
+    _ = found.shape  # read it now: a bad file is an error here, not in a run
+    return found
+
+
+def models(pattern: str | Path, **options: object) -> list[Model]:
+    """The models that a pattern or a folder names, in order of name; options as of `model`.
+
+        >>> cans = pf.models("ycb/*.ply", unit="mm")
+
+    Raises BadInput where there is none, or one that cannot be read.
+    """
+    text = str(pattern)
+    if Path(text).is_dir():
+        found = sorted(p for p in Path(text).rglob("*") if p.suffix.lower() in SUFFIXES)
+    else:
+        found = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
+    if not found:
+        raise BadInput(pattern, "", "no model found", hint=f"of {', '.join(SUFFIXES)}")
+    return [model(path, **options) for path in found]  # type: ignore[arg-type]

@@ -1,0 +1,167 @@
+"""Pictures of homes from Python: in memory one by one, or many into a folder by this machine's pool."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Final, overload
+
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.run import plan
+from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.processes.render_task import Event
+from pbrs_farm.sample.stored_cameras import OUTSIDE
+from pbrs_farm.scene.home import Home, recipe_of
+from pbrs_farm.scene.rendering import RENDERER
+from pbrs_farm.scene.viewpoints import Viewpoint
+from pbrs_farm.study.reading.open_views import open_views
+from pbrs_farm.study.reading.views import Frame, Views
+
+AnyCamera = Camera | Viewpoint
+
+# Labels that every frame has, by the names that are asked for.
+_ALL: Final = tuple(mode.value for mode in ALL_MODES)
+_ALWAYS: Final = ("depth", "normal", "valid", "semantic", "class40", "instance", "boundary")
+
+
+@overload
+def render(
+    home: Home, cameras: AnyCamera, *, modes: Iterable[str] = ..., layers: Iterable[str] = ...,
+    size: tuple[int, int] | None = ..., observe: Callable[[str], None] | None = ...,
+) -> Frame: ...  # fmt: skip
+@overload
+def render(
+    home: Home, cameras: Sequence[AnyCamera], *, modes: Iterable[str] = ...,
+    layers: Iterable[str] = ..., size: tuple[int, int] | None = ...,
+    observe: Callable[[str], None] | None = ...,
+) -> Views: ...  # fmt: skip
+def render(
+    home: Home,
+    cameras: AnyCamera | Sequence[AnyCamera],
+    *,
+    modes: Iterable[str] = (Mode.MLT_IL_OL,),
+    layers: Iterable[str] = (),
+    size: tuple[int, int] | None = None,
+    observe: Callable[[str], None] | None = None,
+) -> Frame | Views:
+    """Pictures and labels of a home in memory: no folder, no second process.
+
+    cameras: one of home.cameras(), or a Camera of your own; or several. modes: of opengl_dl,
+    opengl_il, mlt_ol, mlt_il_ol; an empty list renders labels alone. layers: optional ones to make
+    beside depth, normal, class and instance, which each frame has (`pbrs-farm layers` lists them).
+    size: (width, height); of a camera of your own its own size, else the recipe's. observe: called
+    with the id of each frame that is done.
+
+    The same bytes as `pbrs-farm run` makes of that home, recipe and view. A camera in no room is a
+    warning. Raises BadInput for a mode, a layer or a size that is none, RenderFailed.
+
+        >>> frame = pf.render(home, pf.Camera.look_at((2, 1.5, 3), (4, 0.8, 3)), layers=["albedo"])
+        >>> frame.colour.shape, frame.depth.max()
+    """
+    given = [cameras] if isinstance(cameras, Camera | Viewpoint) else list(cameras)
+    found = [home.viewpoint(camera) for camera in given]
+    if not found:
+        raise BadInput(home.id, "cameras", "give at least one")
+    for one in found:
+        if one.room == OUTSIDE:
+            x, y, z = one.camera.eye
+            warnings.warn(
+                f"{home.id}: the camera at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room", stacklevel=2
+            )
+    recipe = _recipe_of_view(home, found, size)
+    frames = RENDERER.frames(
+        home.source, recipe, found, _wanted(modes, layers), observe or (lambda _view: None)
+    )
+    return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
+
+
+def _wanted(modes: Iterable[str], layers: Iterable[str]) -> plan.Wanted:
+    names = [str(mode) for mode in modes]
+    want = plan.wanted(names, [name for name in layers if name not in _ALWAYS])
+    # An empty list asks for labels alone, where the command line takes it for all modes.
+    chosen = tuple(m for m in ALL_MODES if m.value in names)
+    return plan.Wanted(chosen, want.layers)
+
+
+def _recipe_of_view(
+    home: Home, viewpoints: Sequence[Viewpoint], size: tuple[int, int] | None
+) -> Recipe:
+    """The home's recipe with the size of the pictures and where their cameras come from."""
+    fields = {id(one.chosen_by): one.chosen_by for one in viewpoints}
+    if len({f.model_dump_json() if f else "" for f in fields.values()}) > 1:
+        raise BadInput(
+            home.id, "cameras", "were chosen in different ways", hint="render them apart"
+        )
+    chosen_by = viewpoints[0].chosen_by
+    sizes = {
+        (one.camera.intrinsics.width_px, one.camera.intrinsics.height_px) for one in viewpoints
+    }
+    settings: dict[str, object] = {}
+    if chosen_by is None:
+        if len(sizes) > 1 and size is None:
+            raise BadInput(home.id, "cameras", "are of different sizes", hint="render them apart")
+        size = size or next(iter(sizes))
+        settings["cameras"] = home.recipe.cameras.model_copy(update={"source": "given"})
+    else:
+        settings["cameras"] = chosen_by
+    if size is not None:
+        settings |= {"image.width_px": int(size[0]), "image.height_px": int(size[1])}
+    return with_settings(home.recipe, settings)
+
+
+def render_homes(
+    homes: Home | Iterable[Home],
+    out: str | Path,
+    *,
+    recipe: str | Path | Recipe | None = None,
+    views: int = 0,
+    modes: Iterable[str] = _ALL,
+    layers: Iterable[str] = (),
+    jobs: int = 1,
+    observe: Callable[[Event], None] | None = None,
+) -> Views:
+    """Every home into one place by this machine's processes: `pbrs-farm run` from Python.
+
+    homes: also edited ones. out: a folder or s3://bucket/prefix; what is there already is not made
+    again, so that a script that was killed goes on where it was. recipe: for all of them; None: the
+    homes' own, which must agree. views: of each home, 0 = all its sampled viewpoints. observe: hears
+    each step that ends.
+
+    Returns the frames of out. A home that cannot be made costs itself alone and is a warning;
+    raises BadRecipe where recipes disagree or out holds another, BadInput where nothing was made.
+
+        >>> pf.render_homes([kitchen(seed) for seed in range(10)], out="out/kitchens", views=6)
+    """
+    every = [homes] if isinstance(homes, Home) else list(homes)
+    if not every:
+        raise BadInput("homes", "", "give at least one")
+    made_with = [_recipe_of_home(home, recipe) for home in every]
+    for home, other in zip(every, made_with, strict=True):
+        if other.digest() != made_with[0].digest():
+            text = "another recipe than the first home's: one place holds one recipe"
+            raise BadInput(home.id, "recipe", text)
+    run = Run(
+        homes=(), store_url=str(out), recipe=made_with[0], sources=[home.source for home in every],
+        want=plan.wanted(modes, layers, views), n_jobs=jobs,
+    )  # fmt: skip
+    summary = run_local(run, observe or (lambda _event: None))
+    _warn_of(summary)
+    return open_views(out)
+
+
+def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
+    if recipe is None:
+        return home.recipe
+    return with_settings(recipe_of(recipe), dict(home.settings))
+
+
+def _warn_of(summary: Summary) -> None:
+    for what, message, command in summary.failures:
+        again = f"; again by: {command}" if command else ""
+        warnings.warn(f"{what}: {message}{again}", stacklevel=3)
+    for house, why in summary.without_views:
+        warnings.warn(f"{house}: no view: {why}", stacklevel=3)

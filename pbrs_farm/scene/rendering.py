@@ -1,0 +1,197 @@
+"""Pictures in memory by the steps of a run, one after another in a thread of its own.
+
+Effects: a thread, memory; the steps' own. Mitsuba, Dr.Jit and OpenGL keep state a thread and a
+process: one thread does all of it, whoever calls, and a forked child is refused. A home's store
+stays for the next call, so that its second view costs what it costs in a run.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, TypeVar
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
+from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.read.source import SourceRef
+from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import CachedHouse, HouseCache
+from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
+from pbrs_farm.run.steps import remember_house, run_step
+from pbrs_farm.scene.viewpoints import Viewpoint
+from pbrs_farm.store.object_store import MemoryStore
+from pbrs_farm.study.reading.stored_root import StoredRoot, copy_view
+from pbrs_farm.study.reading.views import ViewRef, Views
+
+if TYPE_CHECKING:
+    from pbrs_farm.repair import RepairReport
+
+_N_HOMES: Final = 4  # whose steps are kept
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A home's finished house, as the step `house` made it."""
+
+    house: House
+    report: RepairReport
+
+
+class Renderer:
+    """What this process keeps of the homes it works on, and the thread that works."""
+
+    def __init__(self) -> None:
+        self._pid = os.getpid()
+        self._lock = threading.Lock()
+        self._thread: ThreadPoolExecutor | None = None
+        self._ident = 0  # of that thread
+        self._stop = threading.Event()
+        self._stores: OrderedDict[tuple[str, str], MemoryStore] = OrderedDict()
+        self._houses = HouseCache()
+
+    def house(self, source: SourceRef, recipe: Recipe) -> Made:
+        """The house of a source, read, dressed, repaired and edited: the step `house`, once."""
+        return self._do(lambda: self._made(source, recipe))
+
+    def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
+        """cameras.json of the step `cameras`."""
+        return self._do(lambda: self._cameras(source, recipe))
+
+    def frames(
+        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: plan.Wanted,
+        observe: Callable[[str], None] = lambda _view: None,
+    ) -> Views:  # fmt: skip
+        """The viewpoints' frames: the steps of `want` for each, in a store of their own."""
+        return self._do(lambda: self._frames(source, recipe, viewpoints, want, observe))
+
+    def close(self) -> None:
+        """Let go of every home."""
+        if self._thread is not None:
+            self._do(self._houses.clear)
+        self._stores.clear()
+
+    def _do(self, task: Callable[[], _T]) -> _T:
+        if os.getpid() != self._pid:
+            hint = 'multiprocessing.set_start_method("spawn"), or render in the children alone'
+            raise MachineFailed("this process was forked from one that renders", hint=hint)
+        # A plugin that makes homes, or a callback, is in the thread already.
+        if threading.get_ident() == self._ident:
+            return task()
+        with self._lock:
+            if self._thread is None:
+                self._thread = ThreadPoolExecutor(1, "pbrs-farm", self._begin)
+        self._stop.clear()
+        future: Future[_T] = self._thread.submit(task)
+        try:
+            return future.result()
+        except BaseException:
+            # Ctrl-C: the step under way ends, no other begins.
+            if not future.done():
+                self._stop.set()
+            raise
+
+    def _begin(self) -> None:
+        self._ident = threading.get_ident()
+
+    def _store(self, source: SourceRef) -> MemoryStore:
+        key = (source.house_id, source.fingerprint)
+        store = self._stores.setdefault(key, MemoryStore())
+        self._stores.move_to_end(key)
+        while len(self._stores) > _N_HOMES:
+            self._stores.popitem(last=False)
+        return store
+
+    def _work(self, source: SourceRef, recipe: Recipe) -> Work:
+        return Work(self._store(source), recipe, source.house_id, self._houses, source)
+
+    def _made(self, source: SourceRef, recipe: Recipe) -> Made:
+        from pbrs_farm.dress.report import DressReport
+        from pbrs_farm.repair import RepairReport
+
+        work = self._work(source, recipe)
+        self._run("house", work)
+        get, key = work.store.get, keys.house_key
+        report = RepairReport.model_validate_json(get(key(source.house_id, "repair.json")))
+        made = Made(self._cached(work).house, report)
+        if not source.edits:
+            # Edits of it begin here.
+            dress_key = key(source.house_id, keys.DRESS)
+            is_dressed = work.store.head(dress_key) is not None
+            dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
+            remember_house(source, recipe, (made.house, report, dressing))
+        return made
+
+    def _cached(self, work: Work) -> CachedHouse:
+        digest = run_step("house", work).marker.digest
+        return self._houses.get(work.store, work.recipe, work.house_id, digest)
+
+    def _cameras(self, source: SourceRef, recipe: Recipe) -> bytes:
+        work = self._work(source, recipe)
+        self._run("house", work)
+        self._run("cameras", work)
+        return work.store.get(keys.house_key(source.house_id, "cameras.json"))
+
+    def _frames(
+        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint],
+        want: plan.Wanted, observe: Callable[[str], None],
+    ) -> Views:  # fmt: skip
+        work = replace(self._work(source, recipe), layers=want.layers)
+        self._run("house", work)
+        if recipe.cameras.source == "given":
+            self._give_cameras(work, viewpoints)
+        for step in plan.house_steps(want, source.house_id)[1:]:
+            self._run(step, work)
+        for one in viewpoints:
+            for step in plan.view_steps(want):
+                self._run(step, replace(work, view_id=one.id))
+            observe(one.id)
+        # Keep a copy: another recipe may put other files in their place.
+        taken = MemoryStore()
+        taken.put(keys.RECIPE, json_bytes(recipe))
+        for one in viewpoints:
+            copy_view(work.store, taken, ViewRef(source.house_id, one.id))
+        root = StoredRoot(taken)
+        return Views(root, tuple(ViewRef(source.house_id, one.id) for one in viewpoints), {})
+
+    def _run(self, step: str, work: Work) -> None:
+        if self._stop.is_set():
+            raise KeyboardInterrupt
+        run_step(step, work)
+
+    def _give_cameras(self, work: Work, viewpoints: Iterable[Viewpoint]) -> None:
+        """Write cameras.json of cameras from Python, those of former calls among them."""
+        key = keys.house_key(work.house_id, "cameras.json")
+        views = {}
+        if work.store.head(key) is not None:
+            held = views_from_json(work.store.get(key), key)
+            views = {name: view for name, view in held.items() if view.origin == "given"}
+        views |= {one.id: one.view for one in viewpoints}
+        found = [views[name] for name in sorted(views)]
+        # Its digest says where they come from, not which they are: a view's own id does.
+        work.store.delete(keys.marker_key(work.house_id, "cameras"))
+        facts = {"views": [[v.id, v.room_id, v.score] for v in found]}
+        data = cameras_json(found, {"source": "given", "n_views": len(found)})
+        run_unless_done("cameras", work, lambda _work: StepOutput({"cameras.json": data}, facts))
+        self._cached(work).forget_views()
+
+
+RENDERER: Final = Renderer()
+"""This process's."""
+
+
+def _forget_in_child() -> None:
+    # A forked child has no thread of it; one that has not rendered yet may begin anew.
+    if RENDERER._thread is None:
+        RENDERER._pid = os.getpid()
+
+
+os.register_at_fork(after_in_child=_forget_in_child)

@@ -1,0 +1,93 @@
+"""Where pictures are taken from: cameras that a home's sampler chose, or the user; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera, View
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.table import Table
+from pbrs_farm.sample.camera_report import CameraReport
+from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Viewpoint:
+    """A camera in a home, and how it was chosen."""
+
+    view: View
+    chosen_by: CameraFields | None = None  # None: by the user
+
+    @property
+    def id(self) -> str:
+        """`<room>_<sector>` and a number where a sector has several."""
+        return self.view.id
+
+    @property
+    def camera(self) -> Camera:
+        """Its pose and intrinsics."""
+        return self.view.camera
+
+    @property
+    def room(self) -> str:
+        """The id of its room; "out" outside all."""
+        return self.view.room_id
+
+    def __repr__(self) -> str:
+        x, y, z = self.camera.eye
+        return f"<Viewpoint {self.id} at ({x:.2f}, {y:.2f}, {z:.2f}), score {self.view.score:.3g}>"
+
+
+class Viewpoints(Sequence[Viewpoint]):
+    """The viewpoints of a home, and the report on those that were refused."""
+
+    def __init__(self, viewpoints: Sequence[Viewpoint], report: CameraReport | None = None) -> None:
+        self._viewpoints = tuple(viewpoints)
+        self.report = report
+
+    @overload
+    def __getitem__(self, at: int) -> Viewpoint: ...
+    @overload
+    def __getitem__(self, at: slice) -> Viewpoints: ...
+    def __getitem__(self, at: int | slice) -> Viewpoint | Viewpoints:
+        if isinstance(at, slice):
+            return Viewpoints(self._viewpoints[at], self.report)
+        return self._viewpoints[at]
+
+    def __len__(self) -> int:
+        return len(self._viewpoints)
+
+    @property
+    def table(self) -> Table:
+        """A row a viewpoint: id, room, eye, score, objects in sight."""
+        rows: list[dict[str, Any]] = [
+            {
+                "id": one.id, "room": one.room, "eye": [round(float(v), 2) for v in one.camera.eye],
+                "score": one.view.score, "objects": len(one.view.objects),
+            }
+            for one in self
+        ]  # fmt: skip
+        return Table(("id", "room", "eye", "score", "objects"), rows)
+
+    def __repr__(self) -> str:
+        return repr(self.table)
+
+    def _repr_html_(self) -> str:
+        return self.table._repr_html_()
+
+
+def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoint:
+    """The user's camera as a viewpoint of a house; its id names its room and its own numbers."""
+    room = room_of(house, camera)
+    room_id, sector = room.id if room else OUTSIDE, sector_of(camera, fields.n_sectors)
+    i = camera.intrinsics
+    numbers = [*np.asarray(camera.world_from_camera).ravel().tolist(), i.fx, i.fy, i.cx, i.cy]
+    mark = keys.digest(numbers, i.width_px, i.height_px, i.lens.table())[:8]
+    view = View(f"{keys.view_id(room_id, sector)}_{mark}", room_id, sector, camera, "given")
+    return Viewpoint(view)

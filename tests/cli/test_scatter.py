@@ -1,0 +1,70 @@
+"""`pbrs-farm scatter`: models of one's own in a home, looked at; a second call makes nothing anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbrs_farm as pf
+from pbrs_farm.check import verify
+from pbrs_farm.cli import main
+from tests.scene.homes import SMALL, can, crate, small_home
+
+FIELDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
+
+
+def test_scattered_models_are_seen_and_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "models").mkdir()
+    can(tmp_path / "models")
+    words = [
+        "scatter", "builtin", "--models", str(tmp_path / "models"), "--unit", "mm", "--count", "4",
+        "--views", "2", "--on", "dining table", "--out", str(tmp_path / "out"), "--recipe", "preview",
+        "--modes", "opengl_dl", *FIELDS,
+    ]  # fmt: skip
+    assert main(words) == 0
+    assert "2 views, 0 already there" in capsys.readouterr().out
+    assert main(words) == 0
+    assert "2 views, 2 already there" in capsys.readouterr().out
+    frames = pf.open(tmp_path / "out")
+    assert len(frames) == 2
+    for frame in frames:
+        seen = [row for row in frame.instances if row.get("model") == "can"]
+        assert max(row["visible_fraction"] for row in seen) >= 0.5
+    assert verify(tmp_path / "out").is_clean
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--count", "0"], "--count: 0: expected 1 or more"),
+        (["--distance", "near"], "--distance: near: expected metres"),
+        (["--on", "dinning table"], "did you mean dining table"),
+        (["--unit", "feet"], "unit: feet: no such unit"),
+        (["--models", "nothing/*.ply"], "no model found"),
+    ],
+)
+def test_what_cannot_be_scattered_is_told(
+    options: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    can(tmp_path)
+    words = ["scatter", "builtin", "--out", str(tmp_path / "out"), "--unit", "mm", *FIELDS]
+    if "--models" not in options:
+        words += ["--models", str(tmp_path / "can.ply")]
+    assert main([*words, *options]) == 1
+    assert says in capsys.readouterr().err
+
+
+def test_cameras_stand_in_rooms_at_the_distance_asked_for(tmp_path: Path) -> None:
+    home = small_home().scatter([crate(tmp_path)], 3, on="desk")
+    found = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
+    middles = np.array([i.bounds.mean(0) for i in home.house.items if i.pose])
+    for one in found:
+        away = np.linalg.norm(middles - one.camera.eye, axis=1).min()
+        assert 0.4 <= away <= 0.91
+        assert one.room == "0_1"
+    again = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
+    assert [one.id for one in found] == [one.id for one in again]

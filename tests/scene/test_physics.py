@@ -1,0 +1,30 @@
+"""Dropped things come to rest, the same for equal seeds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.errors import BadInput
+from tests.scene.homes import can, crate, small_home
+
+
+@pytest.mark.parametrize("on", ["dining table", "Bedroom"])
+def test_dropped_things_lie_on_their_support(on: str, tmp_path: Path) -> None:
+    home, models = small_home(), [can(tmp_path), crate(tmp_path)]
+    one, again = (home.scatter(models, 6, on=on, seed=1, physics=True) for _ in range(2))
+    assert one.id == again.id
+    placed = [i for i in one.house.items if i.pose]
+    assert len(placed) == 6
+    lowest = np.array([i.bounds[0, 1] for i in placed])
+    height = 0.75 if on == "dining table" else 0.0
+    # Some lie on others, none has sunk in; a thing that left the table lies on what is below it.
+    assert (lowest > -0.001).all()
+    assert (np.abs(lowest - height) < 0.001).sum() >= 3
+
+
+def test_what_cannot_be_dropped_is_told(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match=r"no room above it|no support"):
+        small_home().scatter([can(tmp_path)], 1, on="ceiling_0_0", physics=True)
