@@ -40,6 +40,19 @@ def test_every_line_of_the_researchers_tutorial_runs(
     assert n_run >= 12
 
 
+def test_every_block_of_the_python_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    found = [text for language, text in blocks("python.md") if language == "python"]
+    for text in found:
+        exec(compile(text, "python.md", "exec"), names)
+    assert len(found) >= 6
+    assert names["pose"]
+    assert len(names["frames"]) == 2  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_shows_verbs_that_exist_and_no_folder_a_clone_lacks(page: Path) -> None:
     text = page.read_text(encoding="utf-8")

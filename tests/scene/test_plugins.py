@@ -1,0 +1,98 @@
+"""Plugins by entry points: the packages under examples/plugins, installed and used."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.plugins import GROUPS, plugin, plugin_homes
+from tests.scene.homes import SMALL
+
+REPO = Path(__file__).parents[2]
+FIELDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
+FEW = ["--modes", "opengl_dl", "--recipe", "preview", *FIELDS]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of a machine that has all example plugins."""
+    folder = tmp_path_factory.mktemp("plugins")
+    examples = sorted((REPO / "examples/plugins").iterdir())
+    assert sorted(p.name for p in examples) == sorted(GROUPS)
+    # Build from copies: setuptools writes beside what it builds.
+    words = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"]
+    words += ["--no-index", "--target", str(folder / "site")]
+    for example in examples:
+        copy = folder / "src" / example.name
+        copy.mkdir(parents=True)
+        for file in example.glob("*.*"):
+            (copy / file.name).write_bytes(file.read_bytes())
+        words.append(str(copy))
+    subprocess.run(words, check=True, capture_output=True, text=True)
+    path = os.pathsep.join([str(folder / "site"), str(REPO)])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def run(env: dict[str, str], folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pbrs_farm.cli", *words]
+    return subprocess.run(command, env=env, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+def done(env: dict[str, str], folder: Path, *words: str) -> str:
+    finished = run(env, folder, *words)
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    return finished.stdout
+
+
+def test_homes_of_a_plugin_are_words(installed: dict[str, str], tmp_path: Path) -> None:
+    words = ["run", "plugin:still_life,1..2,count=2", "--views", "1", "--out", "o", *FEW]
+    done(installed, tmp_path, *words)
+    houses = sorted((tmp_path / "o/houses").iterdir())
+    assert [h.name[:13] for h in houses] == ["still-life-1-", "still-life-2-"]
+    facts = json.loads((houses[0] / "house.json").read_text())
+    assert sum(item["id"].startswith("still-life-box") for item in facts["items"]) == 2
+    assert "0 steps done" in done(installed, tmp_path, *words)
+    done(installed, tmp_path, "verify", "o")
+
+
+def test_a_reader_of_a_plugin_reads_its_files(installed: dict[str, str], tmp_path: Path) -> None:
+    (tmp_path / "mine.room").write_text('{"width": 4, "depth": 3, "height": 2.5}')
+    done(installed, tmp_path, "run", "mine.room", "--views", "1", "--out", "o", *FEW)
+    assert len(list((tmp_path / "o/houses").iterdir())) == 1
+    (tmp_path / "bad.room").write_text('{"width": 4}')
+    bad = run(installed, tmp_path, "run", "bad.room", "--out", "p", *FEW)
+    assert bad.returncode == 1
+    assert "bad.room: is no room: 'depth'" in bad.stdout + bad.stderr
+
+
+def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_path: Path) -> None:
+    words = ["--layers", "height", "--set", "cameras.preset=corners", "--out", "o", *FEW]
+    done(installed, tmp_path, "run", "builtin", *words)
+    views = sorted((tmp_path / "o").glob("houses/*/views/*"))
+    assert [v.name for v in views] == ["0_0_0", "0_1_0"]
+    assert all((v / "height.png").exists() for v in views)
+    assert "mm above the lowest floor" in done(installed, tmp_path, "layers")
+    done(installed, tmp_path, "verify", "o")
+    done(installed, tmp_path, "export", "o", "--to", "captions", "--out", "words")
+    assert "1 bed" in (tmp_path / "words/captions.tsv").read_text()
+
+
+def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: Path) -> None:
+    words = ["--dress", "3", "--catalogue", "generated", "--set", "dress.passes=red_chairs"]
+    done(installed, tmp_path, "run", "builtin", *words, "--views", "1", "--out", "o", *FEW)
+    report = json.loads(next((tmp_path / "o").glob("houses/*/dress.json")).read_text())
+    assert report["changed"]["red_chairs"] >= 2
+
+
+def test_what_is_not_installed_is_told() -> None:
+    with pytest.raises(MachineFailed, match="no plugin 'kitchen' for homes is installed here"):
+        plugin("homes", "kitchen")
+    for word in ("plugin:kitchen", "plugin:kitchen,2..1", "plugin:a b,1", "plugin:kitchen,1,2"):
+        with pytest.raises(BadInput):
+            plugin_homes(word)
