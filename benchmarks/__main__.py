@@ -44,6 +44,7 @@ OWN_TARGET: Final = {
     "lived_in": "study.lived_in",
     "board": "board.board_pages",
     "motion": "motion.motion",
+    "python": "python_api",
 }
 
 

@@ -1,0 +1,179 @@
+"""What Python costs and can do -> out/bench/python.json.
+
+`python -m benchmarks python`: import, the first picture, equality with `run`, a warm view, physics over
+PBRS_SCATTERINGS scatterings (default 40; the gate is of 200), what people ask for, examples.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import trimesh
+
+import pbrs_farm as pf
+from benchmarks.figures import write_report
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.marker import Marker
+from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.plan import wanted
+from pbrs_farm.scene import physics
+
+REPO: Final = Path(__file__).parents[1]
+EXAMPLES: Final = REPO / "examples"
+
+# What people ask of such tools, and the example that answers; "" where there is none.
+ASKED: Final = {
+    "load a home, list rooms and things": "first_picture",
+    "move, remove, turn a thing": "move_and_remove",
+    "my GLB on a table": "object_poses",
+    "change a material": "materials",
+    "sun, time of day, sky": "sun_over_a_day",
+    "my K and pose": "given_poses",
+    "RGB, depth, normals, instances to numpy": "first_picture",
+    "ten random variations": "random_materials",
+    "own label layer": "plugins/layers/height",
+    "own mesh before a room": "on_surfaces",
+    "physics drop": "physics",
+    "stereo": "stereo",
+    "trajectory": "film",
+    "6-D poses, BOP": "bop_dataset",
+    "textures at random": "materials",
+    "distractors": "distractors",
+    "own class map": "segmentation",
+    "which things are seen, how much": "object_poses",
+    "Jupyter, own Python": "first_picture",
+    "loader, epochs": "scene_family",
+    "own floor plan": "",
+    "USD, Isaac, Unity out": "",
+}
+UNITS: Final = {
+    "python.asked": f"of {len(ASKED)} things that people ask for, with an example that a test runs",
+    "python.import_ms": "ms of `import pbrs_farm`, median of 9 processes, the interpreter apart",
+    "python.first_picture_lines": "lines of docs/python.md's first picture",
+    "python.render_equal": "1 = every file of a saved frame but markers equals that of `run`",
+    "python.warm_overhead": "seconds a warm view takes over those of its steps in `run`",
+    "python.examples": "scripts under examples/",
+    "python.physics_scatterings": "scatterings of 20 things on a table, seeds 0...",
+    "python.physics_settled": "share of them that came to rest",
+    "python.physics_penetration_mm": "mm, deepest contact of any, as MuJoCo measures it",
+    "python.physics_s": "s a scattering, median",
+}
+
+
+def main() -> None:
+    """Measure everything and write the report."""
+    figures: dict[str, Any] = {
+        "python.asked": sum((EXAMPLES / f"{name}.py").exists() for name in ASKED.values()),
+        "python.import_ms": import_ms(),
+        "python.first_picture_lines": first_picture_lines(),
+        "python.examples": len(list(EXAMPLES.glob("*.py"))),
+    }
+    figures |= against_run()
+    figures |= of_physics(int(os.environ.get("PBRS_SCATTERINGS", "40")))
+    write_report("python", figures, UNITS)
+
+
+def import_ms() -> float:
+    """What importing the package adds to a process."""
+
+    def seconds(code: str) -> float:
+        started = time.perf_counter()
+        subprocess.run([sys.executable, "-c", code], check=True)
+        return time.perf_counter() - started
+
+    bare = statistics.median(seconds("pass") for _ in range(9))
+    return round(
+        1000 * (statistics.median(seconds("import pbrs_farm") for _ in range(9)) - bare), 1
+    )
+
+
+def first_picture_lines() -> int:
+    """Lines of the first block of docs/python.md until the frame is there."""
+    text = (REPO / "docs/python.md").read_text(encoding="utf-8")
+    found = re.search(r"```python\n(.*?frame = [^\n]*)\n", text, re.DOTALL)
+    return len([line for line in found[1].splitlines() if line.strip()]) if found else 0
+
+
+def against_run() -> dict[str, Any]:
+    """The same views in memory and by `run`: bytes, and seconds of a view once all is warm."""
+    home = pf.load("builtin", recipe="preview")
+    with tempfile.TemporaryDirectory() as scratch:
+        mine, theirs = Path(scratch) / "mine", Path(scratch) / "run"
+        cameras = home.cameras(n=4)
+        pf.render(home, cameras[0])
+        started = time.perf_counter()
+        frames = pf.render(home, cameras[1:])
+        warm_s = (time.perf_counter() - started) / (len(cameras) - 1)
+        frames.save(mine)
+        pf.render(home, cameras[0]).save(mine)
+        run_local(Run(["builtin"], str(theirs), home.recipe, wanted(["mlt_il_ol"], [], 4)))
+        run_s = [_seconds_of_steps(theirs, one.id) for one in cameras[1:]]
+        equal = _files(mine) == _files(theirs)
+    return {
+        "python.render_equal": int(equal),
+        "python.warm_overhead": round(warm_s / statistics.mean(run_s), 3),
+    }
+
+
+def _seconds_of_steps(root: Path, view: str) -> float:
+    markers = root.glob(f"houses/*/done/*.{view}.json")
+    return sum(Marker.model_validate_json(path.read_bytes()).seconds for path in markers)
+
+
+def _files(root: Path) -> dict[str, bytes]:
+    every = (p for p in root.rglob("*") if p.is_file() and p.parent.name != "done")
+    return {str(p.relative_to(root)): p.read_bytes() for p in every}
+
+
+def of_physics(n: int) -> dict[str, Any]:
+    """Scatterings of 20 things: who comes to rest, and how deep contacts are."""
+    home = pf.load("builtin", recipe="preview")
+    house, table = home.house, home.items.named("dining table")
+    depths, times, n_settled = [], [], 0
+    with tempfile.TemporaryDirectory() as folder:
+        models = _models(Path(folder))
+        for seed in range(n):
+            started = time.perf_counter()
+            try:
+                placed = physics.settled_poses(house, models, 20, list(table), seed)
+            except BadInput as error:
+                warnings.warn(f"seed {seed}: {error}", stacklevel=1)
+                continue
+            times.append(time.perf_counter() - started)
+            n_settled += 1
+            depths.append(physics.penetration_m(house, placed, list(table)))
+    return {
+        "python.physics_scatterings": n,
+        "python.physics_settled": round(n_settled / n, 4),
+        "python.physics_penetration_mm": round(1000 * max(depths, default=float("nan")), 3),
+        "python.physics_s": round(statistics.median(times), 2) if times else None,
+    }
+
+
+def _models(folder: Path) -> list[pf.Model]:
+    meshes = {
+        "can": trimesh.creation.cylinder(0.033, 0.122),
+        "crate": trimesh.creation.box((0.08, 0.05, 0.12)),
+        "ring": trimesh.creation.annulus(0.03, 0.04, 0.05),
+        "ball": trimesh.creation.icosphere(radius=0.035),
+        "flask": trimesh.creation.revolve(
+            np.array([[0, 0], [0.03, 0], [0.03, 0.12], [0.012, 0.17], [0.012, 0.22], [0, 0.22]])
+        ),
+    }
+    for name, mesh in meshes.items():
+        mesh.export(folder / f"{name}.ply")
+    return [pf.model(folder / f"{name}.ply") for name in meshes]
+
+
+if __name__ == "__main__":
+    main()
