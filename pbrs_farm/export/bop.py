@@ -36,7 +36,7 @@ from pbrs_farm.truth.coverage import coverage
 
 _SPLIT: Final = "train_pbr"
 _MM: Final = 1000.0
-_OWN_NUMBER: Final = re.compile(r"obj_0*([1-9]\d{0,5})")
+_OWN_NUMBER: Final = re.compile(r"obj[_-]0*([1-9]\d{0,5})")
 _VERTEX: Final = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
 _FACE: Final = np.dtype([("n", "u1"), ("corners", "<i4", 3)])
 
@@ -53,7 +53,7 @@ class _Mesh:
 def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """The layout above of views of homes with placed models; the number of files.
 
-    A model called obj_<number> keeps its number, others follow in the order of their names.
+    A model called obj_<number> or obj-<number> keeps its number, others follow in the order of their names.
     Raises BadInput where no house of the views holds a placed model, and for a lens that is no
     pin-hole.
     """

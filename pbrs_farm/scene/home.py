@@ -43,7 +43,7 @@ from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.scene.models import Model
-from pbrs_farm.scene.rendering import RENDERER, Made
+from pbrs_farm.scene.rendering import RENDERER
 from pbrs_farm.scene.viewpoints import Viewpoint, Viewpoints, viewpoint_of
 from pbrs_farm.transport.scene_tables.scene_tables import rgb_from_kelvin
 
@@ -81,19 +81,18 @@ class Home:
         """The fields it is made and rendered with."""
         return with_settings(self.base, dict(self.settings))
 
-    @cached_property
-    def _made(self) -> Made:
-        return RENDERER.house(self.source, self.recipe)
-
     @property
     def house(self) -> House:
-        """Its geometry, materials, lamps and rooms as frozen arrays (pbrs_farm.core.house)."""
-        return self._made.house
+        """Its geometry, materials, lamps and rooms as frozen arrays (pbrs_farm.core.house).
+
+        This process keeps those of the last homes: a list of a thousand homes holds none.
+        """
+        return RENDERER.house(self.source, self.recipe).house
 
     @property
     def report(self) -> RepairReport:
         """What repair changed and measured."""
-        return self._made.report
+        return RENDERER.house(self.source, self.recipe).report
 
     @property
     def rooms(self) -> Rooms:
@@ -106,10 +105,8 @@ class Home:
         return Items(self.house)
 
     def __repr__(self) -> str:
-        made = self.__dict__.get("_made")
-        if made is None:
-            return f"<Home {self.id}>"
-        return f"<Home {self.id}: {len(made.house.rooms)} rooms, {len(made.house.items)} items>"
+        edits = f", {len(self.source.edits)} edits" if self.source.edits else ""
+        return f"<Home {self.id}: {self.recipe.name}{edits}>"
 
     # What a home is made of: before its first edit.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -123,4 +124,18 @@ def models(pattern: str | Path, **options: object) -> list[Model]:
         found = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
     if not found:
         raise BadInput(pattern, "", "no model found", hint=f"of {', '.join(SUFFIXES)}")
-    return [model(path, **options) for path in found]  # type: ignore[arg-type]
+    names = _names(found)
+    return [model(path, name=name, **options) for path, name in zip(found, names, strict=True)]  # type: ignore[arg-type]
+
+
+def _names(paths: list[Path]) -> list[str]:
+    """A name of its own for each file: its stem, with its folder where others have it too."""
+    stems = Counter(keys.slug(path.stem) for path in paths)
+    names: list[str] = []
+    for path in paths:
+        # Folders of scans call every file alike: then the folder tells them apart.
+        alone = stems[keys.slug(path.stem)] == 1
+        name = keys.slug(path.stem if alone else f"{path.parent.name} {path.stem}")
+        n = names.count(name) + sum(other.startswith(f"{name}-x") for other in names)
+        names.append(f"{name}-x{n + 1}" if n else name)
+    return names

@@ -65,7 +65,7 @@ def settled_poses(
         model = models[int(rng.integers(len(models)))]
         support = supports[int(rng.choice(len(supports), p=weights / weights.sum()))]
         things.append(_Thing(model, support, np.eye(4)))
-    parts = {thing.model.id: convex_parts(thing.model) for thing in things}
+    parts = {thing.model: convex_parts(thing.model) for thing in things}
     statics = _static_solids(
         house, supports, max(float(np.linalg.norm(t.model.size_m)) for t in things)
     )
@@ -88,7 +88,7 @@ def penetration_m(
     """How deep the deepest contact is of models (model, world_from_model) at rest, metres."""
     mujoco = _mujoco()
     things = [_Thing(model, supports[0], pose) for model, pose in placed]
-    parts = {thing.model.id: convex_parts(thing.model) for thing in things}
+    parts = {thing.model: convex_parts(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
     world = mujoco.MjModel.from_xml_string(
         _mjcf(things, parts, _static_solids(house, supports, size))
@@ -242,7 +242,10 @@ def _is_open(house: House, centre: F64, radius: float) -> bool:
 
 
 def _simulate(
-    mujoco: Any, things: Sequence[_Thing], parts: dict[str, tuple[F64, ...]], statics: Sequence[F64]
+    mujoco: Any,
+    things: Sequence[_Thing],
+    parts: dict[Model, tuple[F64, ...]],
+    statics: Sequence[F64],
 ) -> list[int]:
     """Let things fall until they lie still, and take their poses; the numbers of those that move."""
     world = mujoco.MjModel.from_xml_string(_mjcf(things, parts, statics))
@@ -271,7 +274,7 @@ def _set_poses(state: Any, things: Sequence[_Thing]) -> None:
 
 
 def _mjcf(
-    things: Sequence[_Thing], parts: dict[str, tuple[F64, ...]], statics: Sequence[F64]
+    things: Sequence[_Thing], parts: dict[Model, tuple[F64, ...]], statics: Sequence[F64]
 ) -> str:
     assets = [_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
     names = {model: f"m{j}" for j, model in enumerate(parts)}
@@ -280,8 +283,8 @@ def _mjcf(
     bodies = [f'<geom type="mesh" mesh="s{k}"/>' for k in range(len(statics))]
     for thing in things:
         geoms = "".join(
-            f'<geom type="mesh" mesh="{names[thing.model.id]}_{k}" density="{_DENSITY}" class="thing"/>'
-            for k in range(len(parts[thing.model.id]))
+            f'<geom type="mesh" mesh="{names[thing.model]}_{k}" density="{_DENSITY}" class="thing"/>'
+            for k in range(len(parts[thing.model]))
         )
         bodies.append(f"<body><freejoint/>{geoms}</body>")
     return f"""<mujoco>

@@ -23,6 +23,8 @@ from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
+from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
+from pbrs_farm.run.edited_house import edited
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.run.steps import remember_house, run_step
@@ -34,7 +36,7 @@ from pbrs_farm.study.reading.views import ViewRef, Views
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
-_N_HOMES: Final = 4  # whose steps are kept
+_N_HOMES: Final = 4  # whose houses and steps are kept
 _T = TypeVar("_T")
 
 
@@ -56,11 +58,22 @@ class Renderer:
         self._ident = 0  # of that thread
         self._stop = threading.Event()
         self._stores: OrderedDict[tuple[str, str], MemoryStore] = OrderedDict()
+        self._made: OrderedDict[str, Made] = OrderedDict()
         self._houses = HouseCache()
 
     def house(self, source: SourceRef, recipe: Recipe) -> Made:
-        """The house of a source, read, dressed, repaired and edited: the step `house`, once."""
-        return self._do(lambda: self._made(source, recipe))
+        """The house of a source, read, dressed, repaired and edited; those of the last homes are kept."""
+        key = keys.digest(source, recipe.digest("read", "dress", "repair"))
+        with self._lock:
+            made = self._made.get(key)
+        if made is None:
+            made = self._do(lambda: self._house(source, recipe))
+        with self._lock:
+            self._made[key] = made
+            self._made.move_to_end(key)
+            while len(self._made) > _N_HOMES:
+                self._made.popitem(last=False)
+        return made
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
         """cameras.json of the step `cameras`."""
@@ -78,6 +91,7 @@ class Renderer:
         if self._thread is not None:
             self._do(self._houses.clear)
         self._stores.clear()
+        self._made.clear()
 
     def _do(self, task: Callable[[], _T]) -> _T:
         if os.getpid() != self._pid:
@@ -89,15 +103,18 @@ class Renderer:
         with self._lock:
             if self._thread is None:
                 self._thread = ThreadPoolExecutor(1, "pbrs-farm", self._begin)
-        self._stop.clear()
-        future: Future[_T] = self._thread.submit(task)
+        stop = threading.Event()
+        future: Future[_T] = self._thread.submit(self._begin_task, task, stop)
         try:
             return future.result()
         except BaseException:
             # Ctrl-C: the step under way ends, no other begins.
-            if not future.done():
-                self._stop.set()
+            stop.set()
             raise
+
+    def _begin_task(self, task: Callable[[], _T], stop: threading.Event) -> _T:
+        self._stop = stop
+        return task()
 
     def _begin(self) -> None:
         self._ident = threading.get_ident()
@@ -113,22 +130,30 @@ class Renderer:
     def _work(self, source: SourceRef, recipe: Recipe) -> Work:
         return Work(self._store(source), recipe, source.house_id, self._houses, source)
 
-    def _made(self, source: SourceRef, recipe: Recipe) -> Made:
+    def _house(self, source: SourceRef, recipe: Recipe) -> Made:
+        if source.edits:
+            # On the house before them, without a step: that is done when it is rendered.
+            before = self.house(source.unedited, recipe)
+            return Made(edited(before.house, source, recipe.read), before.report)
+        return self._unedited(source, recipe)
+
+    def _unedited(self, source: SourceRef, recipe: Recipe) -> Made:
         from pbrs_farm.dress.report import DressReport
         from pbrs_farm.repair import RepairReport
 
+        if uses_catalogue(source, recipe):
+            fetch_catalogue(recipe.dress)
         work = self._work(source, recipe)
         self._run("house", work)
         get, key = work.store.get, keys.house_key
         report = RepairReport.model_validate_json(get(key(source.house_id, "repair.json")))
-        made = Made(self._cached(work).house, report)
-        if not source.edits:
-            # Edits of it begin here.
-            dress_key = key(source.house_id, keys.DRESS)
-            is_dressed = work.store.head(dress_key) is not None
-            dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
-            remember_house(source, recipe, (made.house, report, dressing))
-        return made
+        house = self._cached(work).house
+        # Edits of it begin here.
+        dress_key = key(source.house_id, keys.DRESS)
+        is_dressed = work.store.head(dress_key) is not None
+        dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
+        remember_house(source, recipe, (house, report, dressing))
+        return Made(house, report)
 
     def _cached(self, work: Work) -> CachedHouse:
         digest = run_step("house", work).marker.digest

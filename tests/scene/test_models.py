@@ -81,6 +81,13 @@ def test_a_model_that_changes_is_refused(tmp_path: Path) -> None:
         _ = model.shape
 
 
+def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    for folder in ("002_can", "003_box"):
+        (tmp_path / folder).mkdir()
+        trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / folder / "textured.ply")
+    assert [m.id for m in pf.models(tmp_path)] == ["002-can-textured", "003-box-textured"]
+
+
 def test_bad_options_are_told(tmp_path: Path) -> None:
     can(tmp_path)
     for options, says in (({"unit": "feet"}, "no such unit"), ({"up": "w"}, "no such axis")):

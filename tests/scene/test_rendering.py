@@ -112,7 +112,7 @@ home.rooms
 pid = os.fork()
 if pid == 0:
     try:
-        pf.load("builtin").rooms
+        home.cameras(n=1)
     except Exception as error:
         print(error)
         sys.stdout.flush()
