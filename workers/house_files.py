@@ -12,6 +12,7 @@ from typing import Final
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
+from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
@@ -61,10 +62,22 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
         if place != path:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
-    if any(ref.kind in ("example", "sweethome3d", "made") for ref in refs):
+    if any(ref.kind in ("example", "sweethome3d", "made", "plugin") for ref in refs):
         _upload_package(store, homes_package.PACKAGE)
-    if any(ref.kind == "made" for ref in refs):
+    if any(ref.kind in ("made", "plugin") for ref in refs):
         _upload_package(store, furniture_package.PACKAGE)
+
+
+def needed_plugins(
+    refs: Sequence[SourceRef], recipe: Recipe, layers: Sequence[str]
+) -> tuple[str, ...]:
+    """The marks of the plugins that workers need for homes under a recipe."""
+    named = [("homes", plugin_homes(ref.location)[0].name) for ref in refs if ref.kind == "plugin"]
+    named += [("readers", ref.location.partition(":")[0]) for ref in refs if ref.kind == "reader"]
+    named += [("passes", name) for name in recipe.dress.passes.split(":") if name]
+    named += [("cameras", recipe.cameras.preset)] * (recipe.cameras.preset in plugins("cameras"))
+    named += [("layers", name) for name in layers if name in plugins("layers")]
+    return tuple(dict.fromkeys(plugin(group, name).mark for group, name in named))
 
 
 def _upload_package(store: Store, package: str) -> None:
@@ -74,8 +87,17 @@ def _upload_package(store: Store, package: str) -> None:
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
-    """The source is read where it lies, so every worker must see it: SUNCG, glTF with side files."""
-    return ref.kind in ("suncg", "gltf") and _placed(ref).location == ref.location
+    """The source is read where it lies, so every worker must see it.
+
+    SUNCG, glTF with side files, and what plugins read.
+    """
+    is_file = ref.kind in ("suncg", "gltf", "reader")
+    return is_file and _placed(ref).location == ref.location
+
+
+def path_of(ref: SourceRef) -> Path:
+    """Where a source that is left in place lies."""
+    return Path(ref.location.partition(":")[2] if ref.kind == "reader" else ref.location)
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:

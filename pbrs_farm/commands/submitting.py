@@ -60,6 +60,7 @@ def _submit(args: argparse.Namespace) -> int:
     from workers.house_files import (
         entries_from_arguments,
         is_left_in_place,
+        needed_plugins,
         placed_reference,
         upload,
         upload_catalogue,
@@ -85,6 +86,8 @@ def _submit(args: argparse.Namespace) -> int:
     farm = farm_of(args)
     farm.ledger.ping()
     farm.check_store()
+    for line in farm.check_plugins(needed_plugins(refs, spec.recipe, spec.layers)):
+        warn(line)
     if any(uses_catalogue(ref, spec.recipe) for ref in refs):
         recipe = upload_catalogue(farm.store, spec.recipe)
         spec = spec.model_copy(update={"recipe": recipe})

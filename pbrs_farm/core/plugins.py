@@ -62,6 +62,12 @@ def plugins(group: str) -> Mapping[str, Plugin]:
     return found
 
 
+@cache
+def installed_marks() -> tuple[str, ...]:
+    """The marks of all plugins that are installed here."""
+    return tuple(one.mark for group in GROUPS for one in plugins(group).values())
+
+
 def _order(entry: EntryPoint) -> tuple[str, str]:
     return entry.name, entry.dist.name if entry.dist else ""
 

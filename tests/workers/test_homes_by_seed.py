@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import pbrs_farm as pf
 from pbrs_farm.assets import debian, furniture_package, homes_package
+from pbrs_farm.core.plugins import Plugin
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
@@ -15,7 +17,7 @@ from pbrs_farm.store import MemoryStore, Store
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import REAL_RUNNER, SmallFarm
 from workers.client.farm_client import completed, new_spec
-from workers.house_files import entries_from_arguments
+from workers.house_files import entries_from_arguments, needed_plugins
 from workers.ids import GEOMETRY, GL, LIGHT, REDUCE, job_key
 from workers.job import JobSpec
 from workers.node.house_runner import HouseRunner
@@ -110,3 +112,33 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     HouseRunner(store, n_threads=1).run(request, lambda _text: None)
     assert (debian.cache_folder() / name).read_bytes() == b"deb"
     assert json.loads(store.get(f"houses/{entry.house_id}/house.json"))["source"]["kind"] == "made"
+
+
+class _Entry:
+    """Stands for an entry point: what it loads is a function of this module."""
+
+    def load(self) -> object:
+        return _without_sofa
+
+
+def _without_sofa(seed: int) -> pf.Home:
+    return pf.load("builtin").without("sofa" if seed == 1 else "bed")
+
+
+def test_homes_of_a_plugin_are_made_on_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = Plugin("homes", "two", "lab", "1.0", _Entry())  # type: ignore[arg-type]
+    monkeypatch.setattr(
+        "pbrs_farm.core.plugins.plugins", lambda group: {"two": own} if group == "homes" else {}
+    )
+    monkeypatch.setattr("tests.workers.test_homes_by_seed.WORDS", ["plugin:two,1", "plugin:two,2"])
+    store = MemoryStore()
+    farmed(store, small())
+    houses = {
+        key: json.loads(store.get(key))
+        for key in store.list("houses/")
+        if key.count("/") == 2 and key.endswith("/house.json")
+    }
+    names = [{item["name"] for item in house["items"]} for house in houses.values()]
+    assert ["sofa" in one for one in names] == [False, True]
+    refs = [ref for _entry, ref in entries_from_arguments(["plugin:two,1"])]
+    assert needed_plugins(refs, small(), ()) == ("two of lab 1.0",)

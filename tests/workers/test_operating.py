@@ -82,6 +82,19 @@ def test_submit_is_refused_where_no_worker_has_the_store(farm: Farm) -> None:
     assert submit(farm).state == "running"
 
 
+def test_what_plugins_workers_lack_is_told_at_submit(
+    farm: Farm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert farm.check_plugins(["kitchen of lab 1.0"]) == []  # nobody is there to say anything
+    registry_of(farm, worker="w7").heartbeat()
+    with pytest.raises(BadInput, match=r"no worker has them all: w7 lacks kitchen of lab 1\.0"):
+        farm.check_plugins(["kitchen of lab 1.0"])
+    marks = ("kitchen of lab 1.0", "height of lab 1.0")
+    monkeypatch.setattr("workers.ledger.worker_registry.installed_marks", lambda: marks)
+    registry_of(farm, worker="w8").heartbeat()
+    assert farm.check_plugins(["kitchen of lab 1.0"]) == ["w7 lacks kitchen of lab 1.0"]
+
+
 def test_submit_goes_on_where_no_worker_is_there_yet_or_says_its_store(farm: Farm) -> None:
     registry_of(farm, worker="old").heartbeat()
     assert submit(farm).state == "running"

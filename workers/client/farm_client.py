@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -233,6 +233,22 @@ class Farm:
             raise BadInput(
                 self.store.url, "", f"no worker has this store, they have {held}", hint=hint
             )
+
+    def check_plugins(self, marks: Collection[str]) -> list[str]:
+        """The living workers that lack a plugin of these marks, each with what it lacks.
+
+        Raises BadInput where workers live and none of them has them all.
+        """
+        living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
+        lacking = {
+            w.name: sorted(set(marks) - set(w.fields.get("plugins", "").split("\n")))
+            for w in living
+        }
+        lines = [f"{name} lacks {', '.join(marks)}" for name, marks in lacking.items() if marks]
+        if living and len(lines) == len(living):
+            hint = "install the same package and version where workers run"
+            raise BadInput("plugins", "", f"no worker has them all: {lines[0]}", hint=hint)
+        return lines
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""

@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping
 
 import pbrs_farm
+from pbrs_farm.core.plugins import installed_marks
 from pbrs_farm.run.processes.limits import machine_mb
 from workers.config import shown_url
 from workers.ids import QUEUES, stages_of_queue
@@ -48,6 +49,7 @@ class Registry:
                 "store": shown_url(config.store_url),
                 "store_id": config.store_id,
                 "version": pbrs_farm.__version__,
+                "plugins": "\n".join(installed_marks()),
                 "pid": os.getpid(),
                 "memory_mb": round(memory_mb),
                 "machine_mb": round(machine_mb()),

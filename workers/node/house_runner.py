@@ -33,7 +33,7 @@ from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
-from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue
+from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue, path_of
 from workers.ids import (
     GEOMETRY,
     GL,
@@ -223,7 +223,7 @@ class HouseRunner:
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
-            fill_cache(self._store, with_furniture=is_dressed or source.kind == "made")
+            fill_cache(self._store, with_furniture=is_dressed or source.kind in ("made", "plugin"))
             here = spec
             if is_dressed:
                 # Look for the furniture before the house is read: another worker may have it.
@@ -302,7 +302,7 @@ class HouseRunner:
         source = SourceRef.model_validate_json(text)
         if not source.location.startswith(FOLDER):
             # Not uploaded: this worker sees it at the path it was submitted by, or cannot do it.
-            if is_left_in_place(source) and not Path(source.location).exists():
+            if is_left_in_place(source) and not path_of(source).exists():
                 raise MachineFailed(
                     f"this worker does not see {source.location}",
                     hint="such sources are not uploaded: mount them at the path they were submitted by",
