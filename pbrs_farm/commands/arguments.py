@@ -167,7 +167,7 @@ def add_output(p: argparse.ArgumentParser) -> None:
     add = p.add_argument
     modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)"
     add("--modes", nargs="+", default=[], metavar="MODE", help=modes)
-    layers = "optional layers to write too"
+    layers = "optional layers to write beside those that are there"
     add("--layers", nargs="+", default=[], metavar="LAYER", help=layers)
     add("--views", type=int, metavar="N", help="at most N views a house (default: all)")
 

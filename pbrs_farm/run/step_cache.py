@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -19,6 +19,7 @@ from typing import Any, Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.edits import VERSION as EDITS_VERSION
 from pbrs_farm.core.errors import BadInput, StoreFailed
+from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
@@ -46,7 +47,7 @@ class Work:
     house_cache: HouseCache
     source: SourceRef | None = None  # only the house step reads it
     view_id: str | None = None  # of a step of a view
-    layers: tuple[str, ...] = ()  # optional layers to write too
+    layers: tuple[str, ...] = ()  # optional layers to write beside those that are there
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
     digest: str = ""  # of the step under way
     tell_share: Callable[[float], None] = _unheard  # called with the share done of a long step
@@ -80,19 +81,34 @@ def run_unless_done(
     step = plan.STEPS[name]
     view_id = work.view_id if step.per_view else None
     inputs = _inputs(step, work)
-    digest = plan.step_digest(step, work.recipe, work.house_id, view_id, inputs, _extra(name, work))
+
+    def digest_of(work: Work) -> str:
+        extra = _extra(name, work)
+        return plan.step_digest(step, work.recipe, work.house_id, view_id, inputs, extra)
+
     key = keys.marker_key(work.house_id, name, view_id)
     old = read_marker(work.store, key)
+    # Layers that are there stay, where nothing else has changed.
+    written = replace(work, layers=_written_layers(old))
+    is_valid = old is not None and old.digest == digest_of(written)
+    if is_valid:
+        work = replace(work, layers=_union(work.layers, written.layers))
+    digest = digest_of(work)
     if old is not None and old.digest == digest:
         return Outcome(old, was_done=True)
-    # Remove the marker before its files change: a crash leaves a step that is not done.
-    if old is not None:
+    # Remove the marker before its files change: a crash leaves a step that is not done. Files
+    # that are right outlast a step that fails to add to them.
+    if old is not None and not is_valid:
         work.store.delete(key)
 
     # Do the step, put its files, then its marker.
     started = time.perf_counter()
     made = function(replace(work, inputs=inputs, digest=digest))
+    if is_valid:
+        work.store.delete(key)
     files = tuple(_put(work, name, file, made.files[file]) for file in sorted(made.files))
+    if old is not None:
+        _remove_stale(work, old, files)
     marker = Marker(
         step=name,
         house_id=work.house_id,
@@ -109,6 +125,26 @@ def run_unless_done(
     if made.unfinished:
         work.store.delete(made.unfinished)
     return Outcome(marker, was_done=False)
+
+
+def _written_layers(marker: Marker | None) -> tuple[str, ...]:
+    """The optional layers that a view's labels were made with; () for other steps."""
+    if marker is None or marker.step != "truth":
+        return ()
+    if "layers" in marker.facts:
+        return tuple(name for name in marker.facts["layers"] if name in LAYER)
+    # Older markers say it by their files alone.
+    places = {keys.parse_house_key(file.key) for file in marker.files}
+    names = {place.file for place in places if place is not None}
+    return tuple(x.name for x in LAYERS if x.optional and x.file in names)
+
+
+def _union(asked: tuple[str, ...], written: tuple[str, ...]) -> tuple[str, ...]:
+    """All of both, in the order of what holds the other, else of the table of layers."""
+    for held in (written, asked):
+        if set(held) >= {*asked, *written}:
+            return held
+    return tuple(x.name for x in LAYERS if x.name in {*asked, *written})
 
 
 def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
@@ -173,6 +209,14 @@ def _put(work: Work, step: str, file: str, data: bytes) -> StoredFile:
         key = keys.house_key(work.house_id, file)
     work.store.put(key, data)
     return StoredFile(key=key, n_bytes=len(data), sha256=keys.sha256(data))
+
+
+def _remove_stale(work: Work, old: Marker, files: Collection[StoredFile]) -> None:
+    """Remove what a step wrote for other inputs and does not write now: no marker lists it."""
+    for stale in {file.key for file in old.files} - {file.key for file in files}:
+        place = keys.parse_house_key(stale)
+        if place and not place.step and (place.house, place.view) == (work.house_id, old.view_id):
+            work.store.delete(stale)
 
 
 # What a view's light keeps every minute, so that a killed run goes on from its film.

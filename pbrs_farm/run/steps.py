@@ -254,7 +254,8 @@ def _truth(work: Work) -> StepOutput:
         table |= truth.optional_tables(work.layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
-    return StepOutput(files, {"table": table})
+    # The marker remembers the layers: a run that asks for others adds to them.
+    return StepOutput(files, {"table": table, **({"layers": work.layers} if work.layers else {})})
 
 
 def _partners(
