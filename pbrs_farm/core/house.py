@@ -63,6 +63,9 @@ class Texture:
     media_type: str  # "image/png"
     data: bytes
 
+    def __repr__(self) -> str:
+        return f"Texture({self.id!r}, {self.name!r}, {self.media_type}, {len(self.data):,} bytes)"
+
 
 @dataclass(frozen=True, slots=True)
 class Material:
@@ -108,6 +111,9 @@ class Surface:
     material: int  # index into House.materials
     uvs: F32 | None = None  # (V, 2) v up, repeat wrap
     normals: F32 | None = None  # (V, 3) unit shading normals; None = flat
+
+    def __repr__(self) -> str:
+        return f"Surface({self.name!r}, {len(self.faces):,} triangles, material {self.material})"
 
 
 def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
@@ -199,6 +205,11 @@ class Item:
     def n_faces(self) -> int:
         """Triangles over all surfaces."""
         return sum(len(s.faces) for s in self.surfaces)
+
+    def __repr__(self) -> str:
+        room = f", room {self.room_id}" if self.room_id else ""
+        what = f"{self.kind}, nyu40 {self.nyu40}{room}, {self.n_faces:,} triangles"
+        return f"Item({self.id!r}, {self.name!r}, {what})"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -327,6 +338,12 @@ class House:
             for j, surface in enumerate(item.surfaces):
                 yield index + 1, item, j, surface
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.rooms)} rooms, {len(self.items)} items"
+        n_faces = sum(item.n_faces for item in self.items)
+        state = "repaired" if self.is_repaired else "as read"
+        return f"House({self.id!r}, {counts}, {n_faces:,} triangles, {state})"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
@@ -339,6 +356,9 @@ class Geometry:
     face_item: NDArray[np.uint32]  # (F,) instance id
     face_material: I32  # (F,) index into House.materials
     face_surface: I32  # (F,) number of the surface in House.surfaces() order
+
+    def __repr__(self) -> str:
+        return f"Geometry({len(self.positions):,} vertices, {len(self.faces):,} triangles)"
 
 
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:

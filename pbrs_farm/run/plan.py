@@ -62,29 +62,35 @@ PICTURE_GROUPS: Final = tuple(sorted({"dress", *(g for s in STEPS.values() for g
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a run was asked to make."""
+    """What a run was asked to make. Modes may be given by name; BadInput for one that is none."""
 
     modes: tuple[Mode, ...] = ALL_MODES
     layers: tuple[str, ...] = ()  # optional layers, by name
     n_views: int = 0  # per house, 0 = all
     pairs: bool = False  # what each pair of views of a room has in common, too
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "modes", tuple(map(_mode, self.modes)))
+
+
+def _mode(name: str) -> Mode:
+    """The lighting mode of that name; BadInput for a word that is none."""
+    names = [m.value for m in ALL_MODES]
+    if name not in names:
+        raise BadInput("--modes", name, "no such lighting mode", hint=hint_of_choice(name, names))
+    return Mode(name)
+
 
 def wanted(
     modes: Iterable[str], layers: Iterable[str], n_views: int = 0, *, pairs: bool = False
 ) -> Wanted:
     """Wanted from words of the command line; raises BadInput for a word that is none of ours."""
-    names = [m.value for m in ALL_MODES]
-    for mode in modes:
-        if mode not in names:
-            raise BadInput(
-                "--modes", mode, "no such lighting mode", hint=hint_of_choice(mode, names)
-            )
+    asked = {_mode(mode) for mode in modes}
     optional = [x.name for x in LAYERS if x.optional]
     for layer in layers:
         if layer not in LAYER:
             raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, optional))
-    chosen = tuple(m for m in ALL_MODES if m.value in set(modes)) or ALL_MODES
+    chosen = tuple(m for m in ALL_MODES if m in asked) or ALL_MODES
     return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views, pairs)
 
 

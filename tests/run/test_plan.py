@@ -129,3 +129,11 @@ def test_the_first_frames_of_a_sequence_are_made_and_pairs_stay_together() -> No
     sampled = recipe_from_name("fast", {"cameras.stereo_m": "0.1"})
     best = [("a_0", "a", 1.0), ("a_0_right", "a", 1.0), ("b_0", "b", 2.0), ("b_0_right", "b", 2.0)]
     assert plan.chosen_views(best, 1, sampled) == ["b_0", "b_0_right"]
+
+
+def test_modes_may_be_given_by_name() -> None:
+    want = plan.Wanted(modes=("opengl_il", Mode.MLT_OL))  # type: ignore[arg-type]
+    assert want.modes == (Mode.OPENGL_IL, Mode.MLT_OL)
+    assert plan.view_steps(want) == ("truth", "opengl_il", "light", "develop", "view")
+    with pytest.raises(BadInput, match="no such lighting mode"):
+        plan.Wanted(modes=("opengl_li",))  # type: ignore[arg-type]
