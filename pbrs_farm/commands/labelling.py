@@ -10,7 +10,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.plugins import plugins
 
 FORMS = (
-    "coco", "hdf5", "webdataset", "released", "yolo", "nerfstudio", "colmap", "tum", "kitti", "bop",
+    "coco", "hdf5", "webdataset", "released", "yolo", "yolo-seg", "nerfstudio", "colmap", "tum", "kitti", "bop",
 )  # fmt: skip
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
@@ -58,7 +58,7 @@ def add_verbs(verb: Verb) -> None:
 def _export(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.chosen_view import Choice
-    from pbrs_farm.export.export_views import export
+    from pbrs_farm.export.export_views import export, remarks_of
 
     # None is all there is: layers (but radiance), modes, the stored size.
     choice = Choice(
@@ -73,6 +73,8 @@ def _export(args: argparse.Namespace) -> int:
         args.folder, out, args.to, selection=args.selection, choice=choice, shares=shares
     )
     echo(f"{out}: {n_views} views, {n_files} files")
+    for remark in remarks_of(out):
+        warn(remark)
     return 0
 
 

@@ -230,6 +230,23 @@ def _read(file: Path) -> bytes:
         raise BadInput(file, "", fault_of(error)) from None
 
 
+# Views that a form cannot hold.
+
+LEFT_OUT: Final = "left_out.txt"
+
+
+def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
+    """left_out.txt, `<house>/<view>: <why>` a line, where any view is; the number of files.
+
+    why: begins with "has no".
+    """
+    if not views:
+        return 0
+    lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
+    (out / LEFT_OUT).write_text("".join(lines))
+    return 1
+
+
 # A folder that appears whole or not at all. Effects: writes beside it, renames.
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
@@ -25,10 +26,12 @@ from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.export.bop import write_bop
 from pbrs_farm.export.chosen_view import (
+    LEFT_OUT,
     PICTURES,
     Choice,
     ChosenView,
     blenderproc_k,
+    name_left_out,
     new_folder,
     require_lens,
 )
@@ -142,34 +145,47 @@ def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray
     return np.where(valid[..., None], (opengl + 1) / 2, 0).astype(np.float32)
 
 
-# YOLO detection: pictures, a text file of boxes for each, data.yaml. Effects: reads views, writes
-# files.
+# YOLO: pictures, a text file of boxes or of polygons for each, data.yaml. Effects: reads views,
+# writes files.
 
 
 # What surrounds the whole picture is no object: it has no boxes.
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
+_YOLO_FORMS: Final = ("yolo", "yolo-seg")
 
 
 def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """images/<house>__<view>.png and labels/<house>__<view>.txt; the number of files.
 
     A line is a box: class (NYU40 id - 1), centre x, y, width, height, as shares of the picture.
-    Views without a picture are left out.
+    Views without a picture are left out, and named in left_out.txt.
     """
-    n_files = 0
+    return _write_yolo(views, out, _box_lines)
+
+
+def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """As write_yolo; a line is a polygon: class, then x and y of each corner as shares.
+
+    Every connected part of an item's visible mask is a polygon, see mask_polygons.
+    """
+    return _write_yolo(views, out, _polygon_lines)
+
+
+def _write_yolo(
+    views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
+) -> int:
+    shown = [view for view in views if view.picture is not None]
     for folder in ("images", "labels"):
         (out / folder).mkdir()
-    for view in views:
-        if view.picture is None:
-            continue
+    for view in shown:
         name = f"{view.house.id}__{view.id}"
-        (out / "images" / f"{name}.png").write_bytes(view.data(view.picture))
-        (out / "labels" / f"{name}.txt").write_text("".join(_lines(view)))
-        n_files += 2
-    return n_files
+        (out / "images" / f"{name}.png").write_bytes(view.data(view.picture or ""))
+        (out / "labels" / f"{name}.txt").write_text("".join(lines_of(view)))
+    without = [view for view in views if view.picture is None]
+    return 2 * len(shown) + name_left_out(out, without, "has no picture")
 
 
-def _lines(view: ChosenView) -> Iterable[str]:
+def _box_lines(view: ChosenView) -> Iterable[str]:
     width, height = view.facts["width_px"], view.facts["height_px"]
     for row in view.facts["instances"]:
         if row["nyu40"] in _NO_BOX:
@@ -179,15 +195,78 @@ def _lines(view: ChosenView) -> Iterable[str]:
         yield f"{row['nyu40'] - 1} " + " ".join(f"{share:.6f}" for share in box) + "\n"
 
 
+def _polygon_lines(view: ChosenView) -> Iterable[str]:
+    instance = view.array("instance")
+    height, width = instance.shape
+    for row in view.facts["instances"]:
+        if row["nyu40"] in _NO_BOX:
+            continue
+        # The mask fills its box: look nowhere else.
+        x0, y0, x1, y1 = row["box2d"]
+        for ring in mask_polygons(instance[y0:y1, x0:x1] == row["id"]):
+            shares = (ring + np.array([x0, y0])) / np.array([width, height])
+            yield f"{row['nyu40'] - 1} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
+
+
+_TOLERANCE_PX: Final = 0.75  # of a polygon's outline: flattens the steps of a slanting edge
+
+
+def mask_polygons(mask: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
+    """(N, 2) x, y in px from the corner of mask (H, W), of each of its parts, the largest first.
+
+    Pixels that share an edge are one part. The outline keeps within a pixel of the mask's. Holes
+    are cut: the ring goes to a hole, around it and back the same way.
+    """
+    # Runs of each row as boxes, joined.
+    steps = np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    (y, x0), (_y, x1) = np.nonzero(steps > 0), np.nonzero(steps < 0)
+    parts = shapely.get_parts(shapely.union_all(shapely.box(x0, y, x1, y + 1))).tolist()
+    parts = [shapely.simplify(part, _TOLERANCE_PX) for part in sorted(parts, key=_minus_area)]
+    return [_one_ring(part) for part in parts if isinstance(part, shapely.Polygon)]
+
+
+def _minus_area(part: shapely.Polygon) -> float:
+    return -float(part.area)
+
+
+def _one_ring(part: shapely.Polygon) -> NDArray[np.float64]:
+    ring = shapely.get_coordinates(part.exterior)
+    for interior in part.interiors:
+        hole = shapely.get_coordinates(interior)[:-1]
+        # Cross where they are nearest.
+        gaps = np.linalg.norm(ring[:, None] - hole[None], axis=-1)
+        i, j = np.unravel_index(int(gaps.argmin()), gaps.shape)
+        ring = np.concatenate([ring[: i + 1], hole[j:], hole[: j + 1], ring[i:]])
+    # The last corner is the first again.
+    return np.asarray(ring[:-1])
+
+
 def write_data_yaml(out: Path, splits: tuple[str, ...]) -> int:
-    """data.yaml of an export with these splits, or none; the number of files, 1."""
-    folders = [(name, f"{name}/images") for name in splits]
-    # Ultralytics wants train and val: without a split both are all views.
-    folders = folders or [("train", "images"), ("val", "images")]
-    lines = ["path: .", *(f"{name}: {folder}" for name, folder in folders), "names:"]
-    lines += [f"  {k}: {name}" for k, name in enumerate(NYU40_NAMES[1:])]
+    """data.yaml of an export with these splits, or none; the number of files, 1.
+
+    Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
+    the other's, and a comment says so.
+    """
+    folders = {name: f"{name}/images" for name in splits} or {"train": "images", "val": "images"}
+    remarks = [] if splits else ["# without --split, train and val are all views"]
+    for name, other in (("train", "val"), ("val", "train")):
+        if name not in folders:
+            other = other if other in folders else next(iter(folders))
+            folders[name] = folders[other]
+            remarks.append(f"# no home is in {name}: it is {other}")
+    lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
+    lines += ["names:", *(f"  {k}: {name}" for k, name in enumerate(NYU40_NAMES[1:]))]
     (out / "data.yaml").write_text("\n".join(lines) + "\n")
     return 1
+
+
+def remarks_of(out: Path) -> list[str]:
+    """What a user should know of an export: its data.yaml's comments, which views are left out."""
+    files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
+    lines = [line for file in files if file.is_file() for line in file.read_text().splitlines()]
+    return [
+        line.removeprefix("# ") for line in lines if line.startswith("# ") or ": has no " in line
+    ]
 
 
 # The layout of the published PBRS data (docs/spec/suncg.md section 5): <kind>_v2/<house>/<6
@@ -267,6 +346,7 @@ FORMS: Final[Mapping[str, Writer]] = {
     "webdataset": write_webdataset,
     "released": write_released,
     "yolo": write_yolo,
+    "yolo-seg": write_yolo_seg,
     "nerfstudio": write_nerfstudio,
     "colmap": write_colmap,
     "tum": write_tum,
@@ -316,7 +396,7 @@ def export(
             part = scratch / split
             part.mkdir(exist_ok=True)
             n_files += write([ChosenView(v, choice) for v in own], part, choice)
-        if form == "yolo":
+        if form in _YOLO_FORMS:
             n_files += write_data_yaml(scratch, tuple(filter(None, by_split)))
     return len(views), n_files
 

@@ -15,7 +15,13 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lenses import COEFFICIENTS
-from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
+from pbrs_farm.export.chosen_view import (
+    Choice,
+    ChosenView,
+    intrinsics_of,
+    name_left_out,
+    require_lens,
+)
 from pbrs_farm.images import png_from_array
 
 
@@ -226,33 +232,43 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """<house>/rgb/, depth/, rgb.txt, depth.txt and groundtruth.txt; the number of files.
 
     groundtruth.txt has rows t x y z qx qy qz qw in the home's world (metres, y up), OpenCV axes:
-    what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. Frames of a
-    sequence alone, left views of pairs; BadInput where there is none.
+    what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. Right views of
+    pairs have all five with `_right` behind their names. Frames of a sequence alone: other views
+    are named in left_out.txt; BadInput where there is none.
     """
-    n_files = 0
+    n_files, written = 0, set[tuple[str, str]]()
     for house, frames in frames_by_house(views).items():
-        timed = [(f.left, f.time_s) for f in frames if f.time_s is not None]
-        if not timed:
-            continue
-        for name in ("rgb", "depth"):
-            (out / house / name).mkdir(parents=True)
-        rows: dict[str, list[str]] = {"rgb": [], "depth": [], "groundtruth": []}
-        for view, time in timed:
-            require_lens(view, "tum", "radtan")
-            name = f"{time:.6f}.png"
-            picture = view.data(required_picture(view, "tum"))
-            (out / house / "rgb" / name).write_bytes(picture)
-            (out / house / "depth" / name).write_bytes(_depth(view))
-            rows["rgb"].append(f"{time:.6f} rgb/{name}")
-            rows["depth"].append(f"{time:.6f} depth/{name}")
-            rows["groundtruth"].append(tum_row(time, pose_opencv(view)))
-        for name, lines in rows.items():
-            (out / house / f"{name}.txt").write_text("\n".join(lines) + "\n")
-        n_files += 2 * len(timed) + 3
+        timed = [(f, f.time_s) for f in frames if f.time_s is not None]
+        lefts = [(f.left, time) for f, time in timed]
+        rights = [(f.right, time) for f, time in timed if f.right is not None]
+        n_files += _write_trajectory(out / house, "", lefts)
+        n_files += _write_trajectory(out / house, "_right", rights)
+        written |= {(house, view.id) for view, _time in (*lefts, *rights)}
     if not n_files:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput("--to", "tum", "no view is a frame of a sequence", hint=hint)
-    return n_files
+    others = [view for view in views if (view.house.id, view.id) not in written]
+    return n_files + name_left_out(out, others, "has no frame of a sequence that is exported")
+
+
+def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView, float]]) -> int:
+    """What TUM's form holds of one camera that moves; the number of files."""
+    if not timed:
+        return 0
+    rows: dict[str, list[str]] = {"rgb": [], "depth": [], "groundtruth": []}
+    for name in ("rgb", "depth"):
+        (folder / f"{name}{side}").mkdir(parents=True)
+    for view, time in timed:
+        require_lens(view, "tum", "radtan")
+        files = {"rgb": view.data(required_picture(view, "tum")), "depth": _depth(view)}
+        for name, data in files.items():
+            at = f"{name}{side}/{time:.6f}.png"
+            (folder / at).write_bytes(data)
+            rows[name].append(f"{time:.6f} {at}")
+        rows["groundtruth"].append(tum_row(time, pose_opencv(view)))
+    for name, lines in rows.items():
+        (folder / f"{name}{side}.txt").write_text("\n".join(lines) + "\n")
+    return 2 * len(timed) + 3
 
 
 def _depth(view: ChosenView) -> bytes:

@@ -5,12 +5,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.coco import compressed_runs, run_lengths
-from pbrs_farm.export.export_views import export
+from pbrs_farm.export.export_views import export, mask_polygons, remarks_of
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
 
@@ -136,6 +137,62 @@ def test_yolo_boxes_are_those_of_the_instances(root, tmp_path):
     assert [x, y, w, h] == pytest.approx(expected, abs=1e-6)
     assert (tmp_path / f"yolo/images/{house}__v0.png").exists()
     assert "\n  4: chair\n" in (tmp_path / "yolo/data.yaml").read_text()
+
+
+def test_data_yaml_works_from_any_directory_and_says_what_stands_for_val(root, tmp_path):
+    export(root, tmp_path / "all", "yolo")
+    export(root, tmp_path / "one", "yolo-seg", shares=SplitShares(1, 0, 0))
+    export(root, tmp_path / "test", "yolo", shares=SplitShares(0, 0, 1))
+    for name, folder in (("all", "images"), ("one", "train/images"), ("test", "test/images")):
+        lines = (tmp_path / name / "data.yaml").read_text().splitlines()
+        assert not [line for line in lines if line.startswith("path")]
+        assert {f"train: {folder}", f"val: {folder}"} <= set(lines)
+        assert (tmp_path / name / folder).is_dir()
+        assert any("val" in remark for remark in remarks_of(tmp_path / name))
+    assert "no home is in val: it is train" in remarks_of(tmp_path / "one")
+
+
+def test_yolo_polygons_cover_the_visible_masks(root, tmp_path):
+    assert export(root, tmp_path / "seg", "yolo-seg") == (2, 5)
+    house = view_folder(root).parent.parent.name
+    lines = (tmp_path / f"seg/labels/{house}__v0.txt").read_text().splitlines()
+    semantic = png(view_folder(root) / "semantic.png")
+    height, width = semantic.shape
+    drawn = np.zeros(semantic.shape, np.uint8)
+    for line in lines:
+        number, *shares = line.split()
+        ring = np.array(shares, float).reshape(-1, 2) * (width, height)
+        assert len(ring) >= 3
+        drawn[filled(ring, semantic.shape)] = int(number) + 1
+    things = np.where(np.isin(semantic, (0, 1, 2, 22)), 0, semantic)
+    assert (drawn == things).mean() > 0.98
+    assert (things > 0).mean() > 0.02
+
+
+def filled(ring: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """The pixels whose centres a ring goes around an odd number of times."""
+    y, x = np.mgrid[: shape[0], : shape[1]] + 0.5
+    inside = np.zeros(shape, bool)
+    for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, 0), strict=True):
+        if y0 != y1:
+            inside ^= ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * (x1 - x0) / (y1 - y0))
+    return inside
+
+
+def test_a_polygon_a_part_with_its_holes_within_a_pixel():
+    y, x = np.mgrid[:80, :100]
+    disc = np.hypot(x - 40, y - 40)
+    mask = (disc < 35) & (disc > 12) & ~(np.hypot(x - 60, y - 40) < 5)
+    mask[5:9, 90:95] = mask[79, 99] = True
+    rings = mask_polygons(mask)
+    assert len(rings) == 3
+    rebuilt = np.logical_or.reduce([filled(ring, mask.shape) for ring in rings])
+    outline = mask ^ binary_erosion(mask) | binary_dilation(mask) ^ mask
+    assert not (rebuilt ^ mask)[~outline].any()
+    assert (rebuilt & mask).sum() / (rebuilt | mask).sum() > 0.97
+    # A pixel's steps are gone, corners stay.
+    assert len(rings[0]) < 150
+    assert sorted(map(tuple, rings[1])) == [(90, 5), (90, 9), (95, 5), (95, 9)]
 
 
 def test_at_another_size_labels_boxes_and_k_agree(root, tmp_path):

@@ -95,6 +95,21 @@ def test_tums_trajectory_is_read_back_as_the_same_poses(root: Path, tmp_path: Pa
     np.testing.assert_array_equal(depth, millimetres.astype(int) * 5)
 
 
+def test_tum_writes_both_views_of_every_pair(root: Path, tmp_path: Path) -> None:
+    n_views, n_files = export(root, tmp_path / "x", "tum")
+    house = only(tmp_path / "x")
+    pictures = [*house.glob("rgb*/*.png")]
+    assert len(pictures) == n_views == 6
+    assert n_files == len([p for p in (tmp_path / "x").rglob("*") if p.is_file()])
+    for name in ("rgb_right", "depth_right"):
+        rows = [line.split() for line in (house / f"{name}.txt").read_text().splitlines()]
+        assert all((house / file).exists() for _time, file in rows)
+    text = (house / "groundtruth_right.txt").read_text()
+    right = poses_from_tum(text, "groundtruth_right.txt")[2].world_from_camera
+    stored = facts_of(root, "frame_00002_right")["world_from_camera_opengl"]
+    np.testing.assert_allclose(right, stored, atol=1e-7)
+
+
 def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
     root: Path, tmp_path: Path
 ) -> None:
