@@ -28,6 +28,8 @@ def add_verbs(verb: Verb) -> None:
     text = "labels by name (`pbrs-farm layers`), default all there are but radiance"
     add("--layers", nargs="+", metavar="LAYER", help=text)
     add_modes_and_size(p)
+    text = "classes of your own: CSV with columns from,id,name (default NYU40)"
+    add("--classes", type=Path, metavar="FILE.csv", help=text)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=500, metavar="N", help="views a tar (webdataset)")
 
@@ -59,6 +61,7 @@ def _export(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.export_views import export, remarks_of
+    from pbrs_farm.formats.class_map import class_map
 
     # None is all there is: layers (but radiance), modes, the stored size.
     choice = Choice(
@@ -66,6 +69,7 @@ def _export(args: argparse.Namespace) -> int:
         modes=tuple(args.modes) if args.modes else None,
         size=size_of(args.size),
         views_per_shard=args.shard_size,
+        classes=class_map(args.classes) if args.classes else None,
     )
     shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")

@@ -18,13 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER, LAYERS, Layer
 from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
+from pbrs_farm.images import png_from_array
 from pbrs_farm.regular_files import fault_of, read_regular
 
 # The picture of a view is the first of these it has.
@@ -34,6 +37,9 @@ _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
 _BY_AREA: Final = (*_MODES, "albedo")
 _IN_PIXELS: Final = ("flow_", "disparity")  # what measures the picture's own pixels
+_CLASSES: Final = "semantic"  # the layer that a user's own classes replace
+# Classes of NYU40 that are parts of the building; all others are objects.
+_STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 _LINES: Final = tuple(layer.name for layer in LAYERS if layer.name.startswith("boundary"))
 
 
@@ -42,13 +48,14 @@ class Choice:
     """What is exported. Raises BadInput for a name that is no layer or mode.
 
     layers: names of core/layers.py without the modes; None for all there are, radiance apart.
-    modes: None for all. size: (width, height), None as rendered.
+    modes: None for all. size: (width, height), None as rendered. classes: None for NYU40.
     """
 
     layers: tuple[str, ...] | None = None
     modes: tuple[str, ...] | None = None
     size: tuple[int, int] | None = None
     views_per_shard: int = 500  # of WebDataset
+    classes: ClassMap | None = None
 
     def __post_init__(self) -> None:
         labels = [layer.name for layer in LAYERS if layer.name not in _MODES]
@@ -73,6 +80,19 @@ class Choice:
         if self.layers is None:
             return name != _RADIANCE
         return name in self.layers or (name == "valid" and "normal" in self.layers)
+
+    @property
+    def class_names(self) -> dict[int, str]:
+        """Id -> name of the classes that are exported, by id: NYU40's, or those of the user's table."""
+        if self.classes is not None:
+            return self.classes.names
+        return {k: name for k, name in enumerate(NYU40_NAMES) if k}
+
+    def is_structure(self, class_id: int) -> bool:
+        """Whether a class is a part of the building, no object."""
+        if self.classes is not None:
+            return class_id in self.classes.structure
+        return NYU40_NAMES[class_id] in _STRUCTURE
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,24 +128,47 @@ class ChosenView:
 
     @cached_property
     def facts(self) -> dict[str, Any]:
-        """view.json, at the size of the export: K, boxes and pixels of instances, layout."""
-        return self.entry.facts if self.choice.size is None else self._resized_facts()
+        """view.json, at the size of the export: K, boxes and pixels of instances, layout.
+
+        With a user's classes each instance has `own_class` and `own_class_name`, too.
+        """
+        facts = self.entry.facts if self.choice.size is None else self._resized_facts()
+        if self.choice.classes is None:
+            return facts
+        names = {0: "", **self.choice.class_names}
+        ids = [self.choice.classes.id_of(row) for row in facts["instances"]]
+        rows = [
+            row | {"own_class": k, "own_class_name": names[k]}
+            for row, k in zip(facts["instances"], ids, strict=True)
+        ]
+        return facts | {"instances": rows}
+
+    def class_of(self, row: dict[str, Any]) -> int:
+        """The class of a row of facts' instances: NYU40's, or the user's; 0 = none."""
+        return int(row["nyu40" if self.choice.classes is None else "own_class"])
 
     @property
     def facts_json(self) -> bytes:
-        """facts as a file: the stored one where nothing is resized."""
-        if self.choice.size is None:
+        """facts as a file: the stored one where nothing is resized and classes are NYU40's."""
+        if self.choice.size is None and self.choice.classes is None:
             return _read(self.entry.folder / "view.json")
         return json.dumps(self.facts, separators=(",", ":")).encode()
 
     def data(self, name: str) -> bytes:
-        """The layer's file: as stored where nothing is resized."""
+        """The layer's file: as stored where nothing is resized; classes of the user as uint16."""
+        if name == _CLASSES and self.choice.classes is not None:
+            return png_from_array(self.array(name))
         if self.choice.size is None:
             return _read(self.entry.folder / LAYER[name].file)
         return layer_bytes(name, self.array(name), self.house.attribution)
 
     def array(self, name: str) -> NDArray[Any]:
-        """The layer's array (H, W) or (H, W, 3), also where it is not exported itself; BadInput."""
+        """The layer's array (H, W) or (H, W, 3), also where it is not exported itself; BadInput.
+
+        "semantic" holds the user's classes (uint16) where there are such.
+        """
+        if name == _CLASSES and self.choice.classes is not None:
+            return self.choice.classes.label(self.array("instance"), self.facts["instances"])
         file = self.entry.folder / LAYER[name].file
         array = layer_from_bytes(name, _read(file), str(file))
         return array if self.choice.size is None else resized_layer(name, array, *self.choice.size)

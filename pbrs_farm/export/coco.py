@@ -8,12 +8,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
 from pbrs_farm.images import png_from_array
 
@@ -35,11 +35,11 @@ def write_panoptic(
     annotations = []
     for view, image in zip(views, images, strict=True):
         name = f"{view.house.id}/{view.id}.png"
-        rows = [row for row in view.facts["instances"] if row["nyu40"]]
+        rows = [row for row in view.facts["instances"] if view.class_of(row)]
         file = out / "panoptic" / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(png_from_array(_segment_ids(view.array("instance"), rows)))
-        segments = [_segment(row) for row in rows]
+        segments = [_segment(row, view.class_of(row)) for row in rows]
         annotations.append({"image_id": image["id"], "file_name": name, "segments_info": segments})
     # Furniture and the like are things; walls, floors, doors and other structure are stuff.
     document = {
@@ -49,7 +49,7 @@ def write_panoptic(
             c
             | {
                 "isthing": int(c["supercategory"] == "object"),
-                "color": NYU40_COLOURS[c["id"]].tolist(),
+                "color": NYU40_COLOURS[1 + (c["id"] - 1) % 40].tolist(),
             }
             for c in categories
         ],
@@ -58,10 +58,10 @@ def write_panoptic(
     return 1 + len(views)
 
 
-def _segment(row: dict[str, Any]) -> dict[str, Any]:
+def _segment(row: dict[str, Any], category: int) -> dict[str, Any]:
     x0, y0, x1, y1 = row["box2d"]
     box = [x0, y0, x1 - x0, y1 - y0]
-    fields = {"category_id": row["nyu40"], "area": row["pixels"], "bbox": box, "iscrowd": 0}
+    fields = {"category_id": category, "area": row["pixels"], "bbox": box, "iscrowd": 0}
     return {"id": row["id"], **fields}
 
 
@@ -109,14 +109,10 @@ def _digits(value: int) -> str:
 # COCO instances.
 
 
-# Classes of the supercategory "structure"; all others are objects.
-_STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
-
-
-def write_coco(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
     """annotations.json, images/<house>/<view>.png and the panoptic form; the number of files.
 
-    Categories are NYU40's; an instance without a class is left out. Masks are compressed run
+    Categories are NYU40's, or those of choice.classes; an instance without a class is left out. Masks are compressed run
     lengths (as pycocotools reads them), iscrowd 0. Fields of our own: house, view, K, lens and
     depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
@@ -129,7 +125,7 @@ def write_coco(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     document: dict[str, Any] = {
         "info": {"description": "pbrs_farm", "version": "1.0"},
         "licenses": _licences(views),
-        "categories": _categories(),
+        "categories": _categories(choice),
         "images": images,
         "annotations": annotations,
     }
@@ -138,11 +134,11 @@ def write_coco(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     return 1 + n_pictures + write_panoptic(views, images, document["categories"], out)
 
 
-def _categories() -> list[dict[str, Any]]:
-    kinds = ["structure" if name in _STRUCTURE else "object" for name in NYU40_NAMES]
-    rows = zip(NYU40_NAMES, kinds, strict=True)
-    # Id 0 is no class.
-    return [{"id": i, "name": n, "supercategory": k} for i, (n, k) in enumerate(rows) if i]
+def _categories(choice: Choice) -> list[dict[str, Any]]:
+    return [
+        {"id": k, "name": n, "supercategory": "structure" if choice.is_structure(k) else "object"}
+        for k, n in choice.class_names.items()
+    ]
 
 
 def _licences(views: list[ChosenView]) -> list[dict[str, Any]]:
@@ -171,11 +167,11 @@ def _image(view: ChosenView, number: int, out: Path) -> dict[str, Any]:
 def _annotations(view: ChosenView) -> Iterator[dict[str, Any]]:
     instance = view.array("instance")
     for row in view.facts["instances"]:
-        if not row["nyu40"]:
+        if not view.class_of(row):
             continue  # no category
         x0, y0, x1, y1 = row["box2d"]
         yield {
-            "category_id": row["nyu40"],
+            "category_id": view.class_of(row),
             "bbox": [x0, y0, x1 - x0, y1 - y0],  # left, top, width, height
             "area": row["pixels"],
             "iscrowd": 0,

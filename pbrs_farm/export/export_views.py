@@ -20,7 +20,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.classes import CEILING, FLOOR, NYU40_NAMES, WALL
+from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.core.plugins import plugins
@@ -82,7 +82,7 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
     colors (H, W, 3) uint8 (the first of PICTURES there is; every mode also by its name), depth
     (H, W) float32 planar metres (0 = nothing), normals (H, W, 3) float32 (n + 1) / 2 with OpenGL
-    camera axes, category_id_segmaps uint8, instance_segmaps uint16, and as JSON text
+    camera axes, category_id_segmaps uint8 (uint16 of a user's classes), instance_segmaps uint16, and as JSON text
     instance_attribute_maps and campose (the OpenGL pose, and cam_K as BlenderProc means it: the centre
     of the first pixel is (0, 0), so that cx is (W - 1) / 2; where no pin-hole, also lens and depth as
     view.json has them). Raises MachineFailed without h5py.
@@ -127,7 +127,7 @@ def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
         if view.has(layer):
             data[name] = view.array(layer)
     rows = view.facts["instances"]
-    maps = [{"idx": r["id"], "name": r["name"], "category_id": r["nyu40"]} for r in rows]
+    maps = [{"idx": r["id"], "name": r["name"], "category_id": view.class_of(r)} for r in rows]
     data["instance_attribute_maps"] = json.dumps(maps)
     pose = view.facts["world_from_camera_opengl"]
     lens = {name: view.facts[name] for name in ("lens", "depth") if name in view.facts}
@@ -157,8 +157,9 @@ _YOLO_FORMS: Final = ("yolo", "yolo-seg")
 def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """images/<house>__<view>.png and labels/<house>__<view>.txt; the number of files.
 
-    A line is a box: class (NYU40 id - 1), centre x, y, width, height, as shares of the picture.
-    Views without a picture are left out, and named in left_out.txt.
+    A line is a box: class (NYU40 id - 1; of a user's table its place among the ids), centre x, y,
+    width, height, as shares of the picture. Views without a picture are left out, and named in
+    left_out.txt.
     """
     return _write_yolo(views, out, _box_lines)
 
@@ -187,25 +188,32 @@ def _write_yolo(
 
 def _box_lines(view: ChosenView) -> Iterable[str]:
     width, height = view.facts["width_px"], view.facts["height_px"]
-    for row in view.facts["instances"]:
-        if row["nyu40"] in _NO_BOX:
-            continue
+    for number, row in _numbered(view):
         x0, y0, x1, y1 = row["box2d"]
         box = ((x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height)
-        yield f"{row['nyu40'] - 1} " + " ".join(f"{share:.6f}" for share in box) + "\n"
+        yield f"{number} " + " ".join(f"{share:.6f}" for share in box) + "\n"
+
+
+def _numbered(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
+    """The instances that count as objects, each with its class's number."""
+    numbers = {k: number for number, k in enumerate(view.choice.class_names)}
+    # Of a user's classes every one counts: the table says which.
+    none = _NO_BOX if view.choice.classes is None else (0,)
+    for row in view.facts["instances"]:
+        class_id = view.class_of(row)
+        if class_id not in none:
+            yield numbers[class_id], row
 
 
 def _polygon_lines(view: ChosenView) -> Iterable[str]:
     instance = view.array("instance")
     height, width = instance.shape
-    for row in view.facts["instances"]:
-        if row["nyu40"] in _NO_BOX:
-            continue
+    for number, row in _numbered(view):
         # The mask fills its box: look nowhere else.
         x0, y0, x1, y1 = row["box2d"]
         for ring in mask_polygons(instance[y0:y1, x0:x1] == row["id"]):
             shares = (ring + np.array([x0, y0])) / np.array([width, height])
-            yield f"{row['nyu40'] - 1} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
+            yield f"{number} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
 
 
 _TOLERANCE_PX: Final = 0.75  # of a polygon's outline: flattens the steps of a slanting edge
@@ -241,7 +249,7 @@ def _one_ring(part: shapely.Polygon) -> NDArray[np.float64]:
     return np.asarray(ring[:-1])
 
 
-def write_data_yaml(out: Path, splits: tuple[str, ...]) -> int:
+def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
     """data.yaml of an export with these splits, or none; the number of files, 1.
 
     Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
@@ -255,7 +263,10 @@ def write_data_yaml(out: Path, splits: tuple[str, ...]) -> int:
             folders[name] = folders[other]
             remarks.append(f"# no home is in {name}: it is {other}")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
-    lines += ["names:", *(f"  {k}: {name}" for k, name in enumerate(NYU40_NAMES[1:]))]
+    names = choice.class_names.values()
+    # A user's name may be anything: JSON's text is YAML's, too.
+    said = names if choice.classes is None else map(json.dumps, names)
+    lines += ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
     (out / "data.yaml").write_text("\n".join(lines) + "\n")
     return 1
 
@@ -354,6 +365,9 @@ FORMS: Final[Mapping[str, Writer]] = {
     "bop": write_bop,
 }
 
+# Forms that can tell a user's own classes; those of plugins may.
+_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo")
+
 
 def known_forms() -> tuple[str, ...]:
     """The forms, those of plugins last."""
@@ -374,11 +388,15 @@ def export(
     out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl
     keeps. choice: which layers and modes, at which size. shares: a folder for each split that has
     views (train, val, test, by home), each whole in itself. Views without labels are left out.
-    Raises BadInput for an unknown form, a folder without finished views, a selection that does not
+    Raises BadInput for an unknown form, classes of the user's for a form without classes, a folder without finished views, a selection that does not
     exist, or an out that holds something.
     """
     if form not in known_forms():
         raise BadInput("--to", form, "no such form", hint=f"of {', '.join(known_forms())}")
+    choice = choice or Choice()
+    if choice.classes is not None and form in FORMS and form not in _BY_CLASS:
+        hint = f"--to {', '.join(_BY_CLASS)}"
+        raise BadInput("--classes", "", f"{form} has no classes of your own", hint=hint)
     write = FORMS[form] if form in FORMS else plugins("exports")[form].load()
     # A view is finished when its labels are there.
     views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
@@ -388,7 +406,6 @@ def export(
         views = [v for v in views if (v.house.id, v.id) in kept]
     if not views:
         raise BadInput(folder, "", "no finished view to export")
-    choice = choice or Choice()
     with new_folder(out) as scratch:
         n_files = 0
         by_split = _by_split(views, shares)
@@ -397,7 +414,7 @@ def export(
             part.mkdir(exist_ok=True)
             n_files += write([ChosenView(v, choice) for v in own], part, choice)
         if form in _YOLO_FORMS:
-            n_files += write_data_yaml(scratch, tuple(filter(None, by_split)))
+            n_files += write_data_yaml(scratch, tuple(filter(None, by_split)), choice)
     return len(views), n_files
 
 

@@ -1,5 +1,6 @@
 import json
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -7,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, binary_erosion
 
+from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.coco import compressed_runs, run_lengths
 from pbrs_farm.export.export_views import export, mask_polygons, remarks_of
+from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
 
@@ -193,6 +196,75 @@ def test_a_polygon_a_part_with_its_holes_within_a_pixel():
     # A pixel's steps are gone, corners stay.
     assert len(rings[0]) < 150
     assert sorted(map(tuple, rings[1])) == [(90, 5), (90, 9), (95, 5), (95, 9)]
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Choice:
+    (tmp_path / "own.csv").write_text(
+        "from,id,name\nwall,300,shell\nfloor,300,shell\nbed,7,rest\n*,12,'other: thing'\n"
+    )
+    return Choice(classes=class_map(tmp_path / "own.csv"))
+
+
+def test_coco_has_the_users_own_classes(root, tmp_path, own):
+    export(root, tmp_path / "coco", "coco", choice=own)
+    document = json.loads((tmp_path / "coco/annotations.json").read_text())
+    kinds = {c["id"]: (c["name"], c["supercategory"]) for c in document["categories"]}
+    assert kinds[300] == ("shell", "structure")
+    assert kinds[7] == ("rest", "object")
+    assert sorted(kinds) == [7, 12, 300]
+    instance, semantic = (png(view_folder(root) / f"{x}.png") for x in ("instance", "semantic"))
+    for a in (a for a in document["annotations"] if a["image_id"] == 1):
+        (nyu40,) = np.unique(semantic[instance == a["instance_id"]])
+        assert a["category_id"] == {1: 300, 2: 300, 4: 7}.get(int(nyu40), 12)
+    panoptic = json.loads((tmp_path / "coco/panoptic.json").read_text())
+    used = {s["category_id"] for a in panoptic["annotations"] for s in a["segments_info"]}
+    assert used == {a["category_id"] for a in document["annotations"]}
+
+
+def test_yolo_counts_the_users_classes_from_0_and_boxes_all(root, tmp_path, own):
+    export(root, tmp_path / "yolo", "yolo", choice=own)
+    names = (tmp_path / "yolo/data.yaml").read_text().partition("names:\n")[2]
+    assert names == '  0: "rest"\n  1: "\'other: thing\'"\n  2: "shell"\n'
+    lines = next((tmp_path / "yolo/labels").glob("*__v0.txt")).read_text().splitlines()
+    rows = json.loads((view_folder(root) / "view.json").read_text())["instances"]
+    assert len(lines) == len(rows)
+    numbers = [{"wall": 2, "floor": 2, "bed": 0}.get(r["class"], 1) for r in rows]
+    assert [int(line.split()[0]) for line in lines] == numbers
+
+
+@pytest.mark.parametrize("size", [None, (64, 48)])
+def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
+    choice = replace(own, size=size)
+    export(root, tmp_path / "web", "webdataset", choice=choice)
+    export(root, tmp_path / "h5", "hdf5", choice=choice)
+    with tarfile.open(tmp_path / "web/shard-000000.tar") as tar:
+        members = [m for m in tar if "__v0." in m.name]
+        data = {m.name.partition(".")[2]: tar.extractfile(m).read() for m in members}
+    label, instance = (array_from_png(data[f"{x}.png"]) for x in ("semantic", "instance"))
+    assert label.dtype == np.uint16
+    facts = json.loads(data["json"])
+    assert {r["own_class_name"] for r in facts["instances"]} <= {"shell", "rest", "'other: thing'"}
+    for row in facts["instances"]:
+        assert (label[instance == row["id"]] == row["own_class"]).all()
+    with h5py.File(tmp_path / "h5/0.hdf5") as file:
+        assert (file["category_id_segmaps"][:] == label).all()
+        attributes = json.loads(file["instance_attribute_maps"][()])
+    assert {a["category_id"] for a in attributes} == set(np.unique(label)) - {0}
+
+
+def test_a_form_without_classes_refuses_those_of_the_user(root, tmp_path, own):
+    with pytest.raises(BadInput, match="--classes: released has no classes of your own"):
+        export(root, tmp_path / "x", "released", choice=own)
+
+
+def test_the_verb_reads_the_table(root, tmp_path, own, capsys):
+    words = ["export", str(root), "--to", "yolo", "--classes"]
+    assert main([*words, str(tmp_path / "own.csv"), "--out", str(tmp_path / "y")]) == 0
+    assert "rest" in (tmp_path / "y/data.yaml").read_text()
+    (tmp_path / "bad.csv").write_text("from,id,name\nchiar,1,seat\n")
+    assert main([*words, str(tmp_path / "bad.csv"), "--out", str(tmp_path / "z")]) == 1
+    assert "line 2: 'chiar' is no class of NYU40" in capsys.readouterr().err
 
 
 def test_at_another_size_labels_boxes_and_k_agree(root, tmp_path):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares
 from pbrs_farm.core.table import Table
+from pbrs_farm.formats.class_map import ClassMap, class_map
 from pbrs_farm.study.reading.stored_layers import ViewFacts
 from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
 
@@ -171,6 +172,18 @@ class Frame:
     def classes(self) -> NDArray[np.uint8]:
         """(H, W) NYU40 class; 0 = none."""
         return np.asarray(self._array("class40"), np.uint8)
+
+    def classes_by(self, table: str | Path | ClassMap) -> NDArray[np.uint16]:
+        """(H, W) classes of your own, 0 = none: a CSV file with columns from,id,name (docs/formats.md).
+
+        Raises BadInput for a table that is wrong, naming its line, and for a frame of shards, which
+        have no table of instances.
+        """
+        classes, rows = class_map(table), self.table.get("instances")
+        if rows is None:
+            hint = "open the output folder itself"
+            raise BadInput(self.source.url, self.id, "has no table of instances", hint=hint)
+        return classes.label(self.instance, rows)
 
     @property
     def instance(self) -> NDArray[np.uint16]:
