@@ -25,7 +25,7 @@ Labels = dict[str, NDArray[Any]]  # layer -> what is stored at N pixels: (N,) or
 
 RAY_LAYERS = (
     "instance", "semantic", "depth", "normal", "valid",
-    "depth_z", "position", "normal_world", "material", "glass",
+    "depth_z", "position", "normal_world", "material", "glass", "nocs",
 )  # fmt: skip
 """Layers that a ray through the pixel's centre decides."""
 
@@ -158,8 +158,40 @@ def _explained(
         "glass": lambda stored: (
             stored == np.where(hit & _of_face(triangles.see_through, face), 255, 0)
         ),
+        "nocs": lambda stored: _nocs_is_right(view, stored, instance, point, triangles),
     }
     return {name: np.asarray(checks[name](stored), bool) for name, stored in labels.items()}
+
+
+def _nocs_is_right(
+    view: StoredView,
+    stored: NDArray[np.int64],
+    instance: NDArray[np.int64],
+    point: Floats,
+    triangles: Triangles,
+) -> Bools:
+    """(N,) stored model coordinates are those of points (N, 3); of what is no placed model, 0."""
+    right = np.asarray(~stored.any(axis=1), bool)
+    for row in view.table["instances"]:
+        own = instance == int(row["id"])
+        if "world_from_model" not in row or not own.any():
+            continue
+        pose = np.array(row["world_from_model"], np.float64)
+        vertices = triangles.faces[triangles.instance == int(row["id"])].reshape(-1)
+        # The model's box, with its triangles and the points back in its own frame.
+        box = _in_frame(pose, triangles.vertices[vertices].astype(np.float64))
+        middle, extent = (box.max(0) + box.min(0)) / 2, np.sqrt((np.ptp(box, axis=0) ** 2).sum())
+        expected = 0.5 + (_in_frame(pose, point[own]) - middle) / extent
+        tolerance = METRES / extent + 1 / 65535
+        close = (np.abs(stored[own] / 65535 - expected) <= tolerance).all(axis=1)
+        right[own] = close & stored[own].any(axis=1)
+    return right
+
+
+def _in_frame(world_from_frame: Floats, points: Floats) -> Floats:
+    """(N, 3) world points in a frame."""
+    own = np.linalg.solve(world_from_frame[:3, :3], (points - world_from_frame[:3, 3]).T)
+    return np.asarray(own.T, np.float64)
 
 
 def _of_face(table: NDArray[Any], face: Faces) -> NDArray[Any]:

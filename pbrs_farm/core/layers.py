@@ -123,6 +123,11 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         "normal_world", "RGB", "uint16", "world frame x, y up, z; round((n + 1) 65535 / 2)", "as normal"
     ),
     optional_layer("albedo", "RGB", "uint8", "sRGB, diffuse colour"),
+    optional_layer(
+        "nocs", "RGB", "uint16",
+        "point of a placed model in its own box, round(65535 c), box centre .5, diagonal 1 (Wang et al. 2019)",
+        "0 in all three",
+    ),
     optional_layer("material", "Y", "uint16", "material id, table in view.json"),
     optional_layer("nyu13", "Y", "uint8", "NYU13 id"),
     optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json"),

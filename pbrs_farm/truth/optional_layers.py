@@ -35,7 +35,7 @@ from pbrs_farm.truth.standard_layers import (
     normal_label,
     semantic_label,
 )
-from pbrs_farm.truth.surface_layers import albedo_label, hha_label, shading_normals
+from pbrs_farm.truth.surface_layers import albedo_label, hha_label, nocs_label, shading_normals
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 
@@ -134,6 +134,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "position": lambda s: s.hit.points.position_world,
     "normal_shading": _normal_shading,
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
+    "nocs": lambda s: nocs_label(s.hit, s.house),
     # Appearance and classes of the hit.
     "albedo": lambda s: albedo_label(s.hit, s.house, s.geometry, s.textures),
     "material": _material,

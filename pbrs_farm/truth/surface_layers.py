@@ -1,4 +1,4 @@
-"""The albedo layer: diffuse reflectance at each pixel's centre; no effects."""
+"""Layers of the surface that is hit: albedo, shading normals, model coordinates, hha; no effects."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64, I32, I64, HitRecord, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
-from pbrs_farm.core.house import Geometry, House
+from pbrs_farm.core.house import Geometry, House, Item, corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
 
@@ -115,6 +115,41 @@ def _bent(geometry: Geometry, faces: I32, seen: F64, mapped: F64) -> F64:
     turn = np.where((seen * unit_normals(corners)).sum(1) < 0, -1.0, 1.0)[:, None]
     bent = turn * perturbed_normals(turn * seen, dp_du, side, mapped)
     return np.where(is_defined[:, None], bent, seen)
+
+
+# The nocs layer: where on its model a point lies.
+# Source: Wang, Sridhar, Huang, Valentin, Song, Guibas 2019, Normalized Object Coordinate Space.
+
+
+def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16: 65535 times the point's x, y, z in its model's frame; (0, 0, 0) = nothing.
+
+    The model's axis-aligned box in its own frame is moved to have its centre at 0.5 and scaled by
+    one over its diagonal. Items that are no placed model are nothing.
+    """
+    out = np.zeros((*hit.face.shape, 3), np.uint16)
+    for instance in np.unique(hit.item[hit.valid]):
+        item = house.items[int(instance) - 1]
+        if item.pose is None:
+            continue
+        mask = hit.valid & (hit.item == instance)
+        model_from_world = np.linalg.inv(np.array(item.pose.world_from_model))
+        centre, diagonal = _model_box(item, model_from_world)
+        points = _moved(hit.points.position_world[mask].astype(np.float64), model_from_world)
+        share = (points - centre) / diagonal + 0.5
+        out[mask] = np.rint(65535 * np.clip(share, 0, 1)).astype(np.uint16)
+    return out
+
+
+def _model_box(item: Item, model_from_world: F64) -> tuple[F64, float]:
+    """(3,) centre and diagonal of the item's triangles in its model's frame, metres."""
+    corners = _moved(corners_of_surfaces(item.surfaces).reshape(-1, 3), model_from_world)
+    low, high = corners.min(0), corners.max(0)
+    return (low + high) / 2, float(np.linalg.norm(high - low))
+
+
+def _moved(points: F64, matrix: F64) -> F64:
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 # The hha layer: horizontal disparity, height above ground, angle with gravity.

@@ -1,15 +1,18 @@
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import pbrs_farm as pf
 from pbrs_farm.check import verify
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, ItemKind, Surface
 from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.check.roots import SIZE, changed_pixel, edit_table, failed, house_of, make_root, sign
+from tests.scene.homes import can, crate, small_home
 
 
 def test_a_moved_camera_is_caught(root):
@@ -146,3 +149,28 @@ def test_surfaces_half_a_millimetre_apart_do_not_coincide(tmp_path):
     certificate = verify(tmp_path, all_pixels=True)
     assert certificate.is_clean, certificate.text()
     assert certificate.coincident == ()
+
+
+def test_model_coordinates_are_recomputed(tmp_path):
+    home = (
+        small_home().place(can(tmp_path), at=(2, 0.5, 2)).place(crate(tmp_path), at=(2.1, 0.5, 1.9))
+    )
+    look = pf.Camera.look_at((1.9, 0.9, 2.6), (2, 0.56, 2), size=(96, 72), hfov_deg=40)
+    pf.render(home, look, modes=[], layers=["nocs"]).save(tmp_path / "root")
+    root = tmp_path / "root"
+    assert verify(root, all_pixels=True).is_clean
+    view = next((house_of(root) / "views").iterdir())
+    label = array_from_png((view / "nocs.png").read_bytes()).copy()
+    rows = json.loads((view / "view.json").read_text())["instances"]
+    instance = array_from_png((view / "instance.png").read_bytes())
+    posed = np.isin(instance, [r["id"] for r in rows if "model" in r])
+    assert (label.any(-1) == posed).all()
+    assert posed.sum() > 500
+    # A tenth of a model beside, and a point on what is no model.
+    for place, value in ((posed, 6000), (~posed, 1)):
+        wrong = label.astype(int)
+        row, column = np.argwhere(place)[7]
+        wrong[row, column] += value
+        (view / "nocs.png").write_bytes(png_from_array(wrong.clip(0, 65535).astype(np.uint16)))
+        sign(root, house_of(root))
+        assert failed(root) == {"ray: nocs"}

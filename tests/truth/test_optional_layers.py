@@ -7,7 +7,7 @@ from pbrs_farm import truth
 from pbrs_farm.core.arrays import HitRecord
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
-from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_house
+from pbrs_farm.core.house import House, Material, MaterialKind, ModelPose, geometry_from_house
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -308,3 +308,24 @@ def test_a_stereo_cameras_noise_grows_with_the_square_of_distance_and_edges_have
     assert found[:, 210:].all()
     same = [stereo_depth(hit(np.ones((6, 8)), 2.0), camera(), seed=s) for s in (3, 3)]
     assert (same[0] == same[1]).all()
+
+
+def test_nocs_is_the_point_in_the_models_box_and_nothing_elsewhere() -> None:
+    # Two squares, the nearer one a model turned by 90 degrees about the axis of view and moved.
+    home = house(5, 1)
+    half, z = 0.5, -2.0
+    pose = ModelPose("m", ((0, -1, 0, 0), (1, 0, 0, 0), (0, 0, 1, z), (0, 0, 0, 1)))
+    model = replace(home.items[0], surfaces=(square(z, half),), pose=pose)
+    home = replace(home, items=(model, replace(home.items[1], surfaces=(square(-3, 9),))))
+    inputs = label_inputs_of(home, camera(64, 64))
+    label = truth.optional_layers(["nocs"], inputs)["nocs"]
+    assert label.dtype == np.uint16
+    own = inputs.hit.item == 1
+    assert own.any()
+    assert not label[~own].any()
+    # The model's x is the world's y, its y the world's -x; the box is flat, its diagonal sqrt(2).
+    world = inputs.hit.points.position_world[own].astype(np.float64)
+    model_xyz = np.stack([world[:, 1], -world[:, 0], np.zeros(len(world))], axis=1)
+    expected = model_xyz / np.sqrt(2) + 0.5
+    assert np.abs(label[own] / 65535 - expected).max() < 1e-5
+    assert (label[own][:, 2] == 32768).all()
