@@ -36,6 +36,7 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.coco import write_coco
+from pbrs_farm.export.point_clouds import write_ply
 from pbrs_farm.export.sequences import write_colmap, write_kitti, write_nerfstudio, write_tum
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, read_regular
@@ -363,10 +364,11 @@ FORMS: Final[Mapping[str, Writer]] = {
     "tum": write_tum,
     "kitti": write_kitti,
     "bop": write_bop,
+    "ply": write_ply,
 }
 
 # Forms that can tell a user's own classes; those of plugins may.
-_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo")
+_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo", "ply")
 
 
 def known_forms() -> tuple[str, ...]:

@@ -414,7 +414,7 @@ def test_only_what_a_selection_keeps_is_exported(root, tmp_path):
 
 def test_a_wrong_form_a_full_folder_and_an_empty_root_are_told(root, tmp_path):
     with pytest.raises(BadInput, match="coco, hdf5, webdataset, released, yolo"):
-        export(root, tmp_path / "x", "ply")
+        export(root, tmp_path / "x", "stl")
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").write_text("mine")
     with pytest.raises(BadInput, match="is there already"):
