@@ -11,7 +11,7 @@ from pbrs_farm.core.plugins import plugins
 
 FORMS = (
     "coco", "hdf5", "webdataset", "released", "yolo", "yolo-seg", "nerfstudio", "colmap", "tum", "kitti", "bop",
-    "ply",
+    "ply", "captions",
 )  # fmt: skip
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"

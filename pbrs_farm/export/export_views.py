@@ -25,6 +25,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.export.bop import write_bop
+from pbrs_farm.export.captions import write_captions
 from pbrs_farm.export.chosen_view import (
     LEFT_OUT,
     PICTURES,
@@ -365,10 +366,11 @@ FORMS: Final[Mapping[str, Writer]] = {
     "kitti": write_kitti,
     "bop": write_bop,
     "ply": write_ply,
+    "captions": write_captions,
 }
 
 # Forms that can tell a user's own classes; those of plugins may.
-_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo", "ply")
+_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo", "ply", "captions")
 
 
 def known_forms() -> tuple[str, ...]:

@@ -79,8 +79,8 @@ def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_pa
     assert all((v / "height.png").exists() for v in views)
     assert "mm above the lowest floor" in done(installed, tmp_path, "layers")
     done(installed, tmp_path, "verify", "o")
-    done(installed, tmp_path, "export", "o", "--to", "captions", "--out", "words")
-    assert "1 bed" in (tmp_path / "words/captions.tsv").read_text()
+    done(installed, tmp_path, "export", "o", "--to", "word_list", "--out", "words")
+    assert "1 bed" in (tmp_path / "words/words.tsv").read_text()
 
 
 def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: Path) -> None:

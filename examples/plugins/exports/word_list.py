@@ -1,6 +1,6 @@
 """An exporter of one's own: a line of words a view, from the scene itself.
 
-pbrs-farm export out/studio --to captions
+pbrs-farm export out/studio --to word_list
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 
-def write_captions(views: list[Any], out: Path, _choice: Any) -> int:
-    """captions.tsv: view, and what is seen, largest first; the number of files.
+def write_word_list(views: list[Any], out: Path, _choice: Any) -> int:
+    """words.tsv: view, and what is seen, largest first; the number of files.
 
     views: of pbrs_farm.export.chosen_view.ChosenView.
     """
@@ -21,5 +21,5 @@ def write_captions(views: list[Any], out: Path, _choice: Any) -> int:
         counts = Counter(row["class"] for row in rows if row["class"] not in ("wall", "none"))
         words = ", ".join(f"{n} {name}" for name, n in counts.items())
         lines.append(f"{view.house.id}/{view.id}\t{words}")
-    (out / "captions.tsv").write_text("\n".join(lines) + "\n")
+    (out / "words.tsv").write_text("\n".join(lines) + "\n")
     return 1

@@ -1,0 +1,286 @@
+"""Captions: what a view shows, in plain English made from its labels.
+
+    captions.jsonl  images/<house>/<view>.png
+
+Effects: reads views, writes files. The words are a function of the labels alone: which room, which
+things and how many, and where the largest of them are to each other.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
+from pbrs_farm.export.sequences import pose_opencv
+from pbrs_farm.home.room_use import RoomKind, named_kind
+
+LEAST_VISIBLE: Final = 0.3
+"""Share of a thing's own pixels that are seen, from which it counts."""
+
+LEAST_FRACTION: Final = 0.003
+"""Share of the picture's pixels from which a thing counts."""
+
+_RELATED: Final = 6  # largest things of which relations are told
+_SAID: Final = 4  # relations that the text tells
+_TOUCH_M: Final = 0.05  # between a thing and what it stands on
+_SLACK_M: Final = 0.02  # by which things that stand apart may overlap
+
+# Things.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Thing:
+    """A thing that counts, with its box in the axes of the camera."""
+
+    row: dict[str, Any]  # of view.json's instances
+    noun: str
+    low: F64  # (3,) x right, y down, z forward, metres
+    high: F64
+    low_world: F64  # (3,) y up
+    high_world: F64
+
+    @property
+    def id(self) -> int:
+        """Its instance."""
+        return int(self.row["id"])
+
+    @property
+    def column(self) -> float:
+        """The middle of its box in the picture, pixels."""
+        return float(self.row["box2d"][0] + self.row["box2d"][2]) / 2
+
+
+def _things(view: ChosenView) -> list[_Thing]:
+    """The things that count, those with most pixels first."""
+    camera_from_world = np.linalg.inv(pose_opencv(view))
+    found = []
+    for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
+        seen = row["visible_fraction"]
+        is_seen = (seen is None or seen >= LEAST_VISIBLE) and row["fraction"] >= LEAST_FRACTION
+        noun = _noun(view, row) if is_seen and not _is_structure(row) else ""
+        if noun:
+            world = _corners(row["box3d"])
+            local = world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+            ends = (local.min(0), local.max(0), world.min(0), world.max(0))
+            found.append(_Thing(row, noun, *ends))
+    return found
+
+
+def _is_structure(row: dict[str, Any]) -> bool:
+    return any(kind.is_structure for kind in ItemKind if kind == row["kind"])
+
+
+def _corners(box: dict[str, Any]) -> F64:
+    """(8, 3) corners of an oriented box, world."""
+    signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
+    half, axes = np.array(box["half"], np.float64), np.array(box["axes"], np.float64)
+    return np.asarray(np.array(box["centre"]) + (signs * half) @ axes)
+
+
+# Nouns.
+
+
+# Classes of NYU40 whose names are no countable nouns, and what of each is counted.
+_COUNTED: Final = {
+    "shelves": "set of shelves", "blinds": "blind", "books": "row of books", "clothes": "piece of clothing",
+    "floor mat": "rug", "paper": "sheet of paper", "night stand": "nightstand",
+}  # fmt: skip
+# Classes of no class in particular, and what is said where the thing's name says nothing.
+_VAGUE: Final = {
+    "otherprop": "object", "otherfurniture": "piece of furniture", "otherstructure": "part of the building",
+    "none": "",
+}  # fmt: skip
+_NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
+_PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")
+_PLURALS: Final = {"person": "people", "bookshelf": "bookshelves", "shelf": "shelves"}
+_NUMBERS: Final = (
+    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
+    "twelve",
+)  # fmt: skip
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+
+
+def _noun(view: ChosenView, row: dict[str, Any]) -> str:
+    """What a thing is called; "" for one without a class."""
+    if view.choice.classes is not None:
+        return str(row["own_class_name"])
+    name = str(row["class"])
+    if name not in _VAGUE:
+        return _COUNTED.get(name, name)
+    if row["kind"] in _NOUNS_OF_KINDS:
+        return _NOUNS_OF_KINDS[row["kind"]]
+    # A thing of no class is what it is called, where that is one word or two.
+    own = str(row["name"]).strip(" 0123456789")
+    return own.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(own) else _VAGUE[name]
+
+
+def plural(noun: str) -> str:
+    """Many of a noun: "chairs", "boxes", "sets of shelves", "people"."""
+    head, of, rest = noun.partition(" of ")
+    first, space, last = head.rpartition(" ")
+    if last in _PLURALS:
+        last = _PLURALS[last]
+    elif re.search(r"(s|x|ch|sh)$", last):
+        last += "es"
+    elif re.search(r"[^aeiou]y$", last):
+        last = f"{last[:-1]}ies"
+    else:
+        last += "s"
+    return f"{first}{space}{last}{of}{rest}"
+
+
+def counted(n: int, noun: str) -> str:
+    """ "a chair", "an armchair", "three chairs"."""
+    if n == 1:
+        return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
+    return f"{_NUMBERS[n] if n < len(_NUMBERS) else n} {plural(noun)}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _titles(things: Sequence[_Thing]) -> dict[int, str]:
+    """Instance -> what tells it from the others: "the sofa", "the left chair", "the third lamp from the left"."""
+    titles = {}
+    for noun in dict.fromkeys(thing.noun for thing in things):
+        own = sorted((t for t in things if t.noun == noun), key=lambda t: (t.column, t.id))
+        for k, thing in enumerate(own):
+            if len(own) == 1:
+                title = f"the {noun}"
+            elif len(own) == 2:
+                title = f"the {('left', 'right')[k]} {noun}"
+            else:
+                ordinal = _ORDINALS[k] if k < len(_ORDINALS) else f"{k + 1}th"
+                title = f"the {ordinal} {noun} from the left"
+            titles[thing.id] = title
+    return titles
+
+
+# Relations.
+
+
+def _relation(a: _Thing, b: _Thing, *, by_axes: bool) -> str:
+    """Where the first is to the second; "" where no word fits. by_axes: the camera looks one way."""
+    if _is_on(a, b):
+        return "on top of"
+    if not by_axes or _is_on(b, a):
+        return ""
+    apart = (
+        a.low - b.high > -_SLACK_M,
+        b.low - a.high > -_SLACK_M,
+    )  # behind it, before it, by axis
+    if not (apart[0][0] or apart[1][0]):
+        return "behind" if apart[0][2] else "in front of" if apart[1][2] else ""
+    # Beside each other both in the room and in the picture.
+    if apart[0][0]:
+        return "to the right of" if a.column > b.column else ""
+    return "to the left of" if a.column < b.column else ""
+
+
+def _is_on(a: _Thing, b: _Thing) -> bool:
+    """The first stands on the second: at the height of its top, its middle above it."""
+    middle = (a.low_world + a.high_world) / 2
+    over = (b.low_world <= middle) & (middle <= b.high_world)
+    return bool(abs(a.low_world[1] - b.high_world[1]) <= _TOUCH_M and over[0] and over[2])
+
+
+def _relations(view: ChosenView, things: Sequence[_Thing]) -> list[dict[str, Any]]:
+    """Of each two of the largest things, the smaller first: what stands on what, then by size."""
+    by_axes = intrinsics_of(view.facts).lens.depth_is_planar
+    rows = []
+    for larger, smaller in combinations(things[:_RELATED], 2):
+        relation = _relation(smaller, larger, by_axes=by_axes)
+        pair = smaller, larger
+        if not relation and _is_on(larger, smaller):
+            relation, pair = "on top of", (larger, smaller)
+        if relation:
+            rows.append({"subject": pair[0].id, "relation": relation, "object": pair[1].id})
+    return sorted(rows, key=lambda row: row["relation"] != "on top of")
+
+
+# The text of a view, and the file of all.
+
+
+_ROOMS: Final = {
+    RoomKind.LIVING: "living room", RoomKind.BEDROOM: "bedroom", RoomKind.KITCHEN: "kitchen",
+    RoomKind.DINING: "dining room", RoomKind.BATHROOM: "bathroom", RoomKind.OFFICE: "study",
+    RoomKind.HALL: "hall", RoomKind.OUTDOOR: "place outdoors", RoomKind.STORE: "storeroom",
+}  # fmt: skip
+
+
+def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """captions.jsonl, a line a view, and images/<house>/<view>.png; the number of files.
+
+    A line has file_name, text, objects (id, noun, box2d of each thing that counts, the largest
+    first) and relations (subject, relation, object by id, among the largest six). A thing counts
+    where LEAST_VISIBLE of it is seen on LEAST_FRACTION of the picture; walls, floors and ceilings do
+    not. Nouns are NYU40's, or the names of the user's classes. Views without a picture are left out.
+    """
+    lines = []
+    for view in views:
+        if view.picture is None:
+            continue
+        name = f"images/{view.house.id}/{view.id}.png"
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / name).write_bytes(view.data(view.picture))
+        lines.append(json.dumps({"file_name": name, **caption(view)}, ensure_ascii=False))
+    (out / "captions.jsonl").write_text("".join(f"{line}\n" for line in lines), "utf-8")
+    return len(lines) + 1
+
+
+def caption(view: ChosenView) -> dict[str, Any]:
+    """text, objects and relations of a view, as write_captions says."""
+    things = _things(view)
+    relations = _relations(view, things)
+    objects = [{"id": t.id, "noun": t.noun, "box2d": t.row["box2d"]} for t in things]
+    sentences = [_first_sentence(view, things), *_told(relations, _titles(things))]
+    return {"text": " ".join(sentences), "objects": objects, "relations": relations}
+
+
+def _first_sentence(view: ChosenView, things: Sequence[_Thing]) -> str:
+    # In the order of the largest of each noun.
+    counts = Counter(thing.noun for thing in things)
+    seen = _listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""
+    room = _room(view)
+    if not room:
+        return f"The picture shows {seen or 'an object'}."
+    return f"The picture shows {room} with {seen}." if seen else f"The picture shows {room}."
+
+
+def _room(view: ChosenView) -> str:
+    """What the view's room is for, else what it is called; "" for a model without context."""
+    if view.house.id.startswith("object_"):
+        return ""
+    name = view.entry.room_name
+    kind = named_kind(name)
+    # A studio is a study in some languages and a home of one room in others.
+    if kind is RoomKind.OFFICE and any(row["class"] == "bed" for row in view.facts["instances"]):
+        return "a studio"
+    if kind in _ROOMS:
+        return counted(1, _ROOMS[kind])
+    is_named = name not in (view.entry.room_id, f"Room {view.entry.room_id}", "")
+    return f'a room called "{name}"' if is_named else "a room"
+
+
+def _told(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
+    """A sentence for each of the first relations; of one thing, one."""
+    first: dict[int, dict[str, Any]] = {}
+    for row in relations:
+        first.setdefault(row["subject"], row)
+    sentences = []
+    for row in list(first.values())[:_SAID]:
+        subject, relation, other = titles[row["subject"]], row["relation"], titles[row["object"]]
+        sentences.append(f"{subject[0].upper()}{subject[1:]} is {relation} {other}.")
+    return sentences

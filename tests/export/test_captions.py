@@ -1,0 +1,153 @@
+"""Captions say what the labels know: counts by hand, relations of boxes by hand, a real view."""
+
+import json
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+import pbrs_farm as pf
+from pbrs_farm.export.captions import caption, counted, plural
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.export_views import export
+from pbrs_farm.formats.class_map import ClassMap, ClassRow
+from tests.scene.homes import small_home
+
+# Camera axes are x right, y down, z forward; the world is y up: turn about x.
+WORLD_FROM_CAMERA = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+def thing(number: int, noun: str, at=(0, 0, 3), size=(1, 1, 1), column=50, **fields) -> dict:
+    """An instance whose box stands at a place in camera axes."""
+    world = np.array(at) * [1, -1, -1]
+    return {
+        "id": number, "name": noun, "class": noun, "kind": "object", "nyu40": 1, "pixels": 1000 - number,
+        "fraction": 0.05, "visible_fraction": 1.0, "box2d": [column - 5, 0, column + 5, 10],
+        "box3d": {
+            "centre": world.tolist(), "half": (np.array(size) / 2).tolist(), "axes": np.eye(3).tolist(),
+        },
+    } | fields  # fmt: skip
+
+
+def view_of(*rows: dict, room: str = "Bedroom", classes: ClassMap | None = None, **facts):
+    table = {
+        "width_px": 100, "height_px": 80, "K": [[50, 0, 50], [0, 50, 40], [0, 0, 1]],
+        "world_from_camera_opencv": WORLD_FROM_CAMERA.tolist(), "instances": list(rows), **facts,
+    }  # fmt: skip
+    view = SimpleNamespace(
+        facts=table, choice=Choice(classes=classes), house=SimpleNamespace(id="h"), id="v",
+        entry=SimpleNamespace(room_name=room, room_id="0_0"),
+    )  # fmt: skip
+    return cast(ChosenView, view)
+
+
+def text(*rows: dict, **fields) -> str:
+    return caption(view_of(*rows, **fields))["text"]
+
+
+@pytest.mark.parametrize(
+    ("noun", "many"),
+    [
+        ("chair", "chairs"), ("box", "boxes"), ("bookshelf", "bookshelves"), ("person", "people"),
+        ("set of shelves", "sets of shelves"), ("dish", "dishes"), ("lady", "ladies"), ("tray", "trays"),
+        ("wine glass", "wine glasses"), ("piece of furniture", "pieces of furniture"),
+    ],
+)  # fmt: skip
+def test_nouns_have_plurals_and_articles(noun, many):
+    assert plural(noun) == many
+    assert counted(3, noun) == f"three {many}"
+    assert counted(13, noun) == f"13 {many}"
+    assert counted(1, noun) == f"a {noun}"
+    assert counted(1, "armchair") == "an armchair"
+
+
+def test_things_are_counted_and_named_by_what_they_are():
+    rows = [
+        thing(1, "bed"), thing(2, "chair"), thing(3, "chair"), thing(4, "otherprop", name="Vase 3"),
+        thing(5, "otherprop", name="Обои"), thing(6, "otherprop", kind="plant"), thing(7, "none"),
+        thing(8, "wall", kind="wall"), thing(9, "sofa", visible_fraction=0.29),
+        thing(10, "sofa", fraction=0.0029), thing(11, "lamp", visible_fraction=None),
+    ]  # fmt: skip
+    said = "a bed, two chairs, a vase, an object, a plant and a lamp."
+    assert text(*rows) == f"The picture shows a bedroom with {said}"
+
+
+@pytest.mark.parametrize(
+    ("room", "said"),
+    [
+        ("Wohnzimmer", "a living room"), ("Room 0_0", "a room"), ("0_0", "a room"),
+        ("Zxqv", 'a room called "Zxqv"'), ("Studio", "a study"),
+    ],
+)  # fmt: skip
+def test_a_room_is_what_its_name_means(room, said):
+    assert text(room=room) == f"The picture shows {said}."
+
+
+def test_a_study_with_a_bed_is_a_studio():
+    assert text(thing(1, "bed"), room="Studio") == "The picture shows a studio with a bed."
+
+
+@pytest.mark.parametrize(
+    ("at", "size", "column", "relation"),
+    [
+        ((2, 0, 3), (1, 1, 1), 90, "to the right of"),
+        ((-2, 0, 3), (1, 1, 1), 10, "to the left of"),
+        ((-2, 0, 30), (1, 1, 1), 60, ""),  # left in the room, right in the picture
+        ((0.2, 0, 5), (1, 1, 1), 50, "behind"),
+        ((0.2, 0, 1.5), (1, 1, 1), 50, "in front of"),
+        ((0.2, -0.6, 3), (0.2, 0.2, 0.2), 50, "on top of"),  # y is down
+        ((0.2, -0.8, 3), (0.2, 0.2, 0.2), 50, ""),  # 20 cm above it
+        ((0.2, 0.2, 3.2), (1, 1, 1), 50, ""),  # in one another
+    ],
+)
+def test_relations_are_those_of_the_boxes(at, size, column, relation):
+    told = caption(view_of(thing(1, "table"), thing(2, "bowl", at, size, column)))["relations"]
+    assert told == ([{"subject": 2, "relation": relation, "object": 1}] if relation else [])
+
+
+def test_the_larger_thing_may_stand_on_the_smaller():
+    rows = thing(1, "lamp", (0, -1, 3)), thing(2, "table")
+    assert text(*rows).endswith("a lamp and a table. The lamp is on top of the table.")
+
+
+def test_things_of_one_noun_are_told_apart_from_left_to_right():
+    pair = [thing(1, "table"), thing(2, "chair", (2, 0, 3), column=90)]
+    pair.append(thing(3, "chair", (-2, 0, 3), column=10))
+    said = (
+        "The right chair is to the right of the table. The left chair is to the left of the table."
+    )
+    assert text(*pair).endswith(said)
+    pair.append(thing(4, "chair", (0, 0, 9), column=50))
+    assert "The second chair from the left is behind the table." in text(*pair)
+
+
+def test_a_panorama_tells_only_what_stands_on_what():
+    rows = thing(1, "table"), thing(2, "bowl", (2, 0, 3), column=90), thing(3, "vase", (0, -1, 3))
+    facts = {"lens": {"model": "equirect"}, "depth": "distance"}
+    told = caption(view_of(*rows, **facts))["relations"]
+    assert [row["relation"] for row in told] == ["on top of"]
+
+
+def test_the_users_classes_are_the_nouns():
+    classes = ClassMap((ClassRow("chair", 1, "seat"), ClassRow("bed", 0, "")))
+    rows = thing(1, "chair", own_class_name="seat"), thing(2, "bed", own_class_name="")
+    assert text(*rows, classes=classes) == "The picture shows a bedroom with a seat."
+
+
+def test_an_export_has_a_line_a_view_and_its_picture(tmp_path):
+    home = small_home()
+    cameras = home.cameras(n=2)
+    pf.render(home, cameras, modes=["opengl_dl"]).save(tmp_path / "root")
+    assert export(tmp_path / "root", tmp_path / "out", "captions") == (2, 3)
+    lines = (tmp_path / "out/captions.jsonl").read_text("utf-8").splitlines()
+    for line in map(json.loads, lines):
+        assert list(line) == ["file_name", "text", "objects", "relations"]
+        assert (tmp_path / "out" / line["file_name"]).is_file()
+        assert line["text"].startswith(
+            ("The picture shows a living room", "The picture shows a bed")
+        )
+        known = {row["id"] for row in line["objects"]}
+        assert all({row["subject"], row["object"]} <= known for row in line["relations"])
+    export(tmp_path / "root", tmp_path / "again", "captions")
+    assert (tmp_path / "again/captions.jsonl").read_text("utf-8").splitlines() == lines
