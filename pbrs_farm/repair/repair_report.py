@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator
 
 from pbrs_farm.core.record import Record
@@ -163,6 +164,19 @@ class RepairReport(Record):
     is_leaking: bool | None = None  # None = not measured
     leaks: LeakReport | None = None
     furniture: FurnitureAudit = FurnitureAudit()
+
+    def __repr__(self) -> str:
+        n_lights = len(self.fallback_lights) + len(self.added_lamps)
+        return (
+            f"<RepairReport {shown(self.house_id)}: {len(self.rooms)} rooms,"
+            f" {len(self.removed)} items taken out, {n_lights} lamps added>"
+        )
+
+    def _repr_html_(self) -> str:
+        """What was wrong with the house and what was done about it, for a notebook."""
+        head, *lines = summary_of_report(self).split("\n")
+        rows = "".join(f"<li>{html.escape(line.removeprefix('- '))}</li>" for line in lines)
+        return f"<div>{html.escape(head)}<ul>{rows}</ul></div>"
 
 
 # A repair report in plain words: what was wrong with the house.

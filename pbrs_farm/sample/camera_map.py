@@ -1,12 +1,13 @@
-"""The floor plan with every candidate, why it was rejected, and the winners; no effects.
+"""Floor plans: a home's own, and the map of its candidates, why each was rejected, and the winners.
 
-One panel per level, then a legend with counts and, room by room, the reason of each sector that
+No effects. A map has one panel per level, then a legend with counts and, room by room, the reason of each sector that
 has no camera.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -24,6 +25,7 @@ from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 from pbrs_farm.sample.camera_report import RoomReport, Verdict
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.paper_rules import room_shape
+from pbrs_farm.sample.room_sampler import RoomTrace
 
 # A drawing of polygons, lines, dots and text, as SVG text or as an RGB array.
 
@@ -129,6 +131,7 @@ _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a pa
 _ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0  # px
 _GAZE_M = 0.45  # length of the lines of gaze along a walk
 _ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
+_EDGE, _LAMP, _LAMP_EDGE = "#9aa5b1", "#ffcc33", "#8a6500"
 
 
 def camera_map_svg(house: House, sampling: Sampling) -> str:
@@ -143,8 +146,27 @@ def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
 
 def camera_map(house: House, sampling: Sampling) -> Drawing:
     """The map of a house's sampling; x of the world to the right, z down."""
+    marks, left, bottom = _levels(house, sampling.views, sampling.traces)
+    # Write the legend and the reasons to the right of the last level.
+    notes = _notes(sampling)
+    marks += [_shifted(mark, left) for mark in notes]
+    height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
+    letters = max(len(mark.text) for mark in notes)
+    width = left + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
+    return Drawing(math.ceil(width), math.ceil(height), tuple(marks))
+
+
+def plan_svg(house: House, views: Sequence[View] = ()) -> str:
+    """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given."""
+    marks, width, bottom = _levels(house, views, (), is_plan=True)
+    return Drawing(math.ceil(width), math.ceil(bottom + _MARGIN), tuple(marks)).svg()
+
+
+def _levels(
+    house: House, views: Sequence[View], traces: Sequence[RoomTrace], *, is_plan: bool = False
+) -> tuple[list[Mark], float, float]:
+    """The levels side by side, each at the scale that fits; where they end on the right and below."""
     marks: list[Mark] = []
-    # Draw the levels side by side, each at the scale that fits.
     left, bottom = _MARGIN, _MARGIN
     for level in house.levels:
         rooms = [room for room in house.rooms if room.level_id == level.id]
@@ -155,16 +177,10 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
         marks.append(_text(left, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
-        marks += _level_marks(house, sampling, level.id, panel)
+        marks += _level_marks(house, views, traces, level.id, panel, is_plan)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
-    # Write the legend and the reasons to the right of the last level.
-    notes = _notes(sampling)
-    marks += [_shifted(mark, left) for mark in notes]
-    height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
-    letters = max(len(mark.text) for mark in notes)
-    width = left + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
-    return Drawing(math.ceil(width), math.ceil(height), tuple(marks))
+    return marks, left, bottom
 
 
 class _Panel:
@@ -177,7 +193,10 @@ class _Panel:
         return self.x + self.scale * float(x), self.y + self.scale * float(z)
 
 
-def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel) -> list[Mark]:
+def _level_marks(
+    house: House, views: Sequence[View], traces: Sequence[RoomTrace], level_id: str, panel: _Panel,
+    is_plan: bool,
+) -> list[Mark]:  # fmt: skip
     rooms = {room.id: room for room in house.rooms if room.level_id == level_id}
     marks = [
         Mark("polygon", tuple(panel(x, z) for x, z in room.polygon), _ROOM, title=shown(room.name))
@@ -187,8 +206,10 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
     # Draw from the floor up: rooms, furniture and walls, candidates, names, winners.
     items = [item for item in house.items if item.level_id == level_id]
     for item in items:
-        marks += _footprint(item, panel)
-    for trace in sampling.traces:
+        marks += _footprint(item, panel, is_plan)
+    if is_plan:
+        marks += [mark for item in items for mark in _lamps(item, panel)]
+    for trace in traces:
         if trace.room_id in rooms:
             for eye, verdict in zip(trace.candidates.eye, trace.verdict, strict=True):
                 kind = Verdict(verdict)
@@ -201,10 +222,10 @@ def _level_marks(house: House, sampling: Sampling, level_id: str, panel: _Panel)
         if len(room.polygon)
     ]
     # A walk is one line; of its frames a few say where they look.
-    views = [view for view in sampling.views if view.room_id in rooms and not view.left_id]
-    frames = [view for view in views if view.frame is not None]
+    own = [view for view in views if view.room_id in rooms and not view.left_id]
+    frames = [view for view in own if view.frame is not None]
     marks += _walk(frames, panel)
-    for view in views:
+    for view in own:
         if view.frame is None:
             marks += _winner(view, panel)
     return marks
@@ -228,7 +249,7 @@ def _walk(frames: list[View], panel: _Panel) -> list[Mark]:
     return marks
 
 
-def _footprint(item: Item, panel: _Panel) -> list[Mark]:
+def _footprint(item: Item, panel: _Panel, has_edge: bool) -> list[Mark]:
     """Furniture: its hull seen from above. Walls: their level faces, tops and bottoms."""
     if item.kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND) or not item.n_faces:
         return []
@@ -247,7 +268,18 @@ def _footprint(item: Item, panel: _Panel) -> list[Mark]:
     if not isinstance(hull, shapely.Polygon):
         return []
     points = tuple(panel(x, z) for x, z in hull.exterior.coords)
-    return [Mark("polygon", points, _FURNITURE, title=shown(item.name))]
+    inside = Mark("polygon", points, _FURNITURE, title=shown(item.name))
+    return [inside, Mark("line", points, _EDGE)] if has_edge else [inside]
+
+
+def _lamps(item: Item, panel: _Panel) -> list[Mark]:
+    """A dot at each light source."""
+    marks = []
+    for light in item.lights:
+        point = (panel(light.position[0], light.position[2]),)
+        title = f"lamp: {shown(item.name)}"
+        marks += [Mark("dot", point, _LAMP_EDGE, 4.0), Mark("dot", point, _LAMP, 3.0, title=title)]
+    return marks
 
 
 def _winner(view: View, panel: _Panel) -> list[Mark]:

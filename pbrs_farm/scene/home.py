@@ -5,6 +5,7 @@ Effects: reads what the home is made of when it is first looked at; renders when
 
 from __future__ import annotations
 
+import html
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, triple
@@ -107,6 +109,9 @@ class Home:
     def __repr__(self) -> str:
         edits = f", {len(self.source.edits)} edits" if self.source.edits else ""
         return f"<Home {self.id}: {self.recipe.name}{edits}>"
+
+    def _repr_html_(self) -> str:
+        return f"<div><code>{html.escape(self.id)}</code><br>{self.plan()}</div>"
 
     # What a home is made of: before its first edit.
 
@@ -331,6 +336,24 @@ class Home:
 
     # Looking and rendering.
 
+    def plan(self, cameras: Sequence[Camera | Viewpoint] = ()) -> str:
+        """Its plan as SVG text: rooms with names, outlines of items, lamps, and cameras if given."""
+        from pbrs_farm.sample.camera_map import plan_svg
+
+        return plan_svg(self.house, [self.viewpoint(camera).view for camera in cameras])
+
+    def sketches(
+        self, cameras: Sequence[Camera | Viewpoint], edge_px: int = 160
+    ) -> list[NDArray[np.uint8]]:
+        """A small OpenGL picture (H, W, 3) sRGB from each camera, edge_px along its longer edge."""
+        small = []
+        for camera in (self.viewpoint(one).camera for one in cameras):
+            width, height = camera.intrinsics.width_px, camera.intrinsics.height_px
+            scale = edge_px / max(width, height)
+            size = max(1, round(scale * width)), max(1, round(scale * height))
+            small.append(camera.with_size(*size))
+        return RENDERER.sketches(self.source, self.recipe, small)
+
     def cameras(
         self, preset: Literal["photo", "paper", "released"] | None = None, n: int = 0, **fields: Any
     ) -> Viewpoints:
@@ -345,7 +368,8 @@ class Home:
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
         chosen = plan.chosen_views(rows, n, home.recipe)
         found = [Viewpoint(views[name], home.recipe.cameras) for name in chosen]
-        return Viewpoints(found, CameraReport.model_validate(json.loads(data)["report"]))
+        report = CameraReport.model_validate(json.loads(data)["report"])
+        return Viewpoints(found, report, self)
 
     def cameras_around(
         self,
@@ -379,7 +403,7 @@ class Home:
             self.house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
             min_visible=min_visible, size=size, hfov_deg=hfov_deg, seed=seed,
         )  # fmt: skip
-        return Viewpoints([self.viewpoint(camera) for camera in cameras])
+        return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 
     def viewpoint(self, camera: Camera | Viewpoint) -> Viewpoint:
         """A camera as a viewpoint of this home, with the room that it is in."""

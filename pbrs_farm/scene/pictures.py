@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final, overload
 
@@ -11,6 +13,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.progress import progress_reporter
 from pbrs_farm.run import plan
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.processes.render_task import Event
@@ -32,12 +35,13 @@ _ALWAYS: Final = ("depth", "normal", "valid", "semantic", "class40", "instance",
 def render(
     home: Home, cameras: AnyCamera, *, modes: Iterable[str] = ..., layers: Iterable[str] = ...,
     size: tuple[int, int] | None = ..., observe: Callable[[str], None] | None = ...,
+    progress: bool = ...,
 ) -> Frame: ...  # fmt: skip
 @overload
 def render(
     home: Home, cameras: Sequence[AnyCamera], *, modes: Iterable[str] = ...,
     layers: Iterable[str] = ..., size: tuple[int, int] | None = ...,
-    observe: Callable[[str], None] | None = ...,
+    observe: Callable[[str], None] | None = ..., progress: bool = ...,
 ) -> Views: ...  # fmt: skip
 def render(
     home: Home,
@@ -47,6 +51,7 @@ def render(
     layers: Iterable[str] = (),
     size: tuple[int, int] | None = None,
     observe: Callable[[str], None] | None = None,
+    progress: bool = False,
 ) -> Frame | Views:
     """Pictures and labels of a home in memory: no folder, no second process.
 
@@ -54,7 +59,7 @@ def render(
     opengl_il, mlt_ol, mlt_il_ol; an empty list renders labels alone. layers: optional ones to make
     beside depth, normal, class and instance, which each frame has (`pbrs-farm layers` lists them).
     size: (width, height); of a camera of your own its own size, else the recipe's. observe: called
-    with the id of each frame that is done.
+    with the id of each frame that is done. progress: show bars on a terminal, lines in a notebook.
 
     The same bytes as `pbrs-farm run` makes of that home, recipe and view. A camera in no room is a
     warning. Raises BadInput for a mode, a layer or a size that is none, RenderFailed.
@@ -73,10 +78,40 @@ def render(
                 f"{home.id}: the camera at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room", stacklevel=2
             )
     recipe = _recipe_of_view(home, found, size)
-    frames = RENDERER.frames(
-        home.source, recipe, found, _wanted(modes, layers), observe or (lambda _view: None)
-    )
+    want = _wanted(modes, layers)
+    with _told(home, found, observe, progress) as tell:
+        frames = RENDERER.frames(home.source, recipe, found, want, tell)
     return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
+
+
+@contextmanager
+def _told(
+    home: Home,
+    viewpoints: Sequence[Viewpoint],
+    observe: Callable[[str], None] | None,
+    progress: bool,
+) -> Iterator[Callable[[str], None]]:
+    """What hears of each view that is done: the caller, and the bars if they are wanted."""
+    if not progress:
+        yield observe or (lambda _view: None)
+        return
+    ids = [one.id for one in viewpoints]
+    began_s = time.monotonic()
+    with progress_reporter(1, as_json=False) as report:
+
+        def hear(view_id: str) -> None:
+            nonlocal began_s
+            now_s = time.monotonic()
+            report(Event("done", home.id, view_id, "", seconds=now_s - began_s))
+            report(Event("end", home.id, view_id, ""))
+            began_s = now_s
+            if observe is not None:
+                observe(view_id)
+
+        report(Event("planned", home.id, None, "cameras", facts={"views": ids}))
+        report(Event("begin", home.id, ids[0], "house"))
+        yield hear
+        report(Event("end", home.id, None, ""))
 
 
 def _wanted(modes: Iterable[str], layers: Iterable[str]) -> plan.Wanted:
@@ -123,13 +158,14 @@ def render_homes(
     layers: Iterable[str] = (),
     jobs: int = 1,
     observe: Callable[[Event], None] | None = None,
+    progress: bool = False,
 ) -> Views:
     """Every home into one place by this machine's processes: `pbrs-farm run` from Python.
 
     homes: also edited ones. out: a folder or s3://bucket/prefix; what is there already is not made
     again, so that a script that was killed goes on where it was. recipe: for all of them; None: the
     homes' own, which must agree. views: of each home, 0 = all its sampled viewpoints. observe: hears
-    each step that ends.
+    each step that ends. progress: show bars on a terminal, lines elsewhere, as `pbrs-farm run` does.
 
     Returns the frames of out. A home that cannot be made costs itself alone and is a warning;
     raises BadRecipe where recipes disagree or out holds another, BadInput where nothing was made.
@@ -148,7 +184,16 @@ def render_homes(
         homes=(), store_url=str(out), recipe=made_with[0], sources=[home.source for home in every],
         want=plan.wanted(modes, layers, views), n_jobs=jobs,
     )  # fmt: skip
-    summary = run_local(run, observe or (lambda _event: None))
+    heard: list[Callable[[Event], None]] = [observe] if observe is not None else []
+
+    def tell(event: Event) -> None:
+        for hear in heard:
+            hear(event)
+
+    with ExitStack() as stack:
+        if progress:
+            heard.append(stack.enter_context(progress_reporter(len(every), as_json=False)))
+        summary = run_local(run, tell)
     _warn_of(summary)
     return open_views(out)
 

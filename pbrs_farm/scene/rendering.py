@@ -15,7 +15,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
@@ -85,6 +89,12 @@ class Renderer:
     ) -> Views:  # fmt: skip
         """The viewpoints' frames: the steps of `want` for each, in a store of their own."""
         return self._do(lambda: self._frames(source, recipe, viewpoints, want, observe))
+
+    def sketches(
+        self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
+    ) -> list[NDArray[np.uint8]]:
+        """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored."""
+        return self._do(lambda: self._sketches(source, recipe, cameras))
 
     def close(self) -> None:
         """Let go of every home."""
@@ -164,6 +174,14 @@ class Renderer:
         self._run("house", work)
         self._run("cameras", work)
         return work.store.get(keys.house_key(source.house_id, "cameras.json"))
+
+    def _sketches(
+        self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
+    ) -> list[NDArray[np.uint8]]:
+        work = self._work(source, recipe)
+        self._run("house", work)
+        rasterizer = self._cached(work).rasterizer
+        return [rasterizer.render_dl(camera) for camera in cameras]
 
     def _frames(
         self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint],

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, View
+from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.core.table import Table
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
+from pbrs_farm.study.reading.views import MOST_SHOWN, figure_html
+
+if TYPE_CHECKING:
+    from pbrs_farm.scene.home import Home
+
+_SKETCH_PX: Final = 160  # of the longer edge of a small picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,9 +55,16 @@ class Viewpoint:
 class Viewpoints(Sequence[Viewpoint]):
     """The viewpoints of a home, and the report on those that were refused."""
 
-    def __init__(self, viewpoints: Sequence[Viewpoint], report: CameraReport | None = None) -> None:
+    def __init__(
+        self,
+        viewpoints: Sequence[Viewpoint],
+        report: CameraReport | None = None,
+        home: Home | None = None,
+    ) -> None:
+        """home: they are of; a notebook shows what is seen from them where it is given."""
         self._viewpoints = tuple(viewpoints)
         self.report = report
+        self.home = home
 
     @overload
     def __getitem__(self, at: int) -> Viewpoint: ...
@@ -57,7 +72,7 @@ class Viewpoints(Sequence[Viewpoint]):
     def __getitem__(self, at: slice) -> Viewpoints: ...
     def __getitem__(self, at: int | slice) -> Viewpoint | Viewpoints:
         if isinstance(at, slice):
-            return Viewpoints(self._viewpoints[at], self.report)
+            return Viewpoints(self._viewpoints[at], self.report, self.home)
         return self._viewpoints[at]
 
     def __len__(self) -> int:
@@ -79,7 +94,22 @@ class Viewpoints(Sequence[Viewpoint]):
         return repr(self.table)
 
     def _repr_html_(self) -> str:
-        return self.table._repr_html_()
+        """The home's plan with them on it, and small OpenGL pictures of at most MOST_SHOWN."""
+        if self.home is None or not self:
+            return self.table._repr_html_()
+        some = self._viewpoints[:MOST_SHOWN]
+        try:
+            pictures = self.home.sketches(some, _SKETCH_PX)
+            cells = "".join(
+                figure_html(f"{one.id}, score {one.view.score:.3g}", rgb, _SKETCH_PX)
+                for one, rgb in zip(some, pictures, strict=True)
+            )
+        except PbrsError as error:
+            # A machine without OpenGL shows where they are.
+            cells = f"<p>{html.escape(str(error))}</p>"
+        left = len(self) - len(some)
+        more = f"<p>... and {left} more</p>" if left else ""
+        return f"<div>{self.home.plan(self)}<br>{cells}{more}</div>"
 
 
 def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoint:

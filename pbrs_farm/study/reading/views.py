@@ -19,7 +19,10 @@ from pbrs_farm.formats.class_map import ClassMap, class_map
 from pbrs_farm.study.reading.stored_layers import ViewFacts
 from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
 
-_THUMB_PX: Final = 320  # of a picture in a notebook
+_PICTURE_PX: Final = 320  # of a picture in a notebook
+_THUMB_PX: Final = 160  # of one among many
+MOST_SHOWN: Final = 24
+"""Pictures of a sheet in a notebook."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -221,7 +224,7 @@ class Frame:
 
     def _repr_html_(self) -> str:
         """The picture of each mode, for a notebook."""
-        cells = "".join(_figure(mode, self.picture(mode)) for mode in self.modes)
+        cells = "".join(figure_html(m, self.picture(m), _PICTURE_PX) for m in self.modes)
         return f"<div><code>{html.escape(self.id)}</code><br>{cells}</div>"
 
     def sample(self, request: SampleRequest | None = None) -> Sample:
@@ -261,6 +264,13 @@ class Views(Sequence[Frame]):
 
     def __repr__(self) -> str:
         return f"<{len(self)} frames of {len(self.homes)} homes in {self.source.url}>"
+
+    def _repr_html_(self) -> str:
+        """Small pictures of at most MOST_SHOWN frames, spread over all, for a notebook."""
+        numbers = np.unique(np.linspace(0, len(self) - 1, min(len(self), MOST_SHOWN)).round())
+        cells = "".join(_small(self[int(k)]) for k in numbers)
+        part = f", {len(numbers)} of them shown" if len(numbers) < len(self) else ""
+        return f"<div><code>{html.escape(repr(self))}</code>{part}<br>{cells}</div>"
 
     @property
     def homes(self) -> tuple[str, ...]:
@@ -314,11 +324,22 @@ def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> 
     return f"none of {n_found} views{where} has what was asked for: {at}: {why}"
 
 
-def _figure(title: str, rgb: NDArray[np.uint8]) -> str:
-    from pbrs_farm.images import jpeg_from_array
+def _small(frame: Frame) -> str:
+    try:
+        return figure_html(frame.id, frame.colour, _THUMB_PX)
+    except BadInput as error:
+        # One that is damaged, or has labels alone, leaves the others to be seen.
+        return f"<p>{html.escape(str(error))}</p>"
 
-    data = base64.b64encode(jpeg_from_array(rgb)).decode()
+
+def figure_html(title: str, rgb: NDArray[np.uint8], width_px: int) -> str:
+    """A picture (H, W, 3) sRGB of that width with its title below, the bytes within the text."""
+    from pbrs_farm.images import jpeg_from_array, thumbnail
+
+    small = thumbnail(rgb, max_edge_px=2 * width_px)  # dense screens show two pixels as one
+    data = base64.b64encode(jpeg_from_array(small)).decode()
     return (
-        f'<figure style="display:inline-block;margin:4px"><img width="{_THUMB_PX}"'
-        f' src="data:image/jpeg;base64,{data}"><figcaption>{html.escape(title)}</figcaption></figure>'
+        f'<figure style="display:inline-block;margin:4px"><img width="{width_px}"'
+        f' src="data:image/jpeg;base64,{data}"><figcaption style="max-width:{width_px}px;'
+        f'overflow-wrap:anywhere">{html.escape(title)}</figcaption></figure>'
     )
