@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -25,7 +25,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not study"
+	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not study and not notebooks"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -55,6 +55,10 @@ endef
 test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
 	@$(study-packages)
 	$(BIN)/pytest -m "study and not slow and not gpu"
+
+test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
+	@$(BIN)/python -c "import nbclient, nbformat, ipykernel" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check -e ".[notebooks]"
+	$(BIN)/pytest -m notebooks tests/docs/test_notebooks.py
 
 test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL

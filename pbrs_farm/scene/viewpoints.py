@@ -101,7 +101,7 @@ class Viewpoints(Sequence[Viewpoint]):
         try:
             pictures = self.home.sketches(some, _SKETCH_PX)
             cells = "".join(
-                figure_html(f"{one.id}, score {one.view.score:.3g}", rgb, _SKETCH_PX)
+                figure_html(_caption(one), rgb, _SKETCH_PX)
                 for one, rgb in zip(some, pictures, strict=True)
             )
         except PbrsError as error:
@@ -110,6 +110,10 @@ class Viewpoints(Sequence[Viewpoint]):
         left = len(self) - len(some)
         more = f"<p>... and {left} more</p>" if left else ""
         return f"<div>{self.home.plan(self)}<br>{cells}{more}</div>"
+
+
+def _caption(one: Viewpoint) -> str:
+    return one.id if one.chosen_by is None else f"{one.id}, score {one.view.score:.3g}"
 
 
 def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoint:

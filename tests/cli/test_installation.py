@@ -30,7 +30,9 @@ def test_every_extra_named_is_one_of_pyproject() -> None:
     assert set(EXTRA_OF.values()) <= set(extras)
     # `all` is every extra that a user may want; those of developers, benches and studies are apart.
     of_all = extras["all"][0].partition("[")[2].strip("]").split(",")
-    assert set(of_all) == set(extras) - {"all", "bench", "dev", "docs", "study", "study-peers"}
+    assert set(of_all) == set(extras) - {
+        "all", "bench", "dev", "docs", "notebooks", "study", "study-peers",
+    }  # fmt: skip
 
 
 def test_a_checkout_and_a_wheel_are_told_apart(

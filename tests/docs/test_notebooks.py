@@ -1,0 +1,57 @@
+"""The notebooks are small, are stored without outputs, and run to their end in a kernel."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+REPO = Path(__file__).parents[2]
+NOTEBOOKS = sorted((REPO / "docs/notebooks").glob("*.ipynb"))
+
+
+def cells(notebook: Path) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return found
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_is_small_explains_itself_and_holds_no_output(notebook: Path) -> None:
+    found = cells(notebook)
+    assert 8 <= len(found) <= 15
+    assert sum(cell["cell_type"] == "markdown" for cell in found) >= 4
+    assert "".join(found[0]["source"]).startswith("# ")
+    for cell in found:
+        assert not cell.get("outputs")
+        assert cell.get("execution_count") is None
+
+
+def test_every_notebook_is_linked_from_the_page_and_the_site() -> None:
+    names = [f"notebooks/{path.name}" for path in NOTEBOOKS]
+    assert len(names) == 4
+    page = (REPO / "docs/python.md").read_text(encoding="utf-8")
+    assert re.findall(r"\]\((notebooks/\w+\.ipynb)\)", page) == names
+    site = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
+    assert re.findall(r": (notebooks/\w+\.ipynb)$", site, re.MULTILINE) == names
+
+
+@pytest.mark.notebooks
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs_to_its_end(
+    notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import nbformat
+    from nbclient import NotebookClient
+
+    monkeypatch.setenv("PYTHONPATH", str(REPO))
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    book = nbformat.read(notebook, as_version=4)
+    here = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(book, timeout=170, kernel_name="python3", resources=here).execute()
+    outputs = [output for cell in book.cells for output in cell.get("outputs", ())]
+    assert not [o for o in outputs if o.get("name") == "stderr"]
+    shown = [o["data"] for o in outputs if "data" in o]
+    assert any("<svg" in d.get("text/html", "") or "image/png" in d for d in shown)
