@@ -33,7 +33,7 @@ class ModelRef(Record):
     credit: str = ""  # the line that pictures of it must carry
 
 
-class Place(Record):
+class PlaceModel(Record):
     """Add a model at a pose."""
 
     do: Literal["place"] = "place"
@@ -42,14 +42,14 @@ class Place(Record):
     world_from_model: Rows  # rigid; model coordinates in metres
 
 
-class Remove(Record):
+class RemoveItems(Record):
     """Take items away, and the holes that doors and windows among them cut stay."""
 
     do: Literal["remove"] = "remove"
     items: tuple[str, ...]
 
 
-class Move(Record):
+class MoveItems(Record):
     """Move items rigidly, lamps with their light."""
 
     do: Literal["move"] = "move"
@@ -57,7 +57,7 @@ class Move(Record):
     world_from_world: Rows
 
 
-class Paint(Record):
+class PaintItems(Record):
     """Give items one plain colour."""
 
     do: Literal["paint"] = "paint"
@@ -66,7 +66,7 @@ class Paint(Record):
     roughness: float | None = None  # 0..1, None = as it was
 
 
-class Cover(Record):
+class CoverItems(Record):
     """Cover items with a picture, repeated every scale_m metres."""
 
     do: Literal["cover"] = "cover"
@@ -99,7 +99,8 @@ class AddLight(Record):
 
 
 Edit = Annotated[
-    Place | Remove | Move | Paint | Cover | SetLight | AddLight, Field(discriminator="do")
+    PlaceModel | RemoveItems | MoveItems | PaintItems | CoverItems | SetLight | AddLight,
+    Field(discriminator="do"),
 ]
 
 VERSION: Final = 1
@@ -129,9 +130,9 @@ def files_of_edits(edits: Sequence[Edit]) -> dict[str, str]:
     """Path -> sha256 of every file that edits read."""
     found = {}
     for edit in edits:
-        if isinstance(edit, Place):
+        if isinstance(edit, PlaceModel):
             found[edit.model.path] = edit.model.sha256
-        elif isinstance(edit, Cover):
+        elif isinstance(edit, CoverItems):
             found[edit.path] = edit.sha256
     return found
 

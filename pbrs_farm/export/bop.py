@@ -42,7 +42,7 @@ _FACE: Final = np.dtype([("n", "u1"), ("corners", "<i4", 3)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Mesh:
+class _ModelMesh:
     """A model in its own frame, millimetres."""
 
     points: F64  # (V, 3)
@@ -58,7 +58,7 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     pin-hole.
     """
     houses = {view.house.id: _house(view) for view in views}
-    meshes: dict[str, _Mesh] = {}
+    meshes: dict[str, _ModelMesh] = {}
     for house in houses.values():
         for item in house.items:
             if item.pose is not None and item.pose.model not in meshes:
@@ -100,7 +100,7 @@ def _numbers(models: list[str]) -> dict[str, int]:
     return {m: own[m] if m in own else next(free) for m in models}
 
 
-def _mesh_of(item: Item, house: House) -> _Mesh:
+def _mesh_of(item: Item, house: House) -> _ModelMesh:
     """The model of a placed item, back in its own frame, a colour a surface."""
     assert item.pose is not None
     model_from_world = np.linalg.inv(np.array(item.pose.world_from_model))
@@ -113,10 +113,10 @@ def _mesh_of(item: Item, house: House) -> _Mesh:
         rgb.append(np.tile(diffuse.astype(np.uint8), (len(surface.positions), 1)))
     world = np.concatenate(points)
     own = world @ model_from_world[:3, :3].T + model_from_world[:3, 3]
-    return _Mesh(own * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
+    return _ModelMesh(own * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
 
 
-def _write_models(folder: Path, meshes: dict[str, _Mesh], numbers: dict[str, int]) -> int:
+def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> int:
     folder.mkdir(parents=True)
     info = {}
     for model, number in sorted(numbers.items(), key=lambda pair: pair[1]):
@@ -141,7 +141,7 @@ def _diameter(points: F64) -> float:
     return float(pdist(points).max())
 
 
-def _ply(mesh: _Mesh) -> bytes:
+def _ply(mesh: _ModelMesh) -> bytes:
     vertices = np.empty(len(mesh.points), _VERTEX)
     vertices["xyz"], vertices["rgb"] = mesh.points, mesh.rgb
     faces = np.empty(len(mesh.faces), _FACE)

@@ -40,7 +40,7 @@ _SLACK_M: Final = 0.02  # by which things that stand apart may overlap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Thing:
+class _Seen:
     """A thing that counts, with its box in the axes of the camera."""
 
     row: dict[str, Any]  # of view.json's instances
@@ -61,7 +61,7 @@ class _Thing:
         return float(self.row["box2d"][0] + self.row["box2d"][2]) / 2
 
 
-def _things(view: ChosenView) -> list[_Thing]:
+def _things(view: ChosenView) -> list[_Seen]:
     """The things that count, those with most pixels first."""
     camera_from_world = np.linalg.inv(pose_opencv(view))
     found = []
@@ -73,7 +73,7 @@ def _things(view: ChosenView) -> list[_Thing]:
             world = _corners(row["box3d"])
             local = world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
             ends = (local.min(0), local.max(0), world.min(0), world.max(0))
-            found.append(_Thing(row, noun, *ends))
+            found.append(_Seen(row, noun, *ends))
     return found
 
 
@@ -151,7 +151,7 @@ def _listed(words: Sequence[str]) -> str:
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
-def _titles(things: Sequence[_Thing]) -> dict[int, str]:
+def _titles(things: Sequence[_Seen]) -> dict[int, str]:
     """Instance -> what tells it from the others: "the sofa", "the left chair", "the third lamp from the left"."""
     titles = {}
     for noun in dict.fromkeys(thing.noun for thing in things):
@@ -171,7 +171,7 @@ def _titles(things: Sequence[_Thing]) -> dict[int, str]:
 # Relations.
 
 
-def _relation(a: _Thing, b: _Thing, *, by_axes: bool) -> str:
+def _relation(a: _Seen, b: _Seen, *, by_axes: bool) -> str:
     """Where the first is to the second; "" where no word fits. by_axes: the camera looks one way."""
     if _is_on(a, b):
         return "on top of"
@@ -189,14 +189,14 @@ def _relation(a: _Thing, b: _Thing, *, by_axes: bool) -> str:
     return "to the left of" if a.column < b.column else ""
 
 
-def _is_on(a: _Thing, b: _Thing) -> bool:
+def _is_on(a: _Seen, b: _Seen) -> bool:
     """The first stands on the second: at the height of its top, its middle above it."""
     middle = (a.low_world + a.high_world) / 2
     over = (b.low_world <= middle) & (middle <= b.high_world)
     return bool(abs(a.low_world[1] - b.high_world[1]) <= _TOUCH_M and over[0] and over[2])
 
 
-def _relations(view: ChosenView, things: Sequence[_Thing]) -> list[dict[str, Any]]:
+def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]]:
     """Of each two of the largest things, the smaller first: what stands on what, then by size."""
     by_axes = intrinsics_of(view.facts).lens.depth_is_planar
     rows = []
@@ -249,7 +249,7 @@ def caption(view: ChosenView) -> dict[str, Any]:
     return {"text": " ".join(sentences), "objects": objects, "relations": relations}
 
 
-def _first_sentence(view: ChosenView, things: Sequence[_Thing]) -> str:
+def _first_sentence(view: ChosenView, things: Sequence[_Seen]) -> str:
     # In the order of the largest of each noun.
     counts = Counter(thing.noun for thing in things)
     seen = _listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""

@@ -45,7 +45,7 @@ _STRUCTURE: Final = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class ClassRow:
+class ClassRule:
     """A row of the table."""
 
     word: str  # small letters
@@ -63,7 +63,7 @@ class ClassRow:
 class ClassMap:
     """The classes of a user's table."""
 
-    rows: tuple[ClassRow, ...]
+    rows: tuple[ClassRule, ...]
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -101,7 +101,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
     if isinstance(table, ClassMap):
         return table
     path = Path(table)
-    rows: dict[str, ClassRow] = {}
+    rows: dict[str, ClassRule] = {}
     line_of: dict[str, int] = {}
     name_of: dict[int, str] = {}
     id_of: dict[str, int] = {}
@@ -166,7 +166,7 @@ def _hint(columns: Sequence[str]) -> str:
     return f"the columns are {','.join(columns)}"
 
 
-def _row(path: Path, line: int, cells: dict[str, str]) -> ClassRow:
+def _row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
     word, number, name = cells["from"].lower(), cells["id"], cells["name"]
     place = f"line {line}"
     if not word:
@@ -186,7 +186,7 @@ def _row(path: Path, line: int, cells: dict[str, str]) -> ClassRow:
         if near:
             hint = f"{question(near)} a pattern such as {shown(word)}* says items of that name"
             raise BadInput(path, place, f"{_quoted(word)} is no class of NYU40", hint=hint)
-    return ClassRow(word, int(number), name)
+    return ClassRule(word, int(number), name)
 
 
 def _quoted(text: str) -> str:

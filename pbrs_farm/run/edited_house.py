@@ -15,11 +15,11 @@ from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
-    Cover,
-    Move,
-    Paint,
-    Place,
-    Remove,
+    CoverItems,
+    MoveItems,
+    PaintItems,
+    PlaceModel,
+    RemoveItems,
     SetLight,
     rows_of_matrix,
 )
@@ -62,7 +62,7 @@ def edited(house: House, source: SourceRef, fields: ReadFields) -> House:
     return replace(house, id=source.house_id)
 
 
-def _place(house: House, edit: Place, fields: ReadFields) -> House:
+def _place(house: House, edit: PlaceModel, fields: ReadFields) -> House:
     if any(item.id == edit.item for item in house.items):
         raise BadInput(house.id, edit.item, "there is an item of that id")
     model, shape = edit.model, model_shape(edit.model, fields)
@@ -116,7 +116,7 @@ def _at_home(house: House, item: Item) -> Item:
     return replace(item, level_id=level.id)
 
 
-def _remove(house: House, edit: Remove, _fields: ReadFields) -> House:
+def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:
     gone = frozenset(edit.items)
     _found(house, gone)
     openings = tuple(
@@ -127,7 +127,7 @@ def _remove(house: House, edit: Remove, _fields: ReadFields) -> House:
     return replace(house, items=kept, openings=openings)
 
 
-def _move(house: House, edit: Move, _fields: ReadFields) -> House:
+def _move(house: House, edit: MoveItems, _fields: ReadFields) -> House:
     matrix = np.array(edit.world_from_world)
     return _changed(house, edit.items, lambda item: _at_home(house, _moved(item, matrix)))
 
@@ -169,7 +169,7 @@ def _moved_light(light: LightPart, matrix: F64) -> LightPart:
     )
 
 
-def _paint(house: House, edit: Paint, _fields: ReadFields) -> House:
+def _paint(house: House, edit: PaintItems, _fields: ReadFields) -> House:
     def painted(material: Material) -> Material:
         if material.kind not in (MaterialKind.OPAQUE, MaterialKind.SHADE):
             return material
@@ -182,7 +182,7 @@ def _paint(house: House, edit: Paint, _fields: ReadFields) -> House:
     return _with_materials(house, edit.items, painted)
 
 
-def _cover(house: House, edit: Cover, _fields: ReadFields) -> House:
+def _cover(house: House, edit: CoverItems, _fields: ReadFields) -> House:
     data = _file(edit.path, edit.sha256)
     try:
         texture, _has_holes = texture_from_bytes(data, Path(edit.path).name)

@@ -24,12 +24,12 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
-    Cover,
+    CoverItems,
     Edit,
-    Move,
-    Paint,
-    Place,
-    Remove,
+    MoveItems,
+    PaintItems,
+    PlaceModel,
+    RemoveItems,
     SetLight,
     rows_of_matrix,
 )
@@ -229,14 +229,14 @@ class Home:
         for model, matrix in placed:
             edits.append(
                 self._placing(
-                    model, matrix, "", taken=[e.item for e in edits if isinstance(e, Place)]
+                    model, matrix, "", taken=[e.item for e in edits if isinstance(e, PlaceModel)]
                 )
             )
         return self._edited(*edits)
 
     def without(self, items: ItemLike) -> Home:
         """The home without items: ids, names, patterns such as "chair*", or items."""
-        return self._edited(Remove(items=self._ids(items)))
+        return self._edited(RemoveItems(items=self._ids(items)))
 
     def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
         """The home with items moved by (x, y, z) metres and turned about the vertical of their middle."""
@@ -247,14 +247,14 @@ class Home:
         matrix[:3, :3] = rotation_y(math.radians(turn_deg))
         matrix[:3, 3] = middle - matrix[:3, :3] @ middle + np.asarray(by, np.float64)
         return self._edited(
-            Move(items=ids, world_from_world=rows_of_matrix(_rigid(matrix, "move")))
+            MoveItems(items=ids, world_from_world=rows_of_matrix(_rigid(matrix, "move")))
         )
 
     def paint(
         self, items: ItemLike, colour: str | Sequence[float], roughness: float | None = None
     ) -> Home:
         """The home with items in one plain colour: "#c8b8a0", or sRGB in 0..1."""
-        edit = Paint(items=self._ids(items), rgb=_rgb(colour), roughness=roughness)
+        edit = PaintItems(items=self._ids(items), rgb=_rgb(colour), roughness=roughness)
         return self._edited(edit)
 
     def material(self, items: ItemLike, picture: str | Path, scale_m: float = 1.0) -> Home:
@@ -266,7 +266,7 @@ class Home:
             raise BadInput(path, "", fault_of(error)) from None
         if not scale_m > 0:
             raise BadInput("material", "scale_m", f"{scale_m} is no length")
-        edit = Cover(
+        edit = CoverItems(
             items=self._ids(items), path=str(path.resolve()), sha256=keys.sha256(data),
             scale_m=scale_m,
         )  # fmt: skip
@@ -304,9 +304,11 @@ class Home:
         _ = home.house  # what is wrong with an edit is an error where it is made
         return home
 
-    def _placing(self, model: Model, matrix: F64, name: str, taken: Sequence[str] = ()) -> Place:
+    def _placing(
+        self, model: Model, matrix: F64, name: str, taken: Sequence[str] = ()
+    ) -> PlaceModel:
         item = name or self._free_name(model.id, taken)
-        return Place(item=item, model=model.ref, world_from_model=rows_of_matrix(matrix))
+        return PlaceModel(item=item, model=model.ref, world_from_model=rows_of_matrix(matrix))
 
     def _free_name(self, stem: str, taken: Sequence[str]) -> str:
         used = {*(item.id for item in self.house.items), *taken}

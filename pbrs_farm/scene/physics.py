@@ -41,7 +41,7 @@ _FALLEN_M: Final = 0.05  # below its support
 
 
 @dataclass(slots=True, eq=False)
-class _Thing:
+class _Body:
     model: Model
     support: Support
     pose: F64  # (4, 4) world_from_model
@@ -64,7 +64,7 @@ def settled_poses(
     for _ in range(n):
         model = models[int(rng.integers(len(models)))]
         support = supports[int(rng.choice(len(supports), p=weights / weights.sum()))]
-        things.append(_Thing(model, support, np.eye(4)))
+        things.append(_Body(model, support, np.eye(4)))
     parts = {thing.model: convex_parts(thing.model) for thing in things}
     statics = _static_solids(
         house, supports, max(float(np.linalg.norm(t.model.size_m)) for t in things)
@@ -87,7 +87,7 @@ def penetration_m(
 ) -> float:
     """How deep the deepest contact is of models (model, world_from_model) at rest, metres."""
     mujoco = _mujoco()
-    things = [_Thing(model, supports[0], pose) for model, pose in placed]
+    things = [_Body(model, supports[0], pose) for model, pose in placed]
     parts = {thing.model: convex_parts(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
     world = mujoco.MjModel.from_xml_string(
@@ -185,7 +185,7 @@ def _prisms(triangles: F64) -> list[F64]:
 
 
 def _lift(
-    house: House, things: Sequence[_Thing], waiting: Sequence[_Thing], rng: np.random.Generator
+    house: House, things: Sequence[_Body], waiting: Sequence[_Body], rng: np.random.Generator
 ) -> None:
     """Put those that wait above their supports, turned at random, apart from each other."""
     balls = [_ball(t.model, t.pose) for t in things if t not in waiting]
@@ -243,7 +243,7 @@ def _is_open(house: House, centre: F64, radius: float) -> bool:
 
 def _simulate(
     mujoco: Any,
-    things: Sequence[_Thing],
+    things: Sequence[_Body],
     parts: dict[Model, tuple[F64, ...]],
     statics: Sequence[F64],
 ) -> list[int]:
@@ -267,14 +267,14 @@ def _simulate(
     return [int(k) for k in np.flatnonzero(fast)]
 
 
-def _set_poses(state: Any, things: Sequence[_Thing]) -> None:
+def _set_poses(state: Any, things: Sequence[_Body]) -> None:
     for k, thing in enumerate(things):
         x, y, z, w = Rotation.from_matrix(thing.pose[:3, :3]).as_quat()
         state.qpos[7 * k : 7 * k + 7] = [*thing.pose[:3, 3], w, x, y, z]
 
 
 def _mjcf(
-    things: Sequence[_Thing], parts: dict[Model, tuple[F64, ...]], statics: Sequence[F64]
+    things: Sequence[_Body], parts: dict[Model, tuple[F64, ...]], statics: Sequence[F64]
 ) -> str:
     assets = [_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
     names = {model: f"m{j}" for j, model in enumerate(parts)}
@@ -305,7 +305,7 @@ def _mesh(name: str, points: F64) -> str:
     return f'<mesh name="{name}" vertex="{text}"/>'
 
 
-def _has_fallen(house: House, thing: _Thing) -> bool:
+def _has_fallen(house: House, thing: _Body) -> bool:
     y = float((thing.model.shape.points @ thing.pose[:3, :3].T)[:, 1].min() + thing.pose[1, 3])
     least = float(level_triangles(house, thing.support)[:, :, 1].min())
     return y < least - _FALLEN_M

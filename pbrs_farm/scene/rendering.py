@@ -45,7 +45,7 @@ _T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class FinishedHouse:
     """A home's finished house, as the step `house` made it."""
 
     house: House
@@ -62,10 +62,10 @@ class Renderer:
         self._ident = 0  # of that thread
         self._stop = threading.Event()
         self._stores: OrderedDict[tuple[str, str], MemoryStore] = OrderedDict()
-        self._made: OrderedDict[str, Made] = OrderedDict()
+        self._made: OrderedDict[str, FinishedHouse] = OrderedDict()
         self._houses = HouseCache()
 
-    def house(self, source: SourceRef, recipe: Recipe) -> Made:
+    def house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         """The house of a source, read, dressed, repaired and edited; those of the last homes are kept."""
         key = keys.digest(source, recipe.digest("read", "dress", "repair"))
         with self._lock:
@@ -140,14 +140,14 @@ class Renderer:
     def _work(self, source: SourceRef, recipe: Recipe) -> Work:
         return Work(self._store(source), recipe, source.house_id, self._houses, source)
 
-    def _house(self, source: SourceRef, recipe: Recipe) -> Made:
+    def _house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         if source.edits:
             # On the house before them, without a step: that is done when it is rendered.
             before = self.house(source.unedited, recipe)
-            return Made(edited(before.house, source, recipe.read), before.report)
+            return FinishedHouse(edited(before.house, source, recipe.read), before.report)
         return self._unedited(source, recipe)
 
-    def _unedited(self, source: SourceRef, recipe: Recipe) -> Made:
+    def _unedited(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         from pbrs_farm.dress.report import DressReport
         from pbrs_farm.repair import RepairReport
 
@@ -163,7 +163,7 @@ class Renderer:
         is_dressed = work.store.head(dress_key) is not None
         dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
         remember_house(source, recipe, (house, report, dressing))
-        return Made(house, report)
+        return FinishedHouse(house, report)
 
     def _cached(self, work: Work) -> CachedHouse:
         digest = run_step("house", work).marker.digest

@@ -11,7 +11,7 @@ import pbrs_farm as pf
 from pbrs_farm.export.captions import caption, counted, plural
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export
-from pbrs_farm.formats.class_map import ClassMap, ClassRow
+from pbrs_farm.formats.class_map import ClassMap, ClassRule
 from tests.scene.homes import small_home
 
 # Camera axes are x right, y down, z forward; the world is y up: turn about x.
@@ -130,7 +130,7 @@ def test_a_panorama_tells_only_what_stands_on_what():
 
 
 def test_the_users_classes_are_the_nouns():
-    classes = ClassMap((ClassRow("chair", 1, "seat"), ClassRow("bed", 0, "")))
+    classes = ClassMap((ClassRule("chair", 1, "seat"), ClassRule("bed", 0, "")))
     rows = thing(1, "chair", own_class_name="seat"), thing(2, "bed", own_class_name="")
     assert text(*rows, classes=classes) == "The picture shows a bedroom with a seat."
 
