@@ -24,6 +24,7 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
+from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
@@ -33,8 +34,8 @@ from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.run.steps import remember_house, run_step
 from pbrs_farm.scene.viewpoints import Viewpoint
-from pbrs_farm.store.object_store import MemoryStore
-from pbrs_farm.study.reading.stored_root import StoredRoot, copy_view
+from pbrs_farm.store.object_store import MemoryStore, Store
+from pbrs_farm.study.reading.stored_root import StoredRoot
 from pbrs_farm.study.reading.views import ViewRef, Views
 
 if TYPE_CHECKING:
@@ -193,17 +194,24 @@ class Renderer:
             self._give_cameras(work, viewpoints)
         for step in plan.house_steps(want, source.house_id)[1:]:
             self._run(step, work)
-        for one in viewpoints:
-            for step in plan.view_steps(want):
-                self._run(step, replace(work, view_id=one.id))
-            observe(one.id)
-        # Keep a copy: another recipe may put other files in their place.
+        # In a store of its own: another call may ask for other files of the same view.
         taken = MemoryStore()
         taken.put(keys.RECIPE, json_bytes(recipe))
+        own = replace(work, store=taken)
+        for key in work.store.list(keys.house_key(source.house_id)):
+            at = keys.parse_house_key(key)
+            if at is not None and at.view is None:
+                taken.put(key, work.store.get(key))
         for one in viewpoints:
-            copy_view(work.store, taken, ViewRef(source.house_id, one.id))
-        root = StoredRoot(taken)
-        return Views(root, tuple(ViewRef(source.house_id, one.id) for one in viewpoints), {})
+            steps = plan.view_steps(want)
+            pictures = [step for step in steps if step not in ("truth", "view")]
+            _copy_steps(work.store, taken, source.house_id, one.id, pictures)
+            for step in steps:
+                self._run(step, replace(own, view_id=one.id))
+            _copy_steps(taken, work.store, source.house_id, one.id, pictures)
+            observe(one.id)
+        refs = tuple(ViewRef(source.house_id, one.id) for one in viewpoints)
+        return Views(StoredRoot(taken), refs, {})
 
     def _run(self, step: str, work: Work) -> None:
         if self._stop.is_set():
@@ -225,6 +233,16 @@ class Renderer:
         data = cameras_json(found, {"source": "given", "n_views": len(found)})
         run_unless_done("cameras", work, lambda _work: StepOutput({"cameras.json": data}, facts))
         self._cached(work).forget_views()
+
+
+def _copy_steps(of: Store, to: Store, house: str, view: str, steps: Iterable[str]) -> None:
+    """Copy what steps of a view have made, those that are done."""
+    for step in steps:
+        marker = read_marker(of, key := keys.marker_key(house, step, view))
+        if marker is not None:
+            for file in marker.files:
+                to.put(file.key, of.get(file.key))
+            to.put(key, marker.json_bytes())
 
 
 RENDERER: Final = Renderer()

@@ -60,6 +60,16 @@ def test_a_frame_has_pictures_labels_and_poses(home: pf.Home, tmp_path: Path) ->
     assert "<img" in frame._repr_html_()
 
 
+def test_a_frame_has_what_its_own_call_asked_for(home: pf.Home) -> None:
+    one = home.cameras(n=1)[0]
+    rich = pf.render(home, one, modes=["opengl_dl", "opengl_il"], layers=["albedo"])
+    plain = pf.render(home, one, modes=["opengl_dl"])
+    assert (rich.modes, plain.modes) == (("opengl_dl", "opengl_il"), ("opengl_dl",))
+    assert ("albedo" in rich.layers, "albedo" in plain.layers) == (True, False)
+    assert pf.render(home, one, modes=[]).modes == ()
+    assert "opengl_il" not in plain.table["modes"]
+
+
 def test_frames_of_cameras_of_ones_own_share_a_folder(home: pf.Home, tmp_path: Path) -> None:
     for x in (2.0, 3.0):
         camera = pf.Camera.look_at((x, 1.5, 3.5), (2, 0.8, 1), size=(64, 48))
