@@ -100,9 +100,13 @@ class CameraBlur:
 
     aperture_radius_m: float = 0.0  # of the entrance pupil; 0 = all depths are sharp
     focus_m: float = 1.0  # depth_z that is sharp
-    # World frame, from the shutter's opening to its closing; the turn about the axis through the eye.
+    # World frame, while the picture is taken: from the opening for the first row to the closing for
+    # the last; the turn about the axis through the eye.
     velocity_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    # Shares of that time: each row is open for so long, and the last row opens so much after the first.
+    open_share: float = 1.0
+    rolling_share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -380,7 +380,7 @@ class SelectionFields(FieldGroup):
 
 
 class BlurFields(FieldGroup):
-    """Depth of field and motion blur of light (docs/lenses.md); labels are sharp, at mid-shutter."""
+    """Depth of field, motion blur and rolling shutter of light (docs/lenses.md); labels are sharp, at mid-shutter."""
 
     aperture_mm: float = Field(
         0.0, ge=0, le=1000, description="diameter of the entrance pupil; 0 = everything is sharp"
@@ -388,6 +388,12 @@ class BlurFields(FieldGroup):
     focus_m: float = Field(0.0, ge=0, le=1e4, description="depth; 0 = what the middle shows")
     shutter_s: float = Field(
         0.0, ge=0, le=60, description="open that long; 0 = nothing moves. Of a walk: along it"
+    )
+    rolling_s: float = Field(
+        0.0,
+        ge=0,
+        le=60,
+        description="from the top row's light to the bottom one's; 0 = all at once",
     )
     right_mps: float = Field(0.0, ge=-1e3, le=1e3, description="motion without a walk, camera axes")
     up_mps: float = Field(0.0, ge=-1e3, le=1e3)
@@ -398,8 +404,8 @@ class BlurFields(FieldGroup):
 
     @property
     def is_on(self) -> bool:
-        """Anything is blurred."""
-        return self.aperture_mm > 0 or self.shutter_s > 0
+        """Anything is blurred or sheared."""
+        return self.aperture_mm > 0 or self.shutter_s > 0 or self.rolling_s > 0
 
 
 # The recipe's lens: a model, K and coefficients, presets, and the Intrinsics they give.

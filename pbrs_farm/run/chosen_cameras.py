@@ -108,11 +108,15 @@ def blurred(
     if fields.aperture_mm > 0 and focus == 0:
         t, _face = caster.first_hit(camera.eye[None], camera.towards[None])
         focus = float(t[0]) if np.isfinite(t[0]) else _FARTHEST_M
+    whole_s = fields.shutter_s + fields.rolling_s
+    rolling_share = fields.rolling_s / whole_s if fields.rolling_s > 0 else 0.0
     blur = CameraBlur(
         aperture_radius_m=fields.aperture_mm / 2000,
         focus_m=focus or 1.0,
-        velocity_m=triple(velocity * fields.shutter_s),
-        turn_rad=triple(turn * fields.shutter_s),
+        velocity_m=triple(velocity * whole_s),
+        turn_rad=triple(turn * whole_s),
+        open_share=1.0 - rolling_share,
+        rolling_share=rolling_share,
     )
     return replace(camera, blur=blur)
 

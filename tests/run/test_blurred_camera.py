@@ -44,6 +44,25 @@ def test_a_single_view_moves_as_the_recipe_says_in_its_own_axes() -> None:
     assert np.allclose(blur.turn_rad, (0, -np.pi / 20, 0))
 
 
+def test_rows_lit_in_turn_share_the_time_with_the_shutter() -> None:
+    view = frame(None, 0.0)
+    fields = BlurFields(shutter_s=0.01, rolling_s=0.03, right_mps=1.0)
+    blur = blurred(view.camera, view, {}, fields, CASTER).blur
+    assert blur is not None
+    assert np.allclose(blur.velocity_m, (0.04, 0, 0))
+    assert (blur.open_share, blur.rolling_share) == pytest.approx((0.25, 0.75))
+    assert BlurFields(rolling_s=0.03).is_on
+
+
+def test_a_recipe_without_a_rolling_shutter_keeps_its_digest() -> None:
+    def digest(**fields: str) -> str:
+        settings = {f"blur.{name}": value for name, value in fields.items()}
+        return recipe_from_name("fast", settings).digest("blur")
+
+    assert digest(shutter_s="0.01") == digest(shutter_s="0.01", rolling_s="0")
+    assert digest(shutter_s="0.01") != digest(shutter_s="0.01", rolling_s="0.02")
+
+
 def test_focus_is_on_what_the_middle_shows() -> None:
     view = frame(None, 0.0)
     blur = blurred(view.camera, view, {}, BlurFields(aperture_mm=20), CASTER).blur

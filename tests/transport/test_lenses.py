@@ -118,3 +118,25 @@ def test_a_moving_camera_spreads_an_edge_by_the_way_it_goes() -> None:
     turned = edge_spread(CameraBlur(turn_rad=(0.0, 0.06, 0.0)))
     assert turned == pytest.approx(FOCAL_PX * 0.06 / math.sqrt(12), rel=0.12)
     assert edge_spread(CameraBlur(velocity_m=(0.0, 0.1, 0.0))) < 0.6
+
+
+def test_a_rolling_shutter_shears_an_upright_edge_and_keeps_it_sharp() -> None:
+    wall = [
+        rooms.quad([(x, -9, 0), (x + 9, -9, 0), (x + 9, 9, 0), (x, 9, 0)], k)
+        for k, x in enumerate((-9, 0))
+    ]
+    house = rooms.house(wall, [rooms.matte("black", 0.0), rooms.matte("white", 0.8)])
+    # The camera goes 0.1 m to the right from the first row's light to the last one's.
+    blur = CameraBlur(velocity_m=(0.1, 0.0, 0.0), open_share=0.0, rolling_share=1.0)
+    camera = replace(rooms.camera((0, 0, 2), (0, 0, 0), 96, 64, 0.6), blur=blur)
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
+    fields = FIELDS.model_copy(update={"spp": 64})
+    albedo = scene.render(camera, "0_0", fields, 1).albedo[..., 0]
+    # White is right of the edge: black pixels of a row count up to it.
+    edge = 96 - albedo.sum(1) / albedo.max()
+    row = np.arange(64) + 0.5
+    expected = 48 - FOCAL_PX * 0.1 / 2 * (row / 64 - 0.5)
+    assert np.abs(edge - expected).max() < 0.15
+    # No pixel but the edge's own is between black and white.
+    between = (albedo > 0.05 * albedo.max()) & (albedo < 0.95 * albedo.max())
+    assert between.sum(1).max() <= 2

@@ -1,7 +1,7 @@
 """Rays of a camera on the device: a pin-hole's by formula, any other's from a table; kernels, no effects.
 
 The table has a row for each pixel, so that no kernel depends on a lens: one kernel serves all of
-them, with or without depth of field and motion blur, and another serves the plain pin-hole.
+them, with or without depth of field, motion blur and rolling shutter, and another serves the plain pin-hole.
 """
 
 from __future__ import annotations
@@ -43,9 +43,12 @@ class LensCamera(NamedTuple):
     width: Any  # UInt32, px
     aperture: Any  # radius of the pupil, m; 0 = a point
     focus: Any  # depth that is sharp, m
-    velocity: Any  # Vector3f, m that the eye moves while the shutter is open
+    velocity: Any  # Vector3f, m that the eye moves while the picture is taken
     turn_axis: Any  # Vector3f, unit
-    turn: Any  # rad about it while the shutter is open
+    turn: Any  # rad about it while the picture is taken
+    exposure: Any  # share of that time for which a row is open
+    rolling: Any  # share of it from the first row's light to the last one's
+    row: Any  # share of it from a row's light to the next one's
 
 
 def device_camera(camera: Camera) -> DeviceCamera | LensCamera:
@@ -78,6 +81,9 @@ def _lens_camera(camera: Camera) -> LensCamera:
         opaque3(mi.Vector3f, blur.velocity_m),
         opaque3(mi.Vector3f, axis),
         dr.opaque(mi.Float, turn),
+        dr.opaque(mi.Float, blur.open_share),
+        dr.opaque(mi.Float, blur.rolling_share),
+        dr.opaque(mi.Float, blur.rolling_share / camera.intrinsics.height_px),
     )
 
 
@@ -108,7 +114,8 @@ def camera_ray(
 ) -> tuple[Any, Any]:
     """(origin, unit direction) through a place of the film: a pixel's corner plus an offset, px.
 
-    sampler: draws the place in the pupil and the time; None: the pupil's middle, mid-shutter.
+    sampler: draws the place in the pupil and the time; None: the pupil's middle, the middle of the
+    time for which the row is open.
     """
     if isinstance(camera, DeviceCamera):
         x, y = corner.x + offset.x, corner.y + offset.y
@@ -118,15 +125,16 @@ def camera_ray(
     middle, right, down = (dr.gather(mi.Vector4f, camera.table, row + k) for k in range(_ROW))
     along = middle + (offset.x - 0.5) * right + (offset.y - 0.5) * down
     local, start = mi.Vector3f(along.x, along.y, along.z), mi.Vector3f(0)
-    moved, angle = mi.Vector3f(0), mi.Float(0)
+    # Rows are lit one after another, the middle one at mid-shutter.
+    time = (corner.y + offset.y) * camera.row - 0.5 * camera.rolling
     if sampler is not None:
         # Start anywhere in the pupil and aim at the point that is sharp.
         pupil = mi.warp.square_to_uniform_disk_concentric(sampler.get_2d(mi.UInt32(_LENS_DIM)))
         start = mi.Vector3f(pupil.x * camera.aperture, pupil.y * camera.aperture, 0)
         local = local * camera.focus - start
-        time = sampler.get_1d(mi.UInt32(_TIME_DIM)) - 0.5
-        moved, angle = camera.velocity * time, camera.turn * time
+        time += (sampler.get_1d(mi.UInt32(_TIME_DIM)) - 0.5) * camera.exposure
     # Stand where the camera is at that time.
+    moved, angle = camera.velocity * time, camera.turn * time
     d = _turned(camera, local, angle)
     origin = mi.Point3f(camera.eye + moved + _turned(camera, start, angle))
     return origin, dr.normalize(d)
