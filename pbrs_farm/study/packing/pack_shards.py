@@ -7,24 +7,24 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import home_of
 from pbrs_farm.export.chosen_view import new_folder
 from pbrs_farm.images import jpeg_from_array
-from pbrs_farm.study.packing.packing_plan import Packing, ShardPlan, shard_plans
+from pbrs_farm.study.packing.data_card import card, croissant_json, described, root_facts
+from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans
 from pbrs_farm.study.reading.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
 from pbrs_farm.study.reading.png_rows import png_of_rows
 from pbrs_farm.study.reading.shard_set import label_parts, tar_end, tar_member
-from pbrs_farm.study.reading.stored_layers import STORED, ViewFacts, array_names, resized_stored
+from pbrs_farm.study.reading.stored_layers import ViewFacts, resized_stored
 from pbrs_farm.study.reading.stored_root import StoredRoot
 from pbrs_farm.study.reading.view_sample import Size
 from pbrs_farm.study.reading.views import ViewRef, Views
@@ -111,96 +111,7 @@ def _schema(row: dict[str, Any]) -> pa.Schema:
     return pa.schema(list(types.items()), metadata={"huggingface": said})
 
 
-# What packed views say of themselves: the rest of dataset.json, and README.md.
-
-
-AXES = "x right, y forward, z up (published); pbrs_farm gives opencv, opengl or published"
-SPLIT_RULE = (
-    "by home: sha256 of the house's id without digest and variant (-d3), its first 8 bytes as a"
-    " number of 0..1: train below train, val below train + val, else test"
-)
-
-
-def described(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:
-    """The fields of dataset.json that readers of other makers need."""
-    colours = [bytes(row).hex() for row in NYU40_COLOURS.tolist()]
-    arrays = {
-        name: {
-            "dtype": STORED[name].dtype,
-            "unit": STORED[name].unit,
-            "nothing": STORED[name].nothing,
-        }
-        for name in array_names(packing.layers)
-    }
-    return {
-        "class_colours_srgb": colours,
-        "arrays": arrays,
-        "normal_axes": AXES,
-        "camera": "K: (x right, y down, z forward) to pixels, centre of the first at (0.5, 0.5)",
-        "split_rule": SPLIT_RULE if packing.shares else None,
-        "colour": packing.colour if packing.colour == "png" else f"jpeg {packing.quality}",
-        "seed": packing.seed,
-        "credits": list(credits),
-        "card": "README.md",
-    }
-
-
-def card(views: Views, packing: Packing, credits: Sequence[str], *, form: str) -> str:
-    """README.md: front matter that Hugging Face reads, what is in it, how to load it, credits."""
-    size = "x".join(map(str, packing.size)) if packing.size else "the size it was rendered in"
-    arrays = [
-        f"| {n} | {STORED[n].dtype} | {STORED[n].unit} |" for n in array_names(packing.layers)
-    ]
-    blocks = [
-        _front_matter(views, packing) if form == "parquet" else "",
-        "# Rendered rooms with exact labels",
-        f"{len(views)} views, {len(views.homes)} homes or variants of homes, {size}, rendered by pbrs_farm."
-        f" Lighting modes: {', '.join(packing.modes)}.",
-        "\n".join(["| split | views | homes |", "|---|---|---|", *_split_rows(views, packing)]),
-        f"Split {SPLIT_RULE}." if packing.shares else "",
-        "\n".join(["| array | type | unit |", "|---|---|---|", *arrays]),
-        f"Axes of normals as stored: {AXES}. Classes are the NYU40's; 0 is none.",
-        _loading(form, next(shard_plans(views.refs, packing)).split),
-        "\n".join(["Credits:", "", *(f"- {line.removeprefix('- ')}" for line in credits)])
-        if credits
-        else "",
-    ]
-    return "\n\n".join(block for block in blocks if block) + "\n"
-
-
-def _split_rows(views: Views, packing: Packing) -> list[str]:
-    n_views: dict[str, int] = {}
-    homes: dict[str, set[str]] = {}
-    for plan in shard_plans(views.refs, packing):
-        n_views[plan.split] = n_views.get(plan.split, 0) + len(plan.refs)
-        homes.setdefault(plan.split, set()).update(home_of(ref.house) for ref in plan.refs)
-    return [f"| {name} | {n} | {len(homes[name])} |" for name, n in n_views.items()]
-
-
-def _front_matter(views: Views, packing: Packing) -> str:
-    splits = dict.fromkeys(plan.split for plan in shard_plans(views.refs, packing))
-    files = "".join(f"\n  - split: {s}\n    path: data/{s}-*.parquet" for s in splits)
-    return f"---\nconfigs:\n- config_name: default\n  data_files:{files}\n---"
-
-
-def _loading(form: str, split: str) -> str:
-    if form == "shards":
-        return (
-            "```python\nfrom pbrs_farm.study.samples.view_loader import ShardedViews\n\n"
-            f"views = ShardedViews('.', split='{split}')  # dictionaries of torch tensors\n```\n\n"
-            "webdataset reads the same files; normals, depth and instances are `.npz` of uint16."
-        )
-    return (
-        "```python\nimport io\n\nimport numpy as np\nfrom datasets import load_dataset\n\n"
-        f"row = load_dataset('.', split='{split}')[0]\n"
-        "normal = np.load(io.BytesIO(row['normal']))['normal'] * (2 / 65535) - 1\n```"
-    )
-
-
 # `pbrs-farm pack`.
-
-
-FORMS = ("shards", "parquet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +126,7 @@ class Packed:
 
 def pack(
     views: Views,
-    out: Path,
+    out: str | Path,
     packing: Packing,
     *,
     form: str = "shards",
@@ -235,12 +146,13 @@ def pack(
     for request in packing.requests():
         views = views.only(request=request)
         left_out |= views.left_out
+    views = replace(views, left_out=left_out)
     write = _write_shards if form == "shards" else _write_parquet_files
-    with new_folder(out) as scratch:
+    with new_folder(Path(out)) as scratch:
         n_files = write(views, source, packing, scratch, tell)
         n_bytes = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
     n_views: dict[str, int] = {}
-    for plan in shard_plans(views.refs, packing):
+    for plan in shard_plans(views.refs, packing, form):
         n_views[plan.split] = n_views.get(plan.split, 0) + len(plan.refs)
     return Packed(n_views, n_files, n_bytes, left_out)
 
@@ -256,9 +168,9 @@ def _write_shards(
         packing.size, packing.modes if "colour" in packing.layers else (), packing.layers,
         tuple(shards), packing.shares, NYU40_NAMES,
     )  # fmt: skip
-    credits = source.credits(views.homes)
-    (out / DATASET_JSON).write_bytes(dataset_json(dataset, described(packing, credits)))
-    (out / "README.md").write_text(card(views, packing, credits, form="shards"), encoding="utf-8")
+    facts = root_facts(views, source)
+    (out / DATASET_JSON).write_bytes(dataset_json(dataset, described(packing, facts.credits)))
+    (out / "README.md").write_text(card(views, packing, facts, form="shards"), encoding="utf-8")
     return len(shards) + 2
 
 
@@ -281,11 +193,13 @@ def _write_shard(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Pat
 def _write_parquet_files(
     views: Views, source: StoredRoot, packing: Packing, out: Path, tell: Callable[[str], None]
 ) -> int:
-    n_files = 0
-    for plan in shard_plans(views.refs, packing):
+    files = []
+    for plan in shard_plans(views.refs, packing, "parquet"):
         file = write_parquet(source, plan, packing, out)
         tell(f"{file.name}: {len(plan.refs)} views, {file.stat().st_size / 1e6:.1f} MB")
-        n_files += 1
-    credits = source.credits(views.homes)
-    (out / "README.md").write_text(card(views, packing, credits, form="parquet"), encoding="utf-8")
-    return n_files + 1
+        files.append(file)
+    facts = root_facts(views, source)
+    (out / "README.md").write_text(card(views, packing, facts, form="parquet"), encoding="utf-8")
+    columns = {field.name: field.type == _PICTURE for field in pq.read_schema(files[0])}
+    (out / "croissant.json").write_bytes(croissant_json(files, columns, facts))
+    return len(files) + 2

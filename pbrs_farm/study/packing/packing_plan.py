@@ -14,6 +14,8 @@ from pbrs_farm.study.reading.view_sample import LAYERS, MODES, SampleRequest, Si
 from pbrs_farm.study.reading.views import ViewRef
 
 COLOURS = ("png", "jpeg")
+FORMS = ("shards", "parquet")
+_WHOLE_OF = {"shards": WHOLE, "parquet": "train"}  # `datasets` refuses a split named "all"
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +61,17 @@ class ShardPlan:
     refs: tuple[ViewRef, ...]
 
 
-def shard_plans(refs: tuple[ViewRef, ...], packing: Packing) -> Iterator[ShardPlan]:
-    """The shards of all splits; each view is in one, views of a home lie far apart."""
-    by_split: dict[str, list[ViewRef]] = {name: [] for name in (WHOLE, *SPLITS)}
+def shard_plans(
+    refs: tuple[ViewRef, ...], packing: Packing, form: str = "shards"
+) -> Iterator[ShardPlan]:
+    """The shards of all splits; each view is in one, views of a home lie far apart.
+
+    What is not split is one split by itself: "all" of shards, "train" of Parquet.
+    """
+    whole = _WHOLE_OF[form]
+    by_split: dict[str, list[ViewRef]] = {name: [] for name in (whole, *SPLITS)}
     for ref in refs:
-        split = split_of_house(ref.house, packing.shares) if packing.shares else WHOLE
+        split = split_of_house(ref.house, packing.shares) if packing.shares else whole
         by_split[split].append(ref)
     for split, own in by_split.items():
         # Mix by an order that follows from the seed and the number of views.

@@ -15,7 +15,7 @@ from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.layers import LAYERS as ALL_LAYERS
-from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.marker import read_marker
@@ -131,6 +131,22 @@ class StoredRoot:
         with suppress(ObjectMissing):
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
         return tuple(dict.fromkeys(line for line in lines if line))
+
+    @property
+    def recipe(self) -> Recipe | None:
+        """What it was made by; None where the root does not hold it."""
+        try:
+            return recipe_from_json(self._get(keys.RECIPE), f"{self.url}: {keys.RECIPE}")
+        except ObjectMissing:
+            return None
+
+    def source_of(self, house: str) -> dict[str, str]:
+        """Where a house came from and under which terms, as its house.json says; {} where none does."""
+        try:
+            row = json.loads(self._get(keys.house_key(house, "house.json")))["source"]
+            return {str(name): str(value) for name, value in row.items()}
+        except (ObjectMissing, ValueError, KeyError, TypeError, AttributeError):
+            return {}
 
     def save(self, refs: Sequence[ViewRef], place: str | Path) -> None:
         to = store_from_url(str(place))

@@ -1,5 +1,7 @@
+import hashlib
 import io
 import json
+import re
 import subprocess
 import sys
 import tarfile
@@ -20,6 +22,7 @@ from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.reading.shard_set import arrays_of_part
 from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest
+from tests.scene.homes import small_home
 from tests.study.small_roots import MODES, arrays_of_view, fill
 
 HOUSES = {f"home-{k}-00000000": 3 for k in range(8)}
@@ -123,7 +126,7 @@ def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
         form="parquet",
     )
     files = sorted((tmp_path / "x/data").iterdir())
-    assert packed.n_files == len(files) + 1
+    assert packed.n_files == len(files) + 2  # the card and croissant.json
     table = pq.read_table(files[-1])
     features = json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]
     assert features["mlt_il_ol"] == {"_type": "Image"}
@@ -135,6 +138,50 @@ def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
     assert (decode_photo(row["mlt_il_ol"]["bytes"], "x") == stored["mlt_il_ol.png"]).all()
     assert json.loads(row["camera"])["width_px"] == 16
     assert "data/train-*.parquet" in (tmp_path / "x/README.md").read_text()
+
+
+def test_parquet_that_is_not_split_is_a_split_that_datasets_takes(root, tmp_path):
+    packed = pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES), form="parquet")
+    assert packed.n_views == {"train": 24}
+    assert [p.name for p in (tmp_path / "x/data").iterdir()] == ["train-00000-of-00001.parquet"]
+    card = (tmp_path / "x/README.md").read_text()
+    assert "split: train" in card
+    assert "all-" not in card
+    said = json.loads((tmp_path / "x/croissant.json").read_text())
+    (file, _files) = said["distribution"]
+    data = (tmp_path / "x" / file["contentUrl"]).read_bytes()
+    assert file["sha256"] == hashlib.sha256(data).hexdigest()
+
+
+def test_the_card_says_what_is_true_of_the_root(tmp_path):
+    home = small_home().set(**{"light.spp": 3})
+    frames = pbrs_farm.render(home, home.cameras(n=2), modes=["mlt_il_ol"])
+    frames.save(tmp_path / "root")
+    packing = Packing((32, 24), modes=("mlt_il_ol",), seed=5, colour="jpeg")
+    pack(pbrs_farm.open(tmp_path / "root"), tmp_path / "x", packing, form="parquet")
+    card = (tmp_path / "x/README.md").read_text()
+    for said in (
+        f"| {home.id} | 2 | Apache-2.0 | pbrs_farm |",
+        "Rendered at 64x48; horizontal field of view",
+        "preset photo, lens pinhole",
+        home.recipe.digest(),
+        "integrator path, 3 samples a pixel",
+        f"Seeds: {home.recipe.seed} of the recipe, 5 of the order of views.",
+        "| wall | ",
+        "the nearest pixel's at 32x24",
+        "JPEG of quality 95",
+        "It is not split.",
+    ):
+        assert said in card, said
+    shares = re.findall(r"\| ([\d.]+) % \|", card)
+    assert sum(map(float, shares)) == pytest.approx(100, abs=0.5)
+
+
+def test_a_root_without_a_recipe_or_licences_is_told(root, tmp_path):
+    pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES))
+    card = (tmp_path / "x/README.md").read_text()
+    assert "holds no recipe.json" in card
+    assert "Homes whose source names no licence: 8." in card
 
 
 def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
@@ -178,6 +225,7 @@ def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
     said = capsys.readouterr()
     assert "1 view left out, one-00000001/0_0_2: no mlt_il_ol.png" in said.err
     assert "2 views, 3 files" in said.out
+    assert "lack a layer: 1." in (out / "README.md").read_text()
     assert main(words) == 1
     assert "is there already" in capsys.readouterr().err
     for wrong in (["--size", "8"], ["--split", "1/2"], ["--layers", "x"], ["--colour", "bmp"]):

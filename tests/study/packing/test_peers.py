@@ -1,7 +1,9 @@
-"""What other people's libraries make of our files and figures: webdataset, torchmetrics, pycocotools."""
+"""What other people's libraries make of our files and figures: webdataset, datasets, mlcroissant,
+torchmetrics, pycocotools."""
 
 from __future__ import annotations
 
+import io
 import warnings
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.export.coco import compressed_runs
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.metrics.confusion import Confusion
@@ -45,6 +48,52 @@ def test_webdataset_reads_every_view_with_all_its_bits(tmp_path: Path) -> None:
             assert array.dtype == np.uint16
             assert np.array_equal(array, stored[f"{name}.png"])
         assert np.array_equal(sample["normal.npz"]["valid"], stored["valid.png"])
+
+
+@pytest.mark.filterwarnings("ignore")  # of its own making
+@pytest.mark.parametrize("shares", [None, SplitShares(0.5, 0.0, 0.5)])
+def test_datasets_loads_a_folder_of_parquet_with_all_its_bits(
+    tmp_path: Path, shares: SplitShares | None
+) -> None:
+    import datasets
+
+    datasets.disable_progress_bars()
+    fill(FolderStore(tmp_path / "root"), {f"home-{k}-00000000": 2 for k in range(6)})
+    packing = Packing(layers=LAYERS, modes=MODES, shares=shares, views_per_shard=4)
+    packed = pack(open_views(tmp_path / "root"), tmp_path / "x", packing, form="parquet")
+    cache = str(tmp_path / "cache")
+    loaded = datasets.load_dataset(str(tmp_path / "x"), cache_dir=cache)
+    assert {name: len(rows) for name, rows in loaded.items()} == packed.n_views
+    assert set(loaded) == ({"train"} if shares is None else {"train", "test"})
+    for row in (row for rows in loaded.values() for row in rows):
+        stored = arrays_of_view(1000 * int(row["house"].split("-")[1]) + int(row["id"][-1]))
+        for mode in MODES:
+            assert np.array_equal(np.asarray(row[mode]), stored[f"{mode}.png"])
+        for name in ("normal", "depth", "instance"):
+            array = np.load(io.BytesIO(row[name]))[name]
+            assert array.dtype == np.uint16
+            assert np.array_equal(array, stored[f"{name}.png"])
+
+
+@pytest.mark.filterwarnings("ignore")  # of its own making
+def test_mlcroissant_validates_what_lies_beside_parquet_and_reads_it(tmp_path: Path) -> None:
+    import mlcroissant
+
+    fill(FolderStore(tmp_path / "root"), {f"home-{k}-00000000": 3 for k in range(6)})
+    packing = Packing(layers=LAYERS, modes=MODES, shares=SplitShares(0.5, 0.0, 0.5))
+    packed = pack(open_views(tmp_path / "root"), tmp_path / "x", packing, form="parquet")
+    dataset = mlcroissant.Dataset(jsonld=str(tmp_path / "x/croissant.json"))
+    assert not dataset.metadata.issues.errors
+    for split, n_views in packed.n_views.items():
+        rows = list(dataset.records(split))
+        assert len(rows) == n_views
+        for row in rows:
+            found = {name.rpartition("/")[2]: value for name, value in row.items()}
+            number = found["house"].decode().split("-")[1]
+            stored = arrays_of_view(1000 * int(number) + int(found["id"].decode()[-1]))
+            assert np.array_equal(np.asarray(found["mlt_il_ol"]), stored["mlt_il_ol.png"])
+            normal = np.load(io.BytesIO(found["normal"]))["normal"]
+            assert np.array_equal(normal, stored["normal.png"])
 
 
 @pytest.mark.parametrize("seed", range(4))
