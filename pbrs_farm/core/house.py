@@ -154,6 +154,8 @@ class LightPart:
     position_end: tuple[float, float, float] | None = None  # other end of a line
     emitting: tuple[int, ...] = ()  # indices into Item.surfaces; repair adds a sphere where none do
     escape: float | None = None  # light output ratio: share that leaves the lamp; None = unmeasured
+    is_coloured: bool = False  # the source tells rgb_linear, also where it is white
+    is_bare: bool = False  # power is what its surfaces send out, not what leaves the lamp
 
 
 Rows4 = tuple[float, float, float, float]

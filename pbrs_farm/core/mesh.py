@@ -7,6 +7,8 @@ and its closest_point takes triangles below half a millimetre for their edges.
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,8 @@ from pbrs_farm.core.arrays import F64, I64, Bools
 
 _TINY = 1e-300  # divides a zero vector to zero
 _ON_PLANE_M = 1e-8  # a corner nearer to a plane than this lies in it
+_PLACE_DIGITS: Final = 5  # corners that agree to 10 micrometres are one
+_CLOSED: Final = 0.95  # share of closed edges from which a mesh has an inside
 _NO_NORMAL = 100 * np.finfo(np.float64).eps  # of a face in a plane: twice its area, m2
 
 
@@ -131,6 +135,13 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
     # Count the faces of each edge, leaving out edges of no length.
     _, n_faces = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
     return float(np.mean(n_faces % 2 == 0)) if len(n_faces) else 0.0
+
+
+def outside_area(corners: F64) -> float:
+    """m2 of triangles (F, 3, 3) seen from outside: both sides of a mesh that is open."""
+    area = float(face_areas(corners).sum())
+    is_closed = closed_edge_share(np.round(corners.astype(np.float32), _PLACE_DIGITS)) > _CLOSED
+    return area if is_closed else 2 * area
 
 
 def edges_are_paired(faces: NDArray[np.integer]) -> bool:

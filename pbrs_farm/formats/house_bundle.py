@@ -31,6 +31,7 @@ _LATER_FIELDS: Final = {
     "normal_texture_id": None,
     "normal_scale": 1.0,
 }
+_LATER_FIELDS_OF_LIGHTS: Final = {"is_coloured": False, "is_bare": False}
 
 
 def bundle_from_house(house: House) -> tuple[bytes, bytes]:
@@ -64,8 +65,11 @@ def _json_of_house(house: House) -> dict[str, Any]:
 
 
 def _json_of_material(material: Material) -> dict[str, Any]:
-    values: dict[str, Any] = json_from_value(material)
-    return {k: v for k, v in values.items() if k not in _LATER_FIELDS or v != _LATER_FIELDS[k]}
+    return _without_unused(json_from_value(material), _LATER_FIELDS)
+
+
+def _without_unused(values: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in values.items() if k not in later or v != later[k]}
 
 
 def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
@@ -74,6 +78,7 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
     }
     if item.pose is None:
         del data["pose"]
+    data["lights"] = [_without_unused(x, _LATER_FIELDS_OF_LIGHTS) for x in data["lights"]]
     data["surfaces"] = [
         {
             "name": s.name,

@@ -233,7 +233,10 @@ def _set_light(house: House, edit: SetLight, _fields: ReadFields) -> House:
 
 def _shining(light: LightPart, edit: SetLight) -> LightPart:
     rgb = light.rgb_linear if edit.rgb_linear is None else edit.rgb_linear
-    return replace(light, power=edit.lm, unit=PowerUnit.LUMEN, rgb_linear=rgb)
+    told = light.is_coloured or edit.rgb_linear is not None
+    return replace(
+        light, power=edit.lm, unit=PowerUnit.LUMEN, rgb_linear=rgb, is_coloured=told, is_bare=False
+    )
 
 
 def _add_light(house: House, edit: AddLight, _fields: ReadFields) -> House:
@@ -248,7 +251,7 @@ def _add_light(house: House, edit: AddLight, _fields: ReadFields) -> House:
         }  # fmt: skip
     light = LightPart(
         edit.position, edit.radius_m, edit.lm, PowerUnit.LUMEN, rgb_linear=edit.rgb_linear,
-        emitting=(0,), **spot,
+        emitting=(0,), is_coloured=True, **spot,
     )  # fmt: skip
     surface = sphere("bulb", np.array(edit.position), edit.radius_m, len(house.materials))
     item = Item(

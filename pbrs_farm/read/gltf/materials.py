@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import triple
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
@@ -30,6 +31,15 @@ F0: Final = 0.04
 MAX_SHININESS: Final = 10_000.0  # Phong exponent; above it a lobe is a mirror's
 
 
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """How a material shines."""
+
+    luminance: float  # cd m-2; 0 = of unknown strength
+    rgb_linear: tuple[float, float, float]  # largest 1
+    is_coloured: bool  # the file tells that colour, also where it is white
+
+
 class SceneMaterials:
     """Resolves the materials of one scene into its material library."""
 
@@ -39,8 +49,10 @@ class SceneMaterials:
         self._notes = notes
         self.library = MaterialLibrary(notes)
 
-    def material(self, number: int | None, *, clear: MaterialKind) -> tuple[Material, float | None]:
-        """(materials[number], its emission in cd m-2 or None). None: glTF's default, white.
+    def material(
+        self, number: int | None, *, clear: MaterialKind
+    ) -> tuple[Material, Emission | None]:
+        """(materials[number], its emission or None). None: glTF's default, white.
 
         clear: the kind of what lets light through.
         """
@@ -126,9 +138,8 @@ class SceneMaterials:
             return clear
         return MaterialKind.MIRROR if metallic > 0.9 and roughness < 0.1 else MaterialKind.OPAQUE
 
-    def _emission(self, fields_json: dict[str, Any], place: str) -> float | None:
-        """Luminance in cd m-2 where KHR_materials_emissive_strength gives it; 0 = of unknown
-        strength; None = none."""
+    def _emission(self, fields_json: dict[str, Any], place: str) -> Emission | None:
+        """Its strength is told by KHR_materials_emissive_strength alone; None = it does not shine."""
         factor = numbers(
             self._gltf, fields_json.get("emissiveFactor", [0] * 3), 3, f"{place}: emission"
         )
@@ -137,11 +148,15 @@ class SceneMaterials:
         strength = object_at(
             object_at(fields_json, "extensions"), "KHR_materials_emissive_strength"
         )
+        rgb = triple(np.maximum(factor, 0.0) / factor.max())
+        # Our own files paint bulbs that have no colour white.
+        is_told = object_at(fields_json, "extras").get("kind") != MaterialKind.BULB.value
         if "emissiveStrength" not in strength:
-            return 0.0
+            return Emission(0.0, rgb, is_told)
         # Take luminance for the strength: its Rec. 709 weights.
         (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")
-        return float(max(value, 0.0) * (factor @ LUMINANCE))
+        luminance = float(value * (np.maximum(factor, 0.0) @ LUMINANCE))
+        return Emission(luminance, rgb, is_told) if luminance > 0 else None
 
     def _fraction(self, holder: dict[str, Any], key: str, default: float, place: str) -> float:
         (value,) = numbers(self._gltf, [holder.get(key, default)], 1, f"{place}: {key}")

@@ -24,7 +24,7 @@ from pbrs_farm.core.house import (
     corners_of_surfaces,
 )
 from pbrs_farm.core.lighting import BULB_RADIUS_M, LightForm, PowerUnit
-from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.core.mesh import face_areas, outside_area
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.read.common.material_library import PANE_OPACITY
@@ -32,7 +32,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
 from pbrs_farm.read.common.room_shells import planar_parts
 from pbrs_farm.read.gltf.document import Placed, meshes_of, numbers, object_at, placed_nodes
-from pbrs_farm.read.gltf.materials import SceneMaterials, glass_materials, names_glass
+from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials, names_glass
 from pbrs_farm.read.gltf.node_classes import (
     UNMAPPED,
     Mapping,
@@ -84,27 +84,34 @@ def punctual_light(
         form=LightForm.SPOT if fields_json["type"] == "spot" else LightForm.POINT,
         direction=triple(direction),
         cutoff_rad=cutoff,
+        is_coloured="color" in fields_json,
     )
 
 
-def emitted(surfaces: Sequence[Surface], luminance: dict[int, float]) -> tuple[LightPart, ...]:
-    """A light for every emissive surface. luminance: surface -> cd m-2, 0 = of unknown strength.
+def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[LightPart, ...]:
+    """A light for every emissive surface. shining: surface -> its emission.
 
-    Surfaces of unknown strength share ASSUMED_LM by their area.
+    Surfaces of unknown strength share ASSUMED_LM by their area. Others send out what they are told
+    to, whatever stands before them: an open one from both its sides.
     """
     # Share the assumed flux by area where no strength is told.
-    area = {k: _area(surfaces[k]) for k in luminance}
-    unknown = sum(area[k] for k, value in luminance.items() if value == 0)
+    corners = {k: corners_of_surfaces([surfaces[k]]) for k in shining}
+    area = {k: float(face_areas(corners[k]).sum()) for k in shining}
+    unknown = sum(area[k] for k, emission in shining.items() if emission.luminance == 0)
     found = []
-    for k, value in luminance.items():
+    for k, emission in shining.items():
         low, high = surfaces[k].positions.min(0), surfaces[k].positions.max(0)
-        known = math.pi * value * area[k]  # a Lambertian emitter
+        # A Lambertian emitter.
+        known = math.pi * emission.luminance * outside_area(corners[k])
         found.append(
             LightPart(
                 position=triple((low + high) / 2),
                 radius_m=float(np.mean(high - low)) / 2,
-                power=known if value else ASSUMED_LM * area[k] / max(unknown, 1e-12),
+                power=known or ASSUMED_LM * area[k] / max(unknown, 1e-12),
                 unit=PowerUnit.LUMEN,
+                rgb_linear=emission.rgb_linear,
+                is_coloured=emission.is_coloured,
+                is_bare=emission.luminance > 0,
                 emitting=(k,),
             )
         )
@@ -115,10 +122,6 @@ def assumed_light(item: Item) -> LightPart:
     """A light in the middle of a lamp about which the scene tells nothing."""
     centre = item.bounds.mean(0)
     return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
-
-
-def _area(surface: Surface) -> float:
-    return float(face_areas(corners_of_surfaces([surface])).sum())
 
 
 # Nodes of a glTF scene -> items placed in the world.
@@ -227,7 +230,7 @@ def _item(
     fields: ReadFields,
 ) -> Item | None:
     surfaces: list[Surface] = []
-    luminance: dict[int, float] = {}
+    shining: dict[int, Emission] = {}
     kind = thing.seen.kind
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
     # What lets light through is a pane in an opening, glass elsewhere.
@@ -247,18 +250,19 @@ def _item(
                 material = replace(material, kind=clear, opacity=PANE_OPACITY)
             # Emission of unknown strength counts for lamps only: screens and stickers glow, too.
             emits = emission is not None and not kind.is_structure
-            emits = emits and (emission != 0 or kind is ItemKind.LAMP)
+            is_known = emission is not None and emission.luminance > 0
+            emits = emits and (is_known or kind is ItemKind.LAMP)
             index = materials.as_bulb(material) if emits else materials.library.index(material)
             name = material.name or f"part {len(surfaces)}"
             surface = placed(mesh, part.world_from_node, name=name, material=index)
             if surface is None:
                 continue
             if emits and emission is not None:
-                luminance[len(surfaces)] = emission
+                shining[len(surfaces)] = emission
             surfaces.append(surface)
     if not surfaces and not lights:
         return None
-    lights += emitted(surfaces, luminance)
+    lights += emitted(surfaces, shining)
     return _finished(thing, surfaces, lights, _box(thing, parts))
 
 

@@ -23,11 +23,11 @@ from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.core.mesh import (
-    closed_edge_share,
     dots,
     face_areas,
     faces_with_area,
     lengths,
+    outside_area,
     triangle_corners,
     unit_normals,
 )
@@ -76,8 +76,6 @@ def _matching(wavelength: F64) -> F64:
 
 
 _MIN_LIGHT_OUTPUT_RATIO: Final = 0.25  # a bulb gets at most four times stronger for its shade
-_PLACE_DIGITS: Final = 5  # corners that agree to 10 micrometres are one
-_CLOSED: Final = 0.95  # share of closed edges from which a mesh has an inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,21 +144,20 @@ def _flux_and_rgb(
     """(flux in lm, colour of luminance 1) of a light part.
 
     The source states the flux that leaves the lamp. Its shade keeps part of the bulb's flux, so
-    the bulb emits more: flux over the light output ratio, which repair stores as part.escape.
+    the bulb emits more: flux over the light output ratio, which repair stores as part.escape. A
+    bare part's flux is its surfaces' own.
     """
     e = recipe.emission
     flux = flux_lm(part.power, part.unit, part.share, lamp_lm=e.lamp_lm, lm_per_watt=e.lm_per_watt)
-    if e.compensate_shades and part.escape is not None:
+    if e.compensate_shades and part.escape is not None and not part.is_bare:
         flux /= min(max(part.escape, _MIN_LIGHT_OUTPUT_RATIO), 1.0)
-    return max(flux, 0.0), lamp_rgb(part.rgb_linear, f"{house.id}/{item.id}/{k}", e, recipe.seed)
+    return max(flux, 0.0), lamp_rgb(part, f"{house.id}/{item.id}/{k}", e, recipe.seed)
 
 
-def lamp_rgb(
-    rgb_linear: tuple[float, float, float], name: str, fields: EmissionFields, seed: int
-) -> F64:
-    """(3,) colour of luminance 1: the source's, or a seeded warm white where that is white."""
-    rgb = np.maximum(np.asarray(rgb_linear, np.float64), 0.0)
-    if np.ptp(rgb) > 0.02 and rgb @ LUMINANCE > 0:
+def lamp_rgb(part: LightPart, name: str, fields: EmissionFields, seed: int) -> F64:
+    """(3,) colour of luminance 1: the source's, or a seeded warm white where it tells none."""
+    rgb = np.maximum(np.asarray(part.rgb_linear, np.float64), 0.0)
+    if (part.is_coloured or np.ptp(rgb) > 0.02) and rgb @ LUMINANCE > 0:
         return np.asarray(rgb / (rgb @ LUMINANCE))
     u = keys.seed("lamp", name, seed) / 2**32
     low, high = fields.lamp_kelvin_min, fields.lamp_kelvin_max
@@ -181,9 +178,7 @@ def _bulb_emitter(
     areas = face_areas(corners)
     area = float(areas.sum())
     flux, rgb = flux_and_rgb
-    # Count both sides of an open mesh, the outside of one that is closed but for a few edges.
-    is_closed = closed_edge_share(np.round(corners.astype(np.float32), _PLACE_DIGITS)) > _CLOSED
-    outside = area if is_closed else 2 * area
+    outside = outside_area(corners)
     radiance = rgb * (flux / (LM_PER_W * math.pi * outside))
     # Replace both by the published radiance, which knows no size.
     if recipe.emission.preset == "released":

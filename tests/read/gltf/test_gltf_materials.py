@@ -6,12 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import ItemKind, MaterialKind
+from pbrs_farm.core.frames import LM_PER_W
+from pbrs_farm.core.house import House, ItemKind, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import LightForm, flux_lm
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.core.recipe import ReadFields, RepairFields, recipe_from_name
+from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
+from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.gltf.scene import read_gltf
+from pbrs_farm.repair import repair
+from pbrs_farm.transport.scene_tables.scene_tables import area_emitters_of_house, lamp_rgb
 from tests.read.gltf.gltf_scenes import item, read, two_rooms
 from tests.read.small_houses import png
 
@@ -159,13 +163,72 @@ def test_emissive_surfaces_of_objects_emit_and_floors_never_glow() -> None:
     house = read(s)
     (screen,) = item(house, "TV").lights
     assert screen.emitting == (0,)
-    assert screen.power == pytest.approx(np.pi * 1000 * 0.5)
+    # Both sides of an open surface shine as told.
+    assert screen.power == pytest.approx(2 * np.pi * 1000 * 0.5)
     (lamp,) = item(house, "Floor lamp").lights
     assert (lamp.power, lamp.emitting) == (800.0, (0,))
     assert not item(house, "Picture").lights
     floor = item(house, "Floor")
     assert not floor.lights
     assert house.materials[floor.surfaces[0].material].kind is MaterialKind.OPAQUE
+
+
+def strong(name: str, rgb: list[float], strength: float) -> dict[str, object]:
+    extension = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    return {"name": name, "emissiveFactor": rgb, "extensions": extension, "doubleSided": True}
+
+
+def test_emitters_shine_as_bright_and_in_the_colour_that_they_are_told() -> None:
+    s = two_rooms()
+    told = {
+        "Panel": ([1, 1, 1], 1000), "Red panel": ([1, 0, 0], 500), "Green box": ([0.2, 0.8, 0.1], 300),
+        "Lamp": ([1, 1, 1], 2000),
+    }  # fmt: skip
+    first = len(s.materials)
+    s.materials += [strong(name, rgb, strength) for name, (rgb, strength) in told.items()]
+    for k, name in enumerate(("Panel", "Red panel")):
+        z = 1.0 + k
+        s.node(name, mesh=s.mesh([[[0.5, 1, z], [1, 1, z], [1, 1.5, z], [0.5, 1.5, z]]], first + k))
+    s.node("Green box", mesh=s.box([2, 1, 1], [2.2, 1.2, 1.2], first + 2))
+    # A bulb within a body that keeps most of its light is as bright.
+    bulb = s.node("bulb", mesh=s.box([2, 2, 2], [2.1, 2.1, 2.1], first + 3))
+    s.node("Lamp", mesh=s.box([1.9, 1.9, 1.9], [2.2, 2.2, 2.2]), children=[bulb])
+    house, _report = repair(read(s), RepairFields(), occluder_from=caster_of)
+    geometry = geometry_from_house(house)
+    keep = np.ones(len(geometry.faces), bool)
+    emitters = area_emitters_of_house(house, geometry, keep, recipe_from_name("fast"))
+    found = {house.items[e.item].name: np.array(e.radiance) * LM_PER_W for e in emitters}
+    for name, (rgb, strength) in told.items():
+        np.testing.assert_allclose(found[name], np.array(rgb) * strength, rtol=0.01, err_msg=name)
+
+
+def caster_of(house: House) -> Caster:
+    return Caster(geometry_from_house(house))
+
+
+def test_a_lamp_without_a_colour_keeps_its_warm_white_and_one_of_told_white_is_white() -> None:
+    s = two_rooms()
+    point = {"type": "point", "intensity": 50}
+    lights = [point, {**point, "color": [1, 1, 1]}]
+    s.more["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    for k, name in enumerate(("Plain lamp", "White lamp")):
+        use = {"KHR_lights_punctual": {"light": k}}
+        bulb = s.node("bulb", extensions=use, translation=[0, 0.5, 0])
+        s.node(name, mesh=s.box([0, 0, 0], [0.2, 0.2, 0.2]), children=[bulb], translation=[1, k, 1])
+    house = read(s)
+    fields = recipe_from_name("fast").emission
+    plain, white = (
+        lamp_rgb(item(house, name).lights[0], name, fields, 0)
+        for name in ("Plain lamp", "White lamp")
+    )
+    assert plain[0] > 5 * plain[2]
+    np.testing.assert_allclose(white, 1.0)
+    # The pair of stored files says the same, and of lights that use neither field what it did.
+    data = bundle_from_house(house)
+    back = house_from_bundle(*data)
+    assert item(back, "White lamp").lights == item(house, "White lamp").lights
+    assert data[1].count(b"is_coloured") == 1
+    assert b"is_bare" not in data[1]
 
 
 def test_a_lamp_without_any_light_gets_an_assumed_one() -> None:
