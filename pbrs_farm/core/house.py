@@ -128,7 +128,7 @@ class Box:
 
     centre: F64  # (3,) metres, world
     half: F64  # (3,) half extents, metres
-    axes: F64  # (3, 3), unit columns
+    axes: F64  # (3, 3), unit columns; view.json has them as rows (docs/formats.md)
 
     @property
     def corners(self) -> F64:
@@ -182,7 +182,9 @@ class Item:
     source_class: str = ""  # the source's own name of its class: catalogue id or model id
     room_id: str | None = None  # the room it stands in
     lights: tuple[LightPart, ...] = ()
-    box: Box | None = None  # oriented bounding box; None = the axis-aligned one holds
+    box: Box | None = (
+        None  # oriented: the source's plan, of a repaired house the mesh's; None = along x, y, z
+    )
     tags: tuple[str, ...] = ()  # words of the source: "mirrored", "unmapped", "boundary_of:0_1"
     pose: ModelPose | None = None  # of what an edit placed
 

@@ -11,7 +11,17 @@ from dataclasses import replace
 import numpy as np
 
 from pbrs_farm.core.arrays import I32, Bools
-from pbrs_farm.core.house import Enclosure, House, Item, ItemKind, Note, Room, Surface
+from pbrs_farm.core.house import (
+    Box,
+    Enclosure,
+    House,
+    Item,
+    ItemKind,
+    Note,
+    Room,
+    Surface,
+    corners_of_surfaces,
+)
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.lamps.bulbs import with_bulbs, with_shades
@@ -33,7 +43,9 @@ from pbrs_farm.repair.structure.cut_openings import with_frames_apart
 from pbrs_farm.repair.structure.walls import BASEBOARD
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
 
-# The small repairs: persons and plants out, default walls white, faces sound.
+_SQUARE = 1e-6  # axes of a box whose products differ more from 0 and 1 are no frame
+
+# The small repairs: persons and plants out, default walls white, faces sound, boxes by the mesh.
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
@@ -121,6 +133,30 @@ def _against_normals(surface: Surface, faces: I32) -> Bools:
     return np.asarray((mean * own).sum(1) < -1e-6)
 
 
+def with_boxes_of_meshes(house: House) -> House:
+    """Every item's box taken from its triangles, along the axes it has: a source's is its plan's.
+
+    A box that its mesh does not fill is made smaller, one that a bulb sticks out of larger.
+    """
+    return house.with_items(map(_with_box_of_mesh, house.items))
+
+
+def _with_box_of_mesh(item: Item) -> Item:
+    corners = corners_of_surfaces(item.surfaces).reshape(-1, 3)
+    if not len(corners):
+        return item
+    axes = np.eye(3) if item.box is None else item.box.axes
+    if np.abs(axes.T @ axes - np.eye(3)).max() > _SQUARE:
+        axes = np.eye(3)
+    # Measure along the axes, which are columns.
+    local = corners @ axes
+    low, high = local.min(0), local.max(0)
+    # Vertices that no triangle has are in no box.
+    if item.box is None and np.array_equal(item.bounds, np.array([low, high])):
+        return item
+    return replace(item, box=Box(axes @ ((low + high) / 2), (high - low) / 2, axes))
+
+
 # The repair pipeline.
 
 
@@ -147,6 +183,7 @@ def repair(
     house, n_apart = with_frames_apart(house)
 
     house, sources, given = _with_light(house, fields, occluder_from)
+    house = with_boxes_of_meshes(house)
 
     # Say which rooms are closed, and let rays look for leaks in them.
     house = replace(house, rooms=_with_enclosure(house.rooms, structure.spaces), is_repaired=True)
