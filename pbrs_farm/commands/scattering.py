@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from pbrs_farm.commands.arguments import (
     HOME,
@@ -37,6 +38,8 @@ def add_verbs(verb: Verb) -> None:
     add("--credit", default="", metavar="TEXT", help="a line that pictures of the models carry")
     text = "from the eye to what it looks at, metres (default 0.5..1.2)"
     add("--distance", default="0.5..1.2", metavar="A..B", help=text)
+    text = "a BOP camera.json: K and size of the pictures"
+    add("--camera", type=Path, metavar="FILE", help=text)
     text = "share of the model looked at that nothing hides (default 0.5)"
     add("--visible", type=float, default=0.5, metavar="SHARE", help=text)
     add("--dress", metavar="SEED", help="dress the home first, by this seed")
@@ -46,6 +49,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _scatter(args: argparse.Namespace) -> int:
+    from pbrs_farm.formats.bop_camera import camera_of_bop
     from pbrs_farm.scene.home import load
     from pbrs_farm.scene.models import models
     from pbrs_farm.scene.pictures import render
@@ -64,7 +68,9 @@ def _scatter(args: argparse.Namespace) -> int:
         )
     ]
     recipe = recipe_of(args)
-    size = recipe.image.width_px, recipe.image.height_px
+    size, k = (recipe.image.width_px, recipe.image.height_px), None
+    if args.camera is not None:
+        size, k = camera_of_bop(args.camera)
     seeds = dress_seeds(args.dress)
     there = finished_views(store_from_url(args.out))
     n_made = n_kept = 0
@@ -78,7 +84,7 @@ def _scatter(args: argparse.Namespace) -> int:
                 )  # fmt: skip
                 cameras = scene.cameras_around(
                     n=args.views, distance_m=distance, min_visible=args.visible, size=size,
-                    seed=seed,
+                    K=k, seed=seed,
                 )  # fmt: skip
                 left = [c for c in cameras if (scene.id, c.id) not in there]
                 n_kept += len(cameras) - len(left)

@@ -179,4 +179,6 @@ def _annotations(view: ChosenView) -> Iterator[dict[str, Any]]:
             "instance_id": row["id"],
             "visible_fraction": row["visible_fraction"],
             "truncated": row["truncated"],
+            # The 6-D pose of a placed model: 4 x 4, metres, x right, y down, z forward.
+            **{name: row[name] for name in ("model", "camera_from_model_opencv") if name in row},
         }

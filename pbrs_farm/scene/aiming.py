@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.camera import Camera, intrinsics_from_k
+from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.shown_text import shown
@@ -31,8 +31,7 @@ def cameras_around(
     distance_m: tuple[float, float],
     elevation_deg: tuple[float, float],
     min_visible: float,
-    size: tuple[int, int],
-    hfov_deg: float,
+    intrinsics: Intrinsics,
     seed: int,
 ) -> list[Camera]:
     """n cameras that look at one of the items each, in a room, clear of everything.
@@ -42,7 +41,7 @@ def cameras_around(
     rng = np.random.default_rng([seed, 4])
     found: list[Camera] = []
     for _ in range(n):
-        camera = _one(house, items, distance_m, elevation_deg, min_visible, size, hfov_deg, rng)
+        camera = _one(house, items, distance_m, elevation_deg, min_visible, intrinsics, rng)
         if camera is None:
             names = shown(", ".join(dict.fromkeys(item.name for item in items)))
             text = f"found {len(found)} of {n} cameras that see {min_visible:g} of {names}"
@@ -53,8 +52,8 @@ def cameras_around(
 
 def _one(
     house: House, items: Sequence[Item], distance_m: tuple[float, float],
-    elevation_deg: tuple[float, float], min_visible: float, size: tuple[int, int],
-    hfov_deg: float, rng: np.random.Generator,
+    elevation_deg: tuple[float, float], min_visible: float, intrinsics: Intrinsics,
+    rng: np.random.Generator,
 ) -> Camera | None:  # fmt: skip
     for _ in range(_TRIES):
         item = items[int(rng.integers(len(items)))]
@@ -67,7 +66,7 @@ def _one(
         aim = target + rng.normal(0, 0.15, 3) * np.ptp(item.bounds, axis=0)
         if not _is_clear(house, eye):
             continue
-        camera = Camera.look(intrinsics_from_k(size, None, hfov_deg), eye, aim - eye)
+        camera = Camera.look(intrinsics, eye, aim - eye)
         if _visible(house, item, camera) >= min_visible:
             return camera
     return None

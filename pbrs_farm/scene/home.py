@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.camera import Camera, intrinsics_from_k
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
@@ -383,12 +383,13 @@ class Home:
         min_visible: float = 0.5,
         size: tuple[int, int] = (640, 480),
         hfov_deg: float = 50.0,
+        K: Any = None,
         seed: int = 0,
     ) -> Viewpoints:
         """n viewpoints that look at items each: at placed models where none are named.
 
         distance_m and elevation_deg: between which they are drawn. min_visible: the share of the
-        item looked at that nothing may hide. Equal seeds give equal cameras. Raises BadInput where
+        item looked at that nothing may hide. K: 3 x 3, instead of hfov_deg. Equal seeds give equal cameras. Raises BadInput where
         fewer are found.
         """
         from pbrs_farm.scene.aiming import cameras_around
@@ -403,7 +404,7 @@ class Home:
             raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
         cameras = cameras_around(
             self.house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
-            min_visible=min_visible, size=size, hfov_deg=hfov_deg, seed=seed,
+            min_visible=min_visible, intrinsics=intrinsics_from_k(size, K, hfov_deg), seed=seed,
         )  # fmt: skip
         return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 

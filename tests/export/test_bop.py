@@ -86,6 +86,16 @@ def test_depth_is_that_of_the_posed_model(bop: Path) -> None:
     assert np.abs(depth[seen] - row["cam_t_m2c"][2]).max() < radius
 
 
+def test_coco_has_the_same_poses(bop: Path, tmp_path: Path) -> None:
+    export(bop.parent / "root", tmp_path / "coco", "coco")
+    document = read(tmp_path / "coco/annotations.json")
+    (row, *_others) = read(bop / "train_pbr/000000/scene_gt.json")["0"]
+    posed = [a for a in document["annotations"] if a.get("model") == "can" and a["image_id"] == 1]
+    assert len(posed) == 1
+    mm = 1000 * np.array(posed[0]["camera_from_model_opencv"])[:3, 3]
+    assert mm == pytest.approx(row["cam_t_m2c"])
+
+
 def test_views_without_placed_models_are_told(tmp_path: Path) -> None:
     home = small_home()
     pf.render(home, home.cameras(n=1), modes=[]).save(tmp_path / "root")

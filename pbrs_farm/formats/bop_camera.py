@@ -1,0 +1,43 @@
+"""camera.json of a BOP data set: the size and the K of its pictures. Effects: reads a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import Finite, checked
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+
+_Focal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Pixels = Annotated[int, Field(gt=0, le=16384)]
+
+
+class _BopCamera(BaseModel):
+    # Other fields, such as depth_scale, are left alone.
+    model_config = ConfigDict(frozen=True, extra="ignore")
+    fx: _Focal
+    fy: _Focal
+    cx: Finite
+    cy: Finite
+    width: _Pixels
+    height: _Pixels
+
+
+def camera_of_bop(path: Path) -> tuple[tuple[int, int], F64]:
+    """((width, height), K (3, 3)) of a camera.json; its K counts from the first pixel's centre.
+
+    Raises BadInput, naming the file and the field, where it is none.
+    """
+    try:
+        data = read_regular(path, MAX_TEXT_BYTES)
+    except OSError as error:
+        raise BadInput(path, "", fault_of(error)) from None
+    c = checked(_BopCamera, data, path, hint="fx, fy, cx, cy, width, height")
+    # Ours counts from the picture's corner: half a pixel more.
+    k = np.array([[c.fx, 0, c.cx + 0.5], [0, c.fy, c.cy + 0.5], [0, 0, 1]], np.float64)
+    return (c.width, c.height), k
