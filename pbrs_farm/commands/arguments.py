@@ -223,6 +223,16 @@ def fields_set(
     return overrides
 
 
+def size_of(text: str | None) -> tuple[int, int] | None:
+    """(width, height) of WxH, None of None; BadInput for anything else."""
+    if text is None:
+        return None
+    width, _, height = text.partition("x")
+    if not all(n.isascii() and n.isdigit() and 1 <= int(n) <= 16384 for n in (width, height)):
+        raise BadInput("--size", text, "expected a width and a height", hint="e.g. 320x240")
+    return int(width), int(height)
+
+
 def recipe_of(args: argparse.Namespace) -> Recipe:
     """The recipe that a command's options name; raises BadRecipe."""
     from pbrs_farm.core.recipe import recipe_from_name
@@ -230,9 +240,9 @@ def recipe_of(args: argparse.Namespace) -> Recipe:
 
     overrides = fields_set(args.set, "group.field=value")
     # Let the options that are short forms of fields win over --set.
-    if args.size is not None:
-        width, _, height = args.size.partition("x")
-        overrides |= {"image.width_px": width, "image.height_px": height}
+    size = size_of(args.size)
+    if size is not None:
+        overrides |= {"image.width_px": str(size[0]), "image.height_px": str(size[1])}
     for option, field in _SHORT_FORMS.items():
         value = getattr(args, option, None)
         if value is not None:

@@ -67,7 +67,10 @@ def _homes(args: argparse.Namespace) -> int:
     # Listing fetches nothing: the list of homes is part of the program.
     package = homes_package.cached()
     for row in rows:
-        echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {row.n_levels} levels")
+        levels = counted(row.n_levels, "level")
+        echo(f"{row.name:<34} {row.n_rooms:>2} rooms, {levels}")
+    echo(f"{'builtin':<34}  2 rooms, 1 level: our own, nothing to fetch")
+    echo(f"{'made:SEED, made:1..20,rooms=2..4':<34}  homes without end: each is made from its seed")
     echo()
     echo(f"fetched: {package.label}" if package else "not fetched yet: pbrs-farm homes --fetch")
     if package and package.note:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, warn
+from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.plugins import plugins
 
@@ -122,16 +122,6 @@ def _pack(args: argparse.Namespace) -> int:
     said = ", ".join(f"{split} {n}" for split, n in packed.n_views.items())
     echo(f"{args.out}: {said} views, {packed.n_files} files, {packed.n_bytes / 1e6:.1f} MB")
     return 0
-
-
-def size_of(text: str | None) -> tuple[int, int] | None:
-    """(width, height) of WxH, None of None; BadInput for anything else."""
-    if text is None:
-        return None
-    width, _, height = text.partition("x")
-    if not all(n.isascii() and n.isdigit() and 1 <= int(n) <= 16384 for n in (width, height)):
-        raise BadInput("--size", text, "expected a width and a height", hint="e.g. 320x240")
-    return int(width), int(height)
 
 
 def _classes(args: argparse.Namespace) -> int:

@@ -37,7 +37,8 @@ def zipped(path: Path, **entries: str) -> Path:
         (["run", "builtin", "--out", "{out}", "--set", "spp"], "expected group.field=value"),
         (["run", "builtin", "--out", "{out}", "--modes", "mlt"], "no such lighting mode"),
         (["run", "builtin", "--out", "{out}", "--layers", "smell"], "no such layer"),
-        (["run", "builtin", "--out", "{out}", "--size", "axb"], "image.width_px"),
+        (["run", "builtin", "--out", "{out}", "--size", "axb"], "expected a width and a height"),
+        (["run", "builtin", "--out", "{out}", "--size", "640"], "e.g. 320x240"),
         (["run", "builtin", "--out", "{out}", "--noise", "low"], "light.noise"),
         (["run", "builtin", "--out", "{out}", "--time-budget", "-1"], "light.time_budget_s"),
         (

@@ -97,6 +97,11 @@ def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch,
     text = printed(capsys, "homes")
     assert all(row["name"] in text for row in rows)
     assert "not fetched yet: pbrs-farm homes --fetch" in text
+    # Homes that need no fetching are homes, too.
+    house = builtin_home()
+    levels = len(house.levels)
+    assert f"builtin {len(house.rooms)} rooms, {levels} level" in " ".join(text.split())
+    assert "made:1..20" in text
 
 
 def test_homes_fetch_without_apt_says_where_to_put_the_package(tmp_path, monkeypatch, capsys):
