@@ -73,7 +73,9 @@ UNITS: Final = {
 def main() -> None:
     """Measure everything and write the report."""
     figures: dict[str, Any] = {
-        "python.asked": sum(bool(name) and (EXAMPLES / f"{name}.py").exists() for name in ASKED.values()),
+        "python.asked": sum(
+            bool(name) and (EXAMPLES / f"{name}.py").exists() for name in ASKED.values()
+        ),
         "python.import_ms": import_ms(),
         "python.first_picture_lines": first_picture_lines(),
         "python.examples": len(list(EXAMPLES.glob("*.py"))),

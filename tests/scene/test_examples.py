@@ -13,10 +13,21 @@ import pbrs_farm as pf
 from tests.scene.homes import SMALL
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
+# Run by `make test`; the others by `make test-slow`.
+QUICK = (
+    "first_picture", "given_poses", "object_poses", "move_and_remove", "lamps_and_spots", "stereo", "physics",
+    "orbit", "bop_dataset", "class_map", "trajectory", "floor_plan",
+)  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore:.*is in no room")
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(path, id=path.stem, marks=() if path.stem in QUICK else pytest.mark.slow)
+        for path in EXAMPLES
+    ],
+)
 def test_an_example_runs(example: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     load, make = pf.load, pf.make
 
