@@ -14,10 +14,7 @@ from tests.scene.homes import SMALL
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 # Run by `make test`; the others by `make test-slow`.
-QUICK = (
-    "first_picture", "given_poses", "object_poses", "move_and_remove", "lamps_and_spots", "stereo", "physics",
-    "orbit", "bop_dataset", "class_map", "trajectory", "floor_plan",
-)  # fmt: skip
+QUICK = ("first_picture", "object_poses", "physics", "bop_dataset", "floor_plan")
 
 
 @pytest.mark.filterwarnings("ignore:.*is in no room")
