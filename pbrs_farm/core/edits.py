@@ -26,6 +26,7 @@ class ModelRef(Record):
 
     path: str
     sha256: str  # of the file
+    companions: str = ""  # digest of the files beside it that reading opens: materials, pictures
     id: str  # what its instances are called in tables: "mug", "obj_000005"
     category: str = ""  # source class
     nyu40: int = 0

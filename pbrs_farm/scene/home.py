@@ -177,9 +177,9 @@ class Home:
         """The home with one more thing.
 
         on: what it is put on where there is room for it, by the seed, upright, touching: an item, a
-        name that one or several items have, or a room's floor. pose: (4, 4) world_from_model instead: metres, world y up, the model's own
-        axes; or at: (3,) where the middle of its foot stands, upright. name: of the new item, its
-        model's id and a number without one.
+        name that one or several items have, or a room's floor. pose: (4, 4) world_from_model
+        instead: metres, world y up, the model's own axes; or at: (3,) where the middle of its foot
+        stands, upright. name: of the new item, its model's id and a number without one.
 
         Raises BadInput where it fits nowhere, for a pose that is no rigid motion, a name that is
         taken, an item there is not.
@@ -193,7 +193,8 @@ class Home:
         elif at is not None:
             matrix = upright_at(model, np.asarray(at, np.float64), 0.0)
         else:
-            matrix = free_pose(self.house, model, self._supports_named(on), seed)
+            house, supports = self.house, self._supports_named(on)
+            matrix = RENDERER.call(lambda: free_pose(house, model, supports, seed))
         return self._edited(self._placing(model, matrix, name))
 
     def scatter(
@@ -210,28 +211,23 @@ class Home:
 
         on: an item or room whose surface takes them; in_: a room, on all its tables, shelves and
         floor; else anywhere in the home. physics: they are dropped and come to rest against each other
-        and the home by rigid-body simulation (extra `physics`); else each stands upright by itself.
+        and the home by rigid-body simulation (extra `physics`), and what falls off four times stays
+        where it fell; else each stands upright by itself.
 
         Raises BadInput where less than n fit, MachineFailed where the extra is not installed.
         """
-        from pbrs_farm.scene.placing import scattered_poses
+        if physics:
+            from pbrs_farm.scene.physics import settled_poses as poses
+        else:
+            from pbrs_farm.scene.placing import scattered_poses as poses
 
         if not models or n < 1:
             raise BadInput(self.id, "scatter", "give at least one model and n >= 1")
         supports = self._supports(in_) if on is None else self._supports_named(on)
-        if physics:
-            from pbrs_farm.scene.physics import settled_poses
-
-            placed = settled_poses(self.house, models, n, supports, seed)
-        else:
-            placed = scattered_poses(self.house, models, n, supports, seed)
-        edits: list[Edit] = []
-        for model, matrix in placed:
-            edits.append(
-                self._placing(
-                    model, matrix, "", taken=[e.item for e in edits if isinstance(e, PlaceModel)]
-                )
-            )
+        house = self.house
+        edits: list[PlaceModel] = []
+        for model, matrix in RENDERER.call(lambda: poses(house, models, n, supports, seed)):
+            edits.append(self._placing(model, matrix, "", taken=[edit.item for edit in edits]))
         return self._edited(*edits)
 
     def without(self, items: ItemLike) -> Home:
@@ -241,7 +237,7 @@ class Home:
     def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
         """The home with items moved by (x, y, z) metres and turned about the vertical of their middle."""
         ids = self._ids(items)
-        bounds = np.array([self.items[one].bounds for one in ids])
+        bounds = np.array([item.bounds for item in self.house.items if item.id in ids])
         middle = (np.nanmin(bounds[:, 0], 0) + np.nanmax(bounds[:, 1], 0)) / 2
         matrix = np.eye(4)
         matrix[:3, :3] = rotation_y(math.radians(turn_deg))
@@ -402,9 +398,12 @@ class Home:
         ]
         if not found:
             raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
-        cameras = cameras_around(
-            self.house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
-            min_visible=min_visible, intrinsics=intrinsics_from_k(size, K, hfov_deg), seed=seed,
+        house, intrinsics = self.house, intrinsics_from_k(size, K, hfov_deg)
+        cameras = RENDERER.call(
+            lambda: cameras_around(
+                house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
+                min_visible=min_visible, intrinsics=intrinsics, seed=seed,
+            )
         )  # fmt: skip
         return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 

@@ -18,7 +18,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.read.common.furniture_classes import nyu40_of
-from pbrs_farm.read.objects.own_model import SUFFIXES, ModelShape, model_shape
+from pbrs_farm.read.objects.own_model import SUFFIXES, ModelShape, companions_digest, model_shape
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
@@ -98,7 +98,8 @@ def model(
         raise BadInput(path, "", fault_of(error)) from None
     label = nyu40_of("", category) or nyu40_of("", path.stem) or OTHERPROP
     known = ModelRef(
-        path=str(path.resolve()), sha256=keys.sha256(data), id=name or keys.slug(path.stem),
+        path=str(path.resolve()), sha256=keys.sha256(data),
+        companions=companions_digest(path.resolve()), id=name or keys.slug(path.stem),
         category=category or path.stem, nyu40=label, scale=UNITS[unit], credit=credit,
     )  # fmt: skip
     if size_m is not None:

@@ -72,7 +72,7 @@ class Renderer:
         with self._lock:
             made = self._made.get(key)
         if made is None:
-            made = self._do(lambda: self._house(source, recipe))
+            made = self.call(lambda: self._house(source, recipe))
         with self._lock:
             self._made[key] = made
             self._made.move_to_end(key)
@@ -82,29 +82,30 @@ class Renderer:
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
         """cameras.json of the step `cameras`."""
-        return self._do(lambda: self._cameras(source, recipe))
+        return self.call(lambda: self._cameras(source, recipe))
 
     def frames(
         self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: plan.Wanted,
         observe: Callable[[str], None] = lambda _view: None,
     ) -> Views:  # fmt: skip
         """The viewpoints' frames: the steps of `want` for each, in a store of their own."""
-        return self._do(lambda: self._frames(source, recipe, viewpoints, want, observe))
+        return self.call(lambda: self._frames(source, recipe, viewpoints, want, observe))
 
     def sketches(
         self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
     ) -> list[NDArray[np.uint8]]:
         """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored."""
-        return self._do(lambda: self._sketches(source, recipe, cameras))
+        return self.call(lambda: self._sketches(source, recipe, cameras))
 
     def close(self) -> None:
         """Let go of every home."""
         if self._thread is not None:
-            self._do(self._houses.clear)
+            self.call(self._houses.clear)
         self._stores.clear()
         self._made.clear()
 
-    def _do(self, task: Callable[[], _T]) -> _T:
+    def call(self, task: Callable[[], _T]) -> _T:
+        """What a task gives, done in the thread that works: rays and pictures have their state there."""
         if os.getpid() != self._pid:
             hint = 'multiprocessing.set_start_method("spawn"), or render in the children alone'
             raise MachineFailed("this process was forked from one that renders", hint=hint)
@@ -135,11 +136,18 @@ class Renderer:
         store = self._stores.setdefault(key, MemoryStore())
         self._stores.move_to_end(key)
         while len(self._stores) > _N_HOMES:
+            # What is loaded may be of that store.
             self._stores.popitem(last=False)
+            self._houses.clear()
         return store
 
-    def _work(self, source: SourceRef, recipe: Recipe) -> Work:
-        return Work(self._store(source), recipe, source.house_id, self._houses, source)
+    def _with_house(self, source: SourceRef, recipe: Recipe) -> Work:
+        """The work on a home whose step `house` is done."""
+        if uses_catalogue(source, recipe):
+            fetch_catalogue(recipe.dress)
+        work = Work(self._store(source), recipe, source.house_id, self._houses, source)
+        self._run("house", work)
+        return work
 
     def _house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         if source.edits:
@@ -152,10 +160,7 @@ class Renderer:
         from pbrs_farm.dress.report import DressReport
         from pbrs_farm.repair import RepairReport
 
-        if uses_catalogue(source, recipe):
-            fetch_catalogue(recipe.dress)
-        work = self._work(source, recipe)
-        self._run("house", work)
+        work = self._with_house(source, recipe)
         get, key = work.store.get, keys.house_key
         report = RepairReport.model_validate_json(get(key(source.house_id, "repair.json")))
         house = self._cached(work).house
@@ -171,16 +176,14 @@ class Renderer:
         return self._houses.get(work.store, work.recipe, work.house_id, digest)
 
     def _cameras(self, source: SourceRef, recipe: Recipe) -> bytes:
-        work = self._work(source, recipe)
-        self._run("house", work)
+        work = self._with_house(source, recipe)
         self._run("cameras", work)
         return work.store.get(keys.house_key(source.house_id, "cameras.json"))
 
     def _sketches(
         self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
     ) -> list[NDArray[np.uint8]]:
-        work = self._work(source, recipe)
-        self._run("house", work)
+        work = self._with_house(source, recipe)
         rasterizer = self._cached(work).rasterizer
         return [rasterizer.render_dl(camera) for camera in cameras]
 
@@ -188,8 +191,7 @@ class Renderer:
         self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint],
         want: plan.Wanted, observe: Callable[[str], None],
     ) -> Views:  # fmt: skip
-        work = replace(self._work(source, recipe), layers=want.layers)
-        self._run("house", work)
+        work = replace(self._with_house(source, recipe), layers=want.layers)
         if recipe.cameras.source == "given":
             self._give_cameras(work, viewpoints)
         for step in plan.house_steps(want, source.house_id)[1:]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import pbrs_farm as pf
 from pbrs_farm.core.errors import BadInput
@@ -86,6 +87,19 @@ def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> No
         (tmp_path / folder).mkdir()
         trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / folder / "textured.ply")
     assert [m.id for m in pf.models(tmp_path)] == ["002-can-textured", "003-box-textured"]
+
+
+def test_a_picture_beside_a_model_is_part_of_it(tmp_path: Path) -> None:
+    (tmp_path / "box.obj").write_text(
+        "mtllib box.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
+    )
+    (tmp_path / "box.mtl").write_text("newmtl a\nmap_Kd box.png\n")
+    digests = []
+    for colour in ("red", "blue"):
+        Image.new("RGB", (4, 4), colour).save(tmp_path / "box.png")
+        digests.append(pf.model(tmp_path / "box.obj").ref.companions)
+    assert digests[0] != digests[1]
+    assert "" not in digests
 
 
 def test_bad_options_are_told(tmp_path: Path) -> None:

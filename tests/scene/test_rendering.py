@@ -70,6 +70,17 @@ def test_a_frame_has_what_its_own_call_asked_for(home: pf.Home) -> None:
     assert "opengl_il" not in plain.table["modes"]
 
 
+def test_what_is_saved_twice_has_the_files_of_both(home: pf.Home, tmp_path: Path) -> None:
+    one = home.cameras(n=1)[0]
+    pf.render(home, one, modes=["opengl_dl"], layers=["albedo"]).save(tmp_path)
+    pf.render(home, one, modes=["opengl_il"], layers=["material"]).save(tmp_path)
+    frame = pf.open(tmp_path)[0]
+    assert frame.modes == ("opengl_dl", "opengl_il")
+    assert {"albedo", "material"} <= set(frame.layers)
+    assert {"opengl_dl", "opengl_il"} <= set(frame.table["modes"])
+    assert verify(tmp_path).is_clean
+
+
 def test_frames_of_cameras_of_ones_own_share_a_folder(home: pf.Home, tmp_path: Path) -> None:
     for x in (2.0, 3.0):
         camera = pf.Camera.look_at((x, 1.5, 3.5), (2, 0.8, 1), size=(64, 48))

@@ -23,8 +23,9 @@ from pbrs_farm.core.house import Material, Surface, Texture, corners_of_surfaces
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import ObjectModel
-from pbrs_farm.read.objects.single_object import model_surfaces
+from pbrs_farm.read.objects.single_object import model_surfaces, object_companions
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
 
 SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
@@ -70,10 +71,19 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
         data = read_regular(path, MAX_SCENE_BYTES)
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
-    if keys.sha256(data) != model.sha256:
+    if (keys.sha256(data), companions_digest(path)) != (model.sha256, model.companions):
         raise BadInput(path, "", "changed since the home was made", hint="make the home again")
     shape = _from_trimesh(path, data) if _is_plain(path) else _from_reader(path, model, fields)
     return _checked(path, _scaled(shape, model.scale), fields)
+
+
+def companions_digest(path: Path) -> str:
+    """Digest of the files beside a model that reading it opens; "" where there are none."""
+    if _is_plain(path):
+        return ""
+    own = ObjectModel(path.stem, path.stem, "", 0, path, path.parent)
+    files = SourceFiles()
+    return files.digest(RootFolder(path.parent), object_companions(own, files))
 
 
 def _is_plain(path: Path) -> bool:

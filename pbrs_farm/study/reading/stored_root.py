@@ -170,7 +170,13 @@ def finished_views(store: Store) -> frozenset[tuple[str, str]]:
 
 
 def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
-    """Copy a view with the files of its house and the markers of both."""
+    """Copy a view with the files of its house and the markers of both.
+
+    Of a view that is there already, pictures and layers of both stay.
+    """
+    if to.head(keys.marker_key(ref.house, "view", ref.view)) is not None:
+        _merge_view(of, to, ref)
+        return
     for key in of.list(keys.house_key(ref.house)):
         at = keys.parse_house_key(key)
         if at is None or at.file == keys.MANIFEST or at.view not in (None, ref.view):
@@ -178,6 +184,34 @@ def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
         if at.file != _CAMERAS and at.step != "cameras":
             to.put(key, of.get(key))
     _copy_cameras(of, to, ref.house)
+
+
+def _merge_view(of: Store, to: Store, ref: ViewRef) -> None:
+    """Put a view's pictures beside those that are there, and make labels and table of both."""
+    from pbrs_farm.run.house_cache import HouseCache
+    from pbrs_farm.run.plan import STEPS
+    from pbrs_farm.run.step_cache import Work
+    from pbrs_farm.run.steps import run_step
+
+    truth = None
+    for step in STEPS.values():
+        marker = read_marker(of, key := keys.marker_key(ref.house, step.name, ref.view))
+        truth = marker if step.name == "truth" else truth
+        if not step.per_view or marker is None or step.name in ("truth", "view"):
+            continue
+        for file in marker.files:
+            to.put(file.key, of.get(file.key))
+        to.put(key, marker.json_bytes())
+    _copy_cameras(of, to, ref.house)
+    layers = tuple(truth.facts.get("layers", ())) if truth is not None else ()
+    recipe = recipe_from_json(of.get(keys.RECIPE), f"{of.url}: {keys.RECIPE}")
+    cache = HouseCache()
+    work = Work(to, recipe, ref.house, cache, view_id=ref.view, layers=layers)
+    try:
+        for name in ("truth", "view"):
+            run_step(name, work)
+    finally:
+        cache.clear()
 
 
 def _copy_cameras(of: Store, to: Store, house: str) -> None:
