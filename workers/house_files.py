@@ -24,8 +24,12 @@ from workers.job import HouseEntry
 # Where sources lie in the store.
 FOLDER: Final = "jobs/sources/"
 _LIBRARIES: Final = f"{FOLDER}libraries/"  # the user's own, to dress with
-# Formats that are one file.
-_UPLOADED: Final = (".sh3d", ".xml", ".zip", ".glb")
+# Kinds that are files of their own, and the suffixes of those that are one file.
+_FILES: Final = ("sweethome3d", "gltf", "scenestate", "front3d", "habitat", "usd", "ifc", "plan")
+_UPLOADED: Final = (
+    ".sh3d", ".xml", ".zip", ".glb", ".json", ".geojson", ".usd", ".usda", ".usdc", ".usdz", ".ifc",
+    ".ifczip", ".csv", ".svg", ".txt",
+)  # fmt: skip
 
 
 def entries_from_arguments(
@@ -89,9 +93,9 @@ def _upload_package(store: Store, package: str) -> None:
 def is_left_in_place(ref: SourceRef) -> bool:
     """The source is read where it lies, so every worker must see it.
 
-    SUNCG, glTF with side files, and what plugins read.
+    SUNCG, files with others beside them or with a folder of models, and what plugins read.
     """
-    is_file = ref.kind in ("suncg", "gltf", "reader")
+    is_file = ref.kind in ("suncg", "reader", *_FILES)
     return is_file and _placed(ref).location == ref.location
 
 
@@ -191,13 +195,9 @@ def _expanded(word: str) -> list[str]:
 def _placed(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
     path = Path(ref.location)
-    # glTF with files beside it cannot travel as one object.
-    has_side_files = ref.kind == "gltf" and bool(ref.companions)
-    if (
-        has_side_files
-        or ref.kind not in ("sweethome3d", "gltf")
-        or path.suffix.lower() not in _UPLOADED
-    ):
+    # A file with others beside it cannot travel as one object; Sweet Home 3D's are a package's.
+    has_side_files = ref.kind != "sweethome3d" and bool(ref.companions or ref.models)
+    if has_side_files or ref.kind not in _FILES or path.suffix.lower() not in _UPLOADED:
         return ref
     key = f"{FOLDER}{home_id(ref)}/{_key_name(path.name)}"
     return ref.model_copy(update={"location": key})

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,6 +167,15 @@ class ModelPose:
 
     model: str
     world_from_model: tuple[Rows4, Rows4, Rows4, Rows4]  # rigid; metres
+
+
+TOLD: Final = "told"
+"""Tag of an item without surfaces of which the source tells class and box alone.
+
+box: its axes are right, up, front (columns). A piece of furniture stands in for it (dress/stand_ins.py).
+"""
+FRONT_TOLD: Final = "front-told"
+"""Tag beside TOLD: the box's front is the source's own, else it is guessed from what is near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -152,7 +152,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
         "stereo_m",
     ),
     "dress": tuple(DressFields.model_fields),
-    "read": ("doors",),
+    "read": ("doors", "stand_ins"),
     "blur": tuple(BlurFields.model_fields),
     "lens": tuple(LensFields.model_fields),
     "sensor": tuple(SensorFields.model_fields),

@@ -49,6 +49,10 @@ class ReadFields(FieldGroup):
     doors: Literal["drawn", "open"] = Field(
         "drawn", description="Sweet Home 3D: `open` swings shut doors between rooms open"
     )
+    stand_ins: Literal["pieces", "boxes", "none"] = Field(
+        "pieces",
+        description="for what a source tells by class and box alone: furniture, plain boxes, nothing",
+    )
     strict: bool = Field(
         False, description="notes of a source are errors but the harmless kinds, docs/houses.md"
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, Protocol, cast
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -24,6 +24,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.formats import kind_of_file
 from pbrs_farm.regular_files import fault_of, read_given, real_path, text_given
 
 if TYPE_CHECKING:
@@ -32,14 +33,52 @@ if TYPE_CHECKING:
 
 _MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # what `objects` reads; a .glb may be a scene
 _UNREAD_SUFFIXES: Final = frozenset({
-    ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".ifc", ".max", ".mb", ".mtl",
-    ".ply", ".rvt", ".skp", ".stl", ".usd", ".usda", ".usdc", ".usdz",
+    ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
+    ".ply", ".rvt", ".sdf", ".skp", ".stl",
 })  # fmt: skip
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
 SourceKind = Literal[
-    "builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object", "plugin", "reader"
-]
+    "builtin", "made", "example", "sweethome3d", "suncg", "gltf", "object", "plugin", "reader",
+    "scenestate", "front3d", "habitat", "usd", "ifc", "plan",
+]  # fmt: skip
+
+
+class Reader(Protocol):
+    """The module of a format whose files are known by their suffix or their JSON's keys."""
+
+    def read(self, path: Path, fields: ReadFields, models: str) -> House:
+        """The House of a file. models: the folder of its models, "" = beside it."""
+        ...
+
+    def companions(self, path: Path, models: str, files: SourceFiles) -> str:
+        """Digest of what reading opens beside the file, "" where there is none; never raises."""
+        ...
+
+
+def _reader(kind: str) -> Reader | None:
+    """The reader of a kind of file, imported when it is first needed."""
+    if kind == "scenestate":
+        from pbrs_farm.read.scenestate import scene_state
+
+        return scene_state
+    if kind == "front3d":
+        from pbrs_farm.read.front3d import front_house
+
+        return front_house
+    if kind == "habitat":
+        from pbrs_farm.read.habitat import scene_instance
+
+        return scene_instance
+    if kind == "usd":
+        from pbrs_farm.read.usd import stage
+
+        return stage
+    if kind == "ifc":
+        from pbrs_farm.read.ifc import building
+
+        return building
+    return None
 
 
 class SourceRef(Record):
@@ -51,6 +90,7 @@ class SourceRef(Record):
     known (named by an earlier version).
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
     edits: what is changed of the repaired house, in order; its id then ends in `-e<digest>`.
+    models: the folder of the models that the file names, "" = where its format keeps them.
     """
 
     kind: SourceKind
@@ -60,6 +100,7 @@ class SourceRef(Record):
     companions: str | None = None
     dress_seed: int = 0  # 0 = as it was drawn
     edits: tuple[Edit, ...] = ()
+    models: str = ""
 
     @property
     def fingerprint(self) -> str:
@@ -104,10 +145,11 @@ def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
     ]
 
 
-def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
+def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") -> SourceRef:
     """The source a word names: "builtin", an example home's name, or a path. Raises BadHouse.
 
-    files: what was looked at before, for many words that share files.
+    files: what was looked at before, for many words that share files. models: the folder of the
+    models that a file of HSSD, 3D-FRONT or Holodeck names.
     """
     path = Path(word)
     if not _is_utf8(word):
@@ -128,6 +170,8 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
         kind = "example"
     elif path.is_dir() or path.name == "house.json":
         kind, word = "suncg", str(real_path(path.parent if path.name == "house.json" else path))
+    elif path.is_file() and (known := kind_of_file(path)) not in ("", "gltf"):
+        kind, word = cast(SourceKind, known), str(real_path(path))
     elif path.suffix.lower() == ".json" and path.is_file():
         raise BadHouse(path, "", "is no house by itself", hint=_ROOT_HINT)
     elif path.suffix.lower() in _MODEL_SUFFIXES:
@@ -139,7 +183,7 @@ def resolve(word: str, files: SourceFiles | None = None) -> SourceRef:
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
-    return _reference(kind, word, files or SourceFiles())
+    return _reference(kind, word, files or SourceFiles(), models and str(real_path(Path(models))))
 
 
 def _is_utf8(word: str) -> bool:
@@ -151,7 +195,7 @@ def _is_utf8(word: str) -> bool:
     return "\0" not in word
 
 
-def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef:
+def _reference(kind: SourceKind, location: str, files: SourceFiles, models: str = "") -> SourceRef:
     """The source at a location of a known kind, with the digests of its files."""
     if kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -178,6 +222,14 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles) -> SourceRef
         companions = _package_digest(package)
     else:
         path = Path(location)
+        if reader := _reader(kind):
+            sha = _sha256(path, files)
+            house_id = keys.house_id(path.stem, sha)
+            beside = reader.companions(path, models, files)
+            return SourceRef(
+                kind=kind, location=location, house_id=house_id, sha256=sha, companions=beside,
+                models=models,
+            )  # fmt: skip
         data, name = read_given(path, error=BadHouse), path.name
         companions = _companions(kind, path, data, files)
     # The house's id depends on its own file alone, so companions never rename a house.
@@ -311,6 +363,8 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
         name, _, location = source.location.partition(":")
         house: House = plugin("readers", name).load().read(Path(location), fields)
         return replace(house, id=home_id(source))
+    if reader := _reader(source.kind):
+        return reader.read(path, fields, source.models)
     if source.kind == "gltf":
         from pbrs_farm.read.gltf.scene import read_gltf_file
 
@@ -367,7 +421,7 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
 def check_unchanged(source: SourceRef) -> None:
     """Raise BadHouse or MachineFailed where a file is not what it was when the source was named."""
     # Name the source again and compare the digests, where both are known.
-    now = _reference(source.kind, source.location, SourceFiles())
+    now = _reference(source.kind, source.location, SourceFiles(), source.models)
     is_known = source.companions is not None
     if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):
         return

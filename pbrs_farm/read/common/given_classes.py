@@ -1,0 +1,70 @@
+"""What the vocabularies of other formats call a thing -> class and kind; no effects.
+
+given_classes.csv, beside this file, has a row a name: source (3dfuture, ai2thor, roomplan, ...),
+name, kind, NYU40 class. A name that it lacks goes by the words of furniture_classes.
+"""
+
+from __future__ import annotations
+
+import csv
+from functools import cache
+from importlib.resources import files
+from typing import Final, NamedTuple
+
+from pbrs_farm.core.classes import DOOR, NYU40_NAMES, WINDOW
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of
+
+LEFT_OUT: Final = "none"
+REVEAL: Final = "opening-reveal"
+
+
+class GivenClass(NamedTuple):
+    """What a name means.
+
+    kind: an ItemKind's value, "opening-reveal" (the jambs of a hole) or "none" (not drawn).
+    nyu40: -1 where the words of the thing's name decide.
+    """
+
+    kind: str
+    nyu40: int
+
+    @property
+    def item_kind(self) -> ItemKind:
+        """The kind as an item has it; jambs are part of their wall."""
+        return ItemKind.WALL if self.kind == REVEAL else ItemKind(self.kind)
+
+
+def given_class(source: str, name: str) -> GivenClass | None:
+    """The row of a source's name, whatever its case; None where the table has none."""
+    return _table().get((source, _key(name)))
+
+
+def class_by_words(*names: str) -> GivenClass | None:
+    """The class of the first name whose words say one, as of a piece of furniture."""
+    for name in names:
+        piece = class_of_piece("", name)
+        if piece.nyu40 is not None:
+            is_opening = piece.nyu40 in (DOOR, WINDOW)
+            kind = kind_of(piece, piece.nyu40, is_opening=is_opening, is_light=False)
+            return GivenClass(kind.value, piece.nyu40)
+    return None
+
+
+def _key(name: str) -> str:
+    return " ".join(name.lower().replace("_", " ").split())
+
+
+@cache
+def _table() -> dict[tuple[str, str], GivenClass]:
+    text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
+    return {
+        (row["source"], _key(row["name"])): GivenClass(row["kind"], _nyu40(row["nyu40"]))
+        for row in csv.DictReader(text.splitlines())
+    }
+
+
+def _nyu40(name: str) -> int:
+    if name == "by name":
+        return -1
+    return NYU40_NAMES.index(name) if name in NYU40_NAMES else 0

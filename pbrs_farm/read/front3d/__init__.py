@@ -1,0 +1,1 @@
+"""3D-FRONT: how it is read."""

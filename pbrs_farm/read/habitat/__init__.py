@@ -1,0 +1,1 @@
+"""Habitat: how it is read."""

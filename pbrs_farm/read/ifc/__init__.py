@@ -1,0 +1,1 @@
+"""IFC: how it is read."""

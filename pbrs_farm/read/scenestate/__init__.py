@@ -1,0 +1,1 @@
+"""sceneState: how it is read."""

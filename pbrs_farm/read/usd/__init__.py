@@ -1,0 +1,1 @@
+"""OpenUSD: how it is read."""
