@@ -41,7 +41,7 @@ def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
         read_house(source, ReadFields())
 
 
-@pytest.mark.parametrize("name", ["chair.fbx", "house.blend", "house.IFC", "room.usdz"])
+@pytest.mark.parametrize("name", ["chair.fbx", "house.blend", "house.SKP", "room.dae"])
 def test_a_file_of_another_program_says_what_is_read(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(b"bytes")
