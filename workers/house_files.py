@@ -79,6 +79,7 @@ def needed_plugins(
     named = [("homes", plugin_homes(ref.location)[0].name) for ref in refs if ref.kind == "plugin"]
     named += [("readers", ref.location.partition(":")[0]) for ref in refs if ref.kind == "reader"]
     named += [("passes", name) for name in recipe.dress.passes.split(":") if name]
+    named += [("pictures", name) for name in recipe.tone.pictures.split(":") if name]
     named += [("cameras", recipe.cameras.preset)] * (recipe.cameras.preset in plugins("cameras"))
     named += [("layers", name) for name in layers if name in plugins("layers")]
     return tuple(dict.fromkeys(plugin(group, name).mark for group, name in named))

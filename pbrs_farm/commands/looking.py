@@ -86,7 +86,7 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
 
 def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list[str]]]:
     """Each option that takes one of some words, with those words."""
-    from pbrs_farm.core.layers import LAYERS
+    from pbrs_farm.core.layers import OPTIONAL
     from pbrs_farm.core.lighting import ALL_MODES
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
@@ -94,7 +94,7 @@ def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list
     known = {
         "--recipe": list(RECIPE_NAMES),
         "--modes": [mode.value for mode in ALL_MODES],
-        "--layers": [layer.name for layer in LAYERS if layer.optional],
+        "--layers": list(OPTIONAL),
     }
     for name, action in parser._option_string_actions.items():
         if action.choices and name.startswith("--"):

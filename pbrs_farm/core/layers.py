@@ -24,15 +24,15 @@ class Layer:
     unit: str
     nodata: str  # what a pixel holds that sees nothing
     step: str  # the step of run/plan.py that writes it
-    optional: bool = False  # only when --layers names it
+    optional: bool = False  # only when --layers names it, a plugin's picture tone.pictures
     # "next", "previous" or "stereo": the view without which there is no such file.
     partner: str = ""
     # What a lens must have: "planar depth" along its axis, "rows" that correspond in a pair.
     needs: str = ""
 
 
-def _picture(name: str, step: str) -> Layer:
-    return Layer(name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step)
+def _picture(name: str, step: str, *, optional: bool = False) -> Layer:
+    return Layer(name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional)
 
 
 def _label(name: str, channels: str, dtype: str, unit: str, nodata: str = "0") -> Layer:
@@ -172,10 +172,18 @@ def _of_plugins() -> tuple[Layer, ...]:
     return tuple(found)
 
 
-LAYERS: Final[tuple[Layer, ...]] = (*OWN_LAYERS, *_of_plugins())
+def _pictures_of_plugins() -> tuple[Layer, ...]:
+    """The pictures of installed plugins, by name: written by the step `develop` when asked for."""
+    return tuple(_picture(name, "develop", optional=True) for name in plugins("pictures"))
+
+
+LAYERS: Final[tuple[Layer, ...]] = (*OWN_LAYERS, *_of_plugins(), *_pictures_of_plugins())
 """All layers: the package's and those of plugins."""
 
 LAYER: Final = {layer.name: layer for layer in LAYERS}
+
+OPTIONAL: Final = tuple(x.name for x in LAYERS if x.optional and x.step == "truth")
+"""The names that --layers takes."""
 
 
 def table() -> str:

@@ -1,4 +1,4 @@
-"""What other packages add by entry points: homes, readers, layers, cameras, passes, exports.
+"""What other packages add by entry points: homes, readers, layers, pictures, exports and more.
 
 Effects: looks through the installed packages' metadata; a plugin's code is imported when it is
 first used. Its package and version are part of the digest of the steps that use it.
@@ -16,7 +16,7 @@ from typing import Any, Final
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.shown_text import hint_of_choice
 
-GROUPS: Final = ("homes", "readers", "layers", "cameras", "passes", "exports")
+GROUPS: Final = ("homes", "readers", "layers", "cameras", "passes", "pictures", "exports")
 """Of entry points, each `pbrs_farm.<group>`; docs/plugins.md says what each function takes."""
 
 PREFIX: Final = "plugin:"
@@ -79,6 +79,17 @@ def plugin(group: str, name: str) -> Plugin:
         hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"
         raise MachineFailed(f"no plugin {name!r} for {group} is installed here", hint=hint)
     return known[name]
+
+
+def checked_names(group: str, names: str) -> str:
+    """Names of plugins with ':' between, all installed; ValueError naming one that is none."""
+    known = plugins(group)
+    for name in filter(None, names.split(":")):
+        if name not in known:
+            raise ValueError(
+                f"no plugin {name!r} for {group}, {hint_of_choice(name, tuple(known))}"
+            )
+    return names
 
 
 # Homes of a plugin: words, each a seed.

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel, radius_of_angle
 from pbrs_farm.core.lighting import BULB_RADIUS_M
-from pbrs_farm.core.plugins import plugins
+from pbrs_farm.core.plugins import checked_names, plugins
 from pbrs_farm.core.shown_text import hint_of_choice
 
 MAX_SAMPLES: Final = 2**20
@@ -315,6 +315,14 @@ class ToneFields(FieldGroup):
         le=1,
         description="how far the light's colour is turned to white; 1 = all the way",
     )
+    pictures: str = Field(
+        "", max_length=256, description="plugins' pictures beside the modes', ':' between"
+    )
+
+    @field_validator("pictures")
+    @classmethod
+    def _pictures_are_known(cls, value: str) -> str:
+        return checked_names("pictures", value)
 
 
 class RasterFields(FieldGroup):

@@ -8,11 +8,13 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import HistogramFields
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
@@ -27,6 +29,7 @@ from pbrs_farm.store.object_store import Store
 from pbrs_farm.transport.develop.mode_pictures import (
     LinearAovs,
     SensorShot,
+    denoised,
     develop,
     wanted_exposures,
 )
@@ -47,12 +50,27 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
+    if work.recipe.tone.pictures and denoise:
+        # Denoise once for the modes and for the plugins' pictures.
+        aovs, denoise = denoised(aovs, wraps=_wraps(work)), False
     shot = _sensor_shot(work, cached)
     images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=_wraps(work))
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
+    for name in filter(None, work.recipe.tone.pictures.split(":")):
+        files[LAYER[name].file] = layer_bytes(name, _picture_of_plugin(name, aovs, work), credit)
+    denoise = work.recipe.light.denoise
     return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
+
+
+def _picture_of_plugin(name: str, light: LinearAovs, work: Work) -> Srgb8Image:
+    """(H, W, 3) uint8 of a plugin's function; BadInput where it gives anything else."""
+    picture = np.asarray(plugin("pictures", name).load()(light, work.recipe.tone))
+    if picture.dtype != np.uint8 or picture.shape != light.outdoor.shape:
+        got = f"gave {picture.dtype} of shape {picture.shape}"
+        raise BadInput(f"picture {name}", "", f"{got}, expected uint8 of {light.outdoor.shape}")
+    return picture
 
 
 def _wraps(work: Work) -> bool:

@@ -14,7 +14,7 @@ from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.core.layers import LAYER, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import hint_of_choice
@@ -86,12 +86,11 @@ def wanted(
 ) -> Wanted:
     """Wanted from words of the command line; raises BadInput for a word that is none of ours."""
     asked = {_mode(mode) for mode in modes}
-    optional = [x.name for x in LAYERS if x.optional]
     for layer in layers:
         if layer not in LAYER:
-            raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, optional))
+            raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, OPTIONAL))
     chosen = tuple(m for m in ALL_MODES if m in asked) or ALL_MODES
-    return Wanted(chosen, tuple(x for x in optional if x in set(layers)), n_views, pairs)
+    return Wanted(chosen, tuple(x for x in OPTIONAL if x in set(layers)), n_views, pairs)
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:

@@ -19,8 +19,8 @@ from typing import Any, Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.edits import VERSION as EDITS_VERSION
 from pbrs_farm.core.errors import BadInput, StoreFailed
-from pbrs_farm.core.layers import LAYER, LAYERS
-from pbrs_farm.core.plugins import plugins
+from pbrs_farm.core.layers import LAYER, LAYERS, OPTIONAL
+from pbrs_farm.core.plugins import plugin, plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
@@ -136,7 +136,7 @@ def _written_layers(marker: Marker | None) -> tuple[str, ...]:
     # Older markers say it by their files alone.
     places = {keys.parse_house_key(file.key) for file in marker.files}
     names = {place.file for place in places if place is not None}
-    return tuple(x.name for x in LAYERS if x.optional and x.file in names)
+    return tuple(x for x in OPTIONAL if LAYER[x].file in names)
 
 
 def _union(asked: tuple[str, ...], written: tuple[str, ...]) -> tuple[str, ...]:
@@ -171,6 +171,9 @@ def _extra(name: str, work: Work) -> object:
     if name == "truth":
         marks = {layer: p.mark for layer, p in plugins("layers").items()}
         return [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
+    if name == "develop" and work.recipe.tone.pictures:
+        names = work.recipe.tone.pictures.split(":")
+        return [plugin("pictures", picture).mark for picture in names if picture]
     if name == "cameras" and work.recipe.cameras.preset in plugins("cameras"):
         return plugins("cameras")[work.recipe.cameras.preset].mark
     if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):

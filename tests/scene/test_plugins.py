@@ -8,7 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.plugins import GROUPS, plugin, plugin_homes
@@ -88,6 +90,23 @@ def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: P
     done(installed, tmp_path, "run", "builtin", *words, "--views", "1", "--out", "o", *FEW)
     report = json.loads(next((tmp_path / "o").glob("houses/*/dress.json")).read_text())
     assert report["changed"]["red_chairs"] >= 2
+
+
+def test_pictures_of_a_plugin_stand_beside_the_modes(
+    installed: dict[str, str], tmp_path: Path
+) -> None:
+    words = ["run", "builtin", "--views", "1", "--recipe", "preview", *FIELDS]
+    words += ["--modes", "mlt_il_ol", "--out", "o"]
+    done(installed, tmp_path, *words)
+    done(installed, tmp_path, *words, "--set", "tone.pictures=dusk", "--update")
+    (view,) = (tmp_path / "o").glob("houses/*/views/*")
+    by_day, at_dusk = (np.asarray(Image.open(view / f"{n}.png")) for n in ("mlt_ol", "dusk"))
+    assert at_dusk.shape == by_day.shape
+    assert (at_dusk != by_day).mean() > 0.2, "the lamps light another picture than the sky"
+    done(installed, tmp_path, "verify", "o")
+    bad = run(installed, tmp_path, *words, "--set", "tone.pictures=dawn")
+    assert bad.returncode == 2
+    assert "no plugin 'dawn' for pictures" in bad.stdout + bad.stderr
 
 
 def test_what_is_not_installed_is_told() -> None:
