@@ -105,7 +105,7 @@ def test_pictures_of_a_plugin_stand_beside_the_modes(
     assert (at_dusk != by_day).mean() > 0.2, "the lamps light another picture than the sky"
     done(installed, tmp_path, "verify", "o")
     bad = run(installed, tmp_path, *words, "--set", "tone.pictures=dawn")
-    assert bad.returncode == 2
+    assert bad.returncode == 1
     assert "no plugin 'dawn' for pictures" in bad.stdout + bad.stderr
 
 
