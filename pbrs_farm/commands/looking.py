@@ -1,4 +1,4 @@
-"""Verbs that tell: doctor, skies, recipes, layers, completion. Effects: print; skies downloads."""
+"""Verbs that tell: doctor, inputs, skies, recipes, layers, completion. Effects: print; skies downloads."""
 
 from __future__ import annotations
 
@@ -117,11 +117,14 @@ def _arguments(verb: str, parser: argparse.ArgumentParser) -> list[str]:
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add doctor, skies, recipes, layers and completion."""
+    """Add doctor, inputs, skies, recipes, layers and completion."""
     p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
+    text = "the formats of houses that are read: what each brings, where one gets it, its licence"
+    p = verb("inputs", _inputs, text)
+    p.add_argument("--json", action="store_true", help="for machines")
     p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
     p = verb("recipes", _recipes, "every field of a recipe and its value")
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
@@ -150,6 +153,21 @@ def _doctor(args: argparse.Namespace) -> int:
     missing = "This machine cannot render yet: see MISSING above."
     echo("This machine can render." if fine else missing)
     return 0 if fine else 1
+
+
+def _inputs(args: argparse.Namespace) -> int:
+    from pbrs_farm.read.formats import formats
+
+    if args.json:
+        echo_json([row._asdict() for row in formats()])
+        return 0
+    for row in formats():
+        echo(f"{row.title}: {row.files}")
+        echo(f"    brings    {row.brings}")
+        if row.needs:
+            echo(f"    needs     {row.needs}")
+        echo(f"    from      {row.where}; {row.licence}")
+    return 0
 
 
 def _skies(_args: argparse.Namespace) -> int:

@@ -31,6 +31,7 @@ from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.object_store import Store
 from pbrs_farm.transport.light_result import Arrays
+from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 
 def _unheard(_share: float) -> None:
@@ -170,7 +171,9 @@ def _extra(name: str, work: Work) -> object:
         return known if len(known) > 1 else source.fingerprint
     if name == "truth":
         marks = {layer: p.mark for layer, p in plugins("layers").items()}
-        return [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
+        known = [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
+        # The albedo is that of the light, whose preset holds it to its own limit.
+        return [*known, f"albedo {max_albedo(work.recipe)}"] if "albedo" in work.layers else known
     if name == "develop" and work.recipe.tone.pictures:
         names = work.recipe.tone.pictures.split(":")
         return [plugin("pictures", picture).mark for picture in names if picture]

@@ -48,6 +48,7 @@ from pbrs_farm.run.step_cache import (
     required_source,
     run_unless_done,
 )
+from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
@@ -248,7 +249,7 @@ def _truth(work: Work) -> StepOutput:
         inputs = truth.LabelInputs(
             hit, house, cached.geometry, camera,
             lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
-            partners, caster.first_hit,
+            partners, caster.first_hit, max_albedo(work.recipe),
         )  # fmt: skip
         arrays |= truth.optional_layers(work.layers, inputs)
         table |= truth.optional_tables(work.layers, house)

@@ -53,6 +53,7 @@ class LabelInputs:
     seed: int = 0  # of depth_sensor's noise
     partners: Mapping[Relation, Camera] = field(default_factory=dict)  # at this picture's size
     first_hit: FirstHit | None = None  # for the layers between views
+    max_albedo: float = 1.0  # that light holds diffuse colour times texture to
 
     @cached_property
     def behind(self) -> HitRecord:
@@ -136,7 +137,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "normal_world": lambda s: encoded_normal(s.hit.geo_normal_world),
     "nocs": lambda s: nocs_label(s.hit, s.house),
     # Appearance and classes of the hit.
-    "albedo": lambda s: albedo_label(s.hit, s.house, s.geometry, s.textures),
+    "albedo": lambda s: albedo_label(s.hit, s.house, s.geometry, s.textures, s.max_albedo),
     "material": _material,
     "nyu13": lambda s: NYU13_FROM_NYU40[semantic_label(s.hit.item, s.house)],
     "class_source": _class_source,

@@ -52,9 +52,12 @@ _BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255
 
 
 def albedo_label(
-    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
-) -> NDArray[np.uint8]:
+    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]],
+    most: float = 1.0,
+) -> NDArray[np.uint8]:  # fmt: skip
     """(H, W, 3) uint8 sRGB: diffuse colour times texture, multiplied in linear light; 0 = nothing.
+
+    most: what the product is held to in each channel, as the light that was traced holds it.
 
     textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top (v = 1), repeated; looked up between the
     four nearest texels, not filtered over the pixel. A missing texture counts as white.
@@ -72,7 +75,7 @@ def albedo_label(
             if pixels is not None:
                 linear[mask] *= bilinear(pixels[..., :3], hit.points.uv[mask], _LINEAR_OF_BYTE)
     # Encode by table: 8-bit sRGB.
-    steps = np.rint(np.clip(linear, 0, 1) * _STEPS).astype(np.int32)
+    steps = np.rint(np.clip(linear, 0, most) * _STEPS).astype(np.int32)
     return np.asarray(_BYTE_OF_LINEAR[steps])
 
 

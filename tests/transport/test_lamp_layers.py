@@ -163,7 +163,9 @@ def test_metropolis_has_no_light_by_lamp_and_says_so() -> None:
 @pytest.mark.parametrize("name", RECIPE_NAMES)
 def test_a_recipe_of_two_groups_keeps_the_digest_it_had_before_there_were_others(name: str) -> None:
     recipe = recipe_from_name(name)
-    fields = recipe.model_dump(mode="json", exclude={"name": True, "light": {"groups"}})
+    fields = recipe.model_dump(
+        mode="json", exclude={"name": True, "light": {"groups"}, "tone": {"pictures"}}
+    )
     light = {k: fields[k] for k in ("seed", "light", "tone")}
     assert recipe.digest("light", "tone") == keys.digest(light)
     if recipe.light.integrator == "path":

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.frames import LUMINANCE
-from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
+from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import Group, Mode
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
@@ -21,6 +22,7 @@ from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
 from pbrs_farm.transport.validation.mitsuba_reference import ReferenceScene
+from pbrs_farm.truth.surface_layers import albedo_label
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
@@ -267,3 +269,21 @@ def test_a_noise_ends_a_time_budget_early() -> None:
     result = scene.render(camera, "0_0", fields.model_copy(update={"noise": target}), 1)
     assert result.noise["sum"] <= target
     assert result.spp < 200
+
+
+@pytest.mark.parametrize(("texel", "most"), [(225, 0.9), (255, 0.9), (255, 1.0)])
+def test_a_textured_floor_is_lit_by_the_albedo_of_its_label(texel: int, most: float) -> None:
+    # Kd times the texture is held to the limit, not Kd before it.
+    recipe = recipe_from_name("released") if most == 1.0 else RECIPE
+    floor = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
+    house = rooms.house([floor], [Material("floor", diffuse=(1, 1, 1), texture_id="t")])
+    pixels = np.full((2, 2, 3), texel, np.uint8)
+    camera = rooms.camera((0, 1, 3), (0, 0, 0))
+    scene = LightScene.load(house, {"t": pixels}, recipe, uniform_sky((1, 1, 1)))
+    result = scene.render(camera, "0_0", FIELDS.model_copy(update={"spp": 256}), 1)
+    geometry = geometry_from_house(house)
+    hit = Caster(geometry).hit_record(camera)
+    label = albedo_label(hit, house, geometry, {"t": pixels}, most)[14:]
+    told = linear_from_srgb(label / 255.0)
+    np.testing.assert_allclose(result.albedo[14:], told, atol=1 / 255)
+    np.testing.assert_allclose(result.outdoor[14:].mean((0, 1)), told.mean((0, 1)), rtol=4e-3)

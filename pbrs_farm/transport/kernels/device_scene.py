@@ -208,6 +208,7 @@ class DeviceScene:
         self._tags = device_array(mi.UInt32, tables.face_tags)
         self._materials = device_array(mi.Float, tables.material_rows.ravel())
         self._texels = device_array(mi.UInt32, tables.texels)
+        self._max_albedo = dr.opaque(mi.Float, tables.max_albedo)
 
     def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
         """The first surface along a ray, by the faster test where there is a tree for it.
@@ -350,7 +351,7 @@ class DeviceScene:
         kind = mi.UInt32(tau[3])
         tinted = has_texture & (kind != MIRROR)
         bsdf = Bsdf(
-            kd=dr.select(tinted, colour(kd) * rgb, colour(kd)),
+            kd=dr.minimum(dr.select(tinted, colour(kd) * rgb, colour(kd)), self._max_albedo),
             f0=colour(f0),
             tau=dr.select(tinted, colour(tau) * rgb, colour(tau)),
             alpha=f0[3],

@@ -26,6 +26,7 @@ SURFACE, MIRROR, GLASS = 0, 1, 2  # rough and diffuse, delta mirror, thin glass
 NULL = 3  # Mitsuba's null BSDF: rays pass as if there were nothing
 
 MAX_ALBEDO: Final = 0.9  # in the preset `physical`: the whitest paints; paths in 1 would never end
+
 _MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source tells no colour
 MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
 _DARKEST_METAL: Final = 0.06  # Ks of a metal whose roughness is known: more than a dielectric's
@@ -47,6 +48,11 @@ def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F
         rows[index] = row
     notes = [f"material {n!r}: Kd + Ks above 1, scaled to conserve energy" for n in scaled]
     return rows, notes
+
+
+def max_albedo(recipe: Recipe) -> float:
+    """What Kd times its texture is held to, in each of R, G and B, under a recipe."""
+    return MAX_ALBEDO if recipe.materials.preset == "physical" else 1.0
 
 
 def _place_in_atlas(row: F32, material: Material, packed: TextureAtlas) -> None:
@@ -73,7 +79,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
     # Decode colours to linear light.
     row = np.zeros(MATERIAL_FLOATS, np.float32)
     kd = linear_from_srgb(np.clip(np.nan_to_num(material.diffuse), 0, 1))
-    kd = np.minimum(kd, MAX_ALBEDO)
+    tint, kd = kd, np.minimum(kd, MAX_ALBEDO)
     ks_encoded = np.clip(np.nan_to_num(material.specular), 0, 1)
     ks = linear_from_srgb(ks_encoded)
     row[KIND] = SURFACE
@@ -102,7 +108,8 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
     else:
         f0 = np.maximum(0.08 * ks_encoded, _MIN_F0 if is_rough else 0)
     # Square the roughness, or turn the Phong exponent into GGX roughness.
-    row[KD] = kd
+    # The kernel holds the product with the texture to MAX_ALBEDO.
+    row[KD] = tint if material.texture_id else kd
     if has_coat:
         phong = math.sqrt(2 / (min(material.shininess, 1e4) + 2))
         row[F0] = f0

@@ -32,7 +32,12 @@ from pbrs_farm.core.mesh import (
     unit_normals,
 )
 from pbrs_farm.core.recipe import EmissionFields, Recipe
-from pbrs_farm.transport.scene_tables.material_rows import MATERIAL_FLOATS, TAU, material_rows
+from pbrs_farm.transport.scene_tables.material_rows import (
+    MATERIAL_FLOATS,
+    TAU,
+    material_rows,
+    max_albedo,
+)
 from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 
 # Blackbody colour: linear sRGB of luminance 1 from a temperature.
@@ -270,6 +275,7 @@ class SceneTables:
     face_tags: NDArray[np.uint32]  # (F,) material + 65536 * lamp
     transparent: Bools  # (F,) thin glass and alpha cut-outs: shadow rays may pass
     material_rows: F32  # (M, 20), columns as in material_rows.py
+    max_albedo: float  # that Kd times its texture is held to
     texels: NDArray[np.uint32]  # the texture atlas
     lamps: tuple[AreaEmitter, ...]  # L of them
     lamp_rows: F32  # (L, 4) radiance r g b, area in m2
@@ -321,6 +327,7 @@ def tables_from_house(
         face_tags=material + (face_lamp[keep] << np.uint32(16)),
         transparent=transparent[material],
         material_rows=rows.reshape(-1, MATERIAL_FLOATS),
+        max_albedo=max_albedo(recipe),
         texels=packed.texels,
         lamps=lamps,
         lamp_rows=np.array([[*x.radiance, x.area_m2] for x in lamps], np.float32).reshape(-1, 4),

@@ -90,7 +90,7 @@ class ReferenceScene:
             row = t.material_rows[int(tag & 0xFFFF)]
             if int(row[KIND]) == NULL or not faces.any():
                 continue
-            fields: dict[str, Any] = {"bsdf": _bsdf(mi, row, t.texels, mirrored=flipped)}
+            fields: dict[str, Any] = {"bsdf": _bsdf(mi, row, t, mirrored=flipped)}
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
@@ -127,8 +127,9 @@ def _mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
     return mesh
 
 
-def _bsdf(mi: Any, row: F32, texels: NDArray[np.uint32], *, mirrored: bool) -> dict[str, Any]:
-    flat = _flat_bsdf(mi, row, texels)
+def _bsdf(mi: Any, row: F32, tables: SceneTables, *, mirrored: bool) -> dict[str, Any]:
+    texels = tables.texels
+    flat = _flat_bsdf(mi, row, tables)
     if int(row[KIND]) == GLASS:
         return flat
     bent = flat
@@ -144,14 +145,20 @@ def _bsdf(mi: Any, row: F32, texels: NDArray[np.uint32], *, mirrored: bool) -> d
     return {"type": "twosided", "nested": bent}
 
 
-def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
+def _flat_bsdf(mi: Any, row: F32, tables: SceneTables) -> dict[str, Any]:
     """The plugin of a material, seen from one side, without its normal map."""
+    texels = tables.texels
     colours = _texels(row, texels, FIRST_TEXEL, TEXTURE_SIZE)
 
     def rgb(values: F32) -> dict[str, Any]:
         if colours is None:
             return {"type": "rgb", "value": [float(v) for v in values]}
         return _bitmap(mi, unpacked_colours(colours) * values)
+
+    def diffuse() -> dict[str, Any]:
+        if colours is None:
+            return rgb(row[KD])
+        return _bitmap(mi, np.minimum(unpacked_colours(colours) * row[KD], tables.max_albedo))
 
     # Choose the plugin by the kind of BSDF.
     if int(row[KIND]) == MIRROR:
@@ -161,7 +168,7 @@ def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
         pane = {"type": "thindielectric", "int_ior": 1.5, "ext_ior": 1.0}
         return pane | {"specular_transmittance": rgb(row[TAU])}
     if row[ALPHA] <= 0:
-        return {"type": "diffuse", "reflectance": rgb(row[KD])}
+        return {"type": "diffuse", "reflectance": diffuse()}
     # Square the roughness of maps, texel by texel.
     alpha = np.full((1, 1), row[ALPHA], np.float64)
     maps = _texels(row, texels, FIRST_MAP_TEXEL, MAP_SIZE)
@@ -170,7 +177,7 @@ def _flat_bsdf(mi: Any, row: F32, texels: NDArray[np.uint32]) -> dict[str, Any]:
         alpha = np.maximum((row[MAP_ROUGHNESS] * roughness) ** 2, MIN_ALPHA)
     if row[KD].max() > 0:
         coat = {"type": "roughplastic", "alpha": float(alpha.mean()), "nonlinear": False}
-        return coat | {"diffuse_reflectance": rgb(row[KD])}
+        return coat | {"diffuse_reflectance": diffuse()}
     metal = {"type": "roughconductor", "material": "none", "distribution": "ggx"}
     tint = {"type": "rgb", "value": [float(v) for v in row[F0]]}
     return metal | {"specular_reflectance": tint, "alpha": _bitmap(mi, alpha[..., None])}
