@@ -25,7 +25,7 @@ from pbrs_farm.installation import EXTRA_OF, install_command
 
 # Module of pbrs_farm.commands -> the verbs it adds.
 MODULES: Final = {
-    "looking": ("doctor", "skies", "recipes", "layers", "completion"),
+    "looking": ("doctor", "inputs", "skies", "recipes", "layers", "completion"),
     "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
     "scattering": ("scatter",),

@@ -13,7 +13,7 @@ from pbrs_farm.core.shown_text import did_you_mean
 
 # What a user wants -> the verbs for it, in the order of the help.
 GROUPS: Final = {
-    "begin": ("demo", "doctor", "homes", "skies", "completion"),
+    "begin": ("demo", "doctor", "homes", "inputs", "skies", "completion"),
     "make pictures and labels": ("run", "scatter", "objects", "step", "recipes", "layers"),
     "look into one home": ("dress", "repair", "cameras"),
     "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
