@@ -148,6 +148,7 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     ),
     # Depth as other works encode or measure it.
     _along_axis("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
+    _along_axis("projector", "Y", "uint8", "dots of an infrared projector beside the camera, or amid a pair"),
     _along_axis("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
     _along_axis("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)"),
     _along_axis("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it"),

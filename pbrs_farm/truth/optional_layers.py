@@ -28,6 +28,7 @@ from pbrs_farm.truth.optical_flow import (
     flow_kitti,
     flow_label,
 )
+from pbrs_farm.truth.projector import projector_label
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
     encoded_normal,
@@ -128,6 +129,14 @@ def _normal_shading(inputs: LabelInputs) -> NDArray[np.uint16]:
     return normal_label(normals, inputs.camera.world_from_camera)
 
 
+def _projector(inputs: LabelInputs) -> NDArray[np.uint8]:
+    if inputs.first_hit is None:
+        return np.zeros(inputs.hit.face.shape, np.uint8)
+    s, partner = inputs, inputs.partners.get("stereo")
+    albedo = albedo_label(s.hit, s.house, s.geometry, s.textures, s.max_albedo)
+    return projector_label(s.hit, s.camera, partner, albedo, inputs.first_hit)
+
+
 # How each optional layer of core/layers.py is computed.
 _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     # Geometry of the hit.
@@ -152,6 +161,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "boundary_semantic": lambda s: instance_boundary(semantic_label(s.hit.item, s.house)),
     "boundary_crease": lambda s: s.boundaries[1],
     "hha": lambda s: hha_label(s.hit, s.camera),
+    "projector": _projector,
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_tof": lambda s: tof_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_stereo": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed),
