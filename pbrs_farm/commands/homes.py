@@ -114,7 +114,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.core.catalogue import EMPTY
     from pbrs_farm.gallery.made_homes import write_home
     from pbrs_farm.generate.made import made_of_plan
-    from pbrs_farm.generate.own_plan import plan_from_file
+    from pbrs_farm.generate.plans.own_plan import plan_from_file
 
     # The plan decides the rooms, so wishes about rooms contradict it.
     given = [f"--{k}" for k in ("rooms", "area", "storeys", "programme") if getattr(args, k)]

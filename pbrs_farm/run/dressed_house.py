@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as MADE_VERSION
 from pbrs_farm.core.plugins import plugin
@@ -25,6 +25,13 @@ VERSION: Final = 12
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 
+TELLS_BOXES: Final = frozenset({"plan", "scenestate", "front3d", "habitat"})
+"""Kinds of sources that may tell a thing by class and box alone."""
+
+STAND_INS_VERSION: Final = 1
+"""Of what stands in for such things."""
+
+
 def seed_of(source: SourceRef, recipe: Recipe) -> int:
     """What a source is dressed by: its own seed, else the recipe's; 0 = not at all."""
     if source.kind == "object":
@@ -34,7 +41,8 @@ def seed_of(source: SourceRef, recipe: Recipe) -> int:
 
 def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
     """Whether a source's house takes anything from the catalogue."""
-    return bool(seed_of(source, recipe)) or _is_furnished(source, recipe)
+    stands_in = source.kind in TELLS_BOXES and recipe.read.stand_ins == "pieces"
+    return bool(seed_of(source, recipe)) or _is_furnished(source, recipe) or stands_in
 
 
 def _is_furnished(source: SourceRef, recipe: Recipe) -> bool:
@@ -69,17 +77,40 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     return dress(bare, catalogue_of(recipe.dress), recipe.dress, seed)
 
 
+def with_told_furnished(house: House, source: SourceRef, recipe: Recipe) -> House:
+    """The house with furniture for what its source tells by class and box alone."""
+    if source.kind not in TELLS_BOXES:
+        return house
+    from pbrs_farm.run.stand_ins import has_told, with_stand_ins
+
+    if not has_told(house):
+        return house
+    doing(source.location, "stand-ins")
+    how = recipe.read.stand_ins
+    catalogue = catalogue_of(recipe.dress) if how == "pieces" else EMPTY
+    return with_stand_ins(house, catalogue, how)
+
+
+def _stand_ins_digest(source: SourceRef, recipe: Recipe) -> list[object]:
+    if source.kind not in TELLS_BOXES:
+        return []
+    how = recipe.read.stand_ins
+    digest = catalogue_of(recipe.dress).digest if how == "pieces" else ""
+    return ["stand-ins", STAND_INS_VERSION, digest]
+
+
 def dressing_digest(source: SourceRef, recipe: Recipe) -> str:
     """Digest of all that dressing and furnishing depend on beside the house; "" where neither is done."""
     seed, is_furnished = seed_of(source, recipe), _is_furnished(source, recipe)
+    told = _stand_ins_digest(source, recipe)
     if not seed and not is_furnished:
-        return ""
+        return keys.digest(*told) if told else ""
     # Where the libraries lie is no matter: their content is.
     fields = recipe.dress.model_dump(
         mode="json", exclude={"seed", "catalogue", "furnish", "passes"}
     )
     passes = [plugin("passes", name).mark for name in recipe.dress.passes.split(":") if name]
-    more = ["furnish", MADE_VERSION] if is_furnished else []
+    more = [*(["furnish", MADE_VERSION] if is_furnished else []), *told]
     return keys.digest(VERSION, seed, fields, catalogue_of(recipe.dress).digest, *more, *passes)
 
 

@@ -37,7 +37,7 @@ from pbrs_farm.read.source import SourceRef, check_unchanged
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.dress_catalogue import house_of_source
-from pbrs_farm.run.dressed_house import dressed, furnished
+from pbrs_farm.run.dressed_house import dressed, furnished, with_told_furnished
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
@@ -132,6 +132,7 @@ def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
     def occluder_from(some: House) -> Caster:
         return Caster(geometry_from_house(some))
 
+    house = with_told_furnished(house, source, recipe)
     house, dressing = dressed(furnished(house, source, recipe), source, recipe)
     doing(source.location, "repair")
     return *repair(house, recipe.repair, occluder_from=occluder_from), dressing

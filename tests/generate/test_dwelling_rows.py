@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
 from pbrs_farm.generate.made import made_of_plan
-from pbrs_farm.generate.own_plan import OwnPlan, plan_from_file
+from pbrs_farm.generate.plans.own_plan import OwnPlan, plan_from_file
 from pbrs_farm.read.sweethome3d.home import read_home
 
 COLUMNS = (

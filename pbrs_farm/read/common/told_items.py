@@ -1,0 +1,42 @@
+"""Things that a source tells by class and box alone; no effects. run/stand_ins.py furnishes them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, Item, ItemKind
+from pbrs_farm.read.common.given_classes import class_by_words, given_class
+
+
+def told_item(
+    item_id: str,
+    vocabulary: str,
+    name: str,
+    centre: tuple[float, float, float],
+    size: tuple[float, float, float],
+    turn_rad: float,
+    *,
+    is_front_told: bool = False,
+    level_id: str = "0",
+    room_id: str | None = None,
+) -> Item | None:
+    """An item without surfaces for a told thing; None where its name means nothing that is drawn.
+
+    vocabulary: whose word the name is (given_classes.csv). centre: of the box, metres, world. size:
+    width, height, depth. turn_rad: about +y; at 0 the front looks to +z.
+    """
+    seen = given_class(vocabulary, name) or class_by_words(name)
+    if seen is not None and seen.kind in ("none", "wall", "floor", "ceiling", "door", "window"):
+        return None
+    if seen is not None and seen.nyu40 < 0:
+        seen = class_by_words(name)
+    cos, sin = math.cos(turn_rad), math.sin(turn_rad)
+    axes = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
+    tags = (TOLD, FRONT_TOLD) if is_front_told else (TOLD,)
+    return Item(
+        id=item_id, name=name.replace("_", " "), kind=ItemKind.OBJECT, level_id=level_id, surfaces=(),
+        nyu40=seen.nyu40 if seen else 40, source_class=name, room_id=room_id,
+        box=Box(np.array(centre, np.float64), np.array(size, np.float64) / 2, axes), tags=tags,
+    )  # fmt: skip
