@@ -16,10 +16,11 @@ from itertools import product
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
+import shapely
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.catalogue import Catalogue, Piece, Place
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, House, Item, Material, Note, Room
 from pbrs_farm.dress.draft import Draft
@@ -40,6 +41,8 @@ _BOARDS: Final = frozenset({
     "curtain", "blinds", "picture_frame", "mirror",
 })  # fmt: skip
 _NEAR_WALL_M: Final = 0.25  # a back that stands nearer to a wall than this stands at it
+_THIN_M: Final = 0.12
+_AT_TABLE_M: Final = 1.5  # from a chair to the middle of its table
 _ON_FLOOR_M: Final = 0.35  # what stands on floors and is told to begin lower stands on the floor
 _MOST_IN_WALL_M: Final = 0.15  # boxes of scans reach into walls
 _IN_WALL_SHARE: Final = 0.06  # of a footprint that may stay outside its room
@@ -67,17 +70,18 @@ def has_told(house: House) -> bool:
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     """The house with a piece, a box or nothing for each told thing; notes say what was left out."""
-    if not has_told(house):
+    told = [item for item in house.items if TOLD in item.tags]
+    if not told:
         return house
     left = replace(house, items=tuple(i for i in house.items if TOLD not in i.tags))
-    told = [item for item in house.items if TOLD in item.tags]
     if how == "none":
         text = f"{len(told)} things that are told by their boxes alone are left out"
         return replace(left, notes=(*house.notes, Note("told-left-out", house.source.file, text)))
     with closing(Draft(left, 0)) as draft:
+        scene = _Scene(house, catalogue if how == "pieces" else None)
         for item in told:
-            _stand_in(draft, item, house, catalogue if how == "pieces" else None)
-        _note(draft, house)
+            _stand_in(draft, item, scene)
+        draft.notes += scene.notes()
         made = draft.house()
     owed = sorted(
         {(p.creator or p.library, p.licence) for p in draft.used.values() if "BY" in p.licence}
@@ -89,43 +93,110 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     return replace(made, source=replace(made.source, attribution=line))
 
 
-def _note(draft: Draft, house: House) -> None:
-    """One note a kind of what became no piece."""
-    for text, names in (
-        ("have no piece that fits and are plain boxes", "box"), ("reach into walls and are left out", "wall"),
-    ):  # fmt: skip
-        found = Counter(
-            {k.partition(": ")[2]: n for k, n in draft.refused.items() if k.startswith(names)}
-        )
-        if found:
-            most = ", ".join(f"{n} {name}" for name, n in found.most_common(5))
-            kind = "stand-in-box" if names == "box" else "told-left-out"
-            draft.notes.append(
-                Note(kind, house.source.file, f"{sum(found.values())} things {text}: {most}")
-            )
+class _Place(NamedTuple):
+    """A room as told things meet it."""
+
+    room: Room
+    outline: Polygon
+    area: Polygon  # a hair larger, prepared
 
 
-def _stand_in(draft: Draft, item: Item, house: House, catalogue: Catalogue | None) -> None:
+def _place(room: Room) -> _Place:
+    outline = Polygon(room.polygon)
+    area = outline.buffer(0.01)
+    shapely.prepare(outline)
+    shapely.prepare(area)
+    return _Place(room, outline, area)
+
+
+class _Scene:
+    """What stands-in are chosen from and placed among; state: counts of what became no piece."""
+
+    def __init__(self, house: House, catalogue: Catalogue | None) -> None:
+        self.house = house
+        self.catalogue = catalogue
+        self._places = [_place(room) for room in house.rooms]
+        self._tables = [
+            i.box.centre for i in house.items
+            if i.box is not None and TOLD in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
+        ]  # fmt: skip
+        self.boxes: Counter[str] = Counter()
+        self.in_walls: Counter[str] = Counter()
+
+    def notes(self) -> list[Note]:
+        """One note a kind of what became no piece."""
+        found = []
+        for kind, text, names in (
+            ("stand-in-box", "have no piece that fits and are plain boxes", self.boxes),
+            ("told-left-out", "reach into walls and are left out", self.in_walls),
+        ):
+            if names:
+                most = ", ".join(f"{n} {name}" for name, n in names.most_common(5))
+                text = f"{names.total()} things {text}: {most}"
+                found.append(Note(kind, self.house.source.file, text))
+        return found
+
+    def place_of(self, item: Item) -> _Place | None:
+        """The room that a told thing names, else the nearest one on its storey; None = out of all."""
+        assert item.box is not None
+        x, y, z = (float(v) for v in item.box.centre)
+        here, best = Point(x, z), None
+        nearest = _MOST_IN_WALL_M
+        for place in self._places:
+            room = place.room
+            if room.id == item.room_id:
+                return place
+            # Many rooms: ask those alone whose bounds are near.
+            x0, z0, x1, z1 = place.outline.bounds
+            if not room.floor_y - 0.3 <= y <= room.ceiling_y + 0.3:
+                continue
+            if not (x0 - nearest <= x <= x1 + nearest and z0 - nearest <= z <= z1 + nearest):
+                continue
+            away = place.outline.distance(here)
+            if away < nearest:
+                best, nearest = place, away
+        return best
+
+    def table_near(self, middle: F64, height: float) -> F64 | None:
+        """The (x, z) of the nearest table on the same storey, within reach of a chair."""
+        tables = [t[[0, 2]] for t in self._tables if abs(t[1] - height) < 1.5]
+        far = [float(np.linalg.norm(t - middle)) for t in tables]
+        nearest = int(np.argmin(far)) if far else -1
+        return tables[nearest] if nearest >= 0 and far[nearest] < _AT_TABLE_M else None
+
+
+def _stand_in(draft: Draft, item: Item, scene: _Scene) -> None:
     assert item.box is not None
-    room = _room_of(house, item)
-    told = _inside(item.box, room)
+    place = scene.place_of(item)
+    told = _inside(_between(item.box, place.room), place.area) if place else item.box
     if told is None:
-        draft.refused[f"wall: {item.name}"] += 1
+        scene.in_walls[item.name] += 1
         return
+    found = _chosen(item, told, place, scene) if scene.catalogue else None
+    if found is not None and scene.catalogue is not None:
+        turned, fit = found
+        shape = scene.catalogue.shape(fit.piece)
+        if shape is not None:
+            draft.add(_placed(draft, item, turned, fit, shape, place), "stand_ins", fit.piece)
+            return
+    if scene.catalogue is not None:
+        scene.boxes[item.name] += 1
+    draft.add(_plain_box(draft, item, told, place), "stand_ins")
+
+
+def _chosen(item: Item, told: Box, place: _Place | None, scene: _Scene) -> tuple[Box, _Fit] | None:
+    """The piece that fits best, and the box as it looks; None where no piece fits either way."""
+    assert scene.catalogue is not None
     group = _group_of(item)
     best: tuple[float, Box, _Fit] | None = None
     for turned in _turned(told, is_front_told=FRONT_TOLD in item.tags):
-        fit = _best(catalogue, group, item, turned) if catalogue else None
-        if fit is not None:
-            cost = fit.misfit + _front_cost(turned, group, room, house)
-            if best is None or cost < best[0] - 1e-9:
-                best = cost, turned, fit
-    if best is None or catalogue is None:
-        draft.refused[f"box: {item.name}"] += 1
-        draft.add(_plain_box(draft, item, told, room), "stand_ins")
-        return
-    _, turned, fit = best
-    draft.add(_placed(draft, item, turned, fit, catalogue, room), "stand_ins", fit.piece)
+        fit = _best(scene.catalogue, group, item, turned)
+        if fit is None:
+            continue
+        cost = fit.misfit + _front_cost(turned, group, place, scene)
+        if best is None or cost < best[0] - 1e-9:
+            best = cost, turned, fit
+    return best and (best[1], best[2])
 
 
 def _group_of(item: Item) -> str:
@@ -144,43 +215,48 @@ def _group_of(item: Item) -> str:
 
 def _best(catalogue: Catalogue, group: str, item: Item, told: Box) -> _Fit | None:
     """The piece of the group, else of the class, that needs the least stretching."""
-    pieces = catalogue.of(group) if group else ()
-    if not pieces and 0 < item.nyu40 < 38:
-        pieces = tuple(p for p in catalogue.pieces if p.nyu40 == item.nyu40)
-    fits = [
-        fit for piece in pieces if (fit := _fit(piece, told)) and piece.place is not Place.OPENING
-    ]
-    return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id), default=None)
+    by_class = 0 < item.nyu40 < 38
+    for pieces in (
+        catalogue.of(group) if group else (),
+        [p for p in catalogue.pieces if by_class and p.nyu40 == item.nyu40],
+    ):
+        fits = [fit for p in pieces if p.place is not Place.OPENING and (fit := _fit(p, told))]
+        if fits:
+            return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id))
+    return None
 
 
 def _fit(piece: Piece, told: Box) -> _Fit | None:
-    width, depth, height = piece.size
-    if min(piece.size) <= 0:
+    """How a piece is scaled to a box; None where it would have to be stretched beyond the limits."""
+    size = np.array([piece.size[0], piece.size[2], piece.size[1]])  # width, height, depth
+    if size.min() <= 0:
         return None
-    # A picture or a rug may be as thin as it likes.
-    wanted = np.maximum(2 * told.half, 0.02)
-    scale = wanted / np.array([width, height, depth])
-    if min(width, height, depth) < 0.12:
-        scale = np.where(np.array([width, height, depth]) < 0.12, 1.0, scale)
+    scale = np.maximum(2 * told.half, 0.01) / size
+    # What is thin, a picture, a rug, a flat screen, says little by its thickness.
+    is_thin = (size < _THIN_M) | (2 * told.half < _THIN_M)
+    scale = np.where(is_thin, np.clip(scale, *_SCALES), scale)
+    thick = scale[~is_thin] if not is_thin.all() else scale
     most = _STRETCH_OF_BOARDS if piece.group in _BOARDS else _STRETCH
-    if scale.min() < _SCALES[0] or scale.max() > _SCALES[1] or scale.max() / scale.min() > most:
+    if thick.min() < _SCALES[0] or thick.max() > _SCALES[1] or thick.max() / thick.min() > most:
         return None
-    logs = np.log(scale)
+    logs = np.log(thick)
     return _Fit(piece, scale, float(np.ptp(logs) + 0.3 * np.abs(logs.mean())))
 
 
 # Where it stands and which way it looks.
 
 
-def _room_of(house: House, item: Item) -> Room | None:
-    assert item.box is not None
-    x, y, z = (float(v) for v in item.box.centre)
-    own = [r for r in house.rooms if r.id == item.room_id]
-    here = [
-        r for r in house.rooms
-        if r.floor_y - 0.3 <= y <= r.ceiling_y + 0.3 and Polygon(r.polygon).distance(Point(x, z)) < _MOST_IN_WALL_M
-    ]  # fmt: skip
-    return next(iter((*own, *here)), None)
+def _between(told: Box, room: Room) -> Box:
+    """The box between its room's floor and ceiling: what is told to begin a little off the floor stands."""
+    low, high = (float(told.centre[1] + side * told.half[1]) for side in (-1, 1))
+    bottom = max(low, room.floor_y)
+    top = min(high, room.ceiling_y - 0.005)
+    if top - bottom < 0.01:
+        # Told to lie outside: keep its height and stand it on the floor.
+        bottom, top = room.floor_y, room.floor_y + min(high - low, room.ceiling_y - room.floor_y)
+    centre, half = told.centre.copy(), told.half.copy()
+    centre[1], half[1] = (bottom + top) / 2, (top - bottom) / 2
+    return replace(told, centre=centre, half=half)
 
 
 def _ground(told: Box) -> Polygon:
@@ -190,11 +266,11 @@ def _ground(told: Box) -> Polygon:
     return Polygon([(float(x), float(z)) for x, z in corners])
 
 
-def _inside(told: Box, room: Room | None) -> Box | None:
+def _inside(told: Box, area: Polygon) -> Box | None:
     """The box moved off the walls of its room by the least step; None where none is small enough."""
-    if room is None:
+    ground = _ground(told)
+    if area.contains(ground):
         return told
-    area, ground = Polygon(room.polygon).buffer(0.01), _ground(told)
     steps = sorted(
         product((0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15), repeat=2), key=lambda s: math.hypot(*s)
     )
@@ -223,68 +299,57 @@ def _turned(told: Box, *, is_front_told: bool) -> Iterator[Box]:
         yield Box(told.centre, half, np.stack([right, up, front], 1))
 
 
-def _front_cost(told: Box, group: str, room: Room | None, house: House) -> float:
+def _front_cost(told: Box, group: str, place: _Place | None, scene: _Scene) -> float:
     """0 where its back is at a wall or it looks at its table, more where it looks the wrong way."""
-    if room is None:
+    if place is None:
         return 0.0
     front = told.axes[[0, 2], 2]
     middle = told.centre[[0, 2]]
     back = middle - front * told.half[2]
-    outline = Polygon(room.polygon).exterior
     before = Point(*(middle + front * (told.half[2] + _NEAR_WALL_M)))
-    blocked = 0.0 if Polygon(room.polygon).contains(before) else 1.0
-    if group in _SEATS and (table := _nearest_table(middle, house)) is not None:
+    blocked = 0.0 if place.outline.contains(before) else 1.0
+    table = scene.table_near(middle, float(told.centre[1])) if group in _SEATS else None
+    if table is not None:
         way = table - middle
         return 1 - float(way @ front) / max(float(np.linalg.norm(way)), 1e-6) + blocked
-    if outline.distance(Point(*back)) < _NEAR_WALL_M:
+    if place.outline.exterior.distance(Point(*back)) < _NEAR_WALL_M:
         return blocked
-    centre = np.array(Polygon(room.polygon).representative_point().coords[0]) - middle
+    centre = np.array(place.outline.representative_point().coords[0]) - middle
     looks = float(centre @ front) / max(float(np.linalg.norm(centre)), 1e-6)
     return 0.5 + 0.25 * (1 - looks) + blocked
-
-
-def _nearest_table(middle: F64, house: House) -> F64 | None:
-    tables = [
-        i.box.centre[[0, 2]] for i in house.items
-        if i.box is not None and NYU40_NAMES[i.nyu40] in _TABLES
-    ]  # fmt: skip
-    far = [float(np.linalg.norm(t - middle)) for t in tables]
-    nearest = int(np.argmin(far)) if far else -1
-    return tables[nearest] if nearest >= 0 and far[nearest] < 1.5 else None
 
 
 # The item that stands there.
 
 
 def _placed(
-    draft: Draft, item: Item, told: Box, fit: _Fit, catalogue: Catalogue, room: Room | None
+    draft: Draft, item: Item, told: Box, fit: _Fit, shape: Shape, place: _Place | None
 ) -> Item:
-    shape = catalogue.shape(fit.piece)
-    if shape is None:
-        return _plain_box(draft, item, told, room)
     size = np.ptp(shape.bounds, axis=0)
     wanted = fit.scale * np.array([fit.piece.size[0], fit.piece.size[2], fit.piece.size[1]])
     scale = wanted / np.maximum(size, 1e-6)
     front = told.axes[:, 2]
     turn_rad = float(np.arctan2(front[0], front[2]))
     low, high = shape.bounds * scale
-    # Bring the middle of its base to the middle of the box's; what hangs keeps its top.
+    # Bring the middle of its base to the middle of the box's, its back to the box's back where it is
+    # deeper than told; what hangs keeps its top.
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     mx, mz = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     base = float(told.centre[1] - told.half[1])
     if fit.piece.place is Place.CEILING:
         base = float(told.centre[1] + told.half[1]) - float(high[1] - low[1])
-    elif room is not None and _stands(fit.piece) and base - room.floor_y < _ON_FLOOR_M:
-        base = room.floor_y
-    at = told.centre - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
+    elif place is not None and _stands(fit.piece) and base - place.room.floor_y < _ON_FLOOR_M:
+        base = place.room.floor_y
+    deeper = max(float(high[2] - low[2]) / 2 - float(told.half[2]), 0.0)
+    at = told.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
     at[1] = base - low[1]
     placed = draft.placed(
-        fit.piece, shape, at, turn_rad, item_id=item.id, room_id=room.id if room else None,
-        level_id=item.level_id, scale=scale,
+        fit.piece, shape, at, turn_rad, item_id=item.id, room_id=_room_id(item, place),
+        level_id=_level_id(item, place), scale=scale,
     )  # fmt: skip
     return replace(
         placed, name=item.name, nyu40=item.nyu40 or placed.nyu40, source_class=item.source_class,
-        tags=(STAND_IN, f"piece:{fit.piece.id}"),
+        box=told, tags=(*_kept(item), STAND_IN, f"piece:{fit.piece.id}"),
     )  # fmt: skip
 
 
@@ -292,7 +357,20 @@ def _stands(piece: Piece) -> bool:
     return piece.place in (Place.FLOOR, Place.KITCHEN) and piece.group != "upper_cabinet"
 
 
-def _plain_box(draft: Draft, item: Item, told: Box, room: Room | None) -> Item:
+def _room_id(item: Item, place: _Place | None) -> str | None:
+    return place.room.id if place else item.room_id
+
+
+def _level_id(item: Item, place: _Place | None) -> str:
+    return place.room.level_id if place else item.level_id
+
+
+def _kept(item: Item) -> tuple[str, ...]:
+    """The tags of a told thing that say more than that it is told."""
+    return tuple(tag for tag in item.tags if tag not in (TOLD, FRONT_TOLD))
+
+
+def _plain_box(draft: Draft, item: Item, told: Box, place: _Place | None) -> Item:
     name = NYU40_NAMES[item.nyu40] if item.nyu40 else ""
     r, g, b = _COLOURS.get(name, _PLAIN)
     material = draft.material(Material(f"stand-in {name}".strip(), diffuse=(r, g, b)))
@@ -301,8 +379,8 @@ def _plain_box(draft: Draft, item: Item, told: Box, room: Room | None) -> Item:
     centre = told.centre + np.array([0.0, 0.001, 0.0])
     surface = box("box", centre, half, material, axes=_right_handed(told.axes))
     return replace(
-        item, surfaces=(surface,), box=told, room_id=room.id if room else item.room_id,
-        tags=(STAND_IN, "piece:box"),
+        item, surfaces=(surface,), box=told, room_id=_room_id(item, place),
+        level_id=_level_id(item, place), tags=(*_kept(item), STAND_IN, "piece:box"),
     )  # fmt: skip
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, Item, ItemKind
-from pbrs_farm.read.common.given_classes import class_by_words, given_class
+from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
+
+_FURNITURE: Final = ("object", "lamp", "plant", "stairs", "person")
+LARGEST_M: Final = 15.0
 
 
 def told_item(
@@ -22,21 +27,34 @@ def told_item(
     level_id: str = "0",
     room_id: str | None = None,
 ) -> Item | None:
-    """An item without surfaces for a told thing; None where its name means nothing that is drawn.
+    """An item without surfaces for a told thing; None where its name means nothing that is drawn, or
+    its box is none: not finite, without a size, larger than any furniture.
 
     vocabulary: whose word the name is (given_classes.csv). centre: of the box, metres, world. size:
     width, height, depth. turn_rad: about +y; at 0 the front looks to +z.
     """
-    seen = given_class(vocabulary, name) or class_by_words(name)
-    if seen is not None and seen.kind in ("none", "wall", "floor", "ceiling", "door", "window"):
+    seen = given_class(vocabulary, name) or class_by_words(_spoken(name))
+    if seen is not None and seen.kind == LEFT_OUT:
         return None
     if seen is not None and seen.nyu40 < 0:
-        seen = class_by_words(name)
+        seen = class_by_words(_spoken(name))
+    if seen is not None and seen.kind not in _FURNITURE:
+        return None
+    if not all(map(math.isfinite, (*centre, *size, turn_rad))):
+        return None
+    if min(size) <= 0 or max(size) > LARGEST_M:
+        return None
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     axes = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
     tags = (TOLD, FRONT_TOLD) if is_front_told else (TOLD,)
     return Item(
-        id=item_id, name=name.replace("_", " "), kind=ItemKind.OBJECT, level_id=level_id, surfaces=(),
+        id=item_id, name=_spoken(name), kind=seen.item_kind if seen else ItemKind.OBJECT, level_id=level_id, surfaces=(),
         nyu40=seen.nyu40 if seen else 40, source_class=name, room_id=room_id,
         box=Box(np.array(centre, np.float64), np.array(size, np.float64) / 2, axes), tags=tags,
     )  # fmt: skip
+
+
+def _spoken(name: str) -> str:
+    """TVStand, tv_stand -> TV stand, tv stand: words that the vocabulary of pieces knows."""
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
+    return parted.replace("_", " ").replace("-", " ").strip()
