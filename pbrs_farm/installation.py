@@ -16,7 +16,8 @@ EXTRA_OF: Final = {
     "moderngl": "gl", "glcontext": "gl", "mitsuba": "transport", "drjit": "transport",
     "pyoidn": "transport", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
-    "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video",
+    "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video", "pxr": "usd",
+    "ifcopenshell": "ifc",
 }  # fmt: skip
 """Module -> the extra of pyproject.toml that installs it."""
 

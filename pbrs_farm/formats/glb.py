@@ -93,19 +93,27 @@ class GlbWriter:
     def glb(self, document: dict[str, Any]) -> bytes:
         """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary."""
         # Chunks are padded to 4 bytes: JSON with spaces, the binary one with zeros.
+        text = json.dumps(
+            self._whole(document), sort_keys=True, separators=(",", ":"), allow_nan=False
+        ).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
+        if self._binary:
+            chunks += struct.pack("<II", len(self._binary), _BIN_CHUNK) + bytes(self._binary)
+        return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+    def gltf(self, document: dict[str, Any], file: str) -> Gltf:
+        """The same without writing it: what a file of another format shows."""
+        return Gltf(self._whole(document), (bytes(self._binary),), file)
+
+    def _whole(self, document: dict[str, Any]) -> dict[str, Any]:
         document = {
             **document,
             "accessors": self._accessors,
             "bufferViews": self._views,
             "buffers": [{"byteLength": len(self._binary)}] if self._binary else [],
         }
-        kept = {k: v for k, v in document.items() if v != []}
-        text = json.dumps(kept, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
-        if self._binary:
-            chunks += struct.pack("<II", len(self._binary), _BIN_CHUNK) + bytes(self._binary)
-        return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+        return {k: v for k, v in document.items() if v != []}
 
 
 def _little(array: NDArray[Any], dtype: str) -> bytes:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from benchmarks.inputs.usd_files import UsdHome, walls_of
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, resolve
 from tests.read.gltf.gltf_scenes import two_rooms
@@ -61,6 +62,18 @@ def gltf(folder: Path, picture: bytes | None) -> SourceRef:
     return _with_picture(folder, "scene.glb", scene.glb(), picture)
 
 
+def usd(folder: Path, picture: bytes | None) -> SourceRef:
+    """A stage of a room with a sofa whose picture lies beside the file."""
+    home = UsdHome(folder / "scene.usda")
+    walls_of(home, "/World", 0, 4, 0, 3)
+    paint = home.material("paint", picture="./picture.any", is_cut=True)
+    home.box("/World/Sofa", [1, 0, 1], [2, 1, 2], material=paint)
+    return _with_picture(folder, "scene.usda", home.save().read_bytes(), picture)
+
+
+# IFC is not among them: its files carry no pictures in practice, and its reader looks at none.
+
+
 def single_object(folder: Path, picture: bytes | None) -> SourceRef:
     """An OBJ model without context and its MTL, which names the picture."""
     (folder / "thing.mtl").write_text(MTL)
@@ -80,6 +93,7 @@ FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "sweethome3d": sweethome3d,
     "suncg": suncg,
     "gltf": gltf,
+    "usd": usd,
     "object": single_object,
 }
 """Format -> writes a source with that picture (None: the file is missing) and names it."""

@@ -21,7 +21,7 @@ from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_byte
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.room_floors import (
     MAX_ROOMS,
@@ -61,8 +61,13 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 
     Raises BadHouse naming the room that is wrong.
     """
+    return told_rooms(json_from_bytes(data, file), file, items)
+
+
+def told_rooms(value: Any, file: str, items: Sequence[Item]) -> list[Room]:
+    """The rooms of the JSON value of a polygon file, or of a scene's extras; as rooms_from_json."""
     hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
-    rows = checked(_RoomFile, json_from_bytes(data, file), file, error=BadHouse, hint=hint).rooms
+    rows = checked(_RoomFile, value, file, error=BadHouse, hint=hint).rooms
     check_number(len(rows), file)
     return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
 
@@ -311,27 +316,52 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
         mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
     # Read what is in the scene, then cut its floors into rooms.
     gltf = gltf_document(data, name, beside.fetch)
-    materials = SceneMaterials(gltf, beside.fetch, notes)
+    copyright_line = gltf.document["asset"].get("copyright", "")
+    source = Source("gltf", name, keys.sha256(data), attribution=str(copyright_line)[:500])
+    return house_of_gltf(
+        gltf, source, stem, fields, notes, mapping=mapping, fetch=beside.fetch, rooms=beside.rooms
+    )
+
+
+def house_of_gltf(
+    gltf: Gltf,
+    source: Source,
+    stem: str,
+    fields: ReadFields,
+    notes: Notes,
+    *,
+    mapping: Mapping,
+    fetch: Fetch,
+    rooms: bytes | None = None,
+) -> House:
+    """The House that a document shows. stem: the name of its file without suffix.
+
+    rooms: the bytes of its room file. Raises BadHouse as read_gltf does.
+    """
+    name, told = source.file, rooms
+    materials = SceneMaterials(gltf, fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
     note_unread(gltf, notes)
-    if beside.rooms is None:
-        rooms = rooms_from_floors(items)
+    if told is not None:
+        found = rooms_from_json(told, f"{stem}.rooms.json", items)
+    elif own := _rooms_of_scene(gltf):
+        found = told_rooms({"rooms": own}, name, items)
     else:
-        rooms = rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
-    if not rooms:
+        found = rooms_from_floors(items)
+    if not found:
         hint = f"name a node `floor`, map one in {stem}.classes.json, or give {stem}.rooms.json"
-        hint = f"{_of_its_size(items)}{hint}; `pbrs-farm objects` renders single models"
+        hint = (
+            f"{_of_its_size(items, source.kind)}{hint}; `pbrs-farm objects` renders single models"
+        )
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
-    levels, numbered = levels_of(rooms)
+    levels, numbered = levels_of(found)
     check_rooms(numbered, name)
     items = [_placed(item, levels, numbered) for item in items]
-    sha256 = keys.sha256(data)
-    copyright_line = gltf.document["asset"].get("copyright", "")
     return House(
-        id=keys.house_id(stem, sha256),
+        id=keys.house_id(stem, source.sha256),
         name=stem,
-        source=Source("gltf", name, sha256, attribution=str(copyright_line)[:500]),
+        source=source,
         levels=levels,
         rooms=numbered,
         items=tuple(items),
@@ -342,14 +372,21 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     )
 
 
-def _of_its_size(items: Sequence[Item]) -> str:
+def _rooms_of_scene(gltf: Gltf) -> Any:
+    """What the scene's extras say of rooms, as our own exports do."""
+    scene = entry(gltf, "scenes", gltf.document.get("scene", 0))
+    return object_at(scene, "extras").get("rooms")
+
+
+def _of_its_size(items: Sequence[Item], kind: str) -> str:
     """What to say of a scene that is no size of a house, as one exported in centimetres; or ""."""
     bounds = np.array([i.bounds for i in items if i.n_faces]).reshape(-1, 2, 3)
     if not len(bounds):
         return ""
     wide = float((bounds[:, 1].max(0) - bounds[:, 0].min(0)).max())
     is_usual = _SMALL_M < wide < _LARGE_M
-    return "" if is_usual else f"it is {wide:.3g} m large, but glTF is in metres: scale it; or "
+    unit = "but glTF is in metres: scale it" if kind == "gltf" else "by its unit: is that right?"
+    return "" if is_usual else f"it is {wide:.3g} m large, {unit}; or "
 
 
 def _placed(item: Item, levels: tuple[Level, ...], rooms: tuple[Room, ...]) -> Item:

@@ -74,11 +74,15 @@ def punctual_light(
         cutoff = float(np.clip(numbers(gltf, [angle], 1, f"{place}: cone")[0], 0.01, math.pi))
     # Candela times the cone's solid angle are lumens; a light looks along -z.
     solid_angle = 2 * math.pi * (1 - math.cos(cutoff))
+    # Of a scene in another format whose lights say how large they are, not how strong.
+    extras = object_at(fields_json, "extras")
+    radius = numbers(gltf, [extras.get("radius_m", BULB_RADIUS_M)], 1, f"{place}: light radius")
+    power = max(float(intensity), 0.0) * solid_angle
     direction = -world_from_node[:3, 2] / max(float(np.linalg.norm(world_from_node[:3, 2])), 1e-12)
     return LightPart(
         position=triple(world_from_node[:3, 3]),
-        radius_m=BULB_RADIUS_M,
-        power=max(float(intensity), 0.0) * solid_angle,
+        radius_m=float(np.clip(radius[0], 1e-3, 10.0)),
+        power=ASSUMED_LM if extras.get("assumed") is True else power,
         unit=PowerUnit.LUMEN,
         rgb_linear=triple(colour / max(float(colour.max()), 1e-6)),
         form=LightForm.SPOT if fields_json["type"] == "spot" else LightForm.POINT,
@@ -130,6 +134,14 @@ def assumed_light(item: Item) -> LightPart:
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)  # what no name tells
 
 
+def _place(gltf: Gltf, thing: _Thing) -> str:
+    """Where a thing stands in its file: a node, or what another format calls it."""
+    is_gltf = gltf.file.lower().endswith((".glb", ".gltf"))
+    if not is_gltf and "item" in thing.extras:
+        return str(thing.extras["item"])
+    return f"nodes[{thing.root.index}] ({thing.name[:60]})"
+
+
 @dataclass(slots=True)
 class _Thing:
     """An item while its nodes are gathered."""
@@ -153,11 +165,11 @@ def items_of_scene(
         item = _item(gltf, thing, materials, notes, known, fields)
         if item is None:
             continue
-        place = f"nodes[{thing.root.index}] ({thing.name[:60]})"
+        place = _place(gltf, thing)
         # Bound the extent, the triangles and the items.
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
-            hint = "glTF is in metres: scale it; limit: read.max_extent_m"
+            hint = "is its unit right? glTF is in metres; limit: read.max_extent_m"
             raise BadHouse(gltf.file, place, text, hint=hint)
         n_faces += item.n_faces
         if n_faces > fields.max_triangles or len(found) >= MAX_INSTANCES:
@@ -202,6 +214,8 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         above = owner.get(node.path[:-1])
         seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
         # A group whose name means several things is no item.
+        if extras.get("group") is True:
+            seen = None
         if seen and not seen.is_tagged and "mesh" not in fields_json:
             grouped = collection_of(name, seen)
             if grouped is not None:
@@ -210,7 +224,7 @@ def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
                     members[node.path] = grouped
         # Leave out empty nodes without a class: they only hold others.
         has_light = "KHR_lights_punctual" in object_at(fields_json, "extensions")
-        has_part = "mesh" in fields_json or has_light
+        has_part = "mesh" in fields_json or has_light or extras.get("one") is True
         # Begin an item at the outermost node of a class, and at tagged ones below it.
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
             above = _Thing(node, name, seen or _UNMAPPED, extras)

@@ -1,0 +1,1 @@
+"""Houses in formats of others, written in code for tests and the benchmark of inputs."""

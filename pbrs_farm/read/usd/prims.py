@@ -1,0 +1,427 @@
+"""Prims of a composed stage -> nodes of a glTF document in metres, y up; no effects of its own.
+
+The reader of glTF makes items of them. What a prim is goes along as the node's extras.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from pxr import Kind, Usd, UsdGeom, UsdLux, UsdShade
+
+from pbrs_farm.core.arrays import I64
+from pbrs_farm.core.classes import LAMP
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import MAX_INSTANCES, ItemKind
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.glb import GlbWriter, Gltf
+from pbrs_farm.formats.house_glb import V_DOWN
+from pbrs_farm.home.room_use import named_kind
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.gltf.document import MAX_DEPTH, MAX_NODES
+from pbrs_farm.read.gltf.node_classes import NodeClass, class_of_node_name
+from pbrs_farm.read.gltf.scene import UNREAD
+from pbrs_farm.read.usd.shaders import Shaders
+from pbrs_farm.read.usd.shapes import NOT_READ, Shape, light_shape, mesh_shape, solid_shape
+
+EXTRAS_ATTRIBUTE: Final = "pbrs:item"
+"""Of a prim: JSON that our own exports say of an item, as extras of its node."""
+LUMEN_ATTRIBUTE: Final = "pbrs:lumen"
+"""Of a light: the flux that leaves it, as our own exports say."""
+_SKIPPED_PURPOSES: Final = ("proxy", "guide")
+_STRUCTURE: Final = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
+_MOST_ID: Final = 100  # characters of an item's id
+
+_Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Above:
+    """What a prim inherits from those above it."""
+
+    node: int
+    depth: int
+    name: str  # of the item, in ids
+    in_lamp: bool = False
+    structure: NodeClass | None = None  # what a label above says, of walls, floors and ceilings
+
+
+class StageNodes:
+    """Collects the nodes of a stage. State: what was added."""
+
+    def __init__(
+        self, stage: Any, file: str, notes: Notes, shaders: Shaders, fields: ReadFields
+    ) -> None:
+        self._stage, self._file, self._notes, self._fields = stage, file, notes, fields
+        self._shaders = shaders
+        self._time = Usd.TimeCode.EarliestTime()
+        self._writer = GlbWriter()
+        self._meshes: list[_Row] = []
+        self._nodes: list[_Row] = []
+        self._lights: list[_Row] = []
+        self._known: dict[Any, int | None] = {}
+        self._unread: dict[str, int] = {}
+        self._n_triangles = 0
+        self._holders = _holders(stage)
+
+    def gltf(self, scene_extras: _Row) -> Gltf:
+        """The document of the whole stage."""
+        metres = float(UsdGeom.GetStageMetersPerUnit(self._stage))
+        world = np.diag([metres, metres, metres, 1.0])
+        if UsdGeom.GetStageUpAxis(self._stage) == UsdGeom.Tokens.z:
+            # (x, y, z) with z up is (x, z, -y) with y up.
+            world[:3, :3] = metres * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+        self._nodes.append({"name": "", "matrix": world.T.ravel().tolist(), "children": []})
+        stack = [(p, _Above(0, 1, "")) for p in reversed(_children(self._stage.GetPseudoRoot()))]
+        while stack:
+            prim, above = stack.pop()
+            stack += reversed(list(self._visit(prim, above)))
+        for kind, n in self._unread.items():
+            self._notes.add(UNREAD, kind, f"{n} prims are {kind}, which are not read")
+        shaders = self._shaders
+        extensions = {"KHR_lights_punctual": {"lights": self._lights}} if self._lights else {}
+        document = {
+            "asset": {"version": "2.0"}, "scene": 0,
+            "scenes": [{"nodes": [0], "extras": scene_extras}], "nodes": self._nodes,
+            "meshes": self._meshes, "materials": shaders.materials, "textures": shaders.textures,
+            "images": shaders.images, "extensions": extensions,
+        }  # fmt: skip
+        return self._writer.gltf(document, self._file)
+
+    def _visit(self, prim: Any, above: _Above) -> Iterator[tuple[Any, _Above]]:
+        """Add a prim's node; the prims below that are to be visited."""
+        if _is_hidden(prim) or _is_no_place(prim):
+            return
+        if above.depth >= MAX_DEPTH:
+            raise BadHouse(self._file, str(prim.GetPath())[:80], f"lies deeper than {MAX_DEPTH}")
+        if prim.IsA(UsdGeom.PointInstancer):
+            yield from self._instances(prim, above)
+            return
+        here = self._node(
+            prim, above, self._matrix(prim), prim.GetName(), f"{above.name}/{prim.GetName()}"
+        )
+        yield from ((child, here) for child in _children(prim))
+
+    def _matrix(self, prim: Any) -> Any:
+        xformable = UsdGeom.Xformable(prim)
+        if not xformable:
+            return None
+        if xformable.GetResetXformStack():
+            # Undo what stands above it.
+            cache = UsdGeom.XformCache(self._time)
+            world = np.array(cache.GetLocalToWorldTransform(prim))
+            parent = np.array(cache.GetParentToWorldTransform(prim))
+            if abs(np.linalg.det(parent)) < 1e-12:
+                return world
+            return world @ np.linalg.inv(parent)
+        return np.array(xformable.GetLocalTransformation(self._time))
+
+    def _node(self, prim: Any, above: _Above, matrix: Any, name: str, path: str) -> _Above:
+        if len(self._nodes) >= MAX_NODES:
+            raise BadHouse(self._file, str(prim.GetPath())[:80], f"more than {MAX_NODES} prims")
+        node: _Row = {"name": name[:200], "children": [], "extras": {"item": _item_id(path)}}
+        if matrix is not None and not np.array_equal(matrix, np.eye(4)):
+            if not np.isfinite(matrix).all():
+                raise BadHouse(self._file, str(prim.GetPath())[:80], "its place is not finite")
+            # Rows of USD are columns of glTF, in the same order of numbers.
+            node["matrix"] = matrix.ravel().tolist()
+        mesh = self._mesh(prim)
+        if mesh is not None:
+            node["mesh"] = mesh
+        seen = self._class(prim, above, node)
+        in_lamp = above.in_lamp or (seen is not None and seen.kind is ItemKind.LAMP)
+        if prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.BoundableLightBase):
+            self._light(prim, node, is_part=above.in_lamp)
+        self._nodes[above.node]["children"].append(len(self._nodes))
+        self._nodes.append(node)
+        label = seen if seen and seen.is_tagged and seen.kind in _STRUCTURE else above.structure
+        return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
+
+    def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:
+        """What the prim is; said in the node's extras where it is told."""
+        told = prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
+        if told:
+            from pbrs_farm.core.checked_json import json_from_bytes
+
+            extras = json_from_bytes(str(told).encode(), self._file)
+            node["extras"] |= extras if isinstance(extras, dict) else {}
+            return class_of_node_name(str(node["extras"].get("class", "")))
+        label = _label(prim)
+        seen = class_of_node_name(label) if label else None
+        is_shape = "mesh" in node
+        if seen is None:
+            if (
+                is_shape
+                and above.structure is not None
+                and class_of_node_name(prim.GetName()) is None
+            ):
+                self._tag(node, above.structure)
+            elif _is_component(prim) and str(prim.GetPath()) not in self._holders:
+                self._component(prim, node)
+            elif not is_shape and self._is_group(prim):
+                node["extras"]["group"] = True
+                return None
+            return class_of_node_name(prim.GetName())
+        # A label of walls on what holds many walls is each one's.
+        is_group = not is_shape and seen.kind in _STRUCTURE
+        if not is_group:
+            self._tag(node, seen)
+        return NodeClass(seen.nyu40, seen.kind, is_tagged=True)
+
+    def _is_group(self, prim: Any) -> bool:
+        """Whether a prim is a room's scope, or holds things that say themselves what they are."""
+        own = class_of_node_name(prim.GetName())
+        if own is not None and own.kind is ItemKind.LAMP:
+            return False
+        return named_kind(prim.GetName()) is not None or str(prim.GetPath()) in self._holders
+
+    def _component(self, prim: Any, node: _Row) -> None:
+        own = class_of_node_name(prim.GetName())
+        inner = [class_of_node_name(p.GetName()) for p in _below(prim)]
+        found = {seen for seen in inner if seen is not None}
+        if own is None and len(found) == 1:
+            own = next(iter(found))
+        if own is None:
+            node["extras"]["one"] = True
+        elif own.kind not in _STRUCTURE:
+            self._tag(node, own)
+
+    def _tag(self, node: _Row, seen: NodeClass) -> None:
+        node["extras"] |= {"nyu40": seen.nyu40, "kind": seen.kind.value}
+
+    # Shapes
+
+    def _mesh(self, prim: Any) -> int | None:
+        if prim.GetTypeName() in NOT_READ:
+            kind = str(prim.GetTypeName())
+            self._unread[kind] = self._unread.get(kind, 0) + 1
+        if not prim.IsA(UsdGeom.Gprim) and not prim.IsA(UsdLux.BoundableLightBase):
+            return None
+        bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        # Instances of one prototype share its mesh.
+        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        key = (str(source.GetPath()), str(bound.GetPath()) if bound else "")
+        if key not in self._known:
+            self._known[key] = self._new_mesh(prim, bound)
+        return self._known[key]
+
+    def _new_mesh(self, prim: Any, bound: Any) -> int | None:
+        is_light = prim.IsA(UsdLux.BoundableLightBase)
+        if is_light:
+            shape, material = (
+                light_shape(prim, self._time),
+                self._shaders.shining(_light_colour(prim)[0]),
+            )
+            parts: list[tuple[I64, int | None]] = []
+            parts += [] if shape is None else [(shape.faces, material)]
+        else:
+            is_mesh = prim.IsA(UsdGeom.Mesh)
+            shape = (
+                mesh_shape(prim, self._time, self._file)
+                if is_mesh
+                else solid_shape(prim, self._time)
+            )
+            parts = [] if shape is None else list(self._parts(prim, shape, bound))
+        if shape is None or not parts:
+            return None
+        self._n_triangles += len(shape.faces)
+        if len(shape.faces) > self._fields.max_model_triangles:
+            text = f"more than {self._fields.max_model_triangles} triangles"
+            hint = "limit: read.max_model_triangles"
+            raise BadHouse(self._file, str(prim.GetPath()), text, hint=hint)
+        if self._n_triangles > self._fields.max_triangles:
+            text = f"more than {self._fields.max_triangles} triangles"
+            raise BadHouse(self._file, str(prim.GetPath()), text, hint="limit: read.max_triangles")
+        add = self._writer.add_vertices
+        attributes = {"POSITION": add(shape.positions.astype(np.float32), with_bounds=True)}
+        if shape.normals is not None:
+            length = np.linalg.norm(shape.normals, axis=1, keepdims=True)
+            normals = shape.normals / np.maximum(length, 1e-12)
+            attributes["NORMAL"] = add(normals.astype(np.float32))
+        if shape.uvs is not None:
+            down = shape.uvs.astype(np.float32) * V_DOWN + np.array([0, 1], np.float32)
+            attributes["TEXCOORD_0"] = add(down)
+        primitives = []
+        for faces, number in parts:
+            row: _Row = {
+                "attributes": attributes,
+                "indices": self._writer.add_faces(faces.astype(np.int32)),
+            }
+            primitives.append(row | ({} if number is None else {"material": number}))
+        self._meshes.append({"name": prim.GetName()[:100], "primitives": primitives})
+        return len(self._meshes) - 1
+
+    def _parts(self, prim: Any, shape: Shape, bound: Any) -> Iterator[tuple[I64, int | None]]:
+        """(triangles, material) of each subset of a mesh's faces, and of the rest."""
+        rest = np.ones(len(shape.faces), np.bool_)
+        binding = UsdShade.MaterialBindingAPI(prim)
+        for subset in binding.GetMaterialBindSubsets() if prim.IsA(UsdGeom.Mesh) else ():
+            chosen = np.asarray(subset.GetIndicesAttr().Get(self._time) or [], np.int64)
+            own = np.isin(shape.polygon, chosen) & rest
+            rest &= ~own
+            material = UsdShade.MaterialBindingAPI(subset.GetPrim()).ComputeBoundMaterial()[0]
+            if own.any():
+                yield shape.faces[own], self._material(prim, material)
+        if rest.any():
+            yield shape.faces[rest], self._material(prim, bound)
+
+    def _material(self, prim: Any, material: Any) -> int | None:
+        if material:
+            return self._shaders.number(material)
+        # Without a material a prim may have a colour.
+        primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("displayColor")
+        colours = primvar.ComputeFlattened(self._time) if primvar and primvar.HasValue() else None
+        if colours is None or not len(colours):
+            return None
+        mean = np.asarray(colours, np.float64).reshape(-1, 3).mean(0)
+        if not np.isfinite(mean).all():
+            return None
+        r, g, b = (round(float(c), 4) for c in np.clip(mean, 0, 1))
+        return self._shaders.plain((r, g, b))
+
+    # Lights
+
+    def _light(self, prim: Any, node: _Row, *, is_part: bool) -> None:
+        """Let a node shine. Suns and skies are the recipe's."""
+        if prim.IsA(UsdLux.NonboundableLightBase):
+            node.pop("mesh", None)
+            return
+        if not is_part and "nyu40" not in node["extras"]:
+            node["extras"] |= {"nyu40": LAMP, "kind": ItemKind.LAMP.value}
+        flux = prim.GetAttribute(LUMEN_ATTRIBUTE).Get()
+        if "mesh" in node and flux is None:
+            return  # its own surface shines
+        node.pop("mesh", None)
+        rgb, is_told = _light_colour(prim)
+        row: _Row = {"type": "point", "extras": {}} | ({"color": list(rgb)} if is_told else {})
+        radius = prim.GetAttribute("inputs:radius").Get(self._time)
+        scale = float(UsdGeom.GetStageMetersPerUnit(self._stage))
+        if radius is not None and np.isfinite(radius) and radius > 0:
+            row["extras"]["radius_m"] = float(radius) * scale
+        cone = prim.GetAttribute("inputs:shaping:cone:angle").Get(self._time)
+        cutoff = np.pi
+        if cone is not None and 0 < cone < 180:
+            cutoff = float(np.radians(cone))
+            row |= {"type": "spot", "spot": {"outerConeAngle": cutoff}}
+        if flux is None or not np.isfinite(flux):
+            row["extras"]["assumed"] = True
+        else:
+            row["intensity"] = float(flux) / (2 * np.pi * (1 - np.cos(cutoff)))
+        node["extensions"] = {"KHR_lights_punctual": {"light": len(self._lights)}}
+        self._lights.append(row)
+
+    # Instances
+
+    def _instances(self, prim: Any, above: _Above) -> Iterator[tuple[Any, _Above]]:
+        instancer = UsdGeom.PointInstancer(prim)
+        path = f"{above.name}/{prim.GetName()}"
+        holder = self._node(prim, above, self._matrix(prim), prim.GetName(), path)
+        numbers = np.asarray(instancer.GetProtoIndicesAttr().Get(self._time) or [], np.int64)
+        paths = instancer.GetPrototypesRel().GetForwardedTargets()
+        if len(numbers) > MAX_INSTANCES:
+            text = f"{len(numbers)} instances, at most {MAX_INSTANCES} are read"
+            raise BadHouse(self._file, str(prim.GetPath()), text)
+        if not len(numbers) or not paths:
+            return
+        if not 0 <= numbers.min() <= numbers.max() < len(paths):
+            raise BadHouse(self._file, str(prim.GetPath()), "names a prototype that does not exist")
+        # The prototypes' own places are part of each instance's.
+        places = instancer.ComputeInstanceTransformsAtTime(
+            self._time, self._time, UsdGeom.PointInstancer.IncludeProtoXform,
+            UsdGeom.PointInstancer.IgnoreMask,
+        )  # fmt: skip
+        mask = instancer.ComputeMaskAtTime(self._time)
+        if len(places) != len(numbers):
+            raise BadHouse(self._file, str(prim.GetPath()), "has not one place for each instance")
+        for k, (number, place) in enumerate(zip(numbers, places, strict=True)):
+            prototype = self._stage.GetPrimAtPath(paths[int(number)])
+            if not prototype or (len(mask) and not mask[k]):
+                continue
+            name = prototype.GetName()
+            here = self._node(prototype, holder, np.array(place), name, f"{path}/{name}.{k}")
+            yield from ((child, here) for child in _children(prototype))
+
+
+def _children(prim: Any) -> list[Any]:
+    return list(prim.GetFilteredChildren(Usd.TraverseInstanceProxies()))
+
+
+def _below(prim: Any) -> list[Any]:
+    return list(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))[1:2000]
+
+
+def _is_hidden(prim: Any) -> bool:
+    imageable = UsdGeom.Imageable(prim)
+    if not imageable:
+        return False
+    if imageable.GetVisibilityAttr().Get(Usd.TimeCode.EarliestTime()) == UsdGeom.Tokens.invisible:
+        return True
+    return imageable.GetPurposeAttr().Get() in _SKIPPED_PURPOSES
+
+
+def _is_no_place(prim: Any) -> bool:
+    """Whether a prim is a material, a subset of faces, a camera: nothing that stands somewhere."""
+    if prim.IsA(UsdShade.NodeGraph) or prim.IsA(UsdShade.Shader):  # a material is a graph of nodes
+        return True
+    return bool(prim.IsA(UsdGeom.Subset) or prim.IsA(UsdGeom.Camera))
+
+
+def _is_component(prim: Any) -> bool:
+    return bool(Kind.Registry.IsA(Usd.ModelAPI(prim).GetKind(), Kind.Tokens.component))
+
+
+def _holders(stage: Any) -> set[str]:
+    """Paths of the prims that hold components, labels, lights or parts of the building."""
+    found: set[str] = set()
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies()):
+        parent = prim.GetParent()
+        if not parent or str(parent.GetPath()) in found or _is_no_place(prim):
+            continue
+        seen = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
+        is_building = seen is not None and (seen.kind in _STRUCTURE or seen.kind is ItemKind.GROUND)
+        is_light = prim.IsA(UsdLux.BoundableLightBase)
+        if is_building or is_light or _is_component(prim) or _label(prim):
+            while parent and str(parent.GetPath()) not in found:
+                found.add(str(parent.GetPath()))
+                parent = parent.GetParent()
+    return found
+
+
+def _label(prim: Any) -> str:
+    """The class that a prim is labelled with itself, "" where it is not."""
+    for taxonomy in ("class", "category"):
+        words = prim.GetAttribute(f"semantics:labels:{taxonomy}").Get()
+        if words is not None and len(words):
+            return str(next(iter(words)))[:100]
+    for attribute in prim.GetAuthoredPropertiesInNamespace("semantic"):
+        # The older schema: semantic:<name>:params:semanticType and semanticData.
+        name = attribute.GetName()
+        if name.endswith(":params:semanticType") and str(prim.GetAttribute(name).Get()) in (
+            "class",
+            "category",
+        ):
+            data = prim.GetAttribute(name.replace("semanticType", "semanticData")).Get()
+            if data:
+                return str(data)[:100]
+    return ""
+
+
+def _light_colour(prim: Any) -> tuple[tuple[float, float, float], bool]:
+    """(linear colour, largest 1; whether the stage tells it)."""
+    colour = prim.GetAttribute("inputs:color")
+    has_temperature = bool(prim.GetAttribute("inputs:enableColorTemperature").Get())
+    value = np.array(list(colour.Get() or (1, 1, 1)), np.float64)
+    if has_temperature:
+        kelvin = prim.GetAttribute("inputs:colorTemperature").Get() or 6500.0
+        value = value * np.array(list(UsdLux.BlackbodyTemperatureAsRgb(float(kelvin))))
+    if not np.isfinite(value).all() or value.max() <= 0:
+        return (1.0, 1.0, 1.0), False
+    r, g, b = (round(float(c), 4) for c in np.maximum(value, 0) / value.max())
+    return (r, g, b), has_temperature or colour.HasAuthoredValue()
+
+
+def _item_id(path: str) -> str:
+    return path[-_MOST_ID:]

@@ -1,0 +1,265 @@
+"""Materials of UsdShade -> rows of a glTF document; pictures by the path that the stage resolves.
+
+UsdPreviewSurface, OmniPBR and OmniGlass are understood; of any other MDL the first picture of its
+text. Effect: reads such texts, through the caller.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from pxr import Sdf, UsdShade
+
+from pbrs_farm.read.common.material_library import PANE_OPACITY
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.gltf.scene import UNREAD
+
+KIND_ATTRIBUTE: Final = "pbrs:kind"
+"""Of a material: how light meets it, as our own exports say."""
+_PICTURE_OF_MDL: Final = re.compile(r'texture_2d\s*\(\s*"([^"]+)"')
+_Row = dict[str, Any]
+
+
+class Shaders:
+    """The materials of a stage as glTF has them, each once. State: what was asked for."""
+
+    def __init__(self, notes: Notes, text_of: Callable[[Any], str], time: Any) -> None:
+        """text_of: the text of an asset that an MDL material names, "" where it cannot be read."""
+        self._notes, self._text_of, self._time = notes, text_of, time
+        self.materials: list[_Row] = []
+        self.textures: list[_Row] = []
+        self.images: list[_Row] = []
+        self.assets: list[Any] = []  # Sdf.AssetPath of each image
+        self._numbers: dict[str, int] = {}
+        self._pictures: dict[str, int] = {}
+
+    def number(self, material: Any) -> int | None:
+        """The row of a UsdShade.Material, None of none."""
+        if not material:
+            return None
+        path = str(material.GetPath())
+        if path not in self._numbers:
+            self._numbers[path] = self._add(self._row(material))
+        return self._numbers[path]
+
+    def plain(self, rgb: tuple[float, ...]) -> int:
+        """A row for what has a colour and no material."""
+        key = f"colour {rgb}"
+        if key not in self._numbers:
+            self._numbers[key] = self._add(_pbr("", [*rgb, 1.0], 1.0, 0.0))
+        return self._numbers[key]
+
+    def shining(self, rgb: tuple[float, ...]) -> int:
+        """A row for the surface of a light."""
+        key = f"light {rgb}"
+        if key not in self._numbers:
+            self._numbers[key] = self._add(
+                {"name": "light", "emissiveFactor": [float(c) for c in rgb]}
+            )
+        return self._numbers[key]
+
+    def _add(self, row: _Row) -> int:
+        self.materials.append(row)
+        return len(self.materials) - 1
+
+    def _row(self, material: Any) -> _Row:
+        name = material.GetPrim().GetName()[:100]
+        shader = material.ComputeSurfaceSource()[0]
+        kind = str(shader.GetIdAttr().Get() or "") if shader else ""
+        if kind == "UsdPreviewSurface":
+            row = self._preview(name, shader)
+        elif shader := material.ComputeSurfaceSource("mdl")[0] or shader:
+            row = self._mdl(name, shader, str(material.GetPath()))
+        else:
+            row = {"name": name}
+        told = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
+        return row | ({"extras": {"kind": str(told)}} if told else {})
+
+    # UsdPreviewSurface
+
+    def _preview(self, name: str, shader: Any) -> _Row:
+        colour, picture = self._colour(shader, "diffuseColor", (0.18, 0.18, 0.18))
+        roughness, rough_picture = self._input(shader, "roughness", 0.5)
+        metallic = _number(self._input(shader, "metallic", 0.0)[0], 0.0)
+        opacity, opacity_picture = self._input(shader, "opacity", 1.0)
+        threshold = _number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
+        alpha = _number(opacity, 1.0) if opacity_picture is None else 1.0
+        row = _pbr(name, [*colour, alpha], _number(roughness, 0.5), metallic)
+        pbr = row["pbrMetallicRoughness"]
+        if picture is not None:
+            pbr["baseColorTexture"] = picture
+        if rough_picture is not None:
+            pbr |= {"metallicRoughnessTexture": rough_picture, "roughnessFactor": 1.0}
+        normal = self._input(shader, "normal", None)[1]
+        if normal is not None:
+            row["normalTexture"] = normal
+        if alpha < 1 or opacity_picture is not None:
+            row["alphaMode"] = "MASK" if threshold > 0 else "BLEND"
+        glow = _triple(self._input(shader, "emissiveColor", (0, 0, 0))[0], (0.0, 0.0, 0.0))
+        if max(glow) > 0:
+            row["emissiveFactor"] = [c / max(glow) for c in glow]
+        return row
+
+    def _colour(
+        self, shader: Any, name: str, default: tuple[float, ...]
+    ) -> tuple[tuple[float, ...], _Row | None]:
+        value, picture = self._input(shader, name, default)
+        if picture is not None:
+            # A picture is multiplied by what its own node says.
+            return _triple(picture.pop("scale_rgb", None), (1.0, 1.0, 1.0)), picture
+        return _triple(value, default), None
+
+    def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Row | None]:
+        """(the value of an input, the picture that it is connected to or None)."""
+        found = shader.GetInput(name)
+        for attribute in found.GetValueProducingAttributes() if found else ():
+            if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
+                value = attribute.Get(self._time)
+                return (default if value is None else value), None
+            node = UsdShade.Shader(attribute.GetPrim())
+            if node.GetIdAttr().Get() == "UsdUVTexture":
+                return default, self._texture(node)
+        return default, None
+
+    def _texture(self, node: Any) -> _Row | None:
+        asset = self._input(node, "file", None)[0]
+        if not isinstance(asset, Sdf.AssetPath) or not asset.path:
+            return None
+        info = self._info(asset)
+        scale = self._input(node, "scale", None)[0]
+        if scale is not None and len(scale) == 4 and not np.allclose(list(scale)[:3], 1):
+            info["scale_rgb"] = tuple(scale)[:3]
+        st = node.GetInput("st")
+        for attribute in st.GetValueProducingAttributes() if st else ():
+            turn = UsdShade.Shader(attribute.GetPrim())
+            if turn.GetIdAttr().Get() == "UsdTransform2d":
+                angle = np.radians(_finite(self._input(turn, "rotation", 0.0)[0], 0.0))
+                size = _pair(self._input(turn, "scale", (1, 1))[0], (1.0, 1.0))
+                shift = _pair(self._input(turn, "translation", (0, 0))[0], (0.0, 0.0))
+                info["extensions"] = _transform(float(angle), size, shift)
+        return info
+
+    # MDL
+
+    def _mdl(self, name: str, shader: Any, place: str) -> _Row:
+        asset = shader.GetPrim().GetAttribute("info:mdl:sourceAsset").Get()
+        told = shader.GetPrim().GetAttribute("info:mdl:sourceAsset:subIdentifier").Get()
+        path = asset.path if isinstance(asset, Sdf.AssetPath) else ""
+        stem = str(told or path.replace("\\", "/").rsplit("/", 1)[-1].removesuffix(".mdl"))
+        if stem.startswith("OmniGlass"):
+            colour = _triple(self._input(shader, "glass_color", (1, 1, 1))[0], (1.0, 1.0, 1.0))
+            return _pbr(name, [*colour, PANE_OPACITY], 0.0, 0.0) | {"alphaMode": "BLEND"}
+        if not stem.startswith("OmniPBR"):
+            return self._other_mdl(name, asset, stem, place)
+        colour = _triple(self._input(shader, "diffuse_color_constant", None)[0], (0.2, 0.2, 0.2))
+        tint = np.array(_triple(self._input(shader, "diffuse_tint", None)[0], (1.0, 1.0, 1.0)))
+        picture = self._mdl_picture(shader, "diffuse_texture")
+        factor = (tint if picture else tint * np.array(colour)).tolist()
+        alpha = 1.0
+        if self._input(shader, "enable_opacity", False)[0]:
+            alpha = _number(self._input(shader, "opacity_constant", 1.0)[0], 1.0)
+        roughness = _number(self._input(shader, "reflection_roughness_constant", 0.5)[0], 0.5)
+        metallic = _number(self._input(shader, "metallic_constant", 0.0)[0], 0.0)
+        row = _pbr(name, [*factor, alpha], roughness, metallic)
+        pbr = row["pbrMetallicRoughness"]
+        if alpha < 1:
+            row["alphaMode"] = "BLEND"
+        if picture:
+            pbr["baseColorTexture"] = picture
+        if normal := self._mdl_picture(shader, "normalmap_texture"):
+            row["normalTexture"] = normal
+        packed = self._input(shader, "enable_ORM_texture", True)[0]
+        rough = self._mdl_picture(shader, "ORM_texture") if packed else None
+        if rough := rough or self._mdl_picture(shader, "reflectionroughness_texture"):
+            pbr |= {"metallicRoughnessTexture": rough, "roughnessFactor": 1.0}
+        if self._input(shader, "enable_emission", False)[0]:
+            glow = _triple(self._input(shader, "emissive_color", None)[0], (1.0, 0.1, 0.1))
+            if max(glow) > 0:
+                row["emissiveFactor"] = [c / max(glow) for c in glow]
+        return row
+
+    def _mdl_picture(self, shader: Any, name: str) -> _Row | None:
+        asset = self._input(shader, name, None)[0]
+        if not isinstance(asset, Sdf.AssetPath) or not asset.path:
+            return None
+        size = _pair(self._input(shader, "texture_scale", None)[0], (1.0, 1.0))
+        shift = _pair(self._input(shader, "texture_translate", None)[0], (0.0, 0.0))
+        is_plain = size == (1.0, 1.0) and shift == (0.0, 0.0)
+        turn = {} if is_plain else {"extensions": _transform(0.0, size, shift)}
+        return self._info(asset) | turn
+
+    def _other_mdl(self, name: str, asset: Any, stem: str, place: str) -> _Row:
+        found = _PICTURE_OF_MDL.search(self._text_of(asset))
+        text = f"{stem or 'a shader'} is not read"
+        if found is None:
+            self._notes.add(UNREAD, place, f"{text}: the surface stays plain")
+            return {"name": name}
+        self._notes.add(UNREAD, place, f"{text}: its first picture is the colour")
+        folder = (asset.resolvedPath or asset.path).replace("\\", "/").rpartition("/")[0]
+        picture = Sdf.AssetPath(found[1], f"{folder}/{found[1].lstrip('./')}")
+        row = _pbr(name, [1.0, 1.0, 1.0, 1.0], 0.5, 0.0)
+        row["pbrMetallicRoughness"]["baseColorTexture"] = self._info(picture)
+        return row
+
+    def _info(self, asset: Any) -> _Row:
+        key = str(asset.resolvedPath or asset.path)
+        if key not in self._pictures:
+            # Pictures are named by number; their names may hold anything.
+            name = asset.path.replace("\\", "/").rsplit("/", 1)[-1].rstrip("]")[:100]
+            self.images.append({"uri": str(len(self.assets)), "name": name or "picture"})
+            self.textures.append({"source": len(self.assets)})
+            self.assets.append(asset)
+            self._pictures[key] = len(self.assets) - 1
+        return {"index": self._pictures[key]}
+
+
+def _pbr(name: str, factor: list[float], roughness: float, metallic: float) -> _Row:
+    values = [float(np.clip(c, 0, 1)) if np.isfinite(c) else 1.0 for c in factor]
+    pbr = {"baseColorFactor": values, "roughnessFactor": roughness, "metallicFactor": metallic}
+    return {"name": name, "pbrMetallicRoughness": pbr}
+
+
+def _transform(
+    angle: float, size: tuple[float, float], shift: tuple[float, float]
+) -> dict[str, _Row]:
+    """UsdTransform2d, which measures v upwards, as KHR_texture_transform, which does downwards."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    # Where (u, v down) = (0, 1), the upward origin, goes to; less what the scale makes of it.
+    turned = np.array([[cos, -sin], [sin, cos]]) @ np.array([0.0, -size[1]])
+    offset = np.array([shift[0], 1 - shift[1]]) - turned * [1, -1]
+    return {
+        "KHR_texture_transform": {
+            "offset": [float(c) for c in offset], "rotation": angle, "scale": list(size),
+        }
+    }  # fmt: skip
+
+
+def _number(value: Any, default: float) -> float:
+    return float(np.clip(_finite(value, default), 0, 1))
+
+
+def _finite(value: Any, default: float) -> float:
+    try:
+        found = float(value)
+    except (TypeError, ValueError):
+        return default
+    return found if np.isfinite(found) else default
+
+
+def _triple(value: Any, default: tuple[float, ...]) -> tuple[float, ...]:
+    try:
+        found = tuple(float(c) for c in value)[:3]
+    except (TypeError, ValueError):
+        return default
+    return found if len(found) == 3 and np.isfinite(found).all() else default
+
+
+def _pair(value: Any, default: tuple[float, float]) -> tuple[float, float]:
+    try:
+        found = tuple(float(c) for c in value)[:2]
+    except (TypeError, ValueError):
+        return default
+    return (found[0], found[1]) if len(found) == 2 and np.isfinite(found).all() else default

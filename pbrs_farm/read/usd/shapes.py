@@ -1,0 +1,216 @@
+"""Geometry of USD prims -> triangles in the prim's own frame; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from pxr import UsdGeom, UsdLux
+
+from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Surface
+from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
+from pbrs_farm.read.mesh.triangulate import triangulated_corners
+
+_ROUND: Final = 24  # segments around a round shape
+_OFF_M: Final = 0.005  # a flat light is moved out of the ceiling that it lies in
+# What else is a shape, and has no triangles here.
+NOT_READ: Final = (
+    "BasisCurves", "NurbsCurves", "NurbsPatch", "HermiteCurves", "Points", "TetMesh", "Volume",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """Triangles in a prim's own frame and unit."""
+
+    positions: F64  # (V, 3)
+    faces: I64  # (F, 3)
+    polygon: I64  # (F,) number of the face of the prim that a triangle was cut from
+    uvs: F64 | None = None  # (V, 2), v up
+    normals: F64 | None = None  # (V, 3)
+
+
+def mesh_shape(prim: Any, time: Any, file: str) -> Shape | None:
+    """The triangles of a UsdGeom.Mesh; None where it has none. BadHouse where they are damaged."""
+    mesh = UsdGeom.Mesh(prim)
+    points = _floats(mesh.GetPointsAttr().Get(time), 3)
+    sizes = _ints(mesh.GetFaceVertexCountsAttr().Get(time))
+    indices = _ints(mesh.GetFaceVertexIndicesAttr().Get(time))
+    if not len(points) or not len(sizes):
+        return None
+    _check(points, sizes, indices, file, str(prim.GetPath()))
+    triangles = triangulated_corners(points[indices], sizes)
+    polygon = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
+    holes = _ints(mesh.GetHoleIndicesAttr().Get(time))
+    if len(holes):
+        kept = ~np.isin(polygon, holes)
+        triangles, polygon = triangles[kept], polygon[kept]
+    if not len(triangles):
+        return None
+    pairs = [_texture_coordinates(prim, time), _normals(mesh, time)]
+    of_points = [_of_points(*pair, len(points)) for pair in pairs]
+    of_corners = [_of_corners(*pair, indices, sizes) for pair in pairs]
+    # Where a corner has values of its own, every corner becomes a vertex.
+    if any(p is None and c is not None for p, c in zip(of_points, of_corners, strict=True)):
+        points, faces = points[indices], triangles
+        spread = [None if p is None else p[indices] for p in of_points]
+        uvs, normals = (c if c is not None else p for c, p in zip(of_corners, spread, strict=True))
+    else:
+        faces, (uvs, normals) = indices[triangles], of_points
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        faces = faces[:, ::-1]
+    return Shape(points, np.ascontiguousarray(faces), polygon, uvs, normals)
+
+
+def _check(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None:
+    if not (np.abs(points) < 1e9).all():
+        raise BadHouse(file, place, "holds a number that is not finite")
+    if sizes.min() < 0 or int(sizes.sum()) != len(indices):
+        text = (
+            f"faceVertexCounts add up to {int(sizes.sum())}, faceVertexIndices are {len(indices)}"
+        )
+        raise BadHouse(file, place, text)
+    if len(indices) and not 0 <= indices.min() <= indices.max() < len(points):
+        raise BadHouse(file, place, "a face names a point that does not exist")
+
+
+def _floats(value: Any, width: int) -> F64:
+    if value is None:
+        return np.zeros((0, width))
+    return np.asarray(value, np.float64).reshape(-1, width)
+
+
+def _ints(value: Any) -> I64:
+    return np.zeros(0, np.int64) if value is None else np.asarray(value, np.int64).reshape(-1)
+
+
+def _texture_coordinates(prim: Any, time: Any) -> tuple[F64 | None, str]:
+    """(values, interpolation) of the texture coordinates, those called st before others."""
+    found = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
+    names = ("st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
+    order = {name: k for k, name in enumerate(names)}
+    found.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
+    if not found:
+        return None, ""
+    values = found[0].ComputeFlattened(time)
+    return (None, "") if values is None else (_floats(values, 2), found[0].GetInterpolation())
+
+
+def _is_pair(primvar: Any) -> bool:
+    return str(primvar.GetTypeName()) in (
+        "texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]",
+    )  # fmt: skip
+
+
+def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:
+    """(values, interpolation) of the normals of a mesh that is no cage of a smoother one."""
+    if mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none:
+        return None, ""
+    primvar = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("normals")
+    if primvar and primvar.HasValue():
+        values = primvar.ComputeFlattened(time)
+        interpolation = primvar.GetInterpolation()
+    else:
+        values, interpolation = mesh.GetNormalsAttr().Get(time), mesh.GetNormalsInterpolation()
+    return (None, "") if values is None else (_floats(values, 3), interpolation)
+
+
+def _of_points(values: F64 | None, interpolation: str, n_points: int) -> F64 | None:
+    """(V, k) values of points; None where there are none, or they are of something else."""
+    if values is None or not np.isfinite(values).all():
+        return None
+    if interpolation == "constant" and len(values) == 1:
+        return np.repeat(values, n_points, axis=0)
+    return values if interpolation in ("vertex", "varying") and len(values) == n_points else None
+
+
+def _of_corners(values: F64 | None, interpolation: str, indices: I64, sizes: I64) -> F64 | None:
+    """(C, k) values of the corners of faces, or None."""
+    if values is None or not np.isfinite(values).all():
+        return None
+    if interpolation == "uniform" and len(values) == len(sizes):
+        return np.repeat(values, sizes, axis=0)
+    return values if interpolation == "faceVarying" and len(values) == len(indices) else None
+
+
+def solid_shape(prim: Any, time: Any) -> Shape | None:
+    """The triangles of a cube, sphere, cylinder, cone, capsule or plane; None of what is none."""
+
+    def value(name: str, default: float) -> float:
+        found = prim.GetAttribute(name).Get(time)
+        found = default if found is None else float(found)
+        return found if np.isfinite(found) and abs(found) < 1e9 else default
+
+    kind, origin = prim.GetTypeName(), np.zeros(3)
+    r, h = value("radius", 1.0), value("height", 2.0)
+    if kind == "Cube":
+        return _of_surface(box("", origin, np.full(3, value("size", 2.0) / 2), 0))
+    if kind == "Sphere":
+        return _of_surface(sphere("", origin, value("radius", 1.0), 0, n=_ROUND))
+    if kind == "Plane":
+        w, d = value("width", 2.0) / 2, value("length", 2.0) / 2
+        # In the plane of lathes, y across it.
+        quad = [[-w, 0, d], [w, 0, d], [w, 0, -d], [-w, 0, -d]]
+        return _along(quads_surface("", np.array([quad]), 0), prim)
+    profiles: dict[str, Any] = {
+        "Cylinder": [[0, -h / 2], [r, -h / 2], [r, h / 2], [0, h / 2]],
+        "Cone": [[0, -h / 2], [r, -h / 2], [0, h / 2]],
+        "Capsule": _capsule(value("radius", 0.5), value("height", 1.0)),
+    }
+    if kind not in profiles:
+        return None
+    return _along(lathe("", np.array(profiles[kind], np.float64), origin, 0, n=_ROUND), prim)
+
+
+def _capsule(r: float, h: float) -> F64:
+    angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
+    lift = np.where(angles < 0, -h / 2, h / 2)
+    return np.column_stack([r * np.cos(angles), r * np.sin(angles) + lift])
+
+
+def _along(surface: Surface, prim: Any) -> Shape:
+    """The shape turned about y, turned to the prim's axis."""
+    axis = str(prim.GetAttribute("axis").Get() or "Z")
+    order = {"Z": [2, 0, 1], "X": [1, 2, 0]}.get(axis, [0, 1, 2])
+    found = _of_surface(surface)
+    normals = None if found.normals is None else found.normals[:, order]
+    return Shape(found.positions[:, order], found.faces, found.polygon, found.uvs, normals)
+
+
+def _of_surface(surface: Surface) -> Shape:
+    normals = None if surface.normals is None else surface.normals.astype(np.float64)
+    uvs = None if surface.uvs is None else surface.uvs.astype(np.float64)
+    n = np.arange(len(surface.faces))
+    return Shape(
+        surface.positions.astype(np.float64), surface.faces.astype(np.int64), n, uvs, normals
+    )
+
+
+def light_shape(prim: Any, time: Any) -> Shape | None:
+    """The shining surface of a light of UsdLux that has a flat or long one; None of others.
+
+    Rectangles and discs shine along -z, cylinders lie along x.
+    """
+    if prim.IsA(UsdLux.RectLight):
+        w, h = (
+            float(prim.GetAttribute(f"inputs:{n}").Get(time) or 1) / 2 for n in ("width", "height")
+        )
+        ring = np.array([[-w, -h], [-w, h], [w, h], [w, -h]])
+    elif prim.IsA(UsdLux.DiskLight):
+        angles = -2 * np.pi * np.arange(_ROUND) / _ROUND
+        radius = float(prim.GetAttribute("inputs:radius").Get(time) or 0.5)
+        ring = radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    elif prim.IsA(UsdLux.CylinderLight):
+        r = float(prim.GetAttribute("inputs:radius").Get(time) or 0.5)
+        h = float(prim.GetAttribute("inputs:length").Get(time) or 1.0) / 2
+        profile = np.array([[0, -h], [r, -h], [r, h], [0, h]], np.float64)
+        found = _of_surface(lathe("", profile, np.zeros(3), 0, n=_ROUND))
+        return Shape(found.positions[:, [1, 2, 0]], found.faces, found.polygon)
+    else:
+        return None
+    points = np.column_stack([ring, np.full(len(ring), -_OFF_M)])
+    k = np.arange(1, len(ring) - 1)
+    return Shape(points, np.column_stack([np.zeros_like(k), k, k + 1]), np.arange(len(k)))

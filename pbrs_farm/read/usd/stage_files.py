@@ -1,0 +1,227 @@
+"""The layers of an OpenUSD stage and what lies beside them; nothing outside the folder is read.
+
+Effects: reads files below one folder; the library opens layers that were looked at here first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pxr import Ar, Sdf, Tf, Usd, UsdUtils
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, real_path
+
+LAYERS: Final = (".usd", ".usda", ".usdc", ".usdz")
+MOST_PRIMS: Final = 500_000  # of a composed stage
+_MOST_LAYERS: Final = 20_000
+_MISSING_SHARE: Final = 1 / 3  # of references; more is another machine's package
+_SAID: Final = re.compile(r": '(.*?)'\s*$", re.DOTALL | re.MULTILINE)
+_UNOPENED: Final = re.compile(r"In <([^>]*)>: Could not open asset @(.*?)@")
+_PICTURE_BYTES: Final = 256 * 2**20
+_HINT: Final = "`--models DIR` names the folder that holds all of its files"
+
+
+@dataclass(frozen=True, slots=True)
+class StageFolder:
+    """The folder below which a stage's files lie."""
+
+    path: Path  # of the root layer
+    root: RootFolder
+
+    @classmethod
+    def of(cls, path: Path, models: str) -> StageFolder:
+        """The file's own folder, or the one that --models names where the file lies in it."""
+        real = real_path(path)
+        if models and real.is_relative_to(real_path(Path(models))):
+            return cls(real, RootFolder(real_path(Path(models))))
+        return cls(real, RootFolder(real.parent))
+
+    def name_of(self, path: str) -> str | None:
+        """The name below the root of a path that the library resolved; None where it lies outside."""
+        real = real_path(Path(path))
+        root = real_path(self.root.root)
+        return str(real.relative_to(root)) if real.is_relative_to(root) else None
+
+    def picture(self, asset: Any) -> bytes | None:
+        """The bytes of an asset that the stage resolved, also in a package; None where there is none."""
+        resolved = str(asset.resolvedPath)
+        package, is_inside, _ = resolved.partition("[")
+        if not resolved or self.name_of(package) is None:
+            return None
+        if not is_inside:
+            return self.root.read(self.name_of(resolved) or "", max_bytes=_PICTURE_BYTES)
+        found = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
+        return bytes(found.GetBuffer()) if found and found.GetSize() < _PICTURE_BYTES else None
+
+
+def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
+    """(name below the root, whether it is a layer) of each file that the stage may open.
+
+    Raises BadHouse for a layer that leads out of the folder, or is no regular file.
+    """
+    first = folder.name_of(str(folder.path))
+    assert first is not None
+    seen, todo = {first}, [first]
+    while todo:
+        name = todo.pop()
+        yield name, True
+        for asset in _named_in(folder.root.root / name):
+            found = _below(folder, name, asset)
+            if found is None or found in seen:
+                continue
+            seen.add(found)
+            if len(seen) > _MOST_LAYERS:
+                raise BadHouse(folder.path, "", f"names more than {_MOST_LAYERS} files")
+            if Path(found).suffix.lower() in LAYERS:
+                todo.append(found)
+            else:
+                yield found, False
+
+
+def _named_in(path: Path) -> list[str]:
+    try:
+        return [name for kind in UsdUtils.ExtractExternalReferences(str(path)) for name in kind]
+    except RuntimeError:  # Tf.ErrorException: a damaged layer, of which the stage will tell
+        return []
+
+
+def _below(folder: StageFolder, layer: str, asset: str) -> str | None:
+    """The name below the root that an asset of a layer means; None where it does not exist."""
+    if "://" in asset or "[" in asset or "\0" in asset:
+        return None
+    # What no dot anchors is looked for beside the layer, too.
+    path = (folder.root.root / layer).parent / asset
+    try:
+        if not path.exists():
+            return None
+        real = real_path(path)
+    except OSError:
+        return None
+    name = folder.name_of(str(real))
+    is_layer = real.suffix.lower() in LAYERS
+    if name is None:
+        if is_layer:
+            text = f"{asset[:80]!r} leads out of the folder"
+            raise BadHouse(folder.path, layer, text, hint=_HINT)
+        return None
+    if not real.is_file():
+        if is_layer:
+            raise BadHouse(folder.path, layer, f"{asset[:80]!r} is no regular file")
+        return None
+    if is_layer and real.stat().st_size > MAX_SCENE_BYTES:
+        text = f"{asset[:80]!r} is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB"
+        raise BadHouse(folder.path, layer, text)
+    return name
+
+
+def opened_stage(folder: StageFolder, notes: Notes) -> Any:
+    """The composed stage; what it names and cannot be opened is a note.
+
+    Raises BadHouse for a damaged file, too many prims, or where a third of the references is
+    missing.
+    """
+    path = folder.path
+    if path.stat().st_size > MAX_SCENE_BYTES:
+        raise BadHouse(path, "", f"is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB")
+    layers = [name for name, is_layer in files_of_stage(folder) if is_layer]
+    said = UsdUtils.CoalescingDiagnosticDelegate()  # else the library writes to our terminal
+    try:
+        n_references = _check_size(folder, layers)
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        found = _SAID.search(str(error))
+        text = " ".join((found[1] if found else "is no USD file").split())
+        for known in {str(path), str(path.parent) + "/"}:
+            text = text.replace(known, "")
+        raise BadHouse(path, "", f"damaged: {text.strip(': ')}") from None
+    for layer in stage.GetUsedLayers():
+        real = layer.realPath.partition("[")[0]
+        if real and folder.name_of(real) is None:
+            raise BadHouse(path, "", f"{real!r} leads out of the folder", hint=_HINT)
+    missing = _note_missing(said, notes)
+    if missing > _MISSING_SHARE * max(n_references, missing):
+        text = f"{missing} of {max(n_references, missing)} references do not resolve"
+        hint = "they name another machine's files: get them, too; " + _HINT
+        raise BadHouse(path, "", text, hint=hint)
+    return stage
+
+
+def _note_missing(said: Any, notes: Notes) -> int:
+    """How many references the library could not open; a note each."""
+    n = 0
+    for row in said.TakeUncoalescedDiagnostics():
+        text = " ".join(str(row.commentary).split())
+        found = _UNOPENED.search(text)
+        n += found is not None
+        if found is not None:
+            notes.add("missing-model", found[1], f"{found[2]} does not exist; left out")
+        elif "Cycle detected" in text:
+            notes.add(
+                "reference-cycle", text.partition(">")[0].removeprefix("In <"), "names itself"
+            )
+    return n
+
+
+def _check_size(folder: StageFolder, names: list[str]) -> int:
+    """The number of references in the layers; BadHouse where they compose too many prims."""
+    by_path: dict[str, Any] = {}
+    for name in names:
+        path = str(folder.root.root / name)
+        layer = Sdf.Layer.FindOrOpen(path)
+        if layer:
+            by_path[path] = layer
+    counted: dict[tuple[str, str], int] = {}
+    n_references = 0
+
+    def references(layer: Any, spec: Any) -> list[tuple[Any, str]]:
+        found = []
+        for key in ("referenceList", "payloadList"):
+            arcs = getattr(spec, key)
+            for arc in (*arcs.explicitItems, *arcs.prependedItems, *arcs.appendedItems):
+                other = layer
+                if arc.assetPath:
+                    where = layer.ComputeAbsolutePath(arc.assetPath)
+                    other = by_path.get(where) or by_path.get(str(real_path(Path(where))))
+                target = (
+                    str(arc.primPath) if arc.primPath else f"/{getattr(other, 'defaultPrim', '')}"
+                )
+                found.append((other, target))
+        return found
+
+    def below(spec: Any) -> Iterator[Any]:
+        yield from spec.nameChildren
+        for variants in spec.variantSets.values():
+            for variant in variants.variants.values():
+                yield variant.primSpec
+
+    # Count what each prim composes to, deepest first, without recursion.
+    for layer in by_path.values():
+        stack = [(layer, spec, False) for spec in layer.rootPrims]
+        while stack:
+            here, spec, is_done = stack.pop()
+            key = (here.identifier, str(spec.path))
+            if key in counted and not is_done:
+                continue
+            arcs = references(here, spec) if spec.hasReferences or spec.hasPayloads else []
+            targets = [(o, s) for o, t in arcs if o is not None and (s := o.GetPrimAtPath(t))]
+            if not is_done:
+                n_references += len(arcs)
+                counted[key] = 1  # also what a cycle sees
+                stack.append((here, spec, True))
+                stack += [(o, s, False) for o, s in targets]
+                stack += [(here, child, False) for child in below(spec)]
+                continue
+            n = 1 + sum(counted.get((here.identifier, str(c.path)), 1) for c in below(spec))
+            n += sum(counted.get((o.identifier, str(s.path)), 1) for o, s in targets)
+            counted[key] = n
+            if n > MOST_PRIMS:
+                text = f"composes more than {MOST_PRIMS} prims"
+                raise BadHouse(folder.path, key[1], text, hint="are references nested?")
+    return n_references
