@@ -35,6 +35,8 @@ class Certificate(Record):
     failures: tuple[str, ...]  # "check: place: what", at most MAX_LISTED per check
     notes: tuple[str, ...] = ()  # what is odd but no failure
     coincident: tuple[Coincidence, ...] = ()  # most pixels first
+    looked_at: tuple[str, ...] = ()  # "file (views): how"
+    not_looked_at: tuple[str, ...] = ()  # the same, and what no file tells
 
     @property
     def is_clean(self) -> bool:
@@ -51,6 +53,8 @@ class Certificate(Record):
         lines += [
             f"{name:<22}{c.checked:>12}{c.failed:>9}{c.ties:>9}" for name, c in self.counts.items()
         ]
+        lines += _block("looked at", self.looked_at)
+        lines += _block("not looked at", self.not_looked_at)
         lines += [f"note: {note}" for note in self.notes]
         lines += self._coincidences()
         lines += list(self.failures)
@@ -70,6 +74,10 @@ class Certificate(Record):
         ]
         more = len(self.coincident) - MAX_LISTED
         return [*lines, f"  and {more} more pairs"] if more > 0 else lines
+
+
+def _block(title: str, rows: tuple[str, ...]) -> list[str]:
+    return [f"{title}:", *(f"  {row}" for row in rows)] if rows else []
 
 
 class Tally:
@@ -116,7 +124,14 @@ class Tally:
         return row[0], row[2]
 
     def certificate(
-        self, folder: str, n_houses: int, n_views: int, *, all_pixels: bool
+        self,
+        folder: str,
+        n_houses: int,
+        n_views: int,
+        *,
+        all_pixels: bool,
+        looked_at: tuple[str, ...] = (),
+        not_looked_at: tuple[str, ...] = (),
     ) -> Certificate:
         """What was collected."""
         return Certificate(
@@ -130,6 +145,8 @@ class Tally:
             },
             failures=tuple(line for lines in self._listed.values() for line in lines),
             notes=tuple(self.notes),
+            looked_at=tuple(shown(line, MAX_MESSAGE) for line in looked_at),
+            not_looked_at=tuple(shown(line, MAX_MESSAGE) for line in not_looked_at),
             # The pairs that share the most pixels come first.
             coincident=tuple(
                 Coincidence(house=house, items=(a, b), pixels=n)

@@ -26,6 +26,7 @@ Labels = dict[str, NDArray[Any]]  # layer -> what is stored at N pixels: (N,) or
 RAY_LAYERS = (
     "instance", "semantic", "depth", "normal", "valid",
     "depth_z", "position", "normal_world", "material", "glass", "nocs",
+    "albedo",
 )  # fmt: skip
 """Layers that a ray through the pixel's centre decides."""
 
@@ -36,6 +37,10 @@ MAX_RAY_ERROR_MM = 5.0
 NORMAL_TOLERANCE_DEG = 0.02
 TIE_DEPTH_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 METRES = 2e-4  # tolerance of depths and positions stored as floats
+ALBEDO_STEPS = 2  # of 255, by which an albedo may differ
+PHYSICAL_ALBEDO = (
+    0.9  # that light holds colour times texture to, materials of the recipe's `physical`
+)
 
 _PARALLEL = 0.999  # least cosine between the normals of coincident surfaces
 _JITTER_PX = 0.02  # from the pixel's centre to the neighbouring rays
@@ -159,8 +164,31 @@ def _explained(
             stored == np.where(hit & _of_face(triangles.see_through, face), 255, 0)
         ),
         "nocs": lambda stored: _nocs_is_right(view, stored, instance, point, triangles),
+        "albedo": lambda stored: (
+            np.abs(stored - _albedo(view, face, point, triangles)).max(axis=1) <= ALBEDO_STEPS + 0.5
+        ),
     }
     return {name: np.asarray(checks[name](stored), bool) for name, stored in labels.items()}
+
+
+def _albedo(view: StoredView, face: Faces, point: Floats, triangles: Triangles) -> Floats:
+    """(N, 3) sRGB 0..255 of the materials at points (N, 3) on faces; 0 where face is -1."""
+    found = np.zeros((len(face), 3))
+    hit = np.nonzero(face >= 0)[0]
+    corners = triangles.faces[face[hit]]
+    a, b, c = (triangles.vertices[corners[:, k]].astype(np.float64) for k in range(3))
+    # Weights of the corners: areas over against them.
+    normal = np.cross(b - a, c - a)
+    squared = np.einsum("ni,ni->n", normal, normal)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at_b = np.einsum("ni,ni->n", np.cross(point[hit] - a, c - a), normal) / squared
+        at_c = np.einsum("ni,ni->n", np.cross(b - a, point[hit] - a), normal) / squared
+    uv = triangles.uv[corners].astype(np.float64)
+    at = uv[:, 0] + at_b[:, None] * (uv[:, 1] - uv[:, 0]) + at_c[:, None] * (uv[:, 2] - uv[:, 0])
+    is_physical = view.recipe is not None and view.recipe.materials.preset == "physical"
+    most = PHYSICAL_ALBEDO if is_physical else 1.0
+    found[hit] = triangles.colours.at(triangles.material[face[hit]], np.nan_to_num(at), most)
+    return found
 
 
 def _nocs_is_right(
@@ -227,6 +255,8 @@ def _coincident(
     """(N,) triangle of the stored instance that the ray pierces at the first hit's depth, or -1."""
     triangles, rays = scene
     found = np.full(len(face), -1, np.int64)
+    if "instance" not in labels:
+        return found
     first = rays.distance(face, origin, directions)
     # Measure gaps across the surface: a slanting ray is longer between the two.
     across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))

@@ -1,4 +1,4 @@
-"""house.glb -> triangles with instance, class and material, read here alone; no effects.
+"""house.glb -> triangles with instance, class, material and texture, read here alone; no effects.
 
 Deliberately shares no code with the package's own reader and writer of GLB: it is their check.
 """
@@ -13,6 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.images import decode_texture
+
 _DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
 _SEE_THROUGH = ("glass", "pane")  # kinds of material
@@ -21,6 +24,60 @@ _MAX_ELEMENTS = 50_000_000  # vertices, triangles: nodes may show one mesh many 
 
 class BadGlb(ValueError):
     """house.glb cannot be read; the text says why."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Colours:
+    """The diffuse colours of a house's materials, textures decoded when one is looked up."""
+
+    factors: NDArray[np.float64]  # (M, 3) linear
+    pictures: tuple[tuple[str, bytes] | None, ...]  # of each material: media type and bytes
+    decoded: dict[int, NDArray[np.uint8] | None]  # of those looked up until now
+
+    def at(
+        self, material: NDArray[np.int64], uv: NDArray[np.float64], most: float
+    ) -> NDArray[np.float64]:
+        """(N, 3) sRGB 0..255: colour times texture at uv (N, 2), v down, held to most in linear."""
+        if not len(self.factors):
+            return np.zeros((len(material), 3))
+        linear = self.factors[material]
+        for number in np.unique(material):
+            pixels = self._picture(int(number))
+            if pixels is not None:
+                own = material == number
+                linear[own] *= _between_texels(pixels, uv[own])
+        linear = np.clip(linear, 0.0, most)
+        low = linear * 12.92
+        return np.asarray(
+            255 * np.where(linear <= 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055)
+        )
+
+    def _picture(self, material: int) -> NDArray[np.uint8] | None:
+        stored = self.pictures[material]
+        if stored is None:
+            return None
+        if material not in self.decoded:
+            try:
+                self.decoded[material] = decode_texture(
+                    stored[1], f"material {material}", stored[0]
+                )
+            except BadInput:
+                self.decoded[material] = None  # counts as white
+        return self.decoded[material]
+
+
+def _between_texels(pixels: NDArray[np.uint8], uv: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) linear colour between the four texels about each uv (N, 2), which repeats; v down."""
+    height, width = pixels.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    found = np.zeros((len(uv), 3))
+    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        column, row = np.floor(x) + dx, np.floor(y) + dy
+        weight = (1 - np.abs(x - column)) * (1 - np.abs(y - row))
+        byte = pixels[(row % height).astype(int), (column % width).astype(int), :3] / 255
+        texel = np.where(byte <= 0.04045, byte / 12.92, ((byte + 0.055) / 1.055) ** 2.4)
+        found += weight[:, None] * texel
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +91,11 @@ class Triangles:
     nyu40: dict[int, int]  # instance id -> class as the GLB says
     see_through: NDArray[np.bool_]  # (F,) glass and panes
     item: dict[int, str]  # instance id -> id of the item
+    uv: NDArray[np.float32]  # (V, 2) v down; 0 where there are none
+    colours: Colours
+    loose: dict[
+        int, NDArray[np.float32]
+    ]  # instance id -> (N, 3) vertices, also those of no triangle
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
@@ -71,6 +133,8 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     owners: list[tuple[int, int, int]] = []  # instance, material, number of faces
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
+    uvs = [np.zeros((0, 2), np.float32)]
+    loose: dict[int, list[NDArray[np.float32]]] = {}
     n_vertices = n_faces = 0
     # Join the primitives of all nodes: those of this package carry no transform.
     for node in document.get("nodes", []):
@@ -79,9 +143,14 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         item[instance] = str(node["extras"].get("item", instance))
         mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
         for primitive in mesh["primitives"]:
+            attributes = primitive["attributes"]
+            points = _accessor(document, binary, attributes["POSITION"])
+            loose.setdefault(instance, []).append(points)
             if primitive.get("mode", 4) != 4:
                 continue  # not triangles
-            points = _accessor(document, binary, primitive["attributes"]["POSITION"])
+            none = np.zeros((len(points), 2), np.float32)
+            uv = attributes.get("TEXCOORD_0")
+            uvs.append(none if uv is None else _accessor(document, binary, uv))
             corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
             faces.append(corners.astype(np.int64) + n_vertices)
@@ -104,4 +173,24 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         nyu40,
         clear[material] if len(material) else np.zeros(0, bool),
         item,
+        np.concatenate(uvs),
+        _colours(document, binary),
+        {instance: np.concatenate(points) for instance, points in loose.items()},
     )
+
+
+def _colours(document: dict[str, Any], binary: bytes) -> Colours:
+    factors, pictures = [], []
+    for material in document.get("materials", []):
+        pbr = material["pbrMetallicRoughness"]
+        factors.append(pbr["baseColorFactor"][:3])
+        texture = pbr.get("baseColorTexture")
+        # A material's picture, by its texture's source.
+        picture = None
+        if texture is not None:
+            image = document["images"][document["textures"][texture["index"]]["source"]]
+            view = document["bufferViews"][image["bufferView"]]
+            start = view.get("byteOffset", 0)
+            picture = image["mimeType"], binary[start : start + view["byteLength"]]
+        pictures.append(picture)
+    return Colours(np.array(factors, np.float64).reshape(-1, 3), tuple(pictures), {})

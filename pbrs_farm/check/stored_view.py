@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.lens_rays import StoredLens
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, BadRecipe
+from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.images import array_from_png, layers_from_exr
 from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
 
@@ -82,6 +83,15 @@ class StoredView:
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return int(self.table["height_px"]), int(self.table["width_px"])
+
+    @cached_property
+    def recipe(self) -> Recipe | None:
+        """What its root was made with; None where recipe.json is not there or damaged."""
+        file = self.folder.parents[3] / "recipe.json"
+        try:
+            return recipe_from_json(stored_bytes(file), str(file))
+        except (BadFile, BadRecipe):
+            return None
 
     @cached_property
     def k(self) -> NDArray[np.float64]:

@@ -16,9 +16,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_pairs, check_partners
+from pbrs_farm.check.picture_checks import check_developed, check_edges, check_histogram
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
+from pbrs_farm.check.sensor_checks import check_derived
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, triangles_from_glb
 from pbrs_farm.check.stored_view import (
     BadFile,
@@ -29,6 +32,7 @@ from pbrs_farm.check.stored_view import (
     stored_object,
     views_of_house,
 )
+from pbrs_farm.check.table_checks import HouseItems, check_rows
 from pbrs_farm.check.view_checks import check_consistency, check_pictures, check_planes, read_labels
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
@@ -133,6 +137,7 @@ class Scenes:
 
     all: tuple[Triangles, Rays]
     opaque: tuple[Triangles, Rays]  # without glass and panes
+    items: HouseItems
 
 
 def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False) -> Certificate:
@@ -146,18 +151,22 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     houses = sorted(found, key=lambda p: p.name)
     if not houses:
         raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
-    tally, n_views = Tally(), 0
+    tally, views = Tally(), list[StoredView]()
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
     check_root_manifest(folder, houses, tally)
     for house in houses:
         check_files(folder, house, tally)
-        n_views += _check_house(house, n_pixels, tally)
+        views += _check_house(house, n_pixels, tally)
     _judge_ties(tally)
-    return tally.certificate(str(folder), len(houses), n_views, all_pixels=all_pixels)
+    return tally.certificate(
+        str(folder), len(houses), len(views), all_pixels=all_pixels,
+        looked_at=looked_at(views), not_looked_at=not_looked_at(views),
+    )  # fmt: skip
 
 
-def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
+def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> list[StoredView]:
+    """Check the house's views; those that could be read."""
     views, faults = views_of_house(house)
     for file, fault in faults.items():
         place = f"{house.name}/{file.parent.name}/view.json"
@@ -166,9 +175,9 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
         triangles = triangles_from_glb(stored_bytes(house / "house.glb"))
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.name, False, f"house.glb {error}")
-        return 0
+        return []
     opaque = Rays(triangles, ~triangles.see_through)
-    scenes = Scenes((triangles, Rays(triangles)), (triangles, opaque))
+    scenes = Scenes((triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles))
     # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
     for view in views:
@@ -185,7 +194,7 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> int:
     check_reprojection(seen, tally)
     check_partners([one.view for one in seen], tally)
     check_pairs(house, scenes.all[1], tally)
-    return len(views)
+    return views
 
 
 def _check_view(
@@ -200,6 +209,11 @@ def _check_view(
     check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
     check_planes(view, arrays, tally)
+    check_derived(view, arrays, tally)
+    check_developed(view, arrays, tally)
+    check_edges(view, arrays, tally)
+    check_histogram(view, arrays, tally)
+    check_rows(view, arrays["instance"], scenes.items, n_pixels, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
     if MOTION_LAYERS & arrays.keys():
         check_motion(view, arrays, scenes.all[1], _chosen(view, n_pixels), tally)
@@ -221,7 +235,7 @@ def _check_rays(
     ):
         # Judge the layers that the view has, as whole numbers where they are.
         present = {name: file for name, file in names.items() if file in arrays}
-        if "instance" not in present:
+        if not present:
             continue
         labels = {name: arrays[file][rows, columns] for name, file in present.items()}
         labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}

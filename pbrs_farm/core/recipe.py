@@ -158,7 +158,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx", "black_modes"),
-    "tone": ("pictures",),
+    "tone": ("pictures", "white", "glare"),
     "sky": ("sun_elevation_deg", "sun_azimuth_deg"),
 }
 

@@ -315,6 +315,10 @@ class ToneFields(FieldGroup):
         le=1,
         description="how far the light's colour is turned to white; 1 = all the way",
     )
+    white: float = Field(
+        64.0, ge=1, le=1e6, description="photo: radiance over a matt white's that becomes 255"
+    )
+    glare: Share = Field(0.0, description="of the light, spread wide about what is bright")
     pictures: str = Field(
         "", max_length=256, description="plugins' pictures beside the modes', ':' between"
     )

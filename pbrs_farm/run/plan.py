@@ -49,7 +49,7 @@ STEPS: Final = {
             "light", 21, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
-        Step("develop", 6, ("tone", "light", "sensor"), ("light",), needs=("light",)),
+        Step("develop", 7, ("tone", "light", "sensor"), ("light",), needs=("light",)),
         Step("view", 3, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip

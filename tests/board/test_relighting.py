@@ -39,6 +39,8 @@ def test_the_packet_holds_each_layer_of_light_to_a_half_floats_precision(
     facts, planes = unpacked(client.get(f"{VIEW}/light?denoise=0").content)
     assert list(planes) == ["albedo", "outdoor", "lamp1", "lamp2"]
     assert (facts["width"], facts["height"], facts["denoised"]) == (WIDTH, HEIGHT, False)
+    knee = facts["tone"].pop("knee")
+    assert abs(0.6 + knee * np.log1p(63.4 / knee) - 1) < 1e-9
     assert facts["tone"] == {"preset": "photo", "key": 0.18, "white_balance": 0.7}
     assert [lamp["name"] for lamp in facts["lamps"]] == ["lamp 0", "lamp 1"]
     stored = light_images(2)

@@ -18,6 +18,7 @@ from pbrs_farm.formats.marker import Marker, StoredFile
 from pbrs_farm.images import exr_from_layers, png_from_array
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.run.house_cache import decoded_textures
 
 SIZE = (128, 96)
 
@@ -61,7 +62,7 @@ def make_root(
             geometry,
             camera,
             lambda skip, c=camera: caster.hit_record(c, skip_faces=skip),
-            {},
+            decoded_textures(home)[0],
         )
         names = truth.OPTIONAL_NAMES if with_optional else ()
         layers |= truth.optional_layers(names, label_inputs)

@@ -128,7 +128,10 @@ def lamp_rows(view_json: bytes) -> list[dict[str, Any]]:
 
 
 def _tone_facts(tone: ToneFields) -> dict[str, Any]:
-    return {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
+    from pbrs_farm.transport.develop.tone_mapping import knee_of
+
+    facts = {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
+    return facts | {"knee": knee_of(tone.white)}
 
 
 def _files(data: bytes) -> tuple[Sequence[bytes], bool]:

@@ -29,17 +29,15 @@ vec3 summed() {
 }`;
 
 const TONE = `
-uniform float u_exposure, u_white;
+uniform float u_exposure, u_white, u_knee;
 uniform vec3 u_gains;
 uniform bool u_released;
 
-const float SHOULDER = 0.6, WHITE = 16.0;
+const float SHOULDER = 0.6;
 
 vec3 rolledOff(vec3 rgb) {
   float top = max(max(rgb.r, rgb.g), rgb.b);
-  float over = max(top - SHOULDER, 0.0), room = 1.0 - SHOULDER;
-  float rise = log(1.0 + over / room) / log(1.0 + (WHITE - SHOULDER) / room);
-  float soft = SHOULDER + room * max(rise, over / (over + room) * (1.0 - 1.0 / WHITE));
+  float soft = SHOULDER + u_knee * log(1.0 + max(top - SHOULDER, 0.0) / u_knee);
   float target = top > SHOULDER ? min(soft, 1.0) : top;
   vec3 scaled = rgb * (top > 0.0 ? target / top : 1.0);
   float fade = clamp(log2(max(top, 1e-9) / 2.0) / 5.0, 0.0, 1.0);
@@ -161,10 +159,11 @@ export class LightGl {
     gl.uniform1f(at.u_height, this.height);
   }
 
-  #setTone(at, { gains, exposure, white }, isReleased) {
+  #setTone(at, { gains, exposure, white, knee }, isReleased) {
     const { gl } = this;
     gl.uniform1f(at.u_exposure, exposure);
     gl.uniform1f(at.u_white, white);
+    gl.uniform1f(at.u_knee, knee);
     gl.uniform3fv(at.u_gains, gains);
     gl.uniform1i(at.u_released, isReleased ? 1 : 0);
   }

@@ -16,7 +16,7 @@ export function toneOf(light, albedo, fields) {
   if (fields.preset === "released") {
     for (let k = 0; k < n; k++) largest = Math.max(largest, dot(light, k, gains, MITSUBA_LUMINANCE));
   }
-  return { gains, exposure, white: largest * exposure * (1 - BURN) ** 2 };
+  return { gains, exposure, white: largest * exposure * (1 - BURN) ** 2, knee: fields.knee };
 }
 
 function dot(light, k, gains, weights) {

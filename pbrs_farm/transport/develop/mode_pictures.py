@@ -19,7 +19,7 @@ from pbrs_farm.core.frames import LM_PER_W, LUMINANCE, srgb_from_linear
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import SensorFields, ToneFields
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone
+from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone, with_glare
 
 # A camera's sensor: from linear light to 8 bits by electrons, a mosaic, noise and JPEG.
 # The order is a camera's own: lens (lateral aberration, vignetting), exposure, Bayer mosaic,
@@ -166,9 +166,8 @@ def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random
 
 
 def _toned(rgb: F64, headroom: float) -> Srgb8Image:
-    """The curve of tone preset `photo`, ended where the sensor saturates instead of far beyond."""
-    end = float(rolled_off(np.full((1, 1, 3), headroom))[0, 0, 0])
-    linear = rolled_off(rgb) / end
+    """The curve of tone preset `photo`, which is white where the sensor saturates."""
+    linear = rolled_off(rgb, headroom)
     return np.rint(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
 
 
@@ -265,6 +264,7 @@ def develop(
     for mode, names in GROUPS_OF_MODE.items():
         if names:
             total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
+            total = with_glare(total, fields.glare)
             gains = white_balance(total, aovs.albedo, fields.white_balance)
             exposure = exposure_of(total * gains, fields)
             if shot is not None:

@@ -6,9 +6,12 @@ key 0.8, burn 0.2); `photo`, the default, rolls highlights off.
 
 from __future__ import annotations
 
+import functools
+import math
 from typing import Final
 
 import numpy as np
+from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, RadianceImage, Srgb8Image
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
@@ -18,7 +21,8 @@ _MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])  # of Mitsu
 _BURN: Final = 0.2  # of Reinhard's operator: how far highlights may burn out
 _LOG_FLOOR: Final = 1e-3  # added before the logarithm, as Mitsuba's tone mapper does
 _SHOULDER: Final = 0.6  # of photo: the curve is straight below
-_WHITE: Final = 16.0  # of photo: the exposed radiance that becomes 1
+_HALVINGS: Final = 60  # that find a knee to the last bit
+_GLARE_WIDTHS: Final = (0.01, 0.04, 0.16)  # of the picture's width, standard deviations
 
 
 def tone(
@@ -34,7 +38,7 @@ def tone(
         linear = _reinhard(rgb, fields.key, exposure)
     else:
         factor = exposure_of(radiance, fields) if exposure is None else exposure
-        linear = rolled_off(rgb * factor)
+        linear = rolled_off(rgb * factor, fields.white)
     return np.round(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
 
 
@@ -70,8 +74,8 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
     return np.asarray(rgb * ratio[..., None])
 
 
-def rolled_off(rgb: F64) -> F64:
-    """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at _WHITE.
+def rolled_off(rgb: F64, white: float) -> F64:
+    """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
 
     It maps the largest component and keeps the hue; colours far beyond white fade to white.
     """
@@ -79,18 +83,42 @@ def rolled_off(rgb: F64) -> F64:
     top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
     is_soft = top > _SHOULDER
     out = np.array(rgb)
-    out[is_soft] = _shoulder(rgb[is_soft], top[is_soft][:, None])
+    out[is_soft] = _shoulder(rgb[is_soft], top[is_soft][:, None], knee_of(white))
     return out
 
 
-def _shoulder(rgb: F64, top: F64) -> F64:
+def _shoulder(rgb: F64, top: F64, knee: float) -> F64:
     """The curve of `photo` above the straight part: of (N, 3) colours, top (N, 1) their largest."""
-    over = top - _SHOULDER
-    room = 1 - _SHOULDER
-    rise = np.log1p(over / room) / np.log1p((_WHITE - _SHOULDER) / room)
-    # Match the slope at the shoulder: a rational start that meets the logarithm's end.
-    soft = _SHOULDER + room * np.maximum(rise, over / (over + room) * (1 - 1 / _WHITE))
-    target = np.minimum(soft, 1.0)
+    # Its slope at the shoulder is 1, so that it goes on without a bend.
+    target = np.minimum(_SHOULDER + knee * np.log1p((top - _SHOULDER) / knee), 1.0)
     # Scale all three components alike; fade to white over five stops, from twice white on.
     fade = np.clip(np.log2(top / 2) / 5, 0, 1)
     return np.asarray(rgb * (target / top) * (1 - fade) + target * fade)
+
+
+@functools.cache
+def knee_of(white: float) -> float:
+    """The k for which _SHOULDER + k log(1 + (white - _SHOULDER) / k) is 1."""
+    low, high = 1e-4, 1e4
+    for _ in range(_HALVINGS):
+        k = (low * high) ** 0.5
+        is_short = _SHOULDER + k * math.log1p((white - _SHOULDER) / k) < 1
+        low, high = (k, high) if is_short else (low, k)
+    return low
+
+
+def with_glare(radiance: RadianceImage, share: float) -> RadianceImage:
+    """Radiance (H, W, 3) with a share of each pixel's light spread wide about it, as in lens and eye.
+
+    A third each by Gaussians of 1, 4 and 16 % of the picture's width; light is neither lost nor
+    made but at the edges, beyond which the picture goes on as its border.
+    """
+    if share <= 0:
+        return radiance
+    light = np.nan_to_num(np.asarray(radiance, np.float32), posinf=0.0)
+    width = radiance.shape[1]
+    spread = sum(
+        ndimage.gaussian_filter(light, (part * width, part * width, 0), mode="nearest", truncate=3)
+        for part in _GLARE_WIDTHS
+    ) / np.float32(len(_GLARE_WIDTHS))
+    return np.asarray(light * np.float32(1 - share) + spread * np.float32(share), np.float32)

@@ -4,7 +4,7 @@ import numpy as np
 
 from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised, wanted_exposures
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone
+from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone, with_glare
 
 
 def grey(level: float) -> np.ndarray:
@@ -38,10 +38,30 @@ def test_tone_rises_with_radiance_and_never_wraps() -> None:
 def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -> None:
     rng = np.random.default_rng(0)
     dim = rng.uniform(0, 0.6, (16, 16, 3))
-    np.testing.assert_array_equal(rolled_off(dim), dim)
+    np.testing.assert_array_equal(rolled_off(dim, 64.0), dim)
     colour = np.array([1.0, 0.5, 0.25])
-    below, above = (rolled_off((level * colour)[None, None]) for level in (0.6, 0.6 + 1e-6))
+    below, above = (rolled_off((level * colour)[None, None], 64.0) for level in (0.6, 0.6 + 1e-6))
     np.testing.assert_allclose(above, below, atol=2e-6)
+
+
+def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
+    sky = np.geomspace(4, 60, 12).reshape(1, -1, 1).repeat(3, -1)
+    steps = tone(sky.astype(np.float32), ToneFields(white=64), exposure=1.0)[0, :, 0].astype(int)
+    assert (np.diff(steps) >= 1).all()
+    assert tone(grey(64.0), ToneFields(white=64), exposure=1.0)[0, 0, 0] == 255
+    assert tone(grey(4.0), ToneFields(white=4), exposure=1.0)[0, 0, 0] == 255
+    assert tone(grey(0.99), ToneFields(white=1), exposure=1.0)[0, 0, 0] < 255
+
+
+def test_glare_spreads_light_and_neither_adds_nor_takes_any() -> None:
+    dark = grey(0.0)
+    dark[16, 16] = 100.0
+    spread = with_glare(dark, 0.1)
+    assert spread[16, 16, 0] < 95
+    assert spread[16, 19, 0] > spread[16, 24, 0] > 0
+    np.testing.assert_allclose(spread.sum(), dark.sum(), rtol=1e-3)
+    np.testing.assert_allclose(with_glare(grey(2.0), 0.1), 2.0, rtol=1e-5)
+    assert with_glare(dark, 0.0) is dark
 
 
 def test_black_stays_black_and_bad_numbers_count_as_black() -> None:

@@ -1,0 +1,98 @@
+"""How `verify` looks at each file of a root, and what it does not look at; no effects.
+
+A file whose row is missing is held against its hash and, of a layer, its size and type.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.layers import LAYERS
+
+RAYS = "recomputed by rays"
+FORMULA = "recomputed from other layers"
+_MOTION = "followed by rays from view to view"
+_BEHIND = "recomputed by rays without glass"
+_NOISE = "each value within its noise, mean and spread by their statistics"
+
+# File -> how it is looked at.
+HOW: dict[str, str] = {
+    "instance.png": RAYS, "semantic.png": RAYS, "depth.png": RAYS, "normal.png": RAYS,
+    "valid.png": RAYS, "depth_z.exr": RAYS, "position.exr": RAYS, "normal_world.png": RAYS,
+    "material.png": RAYS, "glass.png": RAYS, "nocs.png": RAYS, "albedo.png": RAYS,
+    "boundary.png": FORMULA, "boundary_semantic.png": FORMULA, "nyu13.png": FORMULA,
+    "class_source.png": FORMULA, "hha.png": FORMULA, "histogram.json": FORMULA,
+    "depth_sensor.png": _NOISE, "depth_sensor_tof.png": _NOISE, "depth_sensor_stereo.png": _NOISE,
+    "mlt_ol.png": "developed from radiance.exr again",
+    "mlt_il_ol.png": "developed from radiance.exr again",
+    "opengl_dl.png": "its edges against those of the instances",
+    "opengl_il.png": "its edges against those of the instances",
+    "view.json": "camera by rays; boxes, shares and counts recomputed",
+    "radiance.exr": "every value finite and not negative; no light is traced",
+    "normal_shading.png": "unit length alone",
+    "boundary_occlusion.png": "values that there are alone",
+    "boundary_crease.png": "values that there are alone",
+    "behind_glass/depth.png": _BEHIND, "behind_glass/normal.png": _BEHIND,
+    "behind_glass/semantic.png": _BEHIND, "behind_glass/instance.png": _BEHIND,
+    "flow_forward.exr": _MOTION, "flow_forward_kitti.png": _MOTION, "occlusion_forward.png": _MOTION,
+    "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
+    "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
+}  # fmt: skip
+
+_LIGHTLY = ("radiance.exr", "normal_shading.png", "boundary_occlusion.png", "boundary_crease.png")
+
+# What no file of a view tells.
+_NEVER = (
+    "levels of light: what radiance.exr holds, illuminance.json, noise",
+    "the choice of views: cameras.json and its scores",
+    "house.glb and house.json against their source; repair.json, dress.json",
+)
+
+
+def looked_at(views: list[StoredView]) -> tuple[str, ...]:
+    """A line for each kind of file that was recomputed: its name, in how many views, how."""
+    counts = _files(views)
+    return tuple(
+        f"{file} ({counts[file]}): {how}"
+        for file, how in HOW.items()
+        if counts[file] and file not in _LIGHTLY
+    )
+
+
+def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
+    """A line for each kind of file that a hash alone speaks for, or little more."""
+    counts = _files(views)
+    layers = {layer.file for layer in LAYERS}
+    lines = []
+    for file in sorted(counts):
+        if file in _LIGHTLY:
+            lines.append(f"{file} ({counts[file]}): {HOW[file]}")
+        elif file not in HOW:
+            how = "hash, size and type alone" if file in layers else "hash alone"
+            lines.append(f"{file} ({counts[file]}): {how}")
+    lines += [f"light of {view.place}: {why}" for view in views if (why := _light_fault(view))]
+    return (*lines, *_NEVER)
+
+
+def _files(views: list[StoredView]) -> Counter[str]:
+    return Counter(
+        str(file.relative_to(view.folder).as_posix())
+        for view in views
+        for file in Path(view.folder).rglob("*")
+        if file.is_file()
+    )
+
+
+def _light_fault(view: StoredView) -> str:
+    """Why a view's light modes were not compared to the step; "" where they were, or are not there."""
+    if not (view.has("mlt_ol.png") or view.has("mlt_il_ol.png")):
+        return ""
+    if view.recipe is None:
+        return "no recipe.json that says how it was developed"
+    if not view.has("radiance.exr"):
+        return "no radiance.exr to develop"
+    if view.recipe.sensor.is_on:
+        return "taken by a sensor: compared by tiles of 16 px, not by pixels"
+    return ""
