@@ -22,7 +22,9 @@ bind 127.0.0.1
 dir $folder
 daemonize yes
 pidfile $folder/redis.pid
-user default off
+appendonly yes
+save ""
+user default off ~* &* +@all
 user farm on >farmpw ~pbrs:* &* +@all -@dangerous +info +keys +scan
 CONF
 redis-server redis.conf
