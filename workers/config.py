@@ -110,6 +110,11 @@ class FarmConfig:
         return self.scratch / f"pbrs-{self.worker}.preempted"
 
     @property
+    def leaving_file(self) -> Path:
+        """While this file exists the worker takes nothing more and finishes what it runs."""
+        return self.scratch / f"pbrs-{self.worker}.leaving"
+
+    @property
     def heartbeat_file(self) -> Path:
         """Touched by the worker's main loop; its age is the liveness probe."""
         return alive_file(self.scratch, self.worker)
@@ -127,8 +132,10 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     limits = f"{_PREFIX}LIMITS_"
     of_limits = {n: text for n, text in env.items() if n.startswith(limits)}
     of_farm = {n: text for n, text in env.items() if n.startswith(_PREFIX) and n not in of_limits}
-    given: dict[str, Any] = {"worker": platform.node(), "scratch": Path(tempfile.gettempdir())}
-    given |= _read(FarmConfig, of_farm, _PREFIX)
+    given: dict[str, Any] = {"worker": platform.node()} | _read(FarmConfig, of_farm, _PREFIX)
+    # Looking for a temporary folder fails where none can be written, as in a read-only container.
+    if "scratch" not in given:
+        given["scratch"] = Path(tempfile.gettempdir())
     return FarmConfig(
         **given,
         redis_url=Secret(_with_password(settings.redis_url.reveal(), password)),

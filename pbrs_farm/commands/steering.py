@@ -13,7 +13,16 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pbrs_farm.commands.arguments import Handler, Verb, add_farm, echo, echo_json, farm_of, warn
+from pbrs_farm.commands.arguments import (
+    Handler,
+    Verb,
+    add_farm,
+    counted,
+    echo,
+    echo_json,
+    farm_of,
+    warn,
+)
 from workers.client.text import (
     explanation_text,
     failures_text,
@@ -107,6 +116,12 @@ def _show(args: argparse.Namespace, value: Any, text: Callable[[], str]) -> None
 
 
 def _status(args: argparse.Namespace) -> int:
+    farm = farm_of(args)
+    # A farm that was just set up is in order; one whose ledger was lost is not.
+    if not args.job and not farm.ledger.known_jobs() and not farm.lost_jobs():
+        n = sum(row["state"] == "alive" for row in farm.workers())
+        _show(args, {"jobs": [], "workers": n}, lambda: f"no job yet; {counted(n, 'worker')}")
+        return 0
     farm, job = _farm_and_job(args)
     # Ask again every two seconds while --watch holds and the job is not over.
     while True:

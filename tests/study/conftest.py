@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out a file of the marker where -m says "not study", so that torch may be missing."""
-    is_deselected = "not study" in config.getoption("markexpr")
+    """Leave out a file of the marker where -m says "not study", so that torch may be missing.
+
+    Where it is missing, a marker that does not name study (chaos, slow) leaves them out as well.
+    """
+    markers = config.getoption("markexpr")
+    asks_for_others = bool(markers) and "study" not in markers
+    is_deselected = "not study" in markers or (asks_for_others and find_spec("torch") is None)
     if not is_deselected or collection_path.suffix != ".py":
         return None
     is_marked = "\npytestmark = pytest.mark.study\n" in collection_path.read_text(encoding="utf-8")

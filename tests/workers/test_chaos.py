@@ -12,6 +12,7 @@ import os
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -295,6 +296,46 @@ def test_a_worker_whose_clock_is_a_minute_off(farm: SmallFarm) -> None:
     seconds = farm.wait_done(120)
     assert farm.farm.view(farm.job).counts.get("expired", 0) == 0
     note("workers' clocks a minute off, both ways", farm, farm.check_complete(n_repeats=0), seconds)
+
+
+def test_a_worker_told_to_leave_is_seen_until_its_task_is_done(farm: SmallFarm) -> None:
+    (farm.control / "slow").write_text("8")
+    farm.coordinator()
+    farm.worker("w1")
+    farm.submit(1)
+    farm.wait(lambda: farm.running() > 0, 30, "a task runs")
+    farm.processes["w1"].send_signal(signal.SIGTERM)
+    config = replace(farm.farm.config, worker="w1", scratch=farm.folder / "scratch")
+    farm.wait(config.leaving_file.exists, 10, "it begins to leave")
+    # Its task runs on; the probe's file and the row of `workers` stay.
+    time.sleep(2)
+    assert farm.running() > 0
+    assert config.heartbeat_file.exists()
+    assert [row["state"] for row in farm.farm.workers()] == ["draining"]
+    farm.processes["w1"].wait(30)
+    assert not config.heartbeat_file.exists()
+    assert farm.farm.workers() == []
+
+
+def test_a_forged_message_ends_no_worker(farm: SmallFarm) -> None:
+    begin(farm, n_houses=2)
+    envelope = {
+        "body": "W10=", "content-encoding": "utf-8", "content-type": "application/x-pbrs-json",
+        "headers": {"lang": "py", "task": "celery.backend_cleanup", "id": "x"},
+        "properties": {
+            "delivery_tag": "x", "delivery_info": {"exchange": "", "routing_key": "gl"},
+            "body_encoding": "base64", "delivery_mode": 2,
+        },
+    }  # fmt: skip
+    forged = ("no JSON", "[1]", "{}", '{"properties": 3}', "[" * 100_000, json.dumps(envelope))
+    for text in forged:
+        farm.redis.client.lpush("pbrs:gl", text)
+    farm.wait_done()
+    farm.check_complete(n_repeats=0)
+    logs = "".join(p.read_text() for p in farm.folder.glob("w*.log"))
+    assert logs.count("dropped what is no message") == len(forged) - 1
+    assert "celery.backend_cleanup" in logs  # an unregistered task, told and thrown away
+    assert all(farm.processes[name].poll() is None for name in ("w1", "w2"))
 
 
 def test_drain_lets_a_worker_leave(farm: SmallFarm) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import tempfile
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.store.secret import Secret
-from workers.config import FarmConfig, Limits, make_scratch
+from workers.config import FarmConfig, Limits, config_from_environment, make_scratch
 
 
 def test_every_setting_stands_in_the_docs() -> None:
@@ -16,6 +17,18 @@ def test_every_setting_stands_in_the_docs() -> None:
     names = {f"_{f.name.upper()}" for f in fields(FarmConfig) if f.name not in elsewhere}
     names |= {f"_{f.name.upper()}" for f in fields(Limits)}
     assert sorted(n for n in names if f"{n}`" not in docs) == []
+
+
+def test_where_scratch_is_named_no_temporary_folder_is_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # As in a container whose root is read-only and has no /tmp.
+    def none_there() -> str:
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "gettempdir", none_there)
+    named = {"PBRS_REDIS_URL": "redis://x/0", "PBRS_FARM_SCRATCH": str(tmp_path)}
+    assert config_from_environment(named).scratch == tmp_path
 
 
 def test_scratch_is_made_and_a_file_in_its_place_is_one_line(tmp_path: Path) -> None:

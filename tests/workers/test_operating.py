@@ -188,6 +188,38 @@ def test_a_drained_worker_that_waits_ends_when_it_is_told_to(farm: Farm, tmp_pat
     assert farm.workers() == []
 
 
+def test_a_worker_that_leaves_is_seen_without_slots_until_it_is_gone(farm: Farm) -> None:
+    farm.registry.heartbeat()
+    assert farm.registry.slots() != {}
+    farm.registry.heartbeat(is_leaving=True)
+    assert farm.workers()[0]["state"] == "draining"
+    assert farm.registry.slots() == {}
+    assert farm.ledger.client.zcard(f"{farm.config.prefix}workers:gl") == 0
+    # It is started again under its name.
+    farm.registry.heartbeat()
+    assert farm.workers()[0]["state"] == "alive"
+
+
+# A farm that was just set up, and one whose ledger is lost
+
+
+def test_status_of_a_fresh_farm_is_no_failure_and_a_lost_ledger_names_the_job(
+    farm: Farm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    environment(farm, monkeypatch)
+    assert main(["status"]) == 0
+    assert capsys.readouterr().out == "no job yet; 0 workers\n"
+    job = submit(farm).job.job_id
+    assert farm.lost_jobs() == []
+    farm.ledger.forget(job)
+    farm.ledger.client.delete(*farm.ledger.client.scan_iter(f"{farm.config.prefix}*"))
+    assert farm.lost_jobs() == [job]
+    assert main(["status"]) == 1
+    assert f"pbrs-farm recover {job}" in capsys.readouterr().err
+    assert main(["recover", job]) == 0
+    assert main(["status"]) == 0
+
+
 # Failures
 
 

@@ -279,8 +279,16 @@ class Farm:
         """The job submitted last; BadInput when there is none."""
         known = self.ledger.known_jobs()
         if not known:
-            raise BadInput("farm", "", "no job in the ledger", hint="`submit`, or `recover JOB`")
+            lost = self.lost_jobs()
+            hint = f"`pbrs-farm recover {lost[-1]}`" if lost else "`pbrs-farm submit HOME`"
+            raise BadInput("farm", "", "no job in the ledger", hint=hint)
         return known[-1]
+
+    def lost_jobs(self) -> list[str]:
+        """Jobs that the store knows and an empty ledger does not; [] where it holds any job."""
+        from workers.coordinator.recover import lost_jobs
+
+        return lost_jobs(self.ledger, self.store) if self.config.store_url else []
 
     def view(self, job: str) -> JobView:
         """The ledger's view of a job; BadInput for an unknown one."""

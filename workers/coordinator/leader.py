@@ -23,6 +23,7 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.store import store_from_url
 from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.progress_rates import Rates, mean_s
@@ -281,11 +282,12 @@ def main() -> int:
         config = config_from_environment()
         make_scratch(config)
         ledger = RedisLedger(config)
-        ledger.ping()
+        ledger.wait_until_there(meanwhile=lambda: touch(config.heartbeat_file))
         notice = _notice(config, ledger)
     except PbrsError as error:
         sys.stderr.write(f"pbrs-farm: {error}\n")
         return 1
+    _tell_of_lost_jobs(config, ledger)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
@@ -296,6 +298,19 @@ def main() -> int:
     send = celery_sender(make_app(config))
     Coordinator(config, ledger, send, registry=Registry(ledger), notice=notice).run(stop)
     return 0
+
+
+def _tell_of_lost_jobs(config: FarmConfig, ledger: RedisLedger) -> None:
+    """Say which jobs the store knows where the ledger holds none: its data were lost."""
+    from workers.coordinator.recover import lost_jobs
+
+    if not config.store_url:
+        return
+    try:
+        for job in lost_jobs(ledger, store_from_url(config.store_url, config.store)):
+            _log.warning("the ledger is empty and the store has job %s: `recover %s`", job, job)
+    except PbrsError as error:
+        _log.warning("the store is not known yet: %s", error)
 
 
 # Tells a URL when a job ends or pauses itself: one POST of JSON. Effects: a request, the ledger.

@@ -48,6 +48,14 @@ def rebuild(
             _enter(ledger, spec.job_id, chunk, list(pool.map(look, chunk)))
 
 
+def lost_jobs(ledger: RedisLedger, store: Store) -> list[str]:
+    """Jobs that the store knows and an empty ledger does not; [] where it holds any job."""
+    if ledger.known_jobs():
+        return []
+    ends = [key.split("/") for key in store.list("jobs/") if key.endswith("/job.json")]
+    return sorted(parts[1] for parts in ends if len(parts) == 3)
+
+
 def names_tell(store: Store, spec: JobSpec) -> bool:
     """Whether a marker's name says that its step is done: one recipe, one version in this root."""
     if store.head(keys.RECIPE_REPLACED) is not None:

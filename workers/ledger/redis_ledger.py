@@ -6,7 +6,9 @@ scripts name keys they compute, so a Redis Cluster will not do; one Redis with a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import logging
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
 T = TypeVar("T")
+_log = logging.getLogger("pbrs.ledger")
+_AWAY_S: Final = 2.0  # between two tries to reach a Redis that is not there yet
 _SCRIPTS: Final = (
     "claim", "heartbeat", "finish", "fail", "reap", "dispatch", "resend", "create", "load",
     "retry", "steer", "lead",
@@ -348,6 +352,25 @@ class RedisLedger:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""
         with self.errors():
             self.client.ping()
+
+    def wait_until_there(
+        self, patience_s: float = 300.0, meanwhile: Callable[[], object] = lambda: None
+    ) -> None:
+        """Return once Redis answers: a service may start before it. meanwhile: called now and then.
+
+        Raises LedgerUnavailable where it refuses these credentials, or does not answer in time.
+        """
+        give_up = time.monotonic() + patience_s
+        while True:
+            meanwhile()
+            try:
+                return self.ping()
+            except LedgerUnavailable as error:
+                is_refused = isinstance(error.__cause__, redis.AuthenticationError)
+                if is_refused or time.monotonic() > give_up:
+                    raise
+                _log.warning("%s; trying again", error)
+                time.sleep(_AWAY_S)
 
     def now(self) -> float:
         """Redis' own clock, the only one the farm goes by."""

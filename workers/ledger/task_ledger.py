@@ -148,6 +148,8 @@ class WorkerView:
         """alive, draining, drained or dead."""
         if self.age_s > ALIVE_S:
             return "dead"
+        if self.fields.get("leaving") == "1":
+            return "draining"
         if self.fields.get("drain") != "1":
             return "alive"
         return "drained" if self.fields.get("slots") == "0" else "draining"

@@ -27,10 +27,13 @@ class Registry:
         self._ledger = ledger
         self._g = ledger.config.prefix
 
-    def heartbeat(self, *, takes_work: bool = True, memory_mb: float = 0.0) -> bool:
+    def heartbeat(
+        self, *, takes_work: bool = True, is_leaving: bool = False, memory_mb: float = 0.0
+    ) -> bool:
         """This worker is alive; True when it is asked to leave.
 
         takes_work: False while it is drained and waits to be asked back; it has no slot then.
+        is_leaving: it takes nothing more and finishes what it runs.
         memory_mb: what its processes hold now, 0 when that is not known.
         """
         config, client = self._ledger.config, self._ledger.client
@@ -40,11 +43,15 @@ class Registry:
             now = self._ledger.now()
             pipe = client.pipeline(transaction=False)
             pipe.zadd(f"{self._g}workers", {config.worker: now})
-            queues = (config.queues or QUEUES) if takes_work else ()
-            for stage in {s for q in queues for s in stages_of_queue(q)}:
+            queues = (config.queues or QUEUES) if takes_work and not is_leaving else ()
+            taken = {s for q in queues for s in stages_of_queue(q)}
+            for stage in taken:
                 pipe.zadd(f"{self._g}workers:{stage}", {config.worker: now})
+            for stage in {s for q in QUEUES for s in stages_of_queue(q)} - taken:
+                pipe.zrem(f"{self._g}workers:{stage}", config.worker)
             fields: Mapping[str, str | int] = {
-                "slots": config.slots if takes_work else 0,
+                "slots": config.slots if queues else 0,
+                "leaving": int(is_leaving),
                 "queues": ",".join(queues),
                 "store": shown_url(config.store_url),
                 "store_id": config.store_id,

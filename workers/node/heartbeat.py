@@ -38,19 +38,20 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
     def stop(self, _parent: Any) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        try:
-            self._registry.leave()
-        except LedgerUnavailable as error:
-            _log.warning("%s", error)
-        self._config.heartbeat_file.unlink(missing_ok=True)
+        # What runs is finished first: the supervisor is seen for this worker from here on.
+        touch(self._config.leaving_file)
+        self._heartbeat()
 
     def _heartbeat(self) -> None:
         touch(self._config.heartbeat_file)
+        is_leaving = self._config.leaving_file.exists()
         try:
             # The supervisor started Celery, and Celery its slots and their renderers.
-            if self._registry.heartbeat(memory_mb=tree_mb(os.getppid())):
+            memory_mb = tree_mb(os.getppid())
+            if self._registry.heartbeat(is_leaving=is_leaving, memory_mb=memory_mb):
                 _log.info("drained: finishing what runs, then leaving")
                 # Celery's warm shutdown: no more messages, what runs ends.
+                touch(self._config.leaving_file)
                 state.should_stop = os.EX_OK
         except LedgerUnavailable as error:
             _log.warning("%s", error)

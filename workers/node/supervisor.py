@@ -37,6 +37,7 @@ from workers.store_identity import store_id
 _log = logging.getLogger("pbrs.supervisor")
 _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
+_SEEN_EVERY_S: Final = 10.0  # of a worker that finishes what it runs
 _DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
 _STORE_S: Final = 5.0  # how long the store may take to say which it is
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
@@ -71,7 +72,7 @@ def command(config: FarmConfig) -> list[str]:
 
 def check_machine(config: FarmConfig) -> None:
     """What a worker needs before it takes work: Redis and room on scratch. Raises PbrsError."""
-    RedisLedger(config).ping()
+    RedisLedger(config).wait_until_there(meanwhile=lambda: touch(config.heartbeat_file))
     if not config.store_url:
         raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
     free_mb = shutil.disk_usage(config.scratch).free / 2**20
@@ -85,6 +86,7 @@ def sweep(config: FarmConfig) -> None:
     """Remove what an earlier life of this worker left on scratch."""
     config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
+    config.leaving_file.unlink(missing_ok=True)
     # Logs of pool processes that are gone; "pbrs-<worker>-<pid>".
     for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
         pid = folder.name.rpartition("-")[2]
@@ -101,6 +103,8 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, orders.on_signal)
     began = time.monotonic()
+    seen_at = 0.0  # as one that leaves
+    registry = Registry(RedisLedger(config))
     if not _wait_while_drained(config, orders):
         return 0
     # Celery's parent process never touches storage: tell it which one this is.
@@ -112,8 +116,16 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
     while True:
         code = _reap(celery)
         if code is not None:
+            with contextlib.suppress(LedgerUnavailable):
+                registry.leave()
             sweep(config)
             return code
+        # Celery's own heartbeat ends while it leaves; what runs may take minutes more.
+        if config.leaving_file.exists() and time.monotonic() >= seen_at + _SEEN_EVERY_S:
+            seen_at = time.monotonic()
+            touch(config.heartbeat_file)
+            with contextlib.suppress(LedgerUnavailable):
+                registry.heartbeat(is_leaving=True, memory_mb=tree_mb(os.getpid()))
         if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
             orders.leave_at = orders.leave_at or time.monotonic()
         # A Slurm job that was preempted puts itself back into the queue, one that is over does not.
@@ -169,6 +181,7 @@ def _leave(
     """The next thing to do on the way out, each once."""
     # Name, seconds after leaving began, what to do.
     steps: list[tuple[str, float, Callable[[], None]]] = [
+        ("be seen leaving", 0.0, lambda: touch(config.leaving_file)),
         ("finish what runs", 0.0, lambda: celery.send_signal(signal.SIGTERM)),
         (
             "give back what runs",

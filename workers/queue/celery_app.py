@@ -107,6 +107,13 @@ def _keep_storage_out(**_: object) -> None:
     forbid_in_this_process()
 
 
+@worker_init.connect  # type: ignore[untyped-decorator]
+def _forget_tasks_of_celery(**_: object) -> None:
+    """Only ours is run: a message that names chords, backend_cleanup or another is rejected."""
+    for name in [name for name in app.tasks if name.startswith("celery.")]:
+        app.tasks.unregister(name)
+
+
 @worker_process_init.connect  # type: ignore[untyped-decorator]
 def _leave_signals_to_the_parent(**_: object) -> None:
     """Slurm signals every process of a step: only the supervisor decides what TERM means."""

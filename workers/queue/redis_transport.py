@@ -1,14 +1,22 @@
-"""Celery's way to Redis, with one client a channel. Effects: kombu's.
+"""Celery's way to Redis, with one client a channel, deaf to what is no message. Effects: kombu's.
 
 kombu makes a redis-py client, with a table of some hundred callbacks, for each message taken and
-each acknowledged: a fifth of what a worker's parent process does for a short task.
+each acknowledged: a fifth of what a worker's parent process does for a short task. An element of a
+queue that is no JSON, or no envelope, would end the worker that takes it: it is dropped, and said.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import logging
+from collections.abc import Mapping
+from json import JSONDecodeError
+from typing import Any, Final
 
 from kombu.transport import redis as kombu_redis
+
+_log = logging.getLogger("pbrs.worker")
+_ENVELOPE: Final = {"body": str, "headers": dict, "properties": dict}
+_PROPERTIES: Final = {"delivery_tag": str, "delivery_info": dict}
 
 
 class Channel(kombu_redis.Channel):  # type: ignore[misc]
@@ -23,8 +31,25 @@ class Channel(kombu_redis.Channel):  # type: ignore[misc]
             self._kept = super()._create_client()
         return self._kept
 
+    def _brpop_read(self, **options: Any) -> Any:
+        try:
+            return super()._brpop_read(**options)
+        except (JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+            _log.error("dropped what is no message: %s", error)
+            return True
+
 
 class Transport(kombu_redis.Transport):  # type: ignore[misc]
     """kombu's transport with our channel."""
 
     Channel = Channel
+
+    def _deliver(self, message: Any, queue: str) -> None:
+        if _has(message, _ENVELOPE) and _has(message["properties"], _PROPERTIES):
+            super()._deliver(message, queue)
+        else:
+            _log.error("dropped what is no message from the queue %s", queue)
+
+
+def _has(value: Any, fields: Mapping[str, type]) -> bool:
+    return isinstance(value, dict) and all(isinstance(value.get(k), t) for k, t in fields.items())

@@ -10,6 +10,7 @@ import pytest
 from pbrs_farm.store.secret import Secret
 from tests.workers.conftest import spec
 from tests.workers.drive import BATCHES, ROOM, drive, with_config
+from tests.workers.redis_server import RedisServer
 from workers.config import FarmConfig
 from workers.coordinator.leader import Coordinator
 from workers.job import HouseEntry
@@ -187,3 +188,20 @@ def test_redis_away_or_wrong_password_is_one_line_without_it(config: FarmConfig)
         RedisLedger(away).ping()
     assert "hush" not in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_service_waits_for_redis_but_not_where_it_is_refused(
+    config: FarmConfig, redis_server: RedisServer
+) -> None:
+    tries = []
+    away = RedisLedger(replace(config, redis_url=Secret("redis://127.0.0.1:1/0")))
+    away.client.retry = None
+    with pytest.raises(LedgerUnavailable, match="no Redis at"):
+        away.wait_until_there(0.0, lambda: tries.append("away"))
+    RedisLedger(config).wait_until_there(60.0, lambda: tries.append("there"))
+    assert tries == ["away", "there"]
+    stranger = replace(
+        config, redis_url=Secret(f"redis://nobody:x@127.0.0.1:{redis_server.port}/0")
+    )
+    with pytest.raises(LedgerUnavailable, match="refuses these credentials"):
+        RedisLedger(stranger).wait_until_there(600.0)
