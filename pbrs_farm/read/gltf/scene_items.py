@@ -286,7 +286,7 @@ def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]
     if len(filled) == 1:
         (part, meshes), *_ = filled
         box = oriented_box(meshes, part.world_from_node)
-        return _across_last(box) if box else None
+        return across_last(box) if box else None
     world = thing.root.world_from_node
     is_opening = thing.seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     if not filled or not is_opening or abs(np.linalg.det(world[:3, :3])) < 1e-12:
@@ -299,7 +299,7 @@ def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]
         for m in meshes
     ]
     box = oriented_box(inner, world)
-    return _across_last(box) if box else None
+    return across_last(box) if box else None
 
 
 def _lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
@@ -360,7 +360,7 @@ def _finished(
     return item
 
 
-def _across_last(box: Box) -> Box:
+def across_last(box: Box) -> Box:
     """The box with its thinnest level axis last, so that a door's or window's front is +z."""
     level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
     if len(level) != 2:

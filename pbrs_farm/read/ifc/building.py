@@ -1,20 +1,529 @@
-"""An IFC building -> House. Effects: reads files."""
+"""An IFC building (.ifc, .ifczip) -> House. Effects: reads the file.
+
+Storeys are levels, spaces rooms; walls come with their openings cut. z up becomes y up.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
+import shapely
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import CEILING, FLOOR, LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import (
+    MAX_INSTANCES,
+    Box,
+    House,
+    Item,
+    ItemKind,
+    Level,
+    Material,
+    MaterialKind,
+    Room,
+    Source,
+    Surface,
+)
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.home.room_use import RoomKind, named_kind
+from pbrs_farm.installation import need
+from pbrs_farm.read.common.given_classes import GivenClass, given_class
+from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.room_floors import check_rooms, coverage, floor_polygon
 from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.gltf.materials import names_glass
+from pbrs_farm.read.gltf.node_classes import UNMAPPED, class_of_node_name
+from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at, rooms_from_floors
+from pbrs_farm.read.gltf.scene_items import across_last, assumed_light
+from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
+from pbrs_farm.read.ifc.model_file import model_of
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.triangulate import horizontal
+from pbrs_farm.read.suncg.wall_holes import openings
+
+Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+"""(x, y, z) with z up -> (x, z, -y) with y up."""
+_FAR_M: Final = 1000.0  # from the origin: coordinates of a national grid
+_CLEAR: Final = 0.3  # transparency of glass in a window
+_LEAST_HEIGHT_M: Final = 1.8  # of an attic that is a room
+_LEAST_ROOM_M: Final = 1.0  # of any other space
+_LEAST_ROOM_M2: Final = 0.3
+_COVERED: Final = 0.5  # share of a room that a slab covers to be its floor or ceiling
+_NEAR_M: Final = 0.35  # from a room's floor or ceiling to the slab that is it
+_BELOW_SLAB_M: Final = 0.005  # a room's own ceiling hangs so far below a slab
+_THIN_M: Final = 0.045  # a part of a window that is no thicker may be its glass
+_OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
+_ROOF: Final = frozenset({"roof", "attic", "dach", "dachraum", "dachboden", "loft", "чердак"})
 
 
 def read(path: Path, fields: ReadFields, models: str) -> House:
     """The House of the file. Raises BadHouse naming the place."""
-    raise BadHouse(path, "", "is not read yet")
+    need("ifcopenshell")
+    return _Building(path, fields).house()
 
 
 def companions(path: Path, models: str, files: SourceFiles) -> str:
     """Digest of what reading opens beside the file; "" where there is none."""
     return ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Space:
+    """An IfcSpace and the body that the library made of it."""
+
+    row: Any
+    mesh: ProductMesh
+
+
+class _Building:
+    """A building while it is read. State: what was found so far."""
+
+    def __init__(self, path: Path, fields: ReadFields) -> None:
+        self._path, self._fields = path, fields
+        self._notes = Notes(path.name, strict=fields.strict)
+        self._library = MaterialLibrary(self._notes)
+        self._model = model_of(path)
+        self._meshes: dict[int, ProductMesh] = {}
+        self._world = Y_UP.copy()
+        self._rooms_of_spaces: dict[int, str] = {}
+
+    def house(self) -> House:
+        """The House of the whole building."""
+        products = [p for p in self._model.by_type("IfcProduct") if p.Representation is not None]
+        products = [p for p in products if not _is_nothing(p)]
+        self._meshes = meshes_of_products(self._model, products, self._path.name, self._fields)
+        self._note_failed(products)
+        self._shift_to_origin()
+        items = list(self._items(products))
+        rooms = self._rooms(items)
+        if not rooms:
+            hint = "export its spaces or rooms, or its floor slabs, with it"
+            raise BadHouse(
+                self._path.name, "", "has no space and no floor between walls", hint=hint
+            )
+        check_rooms(rooms, self._path.name)
+        levels = self._levels(rooms)
+        items += self._covers(rooms, items)
+        items = [self._standing(item, levels, rooms) for item in items]
+        if len(items) > MAX_INSTANCES:
+            raise BadHouse(self._path.name, "", f"more than {MAX_INSTANCES} products")
+        sha256 = keys.sha256(self._path.read_bytes())
+        stem = self._path.stem
+        return House(
+            id=keys.house_id(stem, sha256),
+            name=stem,
+            source=Source("ifc", self._path.name, sha256),
+            levels=levels,
+            rooms=tuple(rooms),
+            items=tuple(items),
+            materials=self._library.materials,
+            textures={},
+            openings=openings(items),
+            notes=self._notes.all(),
+        )
+
+    def _note_failed(self, products: Sequence[Any]) -> None:
+        for product in products:
+            if product.id() not in self._meshes and _has_body(product):
+                place = f"#{product.id()} {product.is_a()} {product.Name or ''}"
+                self._notes.add(
+                    "unusable-model", place.strip(), "its shape cannot be made; left out"
+                )
+
+    def _shift_to_origin(self) -> None:
+        """Stand the building at the origin where it has the coordinates of a country."""
+        lows = [m.world.min(0) for m in self._meshes.values()]
+        if not lows:
+            return
+        # A site or a stray piece may lie far off: take the middle of all.
+        middle = np.median(np.array(lows), axis=0)
+        if np.abs(middle).max() <= _FAR_M:
+            return
+        shift = np.floor(middle)
+        self._world = Y_UP @ np.array(
+            [[1, 0, 0, -shift[0]], [0, 1, 0, -shift[1]], [0, 0, 1, -shift[2]], [0, 0, 0, 1.0]]
+        )
+        text = "moved to the origin from {:.0f}, {:.0f}, {:.0f}".format(*shift)
+        self._notes.add("moved-to-origin", "IfcSite", text)
+
+    # Products
+
+    def _items(self, products: Sequence[Any]) -> Iterator[Item]:
+        taken: set[str] = set()
+        for product in products:
+            mesh = self._meshes.get(product.id())
+            if mesh is None or product.is_a("IfcSpace") or product.is_a("IfcOpeningElement"):
+                continue
+            item = self._item(product, mesh)
+            if item is None:
+                continue
+            unique, k = item.id, 2
+            while unique in taken:
+                unique, k = f"{item.id}.{k}", k + 1
+            taken.add(unique)
+            yield replace(item, id=unique)
+
+    def _item(self, product: Any, mesh: ProductMesh) -> Item | None:
+        own = self._class(product, mesh)
+        if own is None:
+            return None
+        kind, nyu40, tags = own
+        name = str(product.Name or _type_name(product) or product.is_a())[:200]
+        world = self._world @ mesh.world_from_product
+        surfaces = tuple(self._surfaces(product, kind, mesh, world))
+        if not surfaces:
+            return None
+        bounds = np.concatenate([s.positions for s in surfaces])
+        if np.abs(bounds).max() > self._fields.max_extent_m:
+            if product.is_a("IfcSite") or kind is ItemKind.GROUND:
+                self._notes.add("far-away", f"#{product.id()}", "the land around is left out")
+                return None
+            text = f"stands farther than {self._fields.max_extent_m:g} m from the origin"
+            hint = "limit: read.max_extent_m"
+            raise BadHouse(self._path.name, f"#{product.id()} {name}", text, hint=hint)
+        item = Item(
+            id=str(product.GlobalId), name=name, kind=kind, level_id="", surfaces=surfaces,
+            nyu40=nyu40, source_class=product.is_a(), box=self._box(product, kind, mesh), tags=tags,
+        )  # fmt: skip
+        if kind is ItemKind.LAMP:
+            item = replace(item, lights=(assumed_light(item),), tags=(*tags, "assumed_light"))
+        return item
+
+    def _class(
+        self, product: Any, mesh: ProductMesh
+    ) -> tuple[ItemKind, int, tuple[str, ...]] | None:
+        """(kind, NYU40 class, tags); None of what is not drawn."""
+        given = _given(product)
+        place = f"#{product.id()} {product.is_a()}"
+        if given is not None and given.kind == "none":
+            return None
+        if product.is_a("IfcPlate") or product.is_a("IfcMember"):
+            return _part_of_wall(product, mesh)
+        if given is not None and given.nyu40 >= 0:
+            return given.item_kind, given.nyu40, _swing(product)
+        for word in (product.Name, product.ObjectType, _type_name(product)):
+            seen = class_of_node_name(str(word or ""))
+            if seen is not None:
+                kind = ItemKind.LAMP if seen.nyu40 == LAMP else seen.kind
+                return kind, seen.nyu40, ()
+        self._notes.add("unmapped-class", f"{place} {product.Name or ''}", "is otherprop")
+        return ItemKind.OBJECT, OTHERPROP, (UNMAPPED,)
+
+    def _surfaces(
+        self, product: Any, kind: ItemKind, mesh: ProductMesh, world: F64
+    ) -> Iterator[Surface]:
+        is_opening = kind in _OPENINGS
+        materials = [self._material(s, kind) for s in mesh.styles]
+        style_of_face = mesh.style_of_face
+        panes = np.zeros(len(mesh.faces), np.bool_)
+        clear = (MaterialKind.PANE, MaterialKind.GLASS)
+        if kind is ItemKind.WINDOW and not any(m.kind in clear for m in materials):
+            panes = _glass_parts(mesh)
+        for k in (-1, *range(len(materials))):
+            for is_pane in (False, True):
+                chosen = (style_of_face == k) & (panes == is_pane)
+                if not chosen.any():
+                    continue
+                material = materials[k] if k >= 0 else self._unstyled(product)
+                if is_pane and is_opening:
+                    material = replace(material, kind=MaterialKind.PANE, opacity=PANE_OPACITY)
+                used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+                part = mesh.positions[used]
+                whole = Mesh(
+                    "", "", part, faces.reshape(-1, 3).astype(np.int32), None, np.zeros_like(part)
+                )
+                name = material.name or f"part {k}"
+                index = self._library.index(material)
+                surface = placed(whole, world, name=name, material=index)
+                if surface is not None:
+                    yield surface
+
+    def _material(self, style: Style, kind: ItemKind) -> Material:
+        clear = MaterialKind.PANE if kind in _OPENINGS else MaterialKind.GLASS
+        is_glass = style.transparency >= _CLEAR or (
+            kind in _OPENINGS and style.transparency == 0 and names_glass(style.name)
+        )
+        opacity = 1.0 - style.transparency if style.transparency >= _CLEAR else PANE_OPACITY
+        return Material(
+            style.name, kind=clear if is_glass else MaterialKind.OPAQUE,
+            diffuse=style.rgb or (0.8, 0.8, 0.8), opacity=opacity if is_glass else 1.0,
+            is_default=style.rgb is None,
+        )  # fmt: skip
+
+    def _unstyled(self, product: Any) -> Material:
+        """The material of what has no style: its name says what it is made of, no colour."""
+        import ifcopenshell.util.element as element
+
+        found = element.get_material(product, should_skip_usage=True)
+        name = str(getattr(found, "Name", None) or getattr(found, "LayerSetName", None) or "")
+        return Material(name[:100], diffuse=(0.8, 0.8, 0.8), is_default=True)
+
+    def _box(self, product: Any, kind: ItemKind, mesh: ProductMesh) -> Box | None:
+        """The box in the product's own frame; of a door or window its hole's, where it fills one."""
+        if kind.is_structure:
+            return None
+        source = mesh
+        for fills in getattr(product, "FillsVoids", None) or ():
+            source = self._meshes.get(fills.RelatingOpeningElement.id(), source)
+        whole = Mesh(
+            "", "", source.positions, source.faces.astype(np.int32), None, source.positions
+        )
+        found = oriented_box([whole], self._world @ source.world_from_product)
+        if found is not None and int(np.abs(found.axes[1]).argmax()) == 2:
+            # Right, up and front are the product's x, z and -y.
+            axes = found.axes[:, [0, 2, 1]] * [1, 1, -1]
+            found = Box(found.centre, found.half[[0, 2, 1]], axes)
+        return across_last(found) if found is not None and kind in _OPENINGS else found
+
+    # Rooms and levels
+
+    def _rooms(self, items: Sequence[Item]) -> list[Room]:
+        spaces = [
+            _Space(row, self._meshes[row.id()])
+            for row in self._model.by_type("IfcSpace")
+            if row.id() in self._meshes
+        ]
+        found = [(s, room) for s in spaces if (room := self._room(s)) is not None]
+        if not found:
+            inside = rooms_from_floors(items)
+            return list(levels_of([r for r in inside if _is_walled(r, items)])[1])
+        _, numbered = levels_of([room for _, room in found])
+        # Numbered in the order they were given.
+        for (space, _), room in zip(found, numbered, strict=True):
+            self._rooms_of_spaces[space.row.id()] = room.id
+        return list(numbered)
+
+    def _room(self, space: _Space) -> Room | None:
+        row, mesh = space.row, space.mesh
+        world = self._world @ mesh.world_from_product
+        points = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
+        low, high = float(points[:, 1].min()), float(points[:, 1].max())
+        name = str(row.LongName or row.Name or "")[:60]
+        place = f"#{row.id()} {name}".strip()
+        is_attic = bool(set(name.lower().split()) & _ROOF)
+        if high - low < (_LEAST_HEIGHT_M if is_attic else _LEAST_ROOM_M):
+            self._notes.add("degenerate-room", place, f"is {high - low:.2f} m high; left out")
+            return None
+        # The lower face, turned to look up.
+        near = points[mesh.faces][:, :, 1].max(1) < low + _NEAR_M
+        faces = np.ascontiguousarray(mesh.faces[near][:, ::-1], np.int32)
+        polygon = floor_polygon([Surface("", points, faces, 0)], []) if len(faces) else None
+        if polygon is None or shapely.Polygon(polygon).area < _LEAST_ROOM_M2:
+            self._notes.add("degenerate-room", place, "has no floor; left out")
+            return None
+        return Room(
+            id="", name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
+            types=(str(row.ObjectType)[:60],) if row.ObjectType else (),
+        )  # fmt: skip
+
+    def _levels(self, rooms: Sequence[Room]) -> tuple[Level, ...]:
+        """Levels by the rooms' floors, with the names of the storeys that are nearest."""
+        import ifcopenshell.util.unit
+
+        scale = float(ifcopenshell.util.unit.calculate_unit_scale(self._model))
+        storeys = []
+        for row in self._model.by_type("IfcBuildingStorey"):
+            if row.Elevation is not None and np.isfinite(row.Elevation):
+                y = float(row.Elevation) * scale + float(self._world[1, 3])
+                storeys.append((y, str(row.LongName or row.Name or "")[:60]))
+        levels, _ = levels_of(rooms)
+        found = []
+        for level in levels:
+            near = min(storeys, key=lambda s: abs(s[0] - level.elevation), default=(np.inf, ""))
+            is_named = abs(near[0] - level.elevation) < 1.0 and near[1]
+            found.append(replace(level, name=near[1]) if is_named else level)
+        return tuple(found)
+
+    def _covers(self, rooms: Sequence[Room], items: Sequence[Item]) -> list[Item]:
+        """A floor or a ceiling for each room over or under which the building has none.
+
+        A slab is the floor of what is above; its underside gets the ceiling of the room below.
+        """
+        white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
+        found: list[Item] = []
+        for room in rooms:
+            is_open = named_kind(" ".join((*room.types, room.name))) is RoomKind.OUTDOOR
+            floors = _heights(items, ItemKind.FLOOR, room, room.floor_y, _top)
+            if not floors:
+                surface = horizontal("floor", [[room.polygon]], room.floor_y, white, up=True)
+                found.append(_cover(room, ItemKind.FLOOR, surface))
+            ceilings = _heights(items, ItemKind.CEILING, room, room.ceiling_y, _bottom)
+            slabs = _heights(items, ItemKind.FLOOR, room, room.ceiling_y, _bottom)
+            if ceilings or (is_open and not slabs):
+                continue
+            y = min([room.ceiling_y, *slabs]) - _BELOW_SLAB_M
+            surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
+            found.append(_cover(room, ItemKind.CEILING, surface))
+        return found
+
+    def _standing(self, item: Item, levels: tuple[Level, ...], rooms: Sequence[Room]) -> Item:
+        """The item with its level, and its room unless it is a wall."""
+        level_id = level_of(levels, float(item.bounds[0, 1]))
+        room_id = None if item.kind is ItemKind.WALL else room_at(rooms, item.bounds.mean(0))
+        return replace(item, level_id=level_id, room_id=item.room_id or room_id)
+
+
+def _is_nothing(product: Any) -> bool:
+    return any(
+        product.is_a(e) for e in ("IfcAnnotation", "IfcGrid", "IfcVirtualElement", "IfcPort")
+    )
+
+
+def _has_body(product: Any) -> bool:
+    """Whether a product has a shape in space, not an axis or a footprint alone."""
+    rows = getattr(product.Representation, "Representations", None) or ()
+    names = {str(r.RepresentationIdentifier or "Body") for r in rows}
+    return bool(names & {"Body", "Facetation", "Body-FallBack"})
+
+
+def _type_name(product: Any) -> str:
+    import ifcopenshell.util.element as element
+
+    found = element.get_type(product)
+    return str(found.Name or "") if found is not None else ""
+
+
+def _given(product: Any) -> GivenClass | None:
+    """The table's row for entity and predefined type, the product's own or its type's."""
+    import ifcopenshell.util.element as element
+
+    kind = element.get_type(product)
+    names = []
+    for row in (product, kind):
+        if row is None:
+            continue
+        entity = row.is_a().removesuffix("Type").removesuffix("Style")
+        told = getattr(row, "PredefinedType", None)
+        if told:
+            names.append(f"{entity} {told}")
+        names.append(entity)
+    for name in sorted(names, key=lambda n: " " not in n):
+        if (found := given_class("ifc", name)) is not None:
+            return found
+    if product.is_a("IfcSlab"):
+        return GivenClass("floor", FLOOR)
+    # A newer or older entity is what it is a kind of.
+    for entity in (
+        "IfcWall",
+        "IfcDoor",
+        "IfcWindow",
+        "IfcRoof",
+        "IfcStair",
+        "IfcColumn",
+        "IfcBeam",
+    ):
+        if product.is_a(entity):
+            return given_class("ifc", entity)
+    return None
+
+
+def _part_of_wall(product: Any, mesh: ProductMesh) -> tuple[ItemKind, int, tuple[str, ...]]:
+    """What a plate or a bar is: glass of a curtain wall is a window, other plates are wall."""
+    in_wall = any(
+        rel.RelatingObject.is_a("IfcCurtainWall")
+        for rel in getattr(product, "Decomposes", ()) or ()
+    )
+    is_glass = any(s.transparency >= _CLEAR or names_glass(s.name) for s in mesh.styles)
+    is_glass = is_glass or names_glass(f"{product.Name or ''} {_type_name(product)}")
+    if product.is_a("IfcPlate") and is_glass:
+        return ItemKind.WINDOW, 9, ("curtain-wall",) if in_wall else ()
+    if product.is_a("IfcPlate") and in_wall:
+        return ItemKind.WALL, 1, ("curtain-wall",)
+    return ItemKind.OBJECT, 38, ("curtain-wall",) if in_wall else ()
+
+
+def _swing(product: Any) -> tuple[str, ...]:
+    """Tags of how a door opens, by its own or its type's OperationType."""
+    import ifcopenshell.util.element as element
+
+    if not product.is_a("IfcDoor"):
+        return ()
+    kind = element.get_type(product)
+    told = getattr(product, "OperationType", None) or getattr(kind, "OperationType", None)
+    word = str(told or "")
+    if "ROLLINGUP" in word:
+        return ("garage",)
+    if "SLIDING" in word or "FOLDING" in word:
+        return ("sliding",)
+    if word.endswith("LEFT") or word.endswith("RIGHT"):
+        return ("hinge:left" if word.endswith("LEFT") else "hinge:right",)
+    return ()
+
+
+def _glass_parts(mesh: ProductMesh) -> Any:
+    """(F,) faces of the thin, large parts of a window without a clear style: its glass."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    rows, columns = mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel()
+    n = len(mesh.positions)
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    part = label[mesh.faces[:, 0]]
+    size = np.ptp(mesh.positions, axis=0)
+    whole = np.sort(size)[1:].prod()
+    panes = np.zeros(len(mesh.faces), np.bool_)
+    for k in np.unique(part):
+        extent = np.sort(np.ptp(mesh.positions[mesh.faces[part == k]].reshape(-1, 3), axis=0))
+        is_pane = extent[0] <= _THIN_M and extent[1] > 5 * extent[0] and extent[1] > 0.15
+        panes |= (part == k) & bool(is_pane and extent[1:].prod() > 0.15 * whole)
+    return panes
+
+
+def _top(item: Item) -> float:
+    return float(item.bounds[1, 1])
+
+
+def _bottom(item: Item) -> float:
+    return float(item.bounds[0, 1])
+
+
+def _heights(items: Sequence[Item], kind: ItemKind, room: Room, y: float, of: Any) -> list[float]:
+    """The heights (of: an item's top or bottom) near y of the items that cover the room."""
+    low, high = room.polygon.min(0), room.polygon.max(0)
+    found = []
+    for item in items:
+        if item.kind is not kind or abs(of(item) - y) > _NEAR_M:
+            continue
+        plan = item.bounds[:, [0, 2]]
+        if (plan[0] < high).all() and (plan[1] > low).all():
+            share = sum(coverage(s, room.polygon) for s in item.surfaces)
+            if share > _COVERED:
+                found.append(of(item))
+    return found
+
+
+def _cover(room: Room, kind: ItemKind, surface: Surface) -> Item:
+    nyu40 = FLOOR if kind is ItemKind.FLOOR else CEILING
+    return Item(
+        id=f"{kind}_{room.id}", name=f"{room.name} {kind}".strip(), kind=kind, level_id="",
+        surfaces=(surface,), nyu40=nyu40, source_class="IfcSpace", room_id=room.id,
+    )  # fmt: skip
+
+
+def _is_walled(room: Room, items: Sequence[Item]) -> bool:
+    """Whether walls stand around most of a room's outline: a terrace has none."""
+    ring: Any = shapely.Polygon(room.polygon).exterior
+    points = shapely.points(
+        [ring.interpolate(d).coords[0] for d in np.arange(0, ring.length, 0.25)]
+    )
+    lines: list[Any] = []
+    for item in items:
+        if item.kind is not ItemKind.WALL:
+            continue
+        for s in item.surfaces:
+            plan = s.positions[s.faces][:, :, [0, 2]]
+            lines.append(shapely.linestrings(np.concatenate([plan, plan[:, :1]], axis=1)))
+    if not lines:
+        return False
+    tree = shapely.STRtree(np.concatenate(lines))
+    _, distance = tree.query_nearest(points, return_distance=True, all_matches=False)
+    return bool((distance < 0.15).mean() > 0.7)

@@ -11,8 +11,10 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 from benchmarks.inputs.usd_files import UsdHome, set_label, walls_of
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, MaterialKind
-from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.repair import repair
+from tests.repair.embree import EmbreeOccluder
 
 
 def room_home(path: Path, unit: float = 1.0, up: str = "Z") -> UsdHome:
@@ -311,3 +313,13 @@ def test_a_cycle_of_references_is_a_note(tmp_path: Path) -> None:
     home = room_home(tmp_path / "a.usda")
     home.stage.DefinePrim("/World/Again").GetReferences().AddInternalReference("/World")
     assert [n.kind for n in read(home).notes] == ["reference-cycle"]
+
+
+def test_a_repaired_stage_leaks_no_ray_and_keeps_walls_and_openings(tmp_path: Path) -> None:
+    house = read(room_home(tmp_path / "a.usda"))
+    repaired, report = repair(house, RepairFields(), occluder_from=EmbreeOccluder)
+    assert report.leaks is not None
+    assert report.leaks.n_rays > 0
+    assert (report.leaks.n_sky, report.leaks.closed_share) == (0, pytest.approx(1))
+    assert "wall-lost" not in {n.kind for n in repaired.notes}
+    assert len(repaired.openings) == len(house.openings) == 1

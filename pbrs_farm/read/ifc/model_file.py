@@ -1,0 +1,122 @@
+"""An IFC file as the library parses it, after what would hang or kill the library is refused.
+
+Effects: reads files. References of IFC lead from a row to rows that it is made of, never back.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.common.source_files import ZipResources
+from pbrs_farm.regular_files import read_given
+
+_MOST_BYTES: Final = 512 * 2**20
+_MOST_ROWS: Final = 5_000_000
+_STRING: Final = re.compile(rb"'(?:[^']|'')*'")
+_COMMENT: Final = re.compile(rb"/\*.*?\*/", re.DOTALL)
+_NUMBER: Final = re.compile(rb"#(\d{1,18})(\s*=)?")
+_NAMED: Final = ("Name", "Description", "ObjectType", "Tag", "LongName", "ElementType")
+
+
+def model_of(path: Path) -> Any:
+    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse naming the row that is wrong."""
+    import ifcopenshell
+
+    data = _bytes_of(path)
+    _check(data, path)
+    try:
+        model = ifcopenshell.file.from_string(data.decode("utf-8", "replace"))
+    except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
+        text = " ".join(str(error).split())[:200] or "the library cannot parse it"
+        raise BadHouse(path, "", f"damaged: {text}") from None
+    if model is None or not model.by_type("IfcProject"):
+        raise BadHouse(path, "", "has no IfcProject", hint="export the whole model again")
+    _mend_names(model)
+    return model
+
+
+def _bytes_of(path: Path) -> bytes:
+    if path.suffix.lower() != ".ifczip":
+        return read_given(path, error=BadHouse)
+    archive = ZipResources(path, path.name)
+    names = [n for n in archive.names() if n.lower().endswith((".ifc", ".ifcxml"))]
+    if len(names) != 1:
+        raise BadHouse(path, "", f"holds {len(names)} IFC files, expected one")
+    return archive.read(names[0]) or b""
+
+
+def _check(data: bytes, path: Path) -> None:
+    """Raise BadHouse for what is no IFC in STEP's form, or damaged so that the library may not end."""
+    head = data[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
+    hint = "export it as IFC (.ifc, STEP), IFC2x3 or IFC4"
+    if head[:1] == b"<":
+        raise BadHouse(path, "", "is IFCXML, which is not read", hint=hint)
+    if head[:1] in (b"{", b"["):
+        raise BadHouse(path, "", "is JSON (IFC5), which is not read", hint=hint)
+    if not head.startswith(b"ISO-10303-21"):
+        raise BadHouse(path, "", "is no IFC file: it does not begin with ISO-10303-21")
+    if len(data) > _MOST_BYTES:
+        raise BadHouse(path, "", f"is larger than {_MOST_BYTES // 2**20} MB")
+    plain = _STRING.sub(b"''", data)
+    if plain.count(b"'") % 2:
+        line = 1 + data.count(b"\n", 0, _last_quote(data))
+        raise BadHouse(path, f"line {line}", "a string is not closed")
+    plain = _COMMENT.sub(b"", plain)
+    if b"/*" in plain:
+        raise BadHouse(path, "", "a comment is not closed")
+    if b"END-ISO-10303-21" not in plain:
+        raise BadHouse(path, "", "is cut short: its end is missing", hint="copy it again")
+    _check_references(plain[plain.find(b"DATA;") :], path)
+
+
+def _last_quote(data: bytes) -> int:
+    """Where the string begins that does not end."""
+    at = 0
+    for found in _STRING.finditer(data):
+        at = found.end()
+    return data.find(b"'", at)
+
+
+def _check_references(plain: bytes, path: Path) -> None:
+    tokens = _NUMBER.findall(plain)
+    if not tokens:
+        raise BadHouse(path, "DATA", "is empty")
+    numbers = np.array([int(n) for n, _ in tokens], np.int64)
+    begins = np.array([bool(e) for _, e in tokens])
+    if begins.sum() > _MOST_ROWS:
+        raise BadHouse(path, "DATA", f"has more than {_MOST_ROWS} rows")
+    ids, counts = np.unique(numbers[begins], return_counts=True)
+    if (counts > 1).any():
+        raise BadHouse(path, f"#{ids[counts > 1][0]}", "is there twice")
+    # Each number belongs to the row that began before it.
+    row = np.cumsum(begins) - 1
+    is_use = ~begins & (row >= 0)
+    used, user = numbers[is_use], numbers[begins][row[is_use]]
+    place = np.searchsorted(ids, used)
+    is_known = (place < len(ids)) & (ids[np.minimum(place, len(ids) - 1)] == used)
+    if not is_known.all():
+        k = int(np.flatnonzero(~is_known)[0])
+        raise BadHouse(path, f"#{user[k]}", f"names #{used[k]}, which does not exist")
+    start = np.searchsorted(ids, user)
+    graph = coo_array((np.ones(len(start), np.int8), (start, place)), shape=(len(ids), len(ids)))
+    _, label = connected_components(graph, directed=True, connection="strong")
+    is_cyclic = (np.bincount(label) > 1)[label]
+    is_cyclic[start[start == place]] = True
+    if is_cyclic.any():
+        raise BadHouse(path, f"#{ids[is_cyclic][0]}", "is made of itself: a cycle of references")
+
+
+def _mend_names(model: Any) -> None:
+    """Set names that read as nothing to nothing: one program writes `*` there, and meshing fails."""
+    for entity in ("IfcProduct", "IfcTypeProduct", "IfcMaterial", "IfcPresentationStyle"):
+        for row in model.by_type(entity):
+            for name in _NAMED:
+                if getattr(row, name, "") is None:
+                    setattr(row, name, None)
