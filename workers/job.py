@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import cache
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from pbrs_farm.core import keys
+from pbrs_farm.core import edits, keys, made_home
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
+
+
+@cache
+def work_version() -> str:
+    """What a worker of this installation makes of a task: workers of one such version make the same.
+
+    It follows the versions of the steps, not the package's: an upgrade that changes no stored byte
+    changes nothing here, and a running job goes on.
+    """
+    from pbrs_farm.run import dressed_house, plan
+
+    steps = {name: step.version for name, step in plan.STEPS.items()}
+    houses = (dressed_house.VERSION, dressed_house.STAND_INS_VERSION, edits.VERSION)
+    return keys.digest(steps, houses, made_home.VERSION)[:12]
+
 
 # What a job is and where its own objects are stored.
 
@@ -43,7 +59,8 @@ class JobSpec(BaseModel):
         frozen=True, extra="forbid", validate_by_name=True, serialize_by_alias=True
     )
     job_id: str
-    version: str
+    version: str  # work_version of who submitted or adopted it
+    versions_before: tuple[str, ...] = ()  # by which it was worked on before it was adopted
     recipe: Recipe
     modes: tuple[str, ...] = ()
     layers: tuple[str, ...] = ()
@@ -61,7 +78,15 @@ class JobSpec(BaseModel):
 
 
 # What is decided when a job is entered and changes nothing of what it makes.
-_NOT_WORK = {"job_id", "priority", "rules", "n_houses", "min_batches", "seconds_per_view"}
+_NOT_WORK = {
+    "job_id",
+    "priority",
+    "rules",
+    "n_houses",
+    "min_batches",
+    "seconds_per_view",
+    "versions_before",
+}
 
 
 def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:

@@ -21,7 +21,7 @@ GROUPS: Final = {
     "train and judge": ("train", "evaluate", "ablation"),
     "run on many machines": (
         "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",
-        "priority", "reduce", "workers", "drain", "recover", "coordinator", "worker",
+        "priority", "reduce", "workers", "drain", "recover", "adopt", "coordinator", "worker",
     ),
 }  # fmt: skip
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add status, why, logs, failures, retry, pause ... reduce, drain, workers, recover; services."""
+    """Add status, why, logs, failures, retry, pause ... reduce, drain, workers, recover, adopt; services."""
 
     def farm_verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:
         p = verb(name, handler, text)
@@ -77,6 +77,11 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--undo", action="store_true", help="let it stay")
     farm_verb("workers", _workers, "the farm's workers")
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
+    p.set_defaults(what="recover")
+    p.add_argument("job")
+    text = "go on with a job of another version: what this one would make alike stays"
+    p = farm_verb("adopt", _recover, text)
+    p.set_defaults(what="adopt")
     p.add_argument("job")
     # The two services of the farm.
     verb("coordinator", _coordinator, "lead the farm, or stand by")
@@ -216,9 +221,9 @@ def _recover(args: argparse.Namespace) -> int:
     farm = farm_of(args)
 
     def progress(line: str) -> None:
-        sys.stderr.write(f"recover: {line}\n")
+        sys.stderr.write(f"{args.what}: {line}\n")
 
-    farm.recover(args.job, progress)
+    getattr(farm, args.what)(args.job, progress)
     status = farm.status(args.job)
     _show(args, status, lambda: status_text(status))
     return 0

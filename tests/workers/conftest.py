@@ -13,7 +13,7 @@ from pbrs_farm.store.secret import Secret
 from tests.workers.redis_server import RedisServer
 from tests.workers.small_farm import SmallFarm
 from workers.config import FarmConfig
-from workers.job import JobRules, JobSpec
+from workers.job import JobRules, JobSpec, work_version
 from workers.ledger.redis_ledger import RedisLedger
 
 JOB_ID = "0123456789ab"
@@ -64,7 +64,7 @@ def ledger(config: FarmConfig) -> Iterator[RedisLedger]:
 def spec(n_houses: int, job_id: str = JOB_ID, **rules: object) -> JobSpec:
     return JobSpec(
         job_id=job_id,
-        version="0.1.0",
+        version=work_version(),
         recipe=recipe_from_name("preview"),
         n_houses=n_houses,
         rules=JobRules.model_validate(rules),

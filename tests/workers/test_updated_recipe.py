@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
+import pbrs_farm
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.run import plan
+from tests.workers.drive import Drive
 from tests.workers.fake_runner import batches_of
 from tests.workers.test_operating import HOUSES, farm
 from workers.client.farm_client import Farm, new_spec
 from workers.ids import job_key
+from workers.job import work_version
 
 __all__ = ["farm"]  # a fixture
 
@@ -38,6 +46,40 @@ def test_every_house_begins_anew_and_does_so_after_a_recovery_too(farm: Farm) ->
     assert done_and_waiting(farm, second) == (0, 3)
     farm.recover(second)
     assert done_and_waiting(farm, second) == (0, 3)
+
+
+def test_a_job_of_another_version_goes_on_once_it_is_adopted(farm: Farm) -> None:
+    job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
+    made = farm.spec(job)
+    # As another version submitted it: what it stored is made again by this one.
+    finish_all(farm)
+    old = made.model_copy(update={"version": "0.0.9"})
+    farm.store.put(job_key(job), old.model_dump_json().encode())
+    farm.recover(job)
+    (task,) = Drive(farm.ledger, old).dispatch()[:1]
+    claim = farm.ledger.claim(job, task, token="t", recipe=made.recipe.digest())
+    assert claim.verdict == "version"
+    for _ in range(2):
+        farm.adopt(job)
+        assert farm.spec(job).versions_before == ("0.0.9",)
+        assert done_and_waiting(farm, job) == (0, 3)
+    d = Drive(farm.ledger, farm.spec(job))
+    (task, *_) = d.dispatch()
+    assert farm.ledger.claim(job, task, token="t", recipe=made.recipe.digest()).verdict == "run"
+
+
+def test_the_version_of_a_job_follows_the_steps_and_not_the_package(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = work_version()
+    monkeypatch.setattr(pbrs_farm, "__version__", "9.9")
+    work_version.cache_clear()
+    assert work_version() == before
+    changed = replace(plan.STEPS["develop"], version=99)
+    monkeypatch.setitem(plan.STEPS, "develop", changed)
+    work_version.cache_clear()
+    assert work_version() != before
+    work_version.cache_clear()
 
 
 def test_markers_of_another_version_do_not_count_either(farm: Farm) -> None:

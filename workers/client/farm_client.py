@@ -18,7 +18,6 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import pbrs_farm
 from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.store import Store, store_from_url
@@ -261,6 +260,20 @@ class Farm:
         assert view is not None
         return view
 
+    def adopt(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
+        """Let workers of this version go on with a job of another one.
+
+        What it stored and this version would make alike stays; the rest is made again.
+        """
+        from workers.job import work_version
+
+        spec = self.spec(job)
+        if spec.version != work_version():
+            before = (*spec.versions_before, spec.version)
+            spec = spec.model_copy(update={"version": work_version(), "versions_before": before})
+            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+        return self.recover(job, progress)
+
     def spec(self, job: str) -> JobSpec:
         """What the job was submitted with; BadInput when the store knows no such job."""
         from pbrs_farm.core.checked_json import checked
@@ -498,10 +511,10 @@ def completed(
 
 def new_spec(recipe: Recipe, **fields: Any) -> JobSpec:
     """A JobSpec of this version; its id is set by submit."""
-    from workers.job import JobSpec
+    from workers.job import JobSpec, work_version
 
     return JobSpec.model_validate(
-        {"job_id": "", "version": pbrs_farm.__version__, "recipe": recipe, **fields}
+        {"job_id": "", "version": work_version(), "recipe": recipe, **fields}
     )
 
 

@@ -62,7 +62,8 @@ def names_tell(store: Store, spec: JobSpec) -> bool:
         return False
     # Every job that ever ran here left its description.
     jobs = [key for key in store.list("jobs/") if key.endswith("/job.json")]
-    return all(json.loads(store.get(key)).get("version") == spec.version for key in jobs)
+    rows = (json.loads(store.get(key)) for key in jobs)
+    return all(r.get("version") == spec.version and not r.get("versions_before") for r in rows)
 
 
 def done_steps(store: Store) -> dict[str, frozenset[str]]:

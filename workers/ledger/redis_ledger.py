@@ -18,7 +18,6 @@ import redis
 from redis.backoff import ExponentialWithJitterBackoff
 from redis.retry import Retry
 
-import pbrs_farm
 from workers.config import FarmConfig, shown_url
 from workers.ids import LEASES, LIGHT_GPU, STAGES
 from workers.ledger.task_ledger import (
@@ -204,11 +203,12 @@ class RedisLedger:
 
     def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
         """May this worker run the task? The attempt is counted before the answer."""
+        from workers.job import work_version
+
         config = self.config
-        version = pbrs_farm.__version__
         verdict, detail, inputs = self._run(
-            "claim", job, task, token, config.worker, version, recipe, config.lease_s, int(direct),
-            config.store_id,
+            "claim", job, task, token, config.worker, work_version(), recipe, config.lease_s,
+            int(direct), config.store_id,
         )  # fmt: skip
         return Claim(verdict, detail, inputs, token)
 

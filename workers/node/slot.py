@@ -232,6 +232,8 @@ class Slot:
             self._release_dead_sibling(job, task, claim.detail)
         if claim.verdict in ("version", "recipe", "store"):
             reason = f"job {job} wants {claim.verdict} {claim.detail}"
+            if claim.verdict == "version":
+                reason = f"job {job} has steps of another version; `pbrs-farm adopt {job}`"
             if claim.verdict == "store":
                 reason = f"job {job} lies in another store than {shown_url(self._config.store_url)}"
             with contextlib.suppress(LedgerUnavailable):

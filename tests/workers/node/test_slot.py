@@ -185,7 +185,9 @@ def test_a_refused_task_starts_no_process(bench: Bench) -> None:
     bench.ledger.refusal = Claim("version", "9.9")
     bench.run()
     assert bench.started == []
-    assert bench.registry.refusals == [f"job {JOB} wants version 9.9"]
+    assert bench.registry.refusals == [
+        f"job {JOB} has steps of another version; `pbrs-farm adopt {JOB}`"
+    ]
     assert bench.clock.now == 1.0  # it waits, so that others may take the task
 
 
