@@ -29,6 +29,7 @@ from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import Occluder, leaks_of_house
+from pbrs_farm.repair.mirrors import with_mirrors
 from pbrs_farm.repair.repair_report import (
     FacesReport,
     Removed,
@@ -175,6 +176,7 @@ def repair(
     house, removed = without_persons_and_plants(house, fields)
     house, faces = with_sound_faces(house)
     house, n_white = with_white_walls(house, fields.default_wall_rgb)
+    house, mirrors = with_mirrors(house)
 
     # Make walls, floors and ceilings watertight, with the openings cut.
     structure = repaired_structure(house, fields.wall_thickness_m)
@@ -196,6 +198,7 @@ def repair(
         house_id=house.id,
         removed=(*removed, *swallowed),
         faces=faces,
+        mirrors=mirrors,
         structure=structure.report.model_copy(
             update={"n_walls_made_white": n_white, "n_frames_moved": n_apart}
         ),

@@ -157,6 +157,7 @@ class RepairReport(Record):
     removed: tuple[Removed, ...] = ()
     faces: FacesReport = FacesReport()
     structure: StructureReport = StructureReport()
+    mirrors: tuple[str, ...] = ()  # ids of items that were drawn as boards and mirror now
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
     added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones
@@ -210,6 +211,8 @@ def _structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(faces.n_degenerate_dropped, 'face')} without area dropped."
     if faces.n_turned:
         yield f"{_n(faces.n_turned, 'face')} looked against their own normals and were turned."
+    if report.mirrors:
+        yield f"{_n(len(report.mirrors), 'mirror')} that did not mirror got a mirror's surface."
     # Say what was done to walls, floors, ceilings and openings.
     s = report.structure
     if s.n_walls_thickened:

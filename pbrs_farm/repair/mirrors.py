@@ -1,0 +1,141 @@
+"""Mirrors mirror, whatever their source says: the large flat part of a piece of that class; no effects.
+
+Sources draw a mirror as a white or grey board, with or without a frame. What faces the room in the
+plane that holds most of the piece's area becomes a mirror's surface; frame, back and sides stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.classes import MIRROR
+from pbrs_farm.core.house import (
+    House,
+    Item,
+    Material,
+    MaterialKind,
+    Room,
+    Surface,
+    corners_of_surfaces,
+)
+from pbrs_farm.core.mesh import face_areas, unit_normals
+
+_REFLECTANCE: Final = 0.9
+_FLAT_COS: Final = 0.985  # of the angle between faces of one plane
+_PLANE_M: Final = 0.004  # across it
+_LEAST_M2: Final = 0.01  # of a mirror's glass
+_LEAST_SHARE: Final = 0.12  # of the piece's area
+_NEAR_BEST: Final = 0.7  # of the largest plane's area, from which facing the room decides
+
+
+def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
+    """The house whose mirrors mirror, and the ids of the items that did not before.
+
+    A piece that has a mirror's material anywhere stays as it is; so does one without a flat part.
+    """
+    materials = list(house.materials)
+    glass: dict[int, int] = {}  # material as read -> its mirror
+    rooms = {room.id: room for room in house.rooms}
+    items, made = [], []
+    for item in house.items:
+        kinds = {house.materials[s.material].kind for s in item.surfaces if len(s.faces)}
+        faces = None
+        if item.nyu40 == MIRROR and MaterialKind.MIRROR not in kinds:
+            faces = _glass_of(item, rooms)
+        if faces is None:
+            items.append(item)
+            continue
+        items.append(_with_glass(item, faces, materials, glass))
+        made.append(item.id)
+    return replace(house, items=tuple(items), materials=tuple(materials)), tuple(made)
+
+
+def _glass_of(item: Item, rooms: Mapping[str, Room]) -> Bools | None:
+    """(F,) which of all its faces, surface after surface, are its glass; None where none can be."""
+    corners = corners_of_surfaces(item.surfaces)
+    areas, normals = np.nan_to_num(face_areas(corners)), unit_normals(corners)
+    if not areas.size or areas.sum() <= 0:
+        return None
+    # Collect planes, from the largest face on.
+    offsets = np.einsum("ni,ni->n", normals, corners.mean(1))
+    left = areas > 0
+    planes: list[Bools] = []
+    while left.any() and len(planes) < 64:
+        first = int(np.argmax(np.where(left, areas, 0)))
+        plane = left & (normals @ normals[first] > _FLAT_COS)
+        plane &= np.abs(corners @ normals[first] - offsets[first]).max(1) < _PLANE_M
+        plane[first] = True
+        planes.append(plane)
+        left &= ~plane
+    sizes = np.array([areas[plane].sum() for plane in planes])
+    if sizes.max() < max(_LEAST_M2, _LEAST_SHARE * areas.sum()):
+        return None
+    # Front and back are often alike: the glass is what faces the room, and lies behind no other.
+    facing = [float(_towards_room(item, corners, rooms) @ normals[np.argmax(p)]) for p in planes]
+    best = [k for k in range(len(planes)) if sizes[k] >= _NEAR_BEST * sizes.max()]
+    return planes[max(best, key=lambda k: (round(facing[k], 2), sizes[k]))]
+
+
+def _towards_room(item: Item, corners: F64, rooms: Mapping[str, Room]) -> F64:
+    """(3,) unit, level, from the item to the middle of its room; (0, 0, 0) where it is in none."""
+    room = rooms.get(item.room_id or "")
+    if room is None:
+        return np.zeros(3)
+    points = corners.reshape(-1, 3)
+    middle = (points.min(0) + points.max(0)) / 2
+    x, z = np.asarray(room.polygon, np.float64).mean(0) - middle[[0, 2]]
+    length = float(np.hypot(x, z))
+    return np.array([x, 0.0, z]) / length if length > 0 else np.zeros(3)
+
+
+def _with_glass(item: Item, faces: Bools, materials: list[Material], glass: dict[int, int]) -> Item:
+    """The item with its glass: whole surfaces change material, of others a part becomes one more."""
+    surfaces, more = list(item.surfaces), []
+    ends = np.cumsum([len(s.faces) for s in item.surfaces])
+    for k, part in enumerate(np.split(faces, ends[:-1])):
+        if not part.any():
+            continue
+        surface = item.surfaces[k]
+        if surface.material not in glass:
+            glass[surface.material] = len(materials)
+            materials.append(_as_mirror(materials[surface.material]))
+        number = glass[surface.material]
+        if part.all():
+            surfaces[k] = replace(surface, material=number)
+            continue
+        surfaces[k] = _part(surface, ~part)
+        more.append(replace(_part(surface, part), name=f"{surface.name}_glass", material=number))
+    # New surfaces stand last, so that LightPart.emitting keeps its meaning.
+    return replace(item, surfaces=(*surfaces, *more))
+
+
+def _part(surface: Surface, faces: Bools) -> Surface:
+    # Without the vertices that only the rest uses.
+    used, numbers = np.unique(surface.faces[faces], return_inverse=True)
+    return replace(
+        surface,
+        positions=surface.positions[used],
+        faces=numbers.reshape(-1, 3).astype(np.int32),
+        uvs=None if surface.uvs is None else surface.uvs[used],
+        normals=None if surface.normals is None else surface.normals[used],
+    )
+
+
+def _as_mirror(material: Material) -> Material:
+    return replace(
+        material,
+        name=f"{material.name}_mirror",
+        kind=MaterialKind.MIRROR,
+        specular=(_REFLECTANCE,) * 3,
+        opacity=1.0,
+        texture_id=None,
+        alpha_cutout=False,
+        roughness=None,
+        roughness_texture_id=None,
+        normal_texture_id=None,
+    )

@@ -1,0 +1,106 @@
+"""A piece of class mirror has a mirror's surface where its large flat part faces the room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from pbrs_farm.core.classes import MIRROR
+from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
+from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.repair import repair
+from pbrs_farm.repair.mirrors import with_mirrors
+from tests.builders import builtin_home
+
+
+def board(name: str, size: tuple[float, float, float], at: tuple[float, float, float]) -> Surface:
+    box = trimesh.creation.box(size)
+    box.apply_translation(at)
+    return Surface(name, box.vertices.astype(np.float32), box.faces.astype(np.int32), 0)
+
+
+def with_item(surfaces: tuple[Surface, ...], *, nyu40: int = MIRROR, behind: bool = False) -> House:
+    """The small home with an item near the wall at small z, or at large z, of its first room."""
+    home = builtin_home()
+    room = home.rooms[0]
+    points = np.asarray(room.polygon)
+    x, z = points.mean(0)
+    z = points[:, 1].max() - 0.05 if behind else points[:, 1].min() + 0.05
+    moved = tuple(
+        replace(
+            s,
+            positions=s.positions + np.array([x, room.floor_y + 1.5, z], np.float32),
+            material=len(home.materials) + k,
+        )
+        for k, s in enumerate(surfaces)
+    )
+    item = Item(
+        "glass", "Mirror", ItemKind.OBJECT, room.level_id, moved, nyu40=nyu40, room_id=room.id
+    )
+    white = tuple(Material(f"white_{k}") for k in range(len(surfaces)))
+    return replace(home, items=(*home.items, item), materials=(*home.materials, *white))
+
+
+def glass_of(house: House) -> tuple[np.ndarray, float]:
+    """Mean normal and area of what mirrors of the item."""
+    item = next(i for i in house.items if i.id == "glass")
+    vectors = [
+        np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]).sum(0) / 2
+        for s in item.surfaces
+        if house.materials[s.material].kind is MaterialKind.MIRROR
+        for c in [s.positions[s.faces].astype(np.float64)]
+    ]
+    total = np.sum(vectors, axis=0) if vectors else np.zeros(3)
+    area = float(np.linalg.norm(total))
+    return total / max(area, 1e-9), area
+
+
+@pytest.mark.parametrize("behind", [False, True])
+def test_a_white_board_mirrors_on_the_side_that_faces_the_room(behind: bool) -> None:
+    house, made = with_mirrors(
+        with_item((board("all", (0.6, 0.9, 0.02), (0, 0, 0)),), behind=behind)
+    )
+    assert made == ("glass",)
+    normal, area = glass_of(house)
+    np.testing.assert_allclose(normal, [0, 0, -1.0 if behind else 1.0], atol=1e-6)
+    assert area == pytest.approx(0.54, abs=1e-5)
+    # No face is lost.
+    item = next(i for i in house.items if i.id == "glass")
+    assert item.n_faces == 12
+
+
+def test_the_frame_of_a_mirror_stays() -> None:
+    glass = board("glass", (0.5, 0.8, 0.01), (0, 0, 0))
+    frame = [board("frame", (0.04, 0.88, 0.03), (s * 0.27, 0, 0.005)) for s in (-1, 1)] + [
+        board("frame", (0.5, 0.04, 0.03), (0, s * 0.42, 0.005)) for s in (-1, 1)
+    ]
+    home = with_item((glass, *frame))
+    house, _made = with_mirrors(home)
+    normal, area = glass_of(house)
+    np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-6)
+    assert area == pytest.approx(0.4, abs=1e-5)
+    item = next(i for i in house.items if i.id == "glass")
+    kinds = [house.materials[s.material].kind for s in item.surfaces]
+    assert kinds.count(MaterialKind.MIRROR) == 1
+    assert kinds[1:5] == [MaterialKind.OPAQUE] * 4
+
+
+def test_what_mirrors_already_or_is_no_mirror_or_has_no_flat_part_stays() -> None:
+    sheet = board("all", (0.6, 0.9, 0.02), (0, 0, 0))
+    other = with_item((sheet,), nyu40=MIRROR - 1)
+    assert with_mirrors(other)[1] == ()
+    once, _made = with_mirrors(with_item((sheet,)))
+    again, made = with_mirrors(once)
+    assert made == ()
+    assert again.items == once.items
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.3)
+    round_one = Surface("ball", ball.vertices.astype(np.float32), ball.faces.astype(np.int32), 0)
+    assert with_mirrors(with_item((round_one,)))[1] == ()
+
+
+def test_repair_tells_which_mirrors_it_made() -> None:
+    _house, report = repair(with_item((board("all", (0.6, 0.9, 0.02), (0, 0, 0)),)), RepairFields())
+    assert report.mirrors == ("glass",)
