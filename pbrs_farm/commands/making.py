@@ -258,6 +258,8 @@ def _demo(args: argparse.Namespace) -> int:
             warn("going on with the built-in home")
             home = "builtin"
     args.dress = _demo_dressing(args)
+    # What a visitor sees first is a home by day, whatever its seed draws.
+    args.set = ["sky.time=day", *args.set]
     from pbrs_farm.gallery.sheet_parts import SheetParts
 
     with closing(SheetParts(Path(args.out))) as parts:

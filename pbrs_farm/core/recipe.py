@@ -159,7 +159,15 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "repair": ("lamp_in_every_room", "lamp_lx"),
     "selection": ("min_room_lx", "black_modes"),
     "tone": ("pictures", "white", "glare"),
-    "sky": ("sun_elevation_deg", "sun_azimuth_deg"),
+    "sky": (
+        "sun_elevation_deg",
+        "sun_azimuth_deg",
+        "time",
+        "overcast",
+        "hour",
+        "latitude_deg",
+        "day_of_year",
+    ),
 }
 
 _PHOTO: Mapping[str, Any] = {
@@ -187,12 +195,14 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 10},
+        "sky": {"time": "drawn"},
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
         "cameras": _PHOTO,
         "light": {"spp": 28},
+        "sky": {"time": "drawn"},
         "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},

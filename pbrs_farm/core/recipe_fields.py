@@ -271,14 +271,31 @@ class SkyFields(FieldGroup):
         "",
         description="folder of latitude-longitude HDR pictures, or one; empty = `pbrs-farm skies`",
     )
+    time: Literal["day", "dusk", "night", "drawn"] = Field(
+        "day",
+        description="sunsky: drawn = by the house: dusk or night of a third, overcast of a sixth",
+    )
+    overcast: bool = Field(False, description="sunsky: an overcast sky, without a sun")
+    hour: float | None = Field(
+        None, ge=0, le=24, description="sunsky: by the sun; its place by latitude_deg, day_of_year"
+    )
+    latitude_deg: float = Field(
+        48.0, ge=-90, le=90, description="north of the equator; -z is north"
+    )
+    day_of_year: int = Field(
+        80, ge=1, le=366, description="1 = 1 January; 80 = day and night alike"
+    )
     sun_elevation_deg: float | None = Field(
         None,
-        ge=0,
+        ge=-90,
         le=90,
-        description="sunsky: above the horizon; none = drawn by the house, 15 to 60",
+        description="sunsky: above the horizon; none = by hour or time, by day drawn, 15 to 60",
     )
     sun_azimuth_deg: float | None = Field(
-        None, ge=-360, le=360, description="sunsky: from -z towards +x; none = drawn by the house"
+        None,
+        ge=-360,
+        le=360,
+        description="sunsky: from -z towards +x; none = by hour, or drawn by the house",
     )
 
 
@@ -444,10 +461,11 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "k1": 0.20796615, "k2": -0.58613825, "p1": 7.2231363e-4, "p2": 1.04796272e-3,
         "k3": 0.49856987,
     },
-    # Camera 0 of TUM VI at 512 x 512, a lens of 195 degrees: Schubert et al. 2018.
+    # Camera 0 of TUM VI at 512 x 512, a lens of 195 degrees: Schubert et al. 2018. Kalibr counts from
+    # the middle of the first pixel, these from its corner: half a pixel more.
     "tum_vi": {
         "model": "fisheye", "width_px": 512, "height_px": 512,
-        "fx": 190.978477, "fy": 190.973307, "cx": 254.931706, "cy": 256.897443,
+        "fx": 190.978477, "fy": 190.973307, "cx": 255.431706, "cy": 257.397443,
         "k1": 0.0034823894, "k2": 0.00071503485, "k3": -0.0020532361, "k4": 0.00020293674,
         "max_angle_deg": 97.5,
     },
@@ -618,6 +636,12 @@ class SensorFields(FieldGroup):
     full_well_e: float = Field(6000.0, ge=10, le=1e7, description="electrons that saturate a pixel")
     read_noise_e: float = Field(3.0, ge=0, le=1e4, description="electrons, standard deviation")
     bits: int = Field(10, ge=1, le=16, description="of the raw values")
+    black_level: float = Field(
+        1 / 16,
+        ge=0,
+        le=0.5,
+        description="of the raw range, at which no light stands: noise has room",
+    )
     mosaic: bool = Field(True, description="a Bayer mosaic (RGGB), demosaiced again")
     vignetting: Share = Field(0.0, description="light lost in the corners")
     aberration_px: float = Field(

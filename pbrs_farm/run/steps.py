@@ -366,7 +366,8 @@ def _illuminance(work: Work) -> StepOutput:
     seed = keys.seed(work.house_id, "floor_lux", work.recipe.seed)
     lux = cached.light_scene.floor_lux(cached.house, seed=seed)
     # Give the views of a room its row through the marker's facts.
-    record = illuminance_record(cached.house, lux)
+    is_day = bool(cached.sky.sun_direction[1] >= 0)
+    record = illuminance_record(cached.house, lux, is_day=is_day)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
     return StepOutput(
         {"illuminance.json": illuminance_json(record, cached.sky.facts())},

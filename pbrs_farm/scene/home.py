@@ -151,7 +151,10 @@ class Home:
         return home
 
     def sun(self, azimuth: float | None = None, elevation: float | None = None) -> Home:
-        """The home with the sun there, in degrees: azimuth from -z towards +x, elevation 0 to 90."""
+        """The home with the sun there, in degrees: azimuth from -z towards +x, elevation -90 to 90.
+
+        Below 0 it is dusk, below -12 night.
+        """
         fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
         told = {name: value for name, value in fields.items() if value is not None}
         return self.set(**{"sky.kind": "sunsky", **told})

@@ -38,10 +38,13 @@ _ABOVE_FLOOR_M: Final = 0.05  # above carpets
 _MAX_ATTEMPTS: Final = 200  # at points in a polygon that is thin in its box
 
 
-def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[str, Any]:
+def illuminance_record(
+    house: House, lux: dict[str, dict[str, float]], *, is_day: bool = True
+) -> dict[str, Any]:
     """The record illuminance.json: a row for each room, with a warning for what is out of range.
 
-    lux: as LightScene.floor_lux gives it; rooms that it lacks are left out.
+    lux: as LightScene.floor_lux gives it; rooms that it lacks are left out. is_day: as of
+    photometric_warnings.
     """
     rows = [
         {
@@ -50,7 +53,7 @@ def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[s
             "lit_by": list(room.lit_by),
             "outdoor_lx": lux[room.id]["outdoor"],
             "indoor_lx": lux[room.id]["indoor"],
-            "warnings": photometric_warnings(room, lux[room.id]),
+            "warnings": photometric_warnings(room, lux[room.id], is_day=is_day),
         }
         for room in house.rooms
         if room.id in lux
@@ -58,14 +61,15 @@ def illuminance_record(house: House, lux: dict[str, dict[str, float]]) -> dict[s
     return {"rooms": rows, "expected_lx": {"outdoor": DAYLIGHT_LX, "indoor": LAMPS_LX}}
 
 
-def photometric_warnings(room: Room, lux: dict[str, float]) -> list[str]:
+def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = True) -> list[str]:
     """A line for each light group whose illuminance of the room's floor is out of range.
 
-    lux: of "outdoor" and "indoor". A group that room.lit_by lacks has no lower bound.
+    lux: of "outdoor" and "indoor". A group that room.lit_by lacks has no lower bound, nor has
+    daylight without the sun above the horizon.
     """
     lines = []
     has_lamps = not {"lamps", "fallback", "added"}.isdisjoint(room.lit_by)
-    has_daylight = not {"windows", "sky"}.isdisjoint(room.lit_by)
+    has_daylight = is_day and not {"windows", "sky"}.isdisjoint(room.lit_by)
     for group, is_expected, (low, high) in (
         ("outdoor", has_daylight, DAYLIGHT_LX),
         ("indoor", has_lamps, LAMPS_LX),

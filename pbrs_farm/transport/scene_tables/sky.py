@@ -27,6 +27,18 @@ GROUND_ALBEDO: Final = 0.2  # grey
 NO_SKIES: Final = ("interior", "studio", "courtyard", "night")  # panoramas without a daylight sky
 
 _SUN_ELEVATION_DEG: Final = (15.0, 60.0)  # range from which a house's sun is drawn
+_DUSK_DEG: Final = (-6.0, -1.5)  # range from which a house's dusk is drawn
+_NIGHT_DEG: Final = -30.0
+_NIGHT_FROM_DEG: Final = 12.0  # below the horizon: nautical twilight is over
+_HORIZON_RAD: Final = math.radians(1.0)  # of the sun whose sky stands for sunset
+_BLUE_DEG: Final = 8.0  # below the horizon, where no glow is left
+# Degrees below the horizon -> log10 lx of a clear sky without a moon, after the twilight tables
+# of the US Naval Observatory.
+_TWILIGHT_LOG_LX: Final = ((0.0, 6.0, 12.0, 18.0), (2.7, 0.5, -2.1, -3.2))
+_TOWN_LX: Final = 0.3  # of street lamps in the air of a town
+_BLUE: Final = (0.35, 0.55, 1.0)
+_TOWN: Final = (1.0, 0.8, 0.6)
+_CLOUDS: Final = (0.94, 0.98, 1.06)
 _OPTICAL_DEPTH: Final = 0.21  # of clear air at the zenith, for the sun's light
 _SUN_RAD: Final = math.radians(4)  # around a panorama's brightest texel, where its sun is sought
 _RING_RAD: Final = math.radians(6)  # outer edge of the ring that tells the sky around the sun
@@ -106,27 +118,121 @@ def sky_for_house(
             raise BadRecipe("sky.kind is panorama and no panorama is given", hint=hint)
         rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
         return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
-    # Where the recipe does not say it, draw the sun's place by seeds of the house.
+    elevation, azimuth, is_overcast = _sun_of_house(recipe, house_id)
+    if elevation < 0:
+        return evening(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
+    if is_overcast:
+        return overcast(recipe)
+    return sunsky(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
+
+
+def _sun_of_house(recipe: Recipe, house_id: str) -> tuple[float, float, bool]:
+    """The sun's elevation and azimuth in rad, and whether clouds hide it.
+
+    What the recipe does not say is drawn by seeds of the house.
+    """
+    fields = recipe.sky
     low, high = _SUN_ELEVATION_DEG
     elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
     azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
-    if recipe.sky.sun_elevation_deg is not None:
-        elevation = math.radians(recipe.sky.sun_elevation_deg)
-    if recipe.sky.sun_azimuth_deg is not None:
-        azimuth = math.radians(recipe.sky.sun_azimuth_deg)
-    return sunsky(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
+    time, is_overcast = str(fields.time), fields.overcast
+    is_told = fields.hour is not None or fields.sun_elevation_deg is not None
+    # A told sun is no drawn one: dusk, night and clouds are then as the recipe says.
+    if time == "drawn" and not is_told:
+        time, drawn_overcast = drawn_time(house_id, recipe.seed)
+        is_overcast |= drawn_overcast
+    if time == "dusk":
+        low, high = _DUSK_DEG
+        elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
+    elif time == "night":
+        elevation = math.radians(_NIGHT_DEG)
+    if fields.hour is not None:
+        elevation, azimuth = sun_of_hour(fields.hour, fields.latitude_deg, fields.day_of_year)
+    if fields.sun_elevation_deg is not None:
+        elevation = math.radians(fields.sun_elevation_deg)
+    if fields.sun_azimuth_deg is not None:
+        azimuth = math.radians(fields.sun_azimuth_deg)
+    return elevation, azimuth, is_overcast
+
+
+def drawn_time(house_id: str, seed: int) -> tuple[str, bool]:
+    """("day", "dusk" or "night", whether overcast) of a house: a third is lit by its lamps."""
+    share = _uniform(house_id, seed, "hour")
+    if share < 1 / 6:
+        return "night", False
+    if share < 1 / 3:
+        return "dusk", False
+    return "day", share < 1 / 2
+
+
+def sun_of_hour(hour: float, latitude_deg: float, day_of_year: int) -> tuple[float, float]:
+    """(elevation, azimuth) of the sun in rad at an hour by the sun itself; azimuth from -z, north, to +x.
+
+    Declination by Cooper 1969, which is within half a degree.
+    """
+    declination = math.radians(23.45) * math.sin(2 * math.pi * (284 + day_of_year) / 365)
+    turned, latitude = math.radians(15 * (hour - 12)), math.radians(latitude_deg)
+    up = math.sin(latitude) * math.sin(declination)
+    up += math.cos(latitude) * math.cos(declination) * math.cos(turned)
+    east = -math.cos(declination) * math.sin(turned)
+    north = math.cos(latitude) * math.sin(declination)
+    north -= math.sin(latitude) * math.cos(declination) * math.cos(turned)
+    return math.asin(max(-1.0, min(1.0, up))), math.atan2(east, north)
+
+
+def evening(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
+    """A sky whose sun is below the horizon: its glow fades to blue, and by night to that of a town.
+
+    The level of the clear twilight sky is that of standard tables (500 lx at sunset, 3 at 6 degrees,
+    0.01 at 12), times sky_lx / 10,000; _TOWN_LX is added.
+    """
+    # The model's sky at sunset, bluer the lower the sun is.
+    depth_deg = -math.degrees(elevation_rad)
+    glow, _sun = _hosek(_direction(_HORIZON_RAD, azimuth_rad))
+    glow[glow.shape[0] // 2 :] = 0.0
+    share = min(depth_deg / _BLUE_DEG, 1.0)
+    level = float(np.interp(depth_deg, *_TWILIGHT_LOG_LX))
+    dome = (1 - share) * _scaled_to(glow, 1.0) + share * _scaled_to(_even(_BLUE), 1.0)
+    dome *= 10**level * recipe.emission.sky_lx / 10_000.0
+    dome += _scaled_to(_even(_TOWN), _TOWN_LX)
+    name = "dusk" if depth_deg < _NIGHT_FROM_DEG else "night"
+    sun = _direction(elevation_rad, azimuth_rad)
+    return _with_ground(Sky(name, dome.astype(np.float32), sun, np.zeros(3)))
+
+
+def overcast(recipe: Recipe) -> Sky:
+    """The CIE's overcast sky: three times as bright at the zenith as at the horizon, no sun."""
+    height = np.maximum(directions(*DOME_SHAPE)[..., 1:2], 0.0)
+    dome = (1 + 2 * height) / 3 * np.array(_CLOUDS)
+    dome[dome.shape[0] // 2 :] = 0.0
+    scaled = _scaled_to(dome, recipe.emission.sky_lx).astype(np.float32)
+    return _with_ground(Sky("overcast", scaled, np.array([0.0, 1.0, 0.0]), np.zeros(3)))
+
+
+def _even(rgb: tuple[float, float, float]) -> F64:
+    """(H, W, 3) of one colour above the horizon."""
+    dome = np.zeros((*DOME_SHAPE, 3))
+    dome[: DOME_SHAPE[0] // 2] = rgb
+    return dome
+
+
+def _scaled_to(dome: NDArray[np.floating], lux: float) -> F64:
+    """The dome with another illuminance of open level ground."""
+    return np.asarray(dome * (lux / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))))
+
+
+def _direction(elevation_rad: float, azimuth_rad: float) -> F64:
+    """(3,) unit, from azimuth -z towards +x."""
+    level = math.cos(elevation_rad)
+    return np.array(
+        [level * math.sin(azimuth_rad), math.sin(elevation_rad), -level * math.cos(azimuth_rad)]
+    )
 
 
 def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place."""
     # Evaluate the model and scale its upper half to sky_lx.
-    sun = np.array(
-        [
-            math.cos(elevation_rad) * math.sin(azimuth_rad),
-            math.sin(elevation_rad),
-            -math.cos(elevation_rad) * math.cos(azimuth_rad),
-        ]
-    )
+    sun = _direction(elevation_rad, azimuth_rad)
     dome, sun_rgb = _hosek(sun)
     dome[dome.shape[0] // 2 :] = 0.0
     scale = recipe.emission.sky_lx / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))

@@ -5,13 +5,16 @@ import math
 import numpy as np
 import pytest
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.transport.scene_tables.sky import (
     choose_panorama,
+    drawn_time,
     horizontal_irradiance,
     sky_for_house,
     sky_from_panorama,
+    sun_of_hour,
     uniform_sky,
 )
 
@@ -68,3 +71,77 @@ def test_a_uniform_sky_of_radiance_1_has_the_irradiance_pi() -> None:
     np.testing.assert_allclose(
         horizontal_irradiance(uniform_sky((1, 1, 1)).dome), math.pi, rtol=5e-3
     )
+
+
+def test_a_third_of_houses_is_lit_by_lamps_and_paper_never() -> None:
+    names = [f"home-{k}" for k in range(900)]
+    times = [drawn_time(name, 0)[0] for name in names]
+    assert 0.28 < np.mean([t != "day" for t in times]) < 0.39
+    assert set(times) == {"day", "dusk", "night"}
+    by_night = next(n for n, t in zip(names, times, strict=True) if t == "night")
+    assert sky_for_house(FAST, by_night).sky_lx < 1
+    assert sky_for_house(recipe_from_name("fast", {"sky.time": "day"}), by_night).sky_lx > 9_000
+    for name in ("paper", "released"):
+        assert recipe_from_name(name).sky.time == "day"
+
+
+def test_a_told_sun_is_no_drawn_one() -> None:
+    for name in ("home-1", "home-2", "home-3", "home-4", "home-5", "home-6"):
+        told = recipe_from_name("fast", {"sky.sun_elevation_deg": "30"})
+        assert sky_for_house(told, name).facts()["sun_elevation_deg"] == pytest.approx(30, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("hour", "latitude", "day", "elevation", "azimuth"),
+    [
+        (12, 0, 80, 90, None),  # overhead at the equator's equinox
+        (12, 48, 80, 42, 180),  # in the south at noon
+        (12, -35, 80, 55, 0),  # in the north, south of the equator
+        (18, 48, 80, 0, -90),  # sets in the west
+        (6, 48, 80, 0, 90),
+        (12, 48, 172, 65.45, 180),
+        (0, 48, 80, -42, 0),
+    ],
+)
+def test_the_sun_of_an_hour_stands_where_spherical_trigonometry_says(
+    hour: float, latitude: float, day: int, elevation: float, azimuth: float | None
+) -> None:
+    found = np.degrees(sun_of_hour(hour, latitude, day))
+    assert found[0] == pytest.approx(elevation, abs=0.6)
+    if azimuth is not None:
+        turn = (found[1] - azimuth + 180) % 360 - 180
+        assert turn == pytest.approx(0, abs=1.5)
+
+
+def test_the_lower_the_sun_below_the_horizon_the_darker_and_bluer_the_sky() -> None:
+    def dusk(degrees: float):
+        told = recipe_from_name(
+            "paper", {"sky.kind": "sunsky", "sky.sun_elevation_deg": str(degrees)}
+        )
+        return sky_for_house(told, "h")
+
+    skies = [dusk(d) for d in (-0.5, -3, -6, -12, -40)]
+    lux = [s.sky_lx for s in skies]
+    assert lux == sorted(lux, reverse=True)
+    assert 300 < lux[0] < 600
+    assert 0.2 < lux[-1] < 0.5
+    assert [s.name for s in skies] == ["dusk", "dusk", "dusk", "night", "night"]
+    assert not any(s.sun_irradiance.any() for s in skies)
+    blue = [float(e[2] / e[0]) for e in (horizontal_irradiance(s.dome) for s in skies[:3])]
+    assert blue == sorted(blue)
+
+
+def test_an_overcast_sky_is_three_times_as_bright_at_the_zenith_and_has_no_sun() -> None:
+    sky = sky_for_house(recipe_from_name("fast", {"sky.overcast": "true", "sky.time": "day"}), "h")
+    assert sky.sky_lx == pytest.approx(10_000, rel=1e-3)
+    assert not sky.sun_irradiance.any()
+    zenith, horizon = sky.dome[0, 0, 1], sky.dome[127, 0, 1]
+    assert zenith / horizon == pytest.approx(3, rel=0.02)
+
+
+def test_the_digest_of_a_sky_by_day_is_what_it_was_before_there_were_hours() -> None:
+    paper = recipe_from_name("paper")
+    assert paper.digest("sky") == keys.digest(
+        {"seed": 0, "sky": {"kind": "panorama", "panoramas": ""}}
+    )
+    assert paper.digest("sky") != recipe_from_name("paper", {"sky.time": "night"}).digest("sky")
