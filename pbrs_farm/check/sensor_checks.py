@@ -30,8 +30,11 @@ _SIGMAS = 6.5  # of noise, for a pixel
 _FLAT_SIGMAS = 0.8  # of noise: what the neighbours of a flat pixel may differ by
 _SLANT_SIGMAS = 8.0  # the same of a time-of-flight sensor
 _BIAS_SIGMAS = 0.35  # of noise: what the mean over flat pixels may be
+_GRAIN_PX2 = {"depth_sensor": 81.0, "depth_sensor_stereo": 28.0}  # pixels that share their noise
+_LEAST_ALIKE = 0.3  # correlation of neighbours' noise, where a sensor matches blocks
 _SPREAD = (0.6, 1.5)  # noise of flat pixels over what it should be
 _LEAST_MEASURED = 0.25  # of flat pixels within reach
+_FEW_BLOCKS = 0.5  # of standard deviations, that so few blocks may be off by chance
 _FEW = 500  # flat pixels that statistics need
 _REACH_PX = 7  # of the neighbours that a pixel may have measured
 
@@ -166,8 +169,17 @@ def _check_statistics(
         return
     values = error[here]
     bias, spread = float(np.mean(values)), float(np.std(values))
+    # So many pixels tell of so many independent blocks.
+    chance = 4 * np.sqrt(_GRAIN_PX2.get(name, 1.0) / here.sum())
     what = f"is off by {bias:.2f} standard deviations in the mean"
-    tally.expect(check, view.place, abs(bias) <= _BIAS_SIGMAS, what)
+    tally.expect(check, view.place, abs(bias) <= _BIAS_SIGMAS + chance, what)
+    if chance > _FEW_BLOCKS:
+        return
+    if name in _GRAIN_PX2:
+        pair = here[:, 1:] & here[:, :-1]
+        alike = float(np.corrcoef(error[:, 1:][pair], error[:, :-1][pair])[0, 1])
+        what = f"has noise of which neighbours share {alike:.2f}"
+        tally.expect(check, view.place, alike >= _LEAST_ALIKE, what)
     what = f"has {spread:.2f} times the noise it should have"
     tally.expect(check, view.place, _SPREAD[0] <= spread <= _SPREAD[1], what)
 

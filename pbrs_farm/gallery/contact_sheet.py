@@ -20,7 +20,7 @@ from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.gallery.gallery_page import attributions
+from pbrs_farm.gallery.gallery_page import attributions, best_first
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
 
 # Draws a line of text in whatever script it is, each letter in the first font that has it.
@@ -160,11 +160,11 @@ def contact_sheet(
     """PNG bytes: a row of nine tiles for each of at most max_views views of an output folder.
 
     made: view folder -> tiles of at most TILE_PX that are there already.
-    The views are spread over houses, then rooms. A tile that is missing says so. Raises BadInput
+    The views are spread over houses, then rooms, the best first. A tile that is missing says so. Raises BadInput
     if folder is no output folder or holds no view.
     """
     # Choose the views and make their tiles.
-    everything = views_of(folder)
+    everything = best_first(views_of(folder))
     if not everything:
         raise BadInput(folder, "houses/", "holds no view yet", hint="run `pbrs-farm run` first")
     views = spread_views(everything, max_views)
@@ -203,7 +203,7 @@ def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
     for view in views:
         rooms[view.house.id][view.room_id].append(view)
     turns = {house: _in_turn(of_room.values()) for house, of_room in rooms.items()}
-    # Take in turn, then go back to the order of the folder.
+    # Take in turn, then go back to the order they came in.
     chosen = _in_turn(turns.values())[: max(max_views, 0)]
     places = {id(view): i for i, view in enumerate(views)}
     return sorted(chosen, key=lambda view: places[id(view)])

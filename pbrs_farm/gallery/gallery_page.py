@@ -65,6 +65,7 @@ MAX_TILE_BYTES: Final = 11_000  # of a thumbnail
 MAX_PAGE_BYTES: Final = 5_000_000
 # Views of a page: nine tiles each, with base64's third on top and 6 kB of words, stay below the bound.
 PAGE_VIEWS: Final = 35
+_BLACK_LX: Final = 0.05  # of daylight on a room's floor: a room without a window has less
 
 
 def page_name(number: int) -> str:
@@ -99,7 +100,7 @@ def gallery_pages(
 
     made: view folder -> card_tiles that are there already.
     """
-    views, reasons = views_of(folder), reasons_of(folder)
+    views, reasons = best_first(views_of(folder)), reasons_of(folder)
     n_pages = max(1, -(-len(views) // PAGE_VIEWS))
     for number in range(1, n_pages + 1):
         yield page_name(number), _page(folder, views, reasons, (number, n_pages), made or {})
@@ -151,6 +152,32 @@ def _near_pages(number: int, n_pages: int) -> list[int]:
     """The pages a page links to: the first, the last, and those around it; none of a single one."""
     near = {1, n_pages, *range(number - 3, number + 4)}
     return sorted(k for k in near if 1 <= k <= n_pages) if n_pages > 1 else []
+
+
+def best_first(views: Iterable[ViewEntry]) -> list[ViewEntry]:
+    """The views house by house, each with its best room first and there with its best view.
+
+    By their score; one that daylight leaves black comes after all others. Frames of a sequence keep
+    their order.
+    """
+    houses: dict[str, dict[str, list[ViewEntry]]] = {}
+    for view in views:
+        houses.setdefault(view.house.id, {}).setdefault(view.room_id, []).append(view)
+    ordered: list[ViewEntry] = []
+    for rooms in houses.values():
+        for own in sorted(rooms.values(), key=lambda r: min(map(_rank, r))):
+            is_sequence = any("frame" in view.facts for view in own)
+            ordered += own if is_sequence else sorted(own, key=_rank)
+    return ordered
+
+
+def _rank(view: ViewEntry) -> tuple[bool, float]:
+    """The lower, the earlier a view is shown."""
+    score = view.facts.get("score")
+    light = (view.facts.get("modes") or {}).get("light") or {}
+    lux = light.get("floor_lux") or {}
+    is_black = bool(lux) and float(lux.get("outdoor", _BLACK_LX)) < _BLACK_LX
+    return is_black, -float(score) if isinstance(score, int | float) else 0.0
 
 
 def attributions(views: Iterable[ViewEntry]) -> list[str]:

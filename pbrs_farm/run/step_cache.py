@@ -173,7 +173,9 @@ def _extra(name: str, work: Work) -> object:
         marks = {layer: p.mark for layer, p in plugins("layers").items()}
         known = [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
         # The albedo is that of the light, whose preset holds it to its own limit.
-        return [*known, f"albedo {max_albedo(work.recipe)}"] if "albedo" in work.layers else known
+        # Layers whose pixels changed are made anew where a view has them.
+        changed = {"albedo": f"albedo {max_albedo(work.recipe)}", "depth_sensor": "patchy noise"}
+        return [*known, *(what for name, what in changed.items() if name in work.layers)]
     if name == "develop" and work.recipe.tone.pictures:
         names = work.recipe.tone.pictures.split(":")
         return [plugin("pictures", picture).mark for picture in names if picture]

@@ -1,7 +1,8 @@
 """The depth_sensor layer: depth as a structured-light sensor (Kinect 1, NYUv2) has it; no effects.
 
 The model has lateral noise, noisy disparity quantised to eighths of a pixel, no return at grazing
-angles and out of range, and none in the shadow of the projector 7.5 cm beside the camera.
+angles and out of range, and none in the shadow of the projector 7.5 cm beside the camera. Both
+noises are patchy: a pixel's disparity is that of a block about it, and neighbours' blocks overlap.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ NEAREST_M, FARTHEST_M = 0.5, 8.0  # range in which the sensor answers
 LATERAL_PX = 0.5  # standard deviation of the measured place, Handa et al. 2014
 DISPARITY_NOISE_PX = 1 / 6  # standard deviation, the same source
 STEPS_PER_PX = 8  # quantisation of disparity, the same source
+KINECT_WIDTH_PX = 640  # of its picture
+KINECT_BLOCK = 9  # px of KINECT_WIDTH_PX, of a matched block, Khoshelham and Elberink 2012
 MAX_ANGLE_RAD = np.radians(82)  # from the normal; beyond it nothing returns, Nguyen et al. 2012
 
 
@@ -36,7 +39,7 @@ def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uin
 
     # Add noise to the disparity f b / z, quantise it, and turn it back into depth.
     with np.errstate(divide="ignore"):
-        disparity = FOCAL_PX * BASELINE_M / z + rng.normal(0, DISPARITY_NOISE_PX, z.shape)
+        disparity = FOCAL_PX * BASELINE_M / z + DISPARITY_NOISE_PX * _patchy(z.shape, rng)
         measured = FOCAL_PX * BASELINE_M / (np.rint(disparity * STEPS_PER_PX) / STEPS_PER_PX)
     good = (z > 0) & (measured >= NEAREST_M) & (measured <= FARTHEST_M)
     return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
@@ -63,10 +66,16 @@ def _in_projector_shadow(depth_z: F32, camera: Camera) -> Mask:
     return np.asarray(from_projector > leftmost + 0.5)
 
 
+def _patchy(shape: tuple[int, ...], rng: np.random.Generator) -> F64:
+    """(H, W) normal noise of standard deviation 1 that neighbours share as their blocks overlap."""
+    size = max(round(KINECT_BLOCK * shape[1] / KINECT_WIDTH_PX) | 1, 3)
+    return np.asarray(ndimage.uniform_filter(rng.normal(0, size, shape), size, mode="wrap"))
+
+
 def _laterally_moved(shape: tuple[int, ...], rng: np.random.Generator) -> tuple[I64, I64]:
     """Rows and columns (H, W) of the pixel each pixel really measures."""
     # Draw a place around each pixel and hold it to the picture.
-    grid = np.indices(shape) + rng.normal(0, LATERAL_PX, (2, *shape))
+    grid = np.indices(shape) + LATERAL_PX * np.stack([_patchy(shape, rng) for _axis in range(2)])
     limit = np.array(shape).reshape(2, 1, 1) - 1
     rows, columns = np.clip(np.rint(grid), 0, limit).astype(np.int64)
     return rows, columns

@@ -272,3 +272,24 @@ def test_the_frame_of_a_missing_tile_stays_in_its_row():
     assert sheet._row_height([Tile(TILES[1], None)]) == sheet._row_height(
         [small, Tile(TILES[1], None)]
     )
+
+
+def test_the_best_room_is_shown_first_and_one_that_daylight_leaves_black_last(
+    tmp_path: Path,
+) -> None:
+    told = {
+        "0_0_1": {"room": "0_0", "score": 1.2, "modes": {"light": {"floor_lux": {"outdoor": 0.0}}}},
+        "0_1_0": {"room": "0_1", "score": 0.4},
+        "0_2_0": {"room": "0_2", "score": 0.3},
+        "0_2_5": {"room": "0_2", "score": 0.9},
+    }
+    write_house(tmp_path, "a", tuple(told))
+    for view, facts in told.items():
+        (tmp_path / f"houses/a/views/{view}/view.json").write_text(json.dumps(facts))
+    ordered = [v.id for v in gallery_page.best_first(views_of(tmp_path))]
+    assert ordered == ["0_2_5", "0_2_0", "0_1_0", "0_0_1"]
+    # Frames of a walk stay in order.
+    for k, view in enumerate(told):
+        facts = {"room": "walk", "frame": k, "score": k}
+        (tmp_path / f"houses/a/views/{view}/view.json").write_text(json.dumps(facts))
+    assert [v.id for v in gallery_page.best_first(views_of(tmp_path))] == list(told)

@@ -210,6 +210,21 @@ def test_a_sensor_measures_a_wall_with_noise_that_grows_with_distance():
     assert 6 < errors[1] / errors[0] < 12
 
 
+def test_a_kinects_noise_is_patchy_over_its_block():
+    wall = hit(np.ones((240, 640)), 2.0)
+    depth = truth.sensor_depth(wall, camera(640, 240), seed=5).astype(float)
+    noise = 580 * 75 / depth - 580 * 75 / 2000
+    assert 0.9 < noise.std() * 6 < 1.1
+
+    def alike(px: int) -> float:
+        return float(np.corrcoef(noise[:, px:].ravel(), noise[:, :-px].ravel())[0, 1])
+
+    # Blocks of 9 x 9 that are px apart share (9 - px) / 9 of their pixels.
+    for px in (1, 3, 6):
+        assert abs(alike(px) - (9 - px) / 9) < 0.08
+    assert abs(alike(12)) < 0.08
+
+
 def test_a_sensor_is_the_same_for_the_same_seed_and_blind_out_of_range():
     record = hit([[1] * 8] * 6, [[0.3, 0.3, 0.3, 0.3, 9.0, 9.0, 9.0, 9.0]] * 6)
     assert not truth.sensor_depth(record, camera(), seed=3).any()

@@ -140,7 +140,7 @@ def demosaiced(raw: F64) -> F64:
     rgb[1::2, 1::2, 0] = across[1::2, 1::2]
     rgb[1::2, 0::2, 2], rgb[0::2, 1::2, 2] = along[1::2, 0::2], down[0::2, 1::2]
     rgb[0::2, 0::2, 2] = across[0::2, 0::2]
-    return np.maximum(rgb, 0.0)
+    return rgb
 
 
 _GREEN: Final = (
@@ -155,14 +155,19 @@ _OTHER: Final = (
 
 
 def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random.Generator) -> F64:
-    """Light (1 = the tone's white) as it is read: shot noise, read noise, saturation, whole steps."""
+    """Light (1 = the tone's white) as it is read: shot noise, read noise, saturation, whole steps.
+
+    What noise makes of darkness may be negative.
+    """
     # The amplifier reaches its end with fewer electrons as ISO rises.
     well = sensor.full_well_e * sensor.iso_min / iso
     electrons = rng.poisson(np.clip(light / sensor.headroom * well, 0, 1e9)).astype(np.float64)
     electrons += rng.normal(0.0, sensor.read_noise_e, light.shape)
     steps = 2**sensor.bits - 1
-    read = np.rint(np.clip(electrons / well, 0, 1) * steps) / steps
-    return np.asarray(read * sensor.headroom)
+    # No light stands at the black level, so that noise below it is not cut off: the mean is right.
+    black = round(sensor.black_level * steps) / steps
+    read = np.rint(np.clip(black + electrons / well * (1 - black), 0, 1) * steps) / steps
+    return np.asarray((read - black) / (1 - black) * sensor.headroom)
 
 
 def _toned(rgb: F64, headroom: float) -> Srgb8Image:

@@ -10,6 +10,7 @@ import pytest
 from pbrs_farm.core.recipe import SensorFields, recipe_from_name
 from pbrs_farm.transport.develop.mode_pictures import (
     Exposure,
+    _electrons_read,
     chosen_exposure,
     demosaiced,
     jpeg_loss,
@@ -133,3 +134,18 @@ def test_a_sensor_changes_develop_alone_and_off_it_changes_nothing() -> None:
     assert plain.digest("tone", "light", "sensor") == plain.digest("tone", "light")
     assert phone.digest("tone", "light", "sensor") != plain.digest("tone", "light", "sensor")
     assert phone.sensor.is_on
+
+
+def test_dark_pixels_are_right_in_the_mean_above_a_black_level() -> None:
+    # Two electrons of light under twelve of read noise.
+    fields = PLAIN.model_copy(update={"read_noise_e": 12.0, "full_well_e": 1000.0, "headroom": 1.0})
+    light = np.full((256, 256), 2 / 1000)
+    kept, cut = (
+        _electrons_read(
+            light, 100.0, fields.model_copy(update={"black_level": b}), np.random.default_rng(1)
+        )
+        for b in (1 / 16, 0.0)
+    )
+    assert kept.mean() == pytest.approx(2 / 1000, abs=2e-4)
+    assert cut.mean() > 5 / 1000
+    assert kept.min() < 0
