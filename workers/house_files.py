@@ -33,7 +33,7 @@ _UPLOADED: Final = (
 
 
 def entries_from_arguments(
-    arguments: Sequence[str], seeds: Sequence[int] = (0,)
+    arguments: Sequence[str], seeds: Sequence[int] = (0,), *, models: str = ""
 ) -> list[tuple[HouseEntry, SourceRef]]:
     """The houses that arguments name: files, folders of files, example homes, `builtin`.
 
@@ -46,7 +46,7 @@ def entries_from_arguments(
     for argument in arguments:
         for one in _expanded(argument):
             doing(one, "read")
-            for ref in variants(resolve(one, files), seeds):
+            for ref in variants(resolve(one, files, models=models), seeds):
                 entry = HouseEntry(
                     house_id=ref.house_id,
                     source=_placed(ref).model_dump_json(),

@@ -103,6 +103,13 @@ def at_least(name: str, value: float, least: int) -> None:
 def add_home(p: argparse.ArgumentParser) -> None:
     """The home that a verb looks at."""
     p.add_argument("home", help=HOME)
+    add_models(p)
+
+
+def add_models(p: argparse.ArgumentParser) -> None:
+    """Where the models lie that a home's file names."""
+    text = "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses.md)"
+    p.add_argument("--models", default="", metavar="DIR", help=text)
 
 
 def add_cameras(p: argparse.ArgumentParser) -> None:

@@ -85,7 +85,7 @@ def _dress(args: argparse.Namespace) -> int:
     if len(seeds) != 1:
         raise BadInput("--seed", args.dress, "expected one seed")
     recipe = recipe_of(args)
-    (source,) = variants(resolve(args.home), seeds)
+    (source,) = variants(resolve(args.home, models=args.models), seeds)
     doing(args.home, "catalogue")
     fetch_catalogue(recipe.dress)
     house, repairs, report = made_house(source, recipe)
@@ -120,7 +120,7 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
 
     # The same recipe without dressing gives the home as it was drawn.
     undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
-    bare, _report = repaired_house(resolve(args.home), undressed)
+    bare, _report = repaired_house(resolve(args.home, models=args.models), undressed)
     doing(args.home, "before and after")
     files = {}
     for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
@@ -144,7 +144,7 @@ def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
-    source = resolve(args.home)
+    source = resolve(args.home, models=args.models)
     house, report = repaired_house(source, recipe)
     # Write the repaired house and what was done to it.
     store = FolderStore(args.out)
@@ -175,7 +175,7 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
-    house, _report = repaired_house(resolve(args.home), recipe)
+    house, _report = repaired_house(resolve(args.home, models=args.models), recipe)
     # Score candidates by the items that rays from them meet.
     caster = Caster(geometry_from_house(house))
     doing(args.home, "cameras")

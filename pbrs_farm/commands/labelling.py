@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
+from pbrs_farm.commands.arguments import (
+    VIEW,
+    Verb,
+    add_models,
+    counted,
+    echo,
+    echo_json,
+    size_of,
+    warn,
+)
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.plugins import plugins
 
@@ -51,6 +60,7 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("classes", _classes, "how often each class is seen, and by which rule")
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
+    add_models(p)
     p.add_argument("--json", action="store_true", help="as JSON")
 
     p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")
@@ -149,7 +159,7 @@ def _home_classes(args: argparse.Namespace) -> int:
     from pbrs_farm.read.source import resolve
     from pbrs_farm.run.dress_catalogue import house_of_source
 
-    house = house_of_source(resolve(args.folder), ReadFields())
+    house = house_of_source(resolve(args.folder, models=args.models), ReadFields())
     fields = ("kind", "nyu40", "name", "source_class", "tags")
     decisions = class_decisions({f: getattr(item, f) for f in fields} for item in house.items)
     if args.json:

@@ -17,6 +17,7 @@ from pbrs_farm.commands.arguments import (
     add_cameras,
     add_dress,
     add_light,
+    add_models,
     add_output,
     add_recipe,
     at_least,
@@ -59,6 +60,7 @@ def add_verbs(verb: Verb) -> None:
     add("--houses", metavar="LIST", help=text)
     add("--out", required=True, help="output folder or store URL")
     add_cameras(p)
+    add_models(p)
     add("--camera-file", type=Path, help="your own: JSON list, or room_camera.txt")
     add_dress(p)
     _add_run(p)
@@ -83,6 +85,7 @@ def add_verbs(verb: Verb) -> None:
     add("--view")
     add("--layers", nargs="+", default=[])
     add("--dress", type=int, default=0, metavar="SEED", help="of a dressed variant")
+    add_models(p)
 
 
 def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
@@ -169,6 +172,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         check_camera_file(recipe.cameras)
     return Run(
         homes=homes,
+        models=getattr(args, "models", "") if homes else "",
         store_url=args.out,
         recipe=recipe,
         want=want,
@@ -302,7 +306,7 @@ def _step(args: argparse.Namespace) -> int:
         raise BadInput("step", args.step, "no such step", hint=hint_of_choice(args.step, STEPS))
     store = store_from_url(args.out, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
-    (source,) = variants(resolve(args.home), [args.dress or recipe.dress.seed])
+    (source,) = variants(resolve(args.home, models=args.models), [args.dress or recipe.dress.seed])
     # One process, one house: the cache keeps it for all steps.
     work = Work(
         store=store, recipe=recipe, house_id=source.house_id, house_cache=HouseCache(), source=source,

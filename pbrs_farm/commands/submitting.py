@@ -12,6 +12,7 @@ from pbrs_farm.commands.arguments import (
     add_dress,
     add_farm,
     add_light,
+    add_models,
     add_output,
     add_recipe,
     at_least,
@@ -38,6 +39,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("homes", nargs="+", metavar="HOME", help="files, folders, example homes")
     text = "file with a SUNCG house id a line (HOME: root)"
     p.add_argument("--houses", metavar="LIST", help=text)
+    add_models(p)
     add_dress(p)
     add_recipe(p)
     add_light(p)
@@ -69,7 +71,9 @@ def _submit(args: argparse.Namespace) -> int:
     spec = _spec(args)
     # Read the homes: what each is, and where workers will find it.
     seeds = dress_seeds(args.dress) or (spec.recipe.dress.seed,)
-    found = entries_from_arguments(home_arguments(args.homes, args.houses), seeds)
+    found = entries_from_arguments(
+        home_arguments(args.homes, args.houses), seeds, models=args.models
+    )
     reference = placed_reference(args.reference) if args.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses, refs = [entry for entry, _ref in found], [ref for _entry, ref in found]

@@ -234,6 +234,8 @@ class Schedule:
     def _command(self, event: Event) -> str:
         source = self._sources[event.house_id]
         words = ["pbrs-farm", "step", event.step, source.location, "--out", self._run.store_url]
+        if source.models:
+            words += ["--models", source.models]
         if source.dress_seed:
             words += ["--dress", str(source.dress_seed)]
         if event.view_id:
@@ -274,6 +276,7 @@ class Run:
     sources: Sequence[SourceRef] = ()  # homes that are resolved already
     dress_seeds: Sequence[int] = ()  # each home dressed by each of them; none = by the recipe's
     refused: Sequence[tuple[str, str]] = ()  # what was asked for and cannot be read, and why
+    models: str = ""  # folder of the models that the homes' files name
 
 
 @dataclass(slots=True)
@@ -349,7 +352,7 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
     for word in run.homes:
         doing(word, "read")
         try:
-            source = resolve(word, files)
+            source = resolve(word, files, models=run.models)
         except PbrsError as error:
             summary.failures.append((shown(word, MAX_PLACE), str(error), ""))
             continue

@@ -568,11 +568,18 @@ def _flux(lm: float) -> float:
     return float(lm)
 
 
-def load(home: str | Path, recipe: str | Path | Recipe = "fast", **settings: Any) -> Home:
+def load(
+    home: str | Path,
+    recipe: str | Path | Recipe = "fast",
+    *,
+    models: str | Path = "",
+    **settings: Any,
+) -> Home:
     """A home by any word of `pbrs-farm run`.
 
     home: a .sh3d, .glb or .gltf file, a SUNCG house folder, an example home's name ("Studio"),
-    "builtin", or "made:7". recipe: preview, fast, paper, released, a .toml file or a Recipe.
+    "builtin", or "made:7". models: the folder of the models that a scene of HSSD, 3D-FRONT or
+    Holodeck names. recipe: preview, fast, paper, released, a .toml file or a Recipe.
     settings: recipe fields to override: pf.load("Studio", **{"light.spp": 64}).
 
     Nothing but the file's digest is read before the home is looked at. Raises BadHouse for a word
@@ -580,7 +587,7 @@ def load(home: str | Path, recipe: str | Path | Recipe = "fast", **settings: Any
 
         >>> home = pf.load("Studio")
     """
-    return Home(resolve(str(home)), recipe_of(recipe)).set(**settings)
+    return Home(resolve(str(home), models=str(models)), recipe_of(recipe)).set(**settings)
 
 
 def make(seed: int, rooms: str = "", **options: Any) -> Home:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from benchmarks.inputs import scenestate_files
 from benchmarks.inputs.usd_files import UsdHome, walls_of
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, resolve
@@ -71,7 +72,11 @@ def usd(folder: Path, picture: bytes | None) -> SourceRef:
     return _with_picture(folder, "scene.usda", home.save().read_bytes(), picture)
 
 
-# IFC is not among them: its files carry no pictures in practice, and its reader looks at none.
+def scenestate(folder: Path, picture: bytes | None) -> SourceRef:
+    """Two rooms whose floors have the picture, which the file itself holds."""
+    path = folder / "home.scenestate.json"
+    path.write_text(json.dumps(scenestate_files.rent3d_like(picture)))
+    return resolve(str(path))
 
 
 def single_object(folder: Path, picture: bytes | None) -> SourceRef:
@@ -89,11 +94,13 @@ def _with_picture(folder: Path, name: str, data: bytes, picture: bytes | None) -
     return resolve(str(folder / name))
 
 
+# IFC is not among them: its files carry no pictures in practice, and its reader looks at none.
 FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "sweethome3d": sweethome3d,
     "suncg": suncg,
     "gltf": gltf,
     "usd": usd,
+    "scenestate": scenestate,
     "object": single_object,
 }
 """Format -> writes a source with that picture (None: the file is missing) and names it."""

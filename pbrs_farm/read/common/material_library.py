@@ -108,6 +108,13 @@ class MaterialLibrary:
         """The material's index, the same for equal materials."""
         return self._materials.setdefault(material, len(self._materials))
 
+    def adopted(self, other: MaterialLibrary) -> tuple[int, ...]:
+        """The indices here of the materials of another library, which is taken in with its textures."""
+        for loaded in other._loaded.values():
+            if loaded is not None:
+                self._loaded.setdefault(f"texture {loaded.texture.id}", loaded)
+        return tuple(self.index(material) for material in other.materials)
+
     def texture(
         self, key: str, *, name: str, place: str, load: Callable[[], bytes | None]
     ) -> LoadedTexture | None:

@@ -182,6 +182,25 @@ def check_outlines(by_level: Mapping[str, Sequence[Points2]], file: str) -> None
         raise BadHouse(file, "rooms", text, hint=HINT)
 
 
+_SMALL_M, _LARGE_M = 0.6, 500.0  # the rooms of a home together are wider, and less wide
+_LOW_M, _HIGH_M = 1.0, 40.0  # a room's height
+
+
+def check_unit(rooms: Sequence[Room], file: str, place: str, hint: str) -> None:
+    """Raise BadHouse for rooms of no size that a home has: their lengths are in another unit."""
+    plan = np.concatenate([room.polygon for room in rooms])
+    wide = float(np.ptp(plan, axis=0).max())
+    high = float(np.median([room.ceiling_y - room.floor_y for room in rooms]))
+    looks = ""
+    if wide > _LARGE_M or high > _HIGH_M:
+        looks = "millimetres" if max(wide / 8_000, high / 1_000) > 1 else "centimetres"
+    elif wide < _SMALL_M or high < _LOW_M:
+        looks = "another unit than metres"
+    if looks:
+        text = f"the rooms are {wide:.3g} m wide and {high:.3g} m high: looks like {looks}"
+        raise BadHouse(file, place, text, hint=hint)
+
+
 def check_number(n_rooms: int, file: str) -> None:
     """Raise BadHouse for more than MAX_ROOMS."""
     if n_rooms > MAX_ROOMS:

@@ -1,20 +1,371 @@
-"""A sceneState file (HSSD-200, Rent3D++, text-to-scene generators) -> House. Effects: reads files."""
+"""A sceneState file (HSSD-200, Rent3D++, text-to-scene generators) -> House. Effects: reads files.
+
+Walls become slabs, rooms get a floor and a ceiling, holes a door or a window; objects are models of
+a folder, or stand-ins by their category.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
+import shapely
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
+from pbrs_farm.read.common.joinery import Hole, joinery_of, merged, opening_of
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_floors import (
+    ceiling_height,
+    check_number,
+    check_rooms,
+    check_unit,
+    floor_height,
+    floor_polygon,
+)
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at
+from pbrs_farm.read.scenestate.scene_document import (
+    ArchMaterials,
+    SceneDocument,
+    ToldElement,
+    scene_document,
+)
+from pbrs_farm.read.scenestate.scene_models import (
+    SceneModels,
+    names_of_model,
+    roots_of,
+    table_names,
+)
+from pbrs_farm.read.scenestate.scene_walls import StandingWall, standing_walls
+from pbrs_farm.read.suncg.arch_json import SLAB_DEPTH_M, Arch, Element, slab_surfaces, wall_surfaces
+from pbrs_farm.read.suncg.wall_holes import LEAST_HOLE_M
 
-
-def read(path: Path, fields: ReadFields, models: str) -> House:
-    """The House of the file. Raises BadHouse naming the place."""
-    raise BadHouse(path, "", "is not read yet")
+_AS_IT_STANDS: Final = Arch(np.eye(4), {})
+_STOREY_M: Final = 2.7
+_ON_FLOOR_M: Final = 0.02  # an object whose origin is so near to a height stands at it
+_LEAST_SILL_M: Final = 0.2  # a hole of no type that begins lower is a door's
+_AREA_M2: Final = 0.05  # of a floor that is one
 
 
 def companions(path: Path, models: str, files: SourceFiles) -> str:
-    """Digest of what reading opens beside the file; "" where there is none."""
-    return ""
+    """Digest of the models and tables that reading may open; "" where there is none."""
+    notes = Notes(path.name, strict=False)
+    try:
+        data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
+        ids = {o.model for o in scene_document(data, path.name, notes).objects}
+    except BadHouse:
+        return ""  # the reader will say what is wrong with it
+    names = [*table_names(), *(n for model in sorted(ids) for n in names_of_model(model))]
+    digests = [files.digest(root, names) for root in roots_of(path, models)]
+    return keys.digest(*digests) if any(digests) else ""
+
+
+def read(path: Path, fields: ReadFields, models: str) -> House:
+    """The House of the file. models: the folder of its models, "" = beside it.
+
+    Raises BadHouse naming the element that is wrong, and for a file without walls and floors.
+    """
+    folder = RootFolder(path.parent)
+    data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
+    if data is None:
+        raise BadHouse(path, "", "no such file")
+    notes = Notes(path.name, strict=fields.strict)
+    document = scene_document(data, path.name, notes)
+    materials = ArchMaterials(document.pictures, folder, notes)
+    shell = _Shell(document, materials, notes)
+    rooms, parts = shell.rooms(path.name)
+    levels, numbered = levels_of(rooms)
+    check_rooms(numbered, path.name)
+    items = [*shell.walls(), *parts]
+    holes = shell.holes(numbered)
+    objects, missing = _objects(document, path, models, shell, notes, fields)
+    items = [_in_room(i, levels, numbered, shell.room_ids(numbered)) for i in (*items, *objects)]
+    for hole in holes:
+        at = hole.centre + np.array([0.0, 0.1 - hole.size[1] / 2, 0.0])
+        made = joinery_of(
+            hole, materials.library, level_of(levels, at[1]), room_at(numbered, hole.centre)
+        )
+        items += [made] if made is not None else []
+    if missing:
+        notes.add("missing-model", "scene.object", missing)
+    _check_limits(items, path.name, fields)
+    sha = keys.sha256(data)
+    return House(
+        id=keys.house_id(path.stem, sha),
+        name=document.id or path.stem,
+        source=Source("scenestate", path.name, sha),
+        levels=levels,
+        rooms=numbered,
+        items=tuple(items),
+        materials=materials.library.materials,
+        textures=materials.library.textures,
+        openings=tuple(opening_of(h, level_of(levels, h.centre[1])) for h in holes),
+        notes=notes.all(),
+    )
+
+
+def _objects(
+    document: SceneDocument, path: Path, models: str, shell: _Shell, notes: Notes, fields: ReadFields
+) -> tuple[list[Item], str]:  # fmt: skip
+    """The objects, and what to say of those that have neither a model nor a known class."""
+    found = SceneModels(roots_of(path, models), shell.materials.library, notes, fields)
+    items = []
+    n_faces = 0
+    for k, one in enumerate(document.objects):
+        item = found.item(one, f"object_{k}")
+        if item is None:
+            continue
+        n_faces += item.n_faces
+        if n_faces > fields.max_triangles:
+            text = f"more than {fields.max_triangles} triangles"
+            raise BadHouse(path.name, one.place, text, hint="limit: read.max_triangles")
+        items.append(item)
+    if not found.missing:
+        return items, ""
+    n, most = sum(found.missing.values()), found.missing.most_common(1)[0][0]
+    return (
+        items,
+        f"{n} objects are left out: no model ({most}.glb) and no objects.csv; --models DIR",
+    )
+
+
+def _check_limits(items: Sequence[Item], file: str, fields: ReadFields) -> None:
+    if len(items) > MAX_INSTANCES:
+        raise BadHouse(file, "", f"more than {MAX_INSTANCES} items")
+    for item in items:
+        if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
+            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
+            raise BadHouse(file, item.id, text, hint="limit: read.max_extent_m")
+
+
+def _in_room(
+    item: Item, levels: Sequence[Level], rooms: Sequence[Room], renamed: Mapping[str, str]
+) -> Item:
+    """The item with its level, and its room by its told one, else by where it stands."""
+    box = item.oriented_box if item.surfaces or item.box else None
+    at = np.zeros(3) if box is None else box.centre
+    low = at[1] if box is None else float(box.corners[:, 1].min())
+    level = level_of(levels, low + (0.1 if item.kind is not ItemKind.CEILING else -1.0))
+    room_id = renamed.get(item.room_id) if item.room_id is not None else None
+    if item.room_id is None and not item.kind.is_structure:
+        room_id = room_at(rooms, at)
+    tags = tuple(_renamed(tag, renamed) for tag in item.tags)
+    return replace(item, level_id=level, room_id=room_id, tags=tags)
+
+
+def _renamed(tag: str, renamed: Mapping[str, str]) -> str:
+    word, _, name = tag.partition(":")
+    return f"{word}:{renamed.get(name, name)}" if word == "boundary_of" else tag
+
+
+class _Shell:
+    """The architecture while it is built: walls, floors, ceilings, rooms, holes."""
+
+    def __init__(self, document: SceneDocument, materials: ArchMaterials, notes: Notes) -> None:
+        self.materials = materials
+        self._document = document
+        self._notes = notes
+        elements = document.elements
+        self._slabs = [e for e in elements if e.element.kind in ("Floor", "Ceiling")]
+        self._slabs = [self._sunk(e) for e in self._slabs]
+        floors = [e for e in self._slabs if e.element.kind == "Floor"]
+        self._floors: dict[str, list[ToldElement]] = {}
+        for k, e in enumerate(floors):
+            names = e.rooms or (f"floor {k}",)
+            self._floors.setdefault(names[0], []).append(e)
+        areas = {name: _plan(some) for name, some in self._floors.items()}
+        told = [e for e in elements if e.element.kind == "Wall"]
+        self._drawn, self._standing = standing_walls(told, areas)
+        self._keys: list[str] = []
+
+    def _sunk(self, told: ToldElement) -> ToldElement:
+        """The slab as it is told, upwards; a floor on whose told height things stand goes down."""
+        e = told.element
+        if e.kind != "Floor" or e.depth_m <= 0:
+            return told
+        low = float(e.points[0][:, 1].min())
+        bases = [
+            float(o.world_from_scene[1] @ o.scene_from_model[:, 3]) for o in self._document.objects
+        ]
+        at_top = sum(abs(y - low - e.depth_m) < _ON_FLOOR_M for y in bases)
+        at_points = sum(abs(y - low) < _ON_FLOOR_M for y in bases)
+        is_down = at_points > at_top or (at_points == at_top and abs(low) < 1e-6)
+        if not is_down:
+            return told
+        points = tuple(ring - [0.0, e.depth_m, 0.0] for ring in e.points)
+        return replace(told, element=replace(e, points=points))
+
+    def walls(self) -> list[Item]:
+        """An item for each wall."""
+        found = []
+        for wall in self._standing:
+            surfaces = wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
+            if surfaces:
+                own = wall.rooms[0] if len(wall.rooms) == 1 else None
+                tags = tuple(f"boundary_of:{room}" for room in wall.rooms)
+                found.append(_structure(wall.id, ItemKind.WALL, surfaces, own, tags))
+        return found
+
+    def rooms(self, file: str) -> tuple[list[Room], list[Item]]:
+        """The rooms in the file's order, and their floors and ceilings."""
+        check_number(len(self._floors), file)
+        walls = [(w, s) for w in self._standing for s in self._wall_faces(w)]
+        order = [*self._document.room_types, *self._floors]
+        rooms: list[Room] = []
+        parts: list[Item] = []
+        ceilings = [
+            (e, shapely.make_valid(shapely.Polygon(e.element.points[0][:, [0, 2]])))
+            for e in self._slabs if e.element.kind == "Ceiling"
+        ]  # fmt: skip
+        for name in dict.fromkeys(order):
+            floors = self._floors.get(name)
+            if floors is None:
+                self._notes.add("empty-room", f"room {name}", "has no floor; left out")
+                continue
+            found = self._room(name, floors, ceilings, walls)
+            if found is not None:
+                rooms.append(found[0])
+                parts += found[1]
+                self._keys.append(name)
+        if not rooms:
+            hint = "rooms follow from elements of the type Floor"
+            raise BadHouse(file, "scene.arch.elements", "has no floor", hint=hint)
+        check_unit(rooms, file, "scene.unit", "metres a unit: 0.01 for centimetres")
+        return rooms, parts
+
+    def _wall_faces(self, wall: StandingWall) -> tuple[Surface, ...]:
+        return wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
+
+    def _room(
+        self, name: str, floors: list[ToldElement], ceilings: list[tuple[ToldElement, Any]],
+        walls: list[tuple[StandingWall, Surface]],
+    ) -> tuple[Room, list[Item]] | None:  # fmt: skip
+        parts = []
+        for k, told in enumerate(floors):
+            surfaces = slab_surfaces(_AS_IT_STANDS, told.element, self.materials)
+            if surfaces:
+                item_id = told.id if k == 0 else f"{told.id}.{k}"
+                parts.append(_structure(item_id, ItemKind.FLOOR, surfaces, name))
+        faces = [s for part in parts for s in part.surfaces]
+        low = floor_height(faces)
+        if low is None:
+            self._notes.add("empty-room", f"room {name}", "its floor has no area; left out")
+            return None
+        plan = np.concatenate([s.positions[:, [0, 2]] for s in faces]).astype(float)
+        near = [(w, s) for w, s in walls if _meets(s, plan.min(0) - 0.3, plan.max(0) + 0.3)]
+        near = [(w, s) for w, s in near if _stands_on(w, low)]
+        polygon = floor_polygon(faces, [s for _, s in near])
+        if polygon is None or shapely.Polygon(polygon).area < _AREA_M2:
+            self._notes.add("empty-room", f"room {name}", "its floor has no area; left out")
+            return None
+        area = shapely.Polygon(polygon)
+        above = [
+            e for e, shape in ceilings
+            if shape.intersection(area).area > 0.3 * area.area
+            and float(e.element.points[0][:, 1].min()) > low + 1.0
+        ]  # fmt: skip
+        own = [e for e in ceilings if name in e[0].rooms]
+        tops = sorted(w.frame.start[1] + w.element.height_m for w, _ in near)
+        top = float(tops[len(tops) // 2]) if tops else low + _STOREY_M
+        if own:
+            for e, _ in own:
+                surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
+                parts += [_structure(e.id, ItemKind.CEILING, surfaces, name)] if surfaces else []
+        elif not above:
+            for k, told in enumerate(floors):
+                made = _ceiling_over(told.element, max(top, low + 1.0))
+                surfaces = slab_surfaces(_AS_IT_STANDS, made, self.materials)
+                parts.append(_structure(f"{told.id}_ceiling{k}", ItemKind.CEILING, surfaces, name))
+        else:
+            for e in above:
+                if not e.rooms:
+                    surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
+                    parts.append(_structure(f"{e.id}_{name}", ItemKind.CEILING, surfaces, name))
+        high = ceiling_height([s for p in parts if p.kind is ItemKind.CEILING for s in p.surfaces])
+        high = top if high is None else high
+        types = self._document.room_types.get(name, ())
+        room = Room(
+            id=name, name=types[0].replace("_", " ") if types else "", level_id="", polygon=polygon,
+            floor_y=low, ceiling_y=high if high > low + 0.5 else low + _STOREY_M, types=types,
+        )  # fmt: skip
+        return room, parts
+
+    def room_ids(self, numbered: Sequence[Room]) -> dict[str, str]:
+        """The file's name of a room -> its id here."""
+        return {key: room.id for key, room in zip(self._keys, numbered, strict=True)}
+
+    def holes(self, rooms: Sequence[Room]) -> list[Hole]:
+        """The holes of all walls, clipped to them, each once."""
+        found = []
+        for wall in self._drawn:
+            for k, hole in enumerate(wall.element.holes):
+                kind = wall.element.hole_types[k] if k < len(wall.element.hole_types) else ""
+                one = self._hole(wall, k, hole, kind, rooms)
+                found += [one] if one is not None else []
+        return merged(found)
+
+    def _hole(
+        self, wall: StandingWall, k: int, hole: tuple[float, float, float, float], kind: str,
+        rooms: Sequence[Room],
+    ) -> Hole | None:  # fmt: skip
+        e, frame = wall.element, wall.frame
+        u0, v0 = max(hole[0], 0.0), max(hole[1], 0.0)
+        u1, v1 = min(hole[2], frame.length), min(hole[3], e.height_m)
+        if u1 - u0 < LEAST_HOLE_M or v1 - v0 < LEAST_HOLE_M:
+            self._notes.add(
+                "hole-outside", f"{wall.id} hole {k}", "lies outside its wall; left out"
+            )
+            return None
+        word = kind.lower()
+        is_window = word == "window" if word in ("door", "window") else v0 > _LEAST_SILL_M
+        axes = frame.axes * [np.linalg.det(frame.axes), 1, 1]
+        centre = frame.start + frame.axes @ [(u0 + u1) / 2, (v0 + v1) / 2, e.depth_m / 2]
+        # A door stands on the floor, not below it.
+        foot = float(frame.start[1] + v0)
+        here = next((r.floor_y for r in rooms if r.id == room_at(rooms, centre)), foot)
+        if not is_window and foot < here < foot + 0.3:
+            centre = centre + np.array([0.0, (here - foot) / 2, 0.0])
+            v0 += here - foot
+        return Hole(
+            id=f"{wall.id}_{'window' if is_window else 'door'}{k}", kind="window" if is_window else "door",
+            centre=centre, size=(u1 - u0, v1 - v0, e.depth_m), axes=axes, source_class=kind,
+        )  # fmt: skip
+
+
+def _structure(
+    item_id: str, kind: ItemKind, surfaces: tuple[Surface, ...], room: str | None,
+    tags: tuple[str, ...] = (),
+) -> Item:  # fmt: skip
+    return Item(
+        id=item_id, name=f"{kind.value} {room or ''}".strip(), kind=kind, level_id="0", surfaces=surfaces,
+        nyu40=NYU40_NAMES.index(kind.value), source_class=kind.value.title(), room_id=room, tags=tags,
+    )  # fmt: skip
+
+
+def _ceiling_over(floor: Element, top: float) -> Element:
+    points = tuple(ring * [1, 0, 1] + [0, top, 0] for ring in floor.points)
+    return replace(floor, kind="Ceiling", points=points, overrides=(), depth_m=SLAB_DEPTH_M)
+
+
+def _plan(floors: Sequence[ToldElement]) -> Any:
+    rings = [shapely.Polygon(e.element.points[0][:, [0, 2]]) for e in floors]
+    return shapely.union_all([shapely.make_valid(r) for r in rings])
+
+
+def _meets(surface: Surface, low: F64, high: F64) -> bool:
+    plan = surface.positions[:, [0, 2]]
+    return bool((plan.max(0) > low).all() and (plan.min(0) < high).all())
+
+
+def _stands_on(wall: StandingWall, floor_y: float) -> bool:
+    low = float(wall.frame.start[1])
+    return low < floor_y + 1.0 < low + wall.element.height_m

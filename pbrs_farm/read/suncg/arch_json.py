@@ -67,6 +67,7 @@ class Element:
     depth_m: float  # thickness
     height_m: float = 0.0  # of a wall
     holes: tuple[tuple[float, float, float, float], ...] = ()  # (H, 4): from, up from, to, up to
+    hole_types: tuple[str, ...] = ()  # as written, "" where a hole tells none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +84,7 @@ def arch_from_json(data: bytes, file: str) -> Arch:
     document = checked(_Document, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
     found: dict[str, list[Element]] = {}
     for i, raw in enumerate(document.elements):
-        element = _element(file, raw, f"element {i}", document.defaults)
+        element = element_of(file, raw, f"element {i}", document.defaults)
         if element is not None:
             found.setdefault(element.room_id, []).append(element)
     return Arch(document.world_from_house(file), found)
@@ -112,6 +113,7 @@ class _Box(Given):
 
 class _Hole(Given):
     box: _Box
+    type: Label = ""
 
 
 class _Wall(_Common):
@@ -141,7 +143,8 @@ class _Slab(_Common):
     offset: Vector = np.zeros(3)
 
 
-def _element(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
+def element_of(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
+    """The element that an entry says, in the file's own axes; None for an unknown type."""
     raw = checked(dict, raw, file, place, error=BadHouse)
     kind = raw.get("type")
     if not isinstance(kind, str) or kind not in _KINDS:
@@ -156,7 +159,10 @@ def _element(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
         wall = checked(_Wall, raw, file, place, error=BadHouse)
         holes = tuple((*h.box.min.tolist(), *h.box.max.tolist()) for h in wall.holes)
         height, ends = wall.height + wall.extraHeight, (np.array(wall.points),)
-        return Element(kind, place, wall.room_id, ends, wall.overrides, wall.depth, height, holes)
+        types = tuple(h.type for h in wall.holes)
+        return Element(
+            kind, place, wall.room_id, ends, wall.overrides, wall.depth, height, holes, types
+        )
     slab = checked(_Slab, raw, file, place, error=BadHouse)
     rings = tuple(np.array(ring) + slab.offset for ring in slab.points)
     return Element(kind, place, slab.room_id, rings, slab.overrides, slab.depth)
@@ -165,8 +171,12 @@ def _element(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
 def arch_items(arch: Arch, node: Node, room_id: str, materials: ModelMaterials) -> Iterator[Item]:
     """The structure items of a Room or Ground node."""
     for item_id, e, outline in _elements_of(arch, node, room_id):
-        frame = _wall_frame(e, outline)
-        surfaces = _slab(arch, e, materials) if frame is None else _wall(arch, e, frame, materials)
+        frame = wall_frame(e, outline)
+        surfaces = (
+            slab_surfaces(arch, e, materials)
+            if frame is None
+            else wall_surfaces(arch, e, frame, materials)
+        )
         if not surfaces:
             continue
         is_ground = e.kind == "Ground"
@@ -190,11 +200,11 @@ def arch_openings(
     found = []
     for node, room_id in rooms:
         for item_id, e, outline in _elements_of(arch, node, room_id):
-            frame = _wall_frame(e, outline)
+            frame = wall_frame(e, outline)
             if frame is None:
                 continue
             for k, hole in enumerate(e.holes):
-                opening = _opening(arch, e, frame, hole, f"{item_id}_hole{k}", node.level_id)
+                opening = opening_of_hole(arch, e, frame, hole, f"{item_id}_hole{k}", node.level_id)
                 found += [_with_leaf(opening, items)] if opening is not None else []
     return tuple(found)
 
@@ -243,7 +253,7 @@ def _kept(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     return tuple(s for s in (_in_world(arch, surface) for surface in surfaces) if s is not None)
 
 
-def _slab(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
+def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
     """A closed slab from the element's height upwards."""
     material = _material(materials, e, 0)
     # Turn the outline counter-clockwise and its holes the other way.
@@ -268,7 +278,7 @@ def _slab(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, .
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Frame:
+class WallFrame:
     """Where a wall stands: its start, and (3, 3) unit columns along, up, outward; its length."""
 
     start: F64
@@ -276,7 +286,7 @@ class _Frame:
     length: float
 
 
-def _wall_frame(e: Element, outline: F64 | None) -> _Frame | None:
+def wall_frame(e: Element, outline: F64 | None) -> WallFrame | None:
     """The frame of a wall with an extent, outward from the room's floor; None for all else."""
     if e.kind != "Wall":
         return None
@@ -294,10 +304,12 @@ def _wall_frame(e: Element, outline: F64 | None) -> _Frame | None:
         x, _y, z = (start + end) / 2 + 0.05 * outward
         if shapely.contains_xy(shapely.Polygon(outline[:, [0, 2]]), x, z):
             outward = -outward
-    return _Frame(start, np.stack([along, up, outward], 1), length)
+    return WallFrame(start, np.stack([along, up, outward], 1), length)
 
 
-def _wall(arch: Arch, e: Element, frame: _Frame, materials: ModelMaterials) -> tuple[Surface, ...]:
+def wall_surfaces(
+    arch: Arch, e: Element, frame: WallFrame, materials: ModelMaterials
+) -> tuple[Surface, ...]:
     """The wall's closed box, without its holes."""
     # Turn a left-handed frame round: the box's faces must look outward.
     half = np.array([frame.length, e.height_m, e.depth_m]) / 2
@@ -314,10 +326,10 @@ def _wall(arch: Arch, e: Element, frame: _Frame, materials: ModelMaterials) -> t
     )
 
 
-def _opening(
+def opening_of_hole(
     arch: Arch,
     e: Element,
-    frame: _Frame,
+    frame: WallFrame,
     hole: tuple[float, float, float, float],
     opening_id: str,
     level_id: str,

@@ -60,7 +60,7 @@ def _rgb(value: Any) -> Any:
     return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 
-def _affine(column_major: F64) -> F64:
+def affine(column_major: F64) -> F64:
     m = column_major.reshape(4, 4).T
     if (np.abs(m[3] - _LAST_ROW) > 1e-6 + 1e-5 * _LAST_ROW).any():
         raise ValueError("is not affine (column-major)")
@@ -121,7 +121,7 @@ class Node(Given):
     index: int  # its position in the level
     model_id: FileName = Field("", alias="modelId")
     # (4, 4), identity for rooms and grounds
-    house_from_model: Annotated[F64, numbers(16, _affine)] = Field(np.eye(4), alias="transform")
+    house_from_model: Annotated[F64, numbers(16, affine)] = Field(np.eye(4), alias="transform")
     bbox: Annotated[Bounds | None, BeforeValidator(_bounds)] = None
     overrides: Overrides = Field((), alias="materials")  # by position in the model's MTL
     # Of a door or curtain, 0 = as modelled.

@@ -1,0 +1,239 @@
+"""The objects of a sceneState: their models from a folder, else what its categories tell.
+
+Effect: reads <folder>/<id>.glb (also by first character, or <id>/<id>.glb) and objects.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.given_classes import GivenClass, class_by_words
+from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.notes import HARMLESS, Notes
+from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.common.told_items import told_item
+from pbrs_farm.read.gltf.document import gltf_document
+from pbrs_farm.read.gltf.materials import SceneMaterials
+from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.scene_items import assumed_light, items_of_scene
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.scenestate.scene_document import PlacedModel
+from pbrs_farm.read.suncg.house_json import NAME
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
+
+_TABLES: Final = (
+    "objects.csv", "semantics/objects.csv", "metadata/objects.csv", "semantics/hssd-hab_semantics_objects.csv",
+)  # fmt: skip
+_MAX_TABLE_BYTES: Final = 64_000_000
+_BESIDE: Final = ("", "..", "../..")  # where models and tables lie when no folder is named
+
+# Width, height, depth of a thing whose model is missing, by class, metres.
+_USUAL: Final = {
+    "bathtub": (1.7, 0.58, 0.75), "bed": (1.6, 0.9, 2.05), "bookshelf": (0.9, 1.8, 0.32),
+    "cabinet": (0.9, 0.9, 0.45), "chair": (0.52, 0.85, 0.55), "counter": (1.2, 0.9, 0.6),
+    "curtain": (1.6, 2.3, 0.12), "desk": (1.3, 0.75, 0.65), "dresser": (1.0, 0.85, 0.48),
+    "floor mat": (1.8, 0.012, 1.2), "lamp": (0.35, 0.6, 0.35), "mirror": (0.6, 0.9, 0.03),
+    "night stand": (0.48, 0.52, 0.4), "picture": (0.6, 0.5, 0.03), "refrigerator": (0.65, 1.75, 0.65),
+    "shelves": (0.9, 1.6, 0.35), "sink": (0.6, 0.85, 0.48), "sofa": (1.95, 0.8, 0.9),
+    "table": (1.3, 0.74, 0.85), "television": (1.1, 0.65, 0.08), "toilet": (0.38, 0.75, 0.68),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    category: str
+    size: tuple[float, float, float] | None  # width, height, depth where the table tells it
+
+
+def roots_of(path: Path, models: str) -> list[RootFolder]:
+    """The folders in which a scene's models may lie."""
+    if models:
+        return [RootFolder(Path(models))]
+    return [RootFolder(path.parent / step) for step in _BESIDE]
+
+
+def names_of_model(model: str) -> Iterator[str]:
+    """Where the model of an id may lie in a folder."""
+    if not NAME.fullmatch(model) or ".." in model:
+        return
+    for folder in ("", "objects/", "models/", "glb/"):
+        yield f"{folder}{model}.glb"
+        yield f"{folder}{model[0]}/{model}.glb"
+        yield f"{folder}{model}/{model}.glb"
+
+
+def table_names() -> tuple[str, ...]:
+    """Where the table of categories may lie in a folder of models."""
+    return _TABLES
+
+
+class SceneModels:
+    """Reads each model once, in its file's own frame; state: those read so far."""
+
+    def __init__(
+        self, roots: list[RootFolder], library: MaterialLibrary, notes: Notes, fields: ReadFields
+    ) -> None:
+        self._roots, self._library, self._notes, self._fields = roots, library, notes, fields
+        self._known: dict[str, tuple[Surface, ...]] = {}
+        self._rows = _table(roots)
+        self.missing: Counter[str] = Counter()  # ids without a model whose class is not known
+
+    def item(self, one: PlacedModel, item_id: str) -> Item | None:
+        """The object as an item; told by its box where its model is missing; None where nothing is known."""
+        row = self._rows.get(one.model)
+        seen = class_by_words(row.category) if row else None
+        surfaces = self._surfaces(one.model, one.place)
+        if not surfaces:
+            return self._told(one, row, seen, item_id)
+        meshes = [_mesh(s) for s in surfaces]
+        world = one.world_from_scene @ one.scene_from_model @ _scene_from_file(one, meshes)
+        found = [
+            placed(m, world, name=s.name, material=s.material)
+            for m, s in zip(meshes, surfaces, strict=True)
+        ]
+        kept = tuple(s for s in found if s is not None)
+        if not kept:
+            self._notes.add("empty-model", one.place, f"{one.model} has no area; left out")
+            return None
+        seen = seen or GivenClass("object", OTHERPROP)
+        kind = ItemKind.OBJECT if seen.kind in _STRUCTURE else seen.item_kind
+        name = row.category if row else one.model
+        item = Item(
+            id=item_id, name=name.replace("_", " "), kind=kind, level_id="0", surfaces=kept,
+            nyu40=seen.nyu40, source_class=f"{one.source}.{one.model}", box=oriented_box(meshes, world),
+            tags=("mirrored",) if np.linalg.det(world[:3, :3]) < 0 else (),
+        )  # fmt: skip
+        return replace(item, lights=(assumed_light(item),)) if kind is ItemKind.LAMP else item
+
+    def _told(
+        self, one: PlacedModel, row: _Row | None, seen: GivenClass | None, item_id: str
+    ) -> Item | None:
+        name = NYU40_NAMES[seen.nyu40] if seen and 0 <= seen.nyu40 < len(NYU40_NAMES) else ""
+        size = (row.size if row else None) or _USUAL.get(name)
+        if row is None or size is None:
+            self.missing[one.model] += 1
+            return None
+        world = one.world_from_scene @ one.scene_from_model
+        # The scene's axes as a model has them: to the right, up, to the front.
+        up, front = (v / np.linalg.norm(v) for v in (one.up, one.front))
+        columns = world[:3, :3] @ np.stack([np.cross(up, front), up, front], 1)
+        unit = float(np.linalg.norm(one.world_from_scene[:3, 0]))
+        scale = np.linalg.norm(columns, axis=0) / unit
+        width, height, depth = (float(s * k) for s, k in zip(size, scale, strict=True))
+        x, y, z = (float(v) for v in world[:3, 3])
+        turn = math.atan2(float(columns[0, 2]), float(columns[2, 2]))
+        return told_item(
+            item_id, "hssd", row.category, (x, y + height / 2, z), (width, height, depth), turn,
+            is_front_told=True,
+        )  # fmt: skip
+
+    def _surfaces(self, model: str, place: str) -> tuple[Surface, ...]:
+        if model not in self._known:
+            self._known[model] = self._read(model, place)
+        return self._known[model]
+
+    def _read(self, model: str, place: str) -> tuple[Surface, ...]:
+        for root in self._roots:
+            for name in names_of_model(model):
+                data = root.read(name, max_bytes=MAX_SCENE_BYTES)
+                if data is None:
+                    continue
+                try:
+                    return self._parsed(data, name)
+                except BadHouse as error:
+                    self._notes.add("unreadable-model", place, f"{error.message}; left out")
+                    return ()
+        return ()
+
+    def _parsed(self, data: bytes, name: str) -> tuple[Surface, ...]:
+        gltf = gltf_document(data, name, lambda _name: None)
+        own = Notes(name, strict=False)
+        materials = SceneMaterials(gltf, lambda _name: None, own)
+        items = list(items_of_scene(gltf, Mapping(), materials, own, self._fields))
+        for note in own.all():
+            if note.kind not in HARMLESS and note.kind != "outer-side":
+                self._notes.add(note.kind, f"{name} {note.place}", note.text)
+        numbers = self._library.adopted(materials.library)
+        return tuple(replace(s, material=numbers[s.material]) for i in items for s in i.surfaces)
+
+
+_STRUCTURE: Final = ("wall", "floor", "ceiling", "none", "opening-reveal")
+
+
+def _mesh(s: Surface) -> Mesh:
+    normals = np.zeros((len(s.positions), 3)) if s.normals is None else s.normals
+    uvs = None if s.uvs is None else s.uvs.astype(np.float64)
+    return Mesh(
+        "", s.name, s.positions.astype(np.float64), s.faces, uvs, normals.astype(np.float64)
+    )
+
+
+def _scene_from_file(one: PlacedModel, meshes: list[Mesh]) -> F64:
+    """(4, 4) the scene's axes and units <- a GLB's: aligned, scaled, then centred as its source says."""
+    up = one.up if one.asset.align.up is None else one.asset.align.up
+    front = one.front if one.asset.align.front is None else one.asset.align.front
+    lengths = [float(np.linalg.norm(v)) for v in (up, front)]
+    found = np.eye(4)
+    if min(lengths) > 1e-9 and abs(up @ front) < 1e-3 * lengths[0] * lengths[1]:
+        up, front = up / lengths[0], front / lengths[1]
+        found[:3, :3] = np.stack([np.cross(up, front), up, front], 1) / one.asset.scale
+    if one.asset.centre is not None:
+        points = np.concatenate([m.positions for m in meshes]) @ found[:3, :3].T
+        low, high = points.min(0), points.max(0)
+        found[:3, 3] = -(low + one.asset.centre * (high - low))
+    return found
+
+
+def _table(roots: list[RootFolder]) -> dict[str, _Row]:
+    """The rows of objects.csv by id: HSSD's has the id first and the category 15th."""
+    for root in roots:
+        for name in _TABLES:
+            try:
+                data = root.read(name, max_bytes=_MAX_TABLE_BYTES)
+            except BadHouse:
+                data = None
+            if data is not None:
+                return _rows(data)
+    return {}
+
+
+def _rows(data: bytes) -> dict[str, _Row]:
+    rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
+    found: dict[str, _Row] = {}
+    try:
+        head = [h.strip().lower() for h in next(rows, [])]
+        at_id = head.index("id") if "id" in head else 0
+        at_category = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
+        at_size = next((k for k, h in enumerate(head) if h.endswith("dims")), -1)
+        for row in rows:
+            if len(row) > max(at_id, at_category) and row[at_category].strip():
+                size = _size(row[at_size]) if 0 <= at_size < len(row) else None
+                found[row[at_id].strip()] = _Row(row[at_category].strip(), size)
+    except csv.Error:
+        return found
+    return found
+
+
+def _size(text: str) -> tuple[float, float, float] | None:
+    """Width, height, depth in metres of centimetres written with commas."""
+    try:
+        width, depth, height = (float(v) / 100 for v in text.replace("\\", "").split(","))
+    except ValueError:
+        return None
+    fits = all(0.005 < v < 20 for v in (width, depth, height))
+    return (width, height, depth) if fits else None

@@ -1,0 +1,182 @@
+"""The walls of a sceneState: which side is out, and one wall where two rooms tell it; no effects.
+
+A wall of one room is a slab outward of its line. One between two rooms stands in the middle of its
+line, and is one wall where both rooms tell it, also where they tell different stretches of it.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.read.scenestate.scene_document import ToldElement
+from pbrs_farm.read.suncg.arch_json import WALL_DEPTH_M, Element, WallFrame
+
+_BESIDE_M: Final = 0.06  # from a wall's line to the floor beside it
+_SAME_M: Final = 0.02  # lines and ends nearer than this are one
+_TURN: Final = 0.0175  # of two lines that are one, radians
+_OFF_GRID: Final = 0.0037  # so that round numbers do not lie between two cells
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StandingWall:
+    """A wall with its frame: start, axes (along, up, out of its first room), length."""
+
+    id: str
+    element: Element
+    frame: WallFrame
+    rooms: tuple[str, ...]
+    is_between: bool  # two rooms
+
+
+def standing_walls(
+    told: Sequence[ToldElement], floors: Mapping[str, Any]
+) -> tuple[list[StandingWall], list[StandingWall]]:
+    """(every wall as it is told, with its frame; the walls that stand, each once).
+
+    floors: room -> the plan area (shapely) of its floor.
+    """
+    tree = shapely.STRtree(list(floors.values()))
+    names = list(floors)
+    drawn = [w for one in told if (w := _standing(one, tree, names)) is not None]
+    lines: dict[tuple[int, int], list[int]] = defaultdict(list)
+    for k, wall in enumerate(drawn):
+        if wall.is_between:
+            lines[_line(wall)].append(k)
+    # Unite what lies on one line; everything else stands as it is told.
+    united = {k: pieces for ks in lines.values() if len(ks) > 1 for k, pieces in _united(drawn, ks)}
+    standing: list[StandingWall] = []
+    for k, wall in enumerate(drawn):
+        standing += united.get(k, [wall])
+    return drawn, standing
+
+
+def _standing(told: ToldElement, tree: Any, names: list[str]) -> StandingWall | None:
+    e = told.element
+    if e.depth_m <= 0:
+        e = replace(e, depth_m=WALL_DEPTH_M)
+    start, end = e.points[0]
+    along = (end - start) * [1, 0, 1]
+    length = float(np.linalg.norm(along))
+    if length < _SAME_M or e.height_m <= 0:
+        return None
+    along /= length
+    left = np.array([along[2], 0.0, -along[0]])
+    sides = [_rooms_beside(start, end, sign * left, tree, names) for sign in (1, -1)]
+    own = [bool(set(side) & set(told.rooms)) for side in sides]
+    is_between = len(told.rooms) > 1 or all(sides)
+    # Out of the first room that tells it, else of the floor that is there.
+    is_left_in = own[0] if own[0] != own[1] else bool(sides[0]) and not sides[1]
+    first = told.rooms[:1]
+    if is_between and first and own == [True, True]:
+        is_left_in = first[0] in sides[0]
+    outward = -left if is_left_in else left
+    if is_between:
+        start = start - outward * e.depth_m / 2
+    up = np.array([0.0, 1.0, 0.0])
+    frame = WallFrame(start, np.stack([along, up, outward], 1), length)
+    return StandingWall(told.id, e, frame, told.rooms, is_between)
+
+
+def _rooms_beside(start: F64, end: F64, side: F64, tree: Any, names: list[str]) -> list[str]:
+    """The rooms whose floors lie on a side of a wall, at its middle or its quarters."""
+    shares = np.array([0.5, 0.25, 0.75])[:, None]
+    points = start + shares * (end - start) + _BESIDE_M * side
+    for point in points:
+        hits = tree.query(shapely.Point(point[0], point[2]), predicate="within")
+        if len(hits):
+            return [names[k] for k in hits]
+    return []
+
+
+def _line(wall: StandingWall) -> tuple[int, int]:
+    along, _up, _out = wall.frame.axes.T
+    if (along[0], along[2]) < (0.0, 0.0) or (abs(along[0]) < 1e-9 and along[2] < 0):
+        along = -along
+    normal = np.array([-along[2], along[0]])
+    middle = wall.element.points[0].mean(0)[[0, 2]]
+    turn = np.arctan2(along[2], along[0])
+    return (
+        int(np.floor((turn + _OFF_GRID) / _TURN)),
+        int(np.floor((float(middle @ normal) + _OFF_GRID) / _SAME_M)),
+    )
+
+
+def _united(
+    drawn: Sequence[StandingWall], on_line: Sequence[int]
+) -> list[tuple[int, list[StandingWall]]]:
+    """Of each wall on a line the pieces that stand for it: those it tells before all others."""
+    first = drawn[on_line[0]]
+    origin, axis = first.frame.start, first.frame.axes[:, 0]
+    spans = {k: _span(drawn[k], origin, axis) for k in on_line}
+    cuts = sorted(v for span in spans.values() for v in span)
+    cuts = [c for i, c in enumerate(cuts) if i == 0 or c - cuts[i - 1] > _SAME_M / 2]
+    pieces: dict[int, list[tuple[float, float, tuple[int, ...]]]] = {k: [] for k in on_line}
+    for low, high in pairwise(cuts):
+        middle = (low + high) / 2
+        here = tuple(k for k in on_line if spans[k][0] < middle < spans[k][1])
+        here = tuple(k for k in here if _same_height(drawn[k], drawn[here[0]]))
+        if not here:
+            continue
+        runs = pieces[here[0]]
+        if runs and runs[-1][2] == here and low - runs[-1][1] < _SAME_M:
+            runs[-1] = (runs[-1][0], high, here)
+        else:
+            runs.append((low, high, here))
+    found = []
+    for k in on_line:
+        runs = pieces[k]
+        # A wall that nobody else tells keeps its id and its ends.
+        whole = len(runs) == 1 and runs[0][2] == (k,)
+        found.append((k, [drawn[k]] if whole else _pieces(drawn, k, runs, origin, axis)))
+    return found
+
+
+def _span(wall: StandingWall, origin: F64, axis: F64) -> tuple[float, float]:
+    ends = (wall.element.points[0] - origin) @ axis
+    return float(ends.min()), float(ends.max())
+
+
+def _same_height(a: StandingWall, b: StandingWall) -> bool:
+    low = max(a.frame.start[1], b.frame.start[1])
+    high = min(w.frame.start[1] + w.element.height_m for w in (a, b))
+    return bool(high - low > 0.5 * min(a.element.height_m, b.element.height_m))
+
+
+def _pieces(
+    drawn: Sequence[StandingWall], k: int, runs: list[tuple[float, float, tuple[int, ...]]],
+    origin: F64, axis: F64,
+) -> list[StandingWall]:  # fmt: skip
+    wall = drawn[k]
+    e, axes = wall.element, wall.frame.axes
+    found = []
+    for number, (low, high, here) in enumerate(runs):
+        others = [drawn[j] for j in here if j != k]
+        # What the other room paints inside is this wall's outside.
+        back = next((o for o in others if o.frame.axes[:, 2] @ axes[:, 2] < 0), None)
+        overrides = e.overrides
+        if back is not None and back.element.overrides and e.overrides:
+            overrides = (e.overrides[0], back.element.overrides[0])
+        # The piece runs the way its wall runs.
+        ends = [low, high] if float(axes[:, 0] @ axis) > 0 else [high, low]
+        offset = (origin - wall.frame.start) @ axes[:, 0]
+        start = wall.frame.start + axes[:, 0] * (offset + ends[0] * float(axes[:, 0] @ axis))
+        top = max(w.frame.start[1] + w.element.height_m for w in (wall, *others))
+        depth = max(w.element.depth_m for w in (wall, *others))
+        start = start + axes[:, 2] * (e.depth_m - depth) / 2
+        piece = replace(
+            e, overrides=overrides, height_m=float(top - start[1]), depth_m=depth, holes=(), hole_types=()
+        )  # fmt: skip
+        rooms = tuple(dict.fromkeys(r for w in (wall, *others) for r in w.rooms))
+        name = wall.id if number == 0 else f"{wall.id}.{number}"
+        found.append(
+            StandingWall(name, piece, WallFrame(start, axes, high - low), rooms, is_between=True)
+        )
+    return found
