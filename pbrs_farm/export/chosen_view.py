@@ -37,6 +37,7 @@ _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
 _BY_AREA: Final = (*_MODES, "albedo")
 _IN_PIXELS: Final = ("flow_", "disparity")  # what measures the picture's own pixels
+_NEEDED: Final = ("width_px", "height_px", "instances")  # of view.json, by every export
 _CLASSES: Final = "semantic"  # the layer that a user's own classes replace
 # Classes of NYU40 that are parts of the building; all others are objects.
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
@@ -132,6 +133,9 @@ class ChosenView:
 
         With a user's classes each instance has `own_class` and `own_class_name`, too.
         """
+        lacks = [name for name in _NEEDED if name not in self.entry.facts]
+        if lacks:
+            raise BadInput(self.entry.folder / "view.json", lacks[0], "is not there")
         facts = self.entry.facts if self.choice.size is None else self._resized_facts()
         if self.choice.classes is None:
             return facts

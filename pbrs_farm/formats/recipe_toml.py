@@ -30,7 +30,8 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
         fields = tomllib.loads(read_regular(path, _MAX_BYTES).decode())
     except OSError as error:
         raise BadRecipe(f"{path}: {fault_of(error)}") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.
+    except (ValueError, RecursionError) as error:
         raise BadRecipe(f"{path}: is no TOML: {error}") from None
     base = fields.pop("recipe", "fast")
     if not isinstance(base, str) or base not in RECIPE_NAMES:

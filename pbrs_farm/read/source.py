@@ -36,6 +36,7 @@ _UNREAD_SUFFIXES: Final = frozenset({
     ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
     ".ply", ".rvt", ".sdf", ".skp", ".stl",
 })  # fmt: skip
+_LONGEST_ID: Final = 255  # bytes of a folder's name
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
 SourceKind = Literal[
@@ -319,6 +320,10 @@ def _package_digest(package: Package | None) -> str:
 def suncg_list(root: Path, list_file: Path) -> list[str]:
     """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out."""
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
+    for number, house in enumerate(ids, 1):
+        if len(house.encode()) > _LONGEST_ID and not house.startswith("#"):
+            text = f"an id of {len(house)} letters is no folder's name"
+            raise BadHouse(list_file, f"line {number}", text)
     return [str(root / "house" / i) for i in ids if i and not i.startswith("#")]
 
 

@@ -1,4 +1,5 @@
 import json
+import shutil
 import tarfile
 from dataclasses import replace
 from pathlib import Path
@@ -56,6 +57,16 @@ def view_folder(root: Path, name: str = "v0") -> Path:
 
 def png(file: Path) -> np.ndarray:
     return array_from_png(file.read_bytes())
+
+
+def test_a_view_that_lacks_a_field_is_named_with_its_file(root, tmp_path):
+    broken = shutil.copytree(root, tmp_path / "root")
+    file = view_folder(broken) / "view.json"
+    facts = json.loads(file.read_text())
+    del facts["width_px"]
+    file.write_text(json.dumps(facts))
+    with pytest.raises(BadInput, match="width_px"):
+        export(broken, tmp_path / "out", "coco")
 
 
 def test_coco_masks_boxes_and_classes_are_those_of_the_labels(root, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.read.source import read_house, resolve, suncg_list
 from tests.example_homes import example_homes
 
 
@@ -47,6 +47,13 @@ def test_a_file_of_another_program_says_what_is_read(tmp_path: Path, name: str) 
     path.write_bytes(b"bytes")
     with pytest.raises(BadHouse, match="files are not read"):
         resolve(str(path))
+
+
+def test_a_list_of_houses_names_the_line_that_is_no_id(tmp_path: Path) -> None:
+    path = tmp_path / "list.txt"
+    path.write_text("# all\n0004d5\n" + "a" * 100_000)
+    with pytest.raises(BadHouse, match="line 3: an id of 100000 letters"):
+        suncg_list(tmp_path, path)
 
 
 def test_a_folder_of_models_names_the_verb_objects(tmp_path: Path) -> None:

@@ -149,7 +149,7 @@ def _signature(takes: Sequence[str]) -> inspect.Signature:
 def _read(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise BadInput(path.name, "", str(error)) from error
 
 

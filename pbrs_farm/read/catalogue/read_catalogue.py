@@ -97,7 +97,11 @@ def _given(path: Path, notes: LibraryNotes) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
     if path.is_dir():
-        return _folder(path, notes)
+        found = _folder(path, notes)
+        if not found.pieces and not found.pictures:
+            first = next((n.text for n in notes.found if n.place.startswith(path.name)), "")
+            raise BadInput(path, "", "holds nothing that can be used", hint=first)
+        return found
     if path.suffix.lower() == ".sh3t":
         return _textures(path, notes, TEXTURES)
     if path.suffix.lower() == ".sh3f":

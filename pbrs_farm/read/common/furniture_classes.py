@@ -123,6 +123,9 @@ def plain(text: str) -> str:
     return folded(parted(text))
 
 
+_LONGEST_NAME: Final = 500  # letters that are looked at
+
+
 @lru_cache(maxsize=4096)
 def _candidates(name: str) -> tuple[tuple[str, bool], ...]:
     return tuple(_found_candidates(name))
@@ -190,7 +193,7 @@ def _fits(label: str, place: PieceSize | None) -> bool:
 def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
-    for label, is_noun in _candidates(name):
+    for label, is_noun in _candidates(name[:_LONGEST_NAME]):
         if not _fits(label, place):
             refused = True
             continue

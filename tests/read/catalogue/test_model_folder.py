@@ -63,6 +63,13 @@ def test_an_empty_folder_is_no_catalogue(tmp_path: Path) -> None:
         catalogue_from([], given=[tmp_path])
 
 
+def test_a_folder_of_which_nothing_can_be_used_says_why(tmp_path: Path) -> None:
+    (tmp_path / "sofa.glb").write_bytes(b"junk")
+    with pytest.raises(BadInput, match="holds nothing that can be used") as caught:
+        catalogue_from([], given=[tmp_path])
+    assert "sofa.glb" in str(caught.value)
+
+
 def test_the_digest_follows_every_file_of_the_folder(tmp_path: Path) -> None:
     write(tmp_path / "sofa" / "a.obj")
     first = catalogue_from([], given=[tmp_path]).digest

@@ -119,5 +119,9 @@ def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
     assert class_of_piece("eTeks#squareTable", "Table").rule == "catalogue"
 
 
+def test_a_name_of_megabytes_is_its_beginning() -> None:
+    assert class_of_piece("", "chair " + "a" * 2**21).nyu40 == class_of_piece("", "chair").nyu40
+
+
 def test_accents_and_case_part_no_words() -> None:
     assert plain("KüchenSchrank TVUnit") == "kuchen schrank tv unit"
