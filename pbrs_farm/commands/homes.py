@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
+from pbrs_farm.commands.arguments import Verb, at_least, counted, echo, echo_json, warn
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
 if TYPE_CHECKING:
@@ -46,10 +46,13 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
     text = (
-        "JSON, GeoJSON or a CSV of WKT: a plan of your own, furnished by the seed (docs/homes.md)"
+        "a floor plan in any format of docs/houses.md, furnished by the seed: JSON, GeoJSON, CSV, "
+        "SVG, TXT"
     )
     add("--plan", type=Path, metavar="FILE", help=text)
     add("--apartment", default="", metavar="ID", help="which one of a CSV with several")
+    text = "which storey of a plan of several, from 0 (default all)"
+    add("--floor", type=int, metavar="K", help=text)
     add("--jobs", type=int, default=1, metavar="N", help="processes (default 1)")
 
 
@@ -113,14 +116,19 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     """Furnish the user's own plan, once for each seed."""
     from pbrs_farm.core.catalogue import EMPTY
     from pbrs_farm.gallery.made_homes import write_home
-    from pbrs_farm.generate.made import made_of_plan
-    from pbrs_farm.generate.plans.own_plan import plan_from_file
+    from pbrs_farm.generate.plans.plan_files import Part, plan_from_file
+    from pbrs_farm.read.formats import PLAN, kind_of_file
+    from pbrs_farm.run.plan_house import made_of_file
 
+    at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
     given = [f"--{k}" for k in ("rooms", "area", "storeys", "programme") if getattr(args, k)]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
-    own = plan_from_file(args.plan, args.apartment)
+    if (kind := kind_of_file(args.plan)) not in ("", PLAN):
+        hint = f"`pbrs-farm run {args.plan}` reads it"
+        raise BadInput(args.plan, "", f"is a house ({kind}), no floor plan", hint=hint)
+    own = plan_from_file(args.plan, Part(args.apartment, args.floor))
     for line in own.left_out:
         warn(f"left out: {line}")
     catalogue = EMPTY if args.empty else catalogue_here()
@@ -128,7 +136,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     for seed in range(args.seed, args.seed + args.count):
         name = args.plan.stem if args.count == 1 else f"{args.plan.stem}-{seed}"
         style = args.style or ""
-        home = made_of_plan(own.plan, catalogue, seed=seed, style=style, name=name)
+        home = made_of_file(own, catalogue, seed=seed, style=style, name=name)
         write_home(args.out / f"{name}.sh3d", home)
         echo(str(args.out / f"{name}.sh3d"))
     return 0
@@ -148,6 +156,8 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
 
     if args.apartment:
         raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")
+    if args.floor is not None:
+        raise BadInput("--floor", str(args.floor), "needs --plan FILE")
     options = [f"{k}={v}" for k in ("rooms", "area", "style", "storeys") if (v := getattr(args, k))]
     options += ["furniture=none"] * args.empty
     given = [f"--{k}" for k in ("rooms", "area") if args.programme and getattr(args, k)]

@@ -61,6 +61,7 @@ class BadInput(PbrsError):
         super().__init__(f"{where}: {message}", hint=hint)
         self.file = str(file)
         self.place = place
+        self.text = message
 
 
 class BadHouse(BadInput):

@@ -162,6 +162,8 @@ def _draw_opening(root: Element, plan: Plan, opening: PlanOpening) -> None:
         element(root, "polyline", points=_text((hole.start, hole.end)), stroke="#333",
                 stroke_width="0.03")  # fmt: skip
         return
+    if opening.kind is OpeningKind.PASSAGE:
+        return
     # The leaf stands open into its room; an arc shows its way.
     hinge, other = (start, end) if opening.hinge_at_start else (end, start)
     nx, nz = _into(plan, opening, wall)

@@ -27,7 +27,7 @@ from pbrs_farm.generate.programme import (
     scaled_rooms,
 )
 from pbrs_farm.generate.slicing import STEP_M, IntRect, drawn_outline
-from pbrs_farm.generate.staircase import Stair, stair_between
+from pbrs_farm.generate.staircase import SLAB_M, Stair, stair_between
 
 # A floor plan by seed: programme, layout, walls, openings.
 
@@ -70,7 +70,6 @@ def _drawn_layout(rng: np.random.Generator, wishes: Wishes | None) -> Layout:
 # A home of two storeys by seed: programmes, a core that both share, a plan for each.
 
 
-SLAB_M: Final = 0.26  # from the lower ceiling to the upper floor
 _STAIRS: Final = (44, 58)  # across its front and from front to back, steps, walls included
 _LANDING: Final = 22  # before it, steps
 _BESIDE: Final = 56  # between stairs and a corner they do not lie in: a room's width, steps

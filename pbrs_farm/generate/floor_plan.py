@@ -57,6 +57,7 @@ class OpeningKind(StrEnum):
 
     DOOR = "door"
     ENTRANCE = "entrance"
+    PASSAGE = "passage"  # a hole without a leaf
     WINDOW = "window"
     FRENCH_WINDOW = "french_window"
 

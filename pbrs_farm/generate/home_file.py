@@ -29,7 +29,7 @@ from pbrs_farm.generate.floor_plan import (
     Storey,
 )
 from pbrs_farm.generate.model_file import joinery, model_files
-from pbrs_farm.generate.staircase import Stair, staircase
+from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
 
 # The paints of a made home.
@@ -67,6 +67,7 @@ _FIELD_OF_VIEW_RAD: Final = 1.1
 _LAMP_POWER: Final = 0.5
 _DOOR_NAMES: Final = {
     OpeningKind.DOOR: "Door", OpeningKind.ENTRANCE: "Front door",
+    OpeningKind.PASSAGE: "Door frame",
     OpeningKind.WINDOW: "Window", OpeningKind.FRENCH_WINDOW: "French window",
 }  # fmt: skip
 _FLOOR_GROUPS: Final = {
@@ -97,7 +98,7 @@ def home_file(
         "wallHeight": _cm(plan.height),
     })  # fmt: skip
     # Without a level that is shown, the program's plan would be blank.
-    if stair is not None:
+    if len(storeys) > 1:
         home.set("selectedLevel", "level-0")
     contents = _Contents()
     _add_properties(home, placed, origin)
@@ -119,7 +120,7 @@ def home_file(
     for storey, level in zip(storeys, levels, strict=True):
         _add_walls(home, storey.plan, paints, level)
     for storey, level in zip(storeys, levels, strict=True):
-        _add_rooms(home, storey.plan, paints, floors, contents, level)
+        _add_rooms(home, storey.plan, paints, floors, contents, level, has_stair=stair is not None)
     xml = ET.tostring(home, encoding="UTF-8", xml_declaration=True)
     return contents.archive(xml)
 
@@ -217,18 +218,20 @@ def _add_levels(
     home: ET.Element, storeys: Sequence[Storey], stair: Stair | None
 ) -> list[dict[str, str]]:
     """The attributes that put an element on each storey: none for a home of one."""
-    if stair is None:
-        return [{} for _ in storeys]
+    if len(storeys) == 1:
+        return [{}]
+    slab = stair.slab_m if stair is not None else SLAB_M
     found, elevation = [], 0.0
     for number, storey in enumerate(storeys):
         name = f"level-{number}"
         ET.SubElement(home, "level", {
-            "id": name, "name": _LEVEL_NAMES[number], "elevation": _cm(elevation),
-            "floorThickness": _cm(stair.slab_m), "height": _cm(storey.plan.height),
+            "id": name, "name": (*_LEVEL_NAMES, f"Floor {number}")[min(number, 2)],
+            "elevation": _cm(elevation),
+            "floorThickness": _cm(slab), "height": _cm(storey.plan.height),
             "elevationIndex": "0",
         })  # fmt: skip
         found.append({"level": name})
-        elevation += storey.plan.height + stair.slab_m
+        elevation += storey.plan.height + slab
     return found
 
 
@@ -391,13 +394,14 @@ def _drawn_floors(catalogue: Catalogue, rng: np.random.Generator) -> dict[str, P
 
 def _add_rooms(
     home: ET.Element, plan: Plan, paints: Paints, floors: dict[str, Picture], contents: _Contents,
-    level: dict[str, str],
+    level: dict[str, str], *, has_stair: bool,
 ) -> None:  # fmt: skip
     first = len(home.findall("room"))
     for number, room in enumerate(plan.rooms):
         is_wet = room.type in _FLOOR_GROUPS
         # Between storeys the stairwell is open: no floor above, no ceiling below.
-        open_at = _OPEN_WELLS.get(level.get("level", "")) if room.type is RoomType.STAIRS else ""
+        is_well = has_stair and room.type is RoomType.STAIRS
+        open_at = _OPEN_WELLS.get(level.get("level", "")) if is_well else ""
         has_ceiling = room.type is not RoomType.BALCONY and open_at != "ceiling"
         element = ET.SubElement(home, "room", {
             "id": f"room-{first + number}", "name": room.name,

@@ -13,7 +13,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
-from pbrs_farm.generate.floor_plan import Plan, PlanRoom, Point, Storey
+from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, PlanRoom, Point, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.programme import Programme, Wishes
@@ -60,18 +60,34 @@ def made_of_plan(
 
     What would stand through a skewed wall is left out.
     """
-    rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, repr(plan)))
-    upright = turned(plan)
-    grounds = [Polygon(room.polygon).buffer(0.02) for room in upright.rooms]
-    pieces = tuple(
-        piece
-        for piece in furnished(upright, catalogue, rng, style)
-        if grounds[piece.room].contains(Polygon(piece.corners))
+    own = ((),)
+    return made_of_storeys(
+        [turned(plan)], own, catalogue, repr(plan), seed=seed, style=style, name=name
     )
-    digest = keys.digest("own plan", VERSION, seed, style, repr(plan), catalogue.digest)
-    storey = Storey(upright, pieces)
-    data = home_file([storey], catalogue, rng, name=name, origin=f"plan {digest}")
-    return Made((storey,), data, f"plan {digest}")
+
+
+def made_of_storeys(
+    plans: Sequence[Plan], told: Sequence[Sequence[PlacedPiece]], catalogue: Catalogue, key: str, *,
+    seed: int, style: str = "", name: str = "home",
+) -> Made:  # fmt: skip
+    """Upright storeys from below; rooms where none of the told pieces stands are furnished by a seed.
+
+    key: what the plans come from, of which the seed makes a home.
+    """
+    rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, key))
+    storeys = []
+    for plan, own in zip(plans, told, strict=True):
+        grounds = [Polygon(room.polygon).buffer(0.02) for room in plan.rooms]
+        taken = {piece.room for piece in own}
+        drawn = [
+            p for p in furnished(plan, catalogue, rng, style)
+            if p.room not in taken and grounds[p.room].contains(Polygon(p.corners))
+        ]  # fmt: skip
+        storeys.append(Storey(plan, (*own, *drawn)))
+    words = [repr(own) for own in told if own]
+    digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)
+    data = home_file(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
+    return Made(tuple(storeys), data, f"plan {digest}")
 
 
 def turned(plan: Plan) -> Plan:

@@ -130,6 +130,8 @@ def joinery(opening: PlanOpening, wall_m: float, colour: Triple) -> Shape:
     # The frame is 2 cm deeper than the wall, so that it shows on both sides.
     w, h, d = opening.width, opening.height, wall_m + 0.02
     frame = _frame(w, h, d, has_sill=opening.sill > 0)
+    if opening.kind is OpeningKind.PASSAGE:
+        return Shape((boxes_surface("frame", frame, 0),), (paint,))
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
         leaf = _leaf(w, h, d)
         handles = _handles(w, d, opening.hinge_at_start)

@@ -20,6 +20,7 @@ from pbrs_farm.generate.floor_plan import Plan, Point, Rect, RoomType
 from pbrs_farm.generate.plan_walls import largest_rectangle
 from pbrs_farm.geometry.solids import Triple, box_quads, boxes_surface, quads_surface
 
+SLAB_M: Final = 0.26  # from the lower ceiling to the upper floor
 HIGHEST_RISER_M: Final = 0.185
 RAIL_M: Final = 0.95  # above the upper floor
 _TREAD_M: Final = 0.04  # thickness of a tread

@@ -37,6 +37,9 @@ _UNREAD_SUFFIXES: Final = frozenset({
     ".ply", ".rvt", ".sdf", ".skp", ".stl",
 })  # fmt: skip
 _LONGEST_ID: Final = 255  # bytes of a folder's name
+ASSETS: Final = "asset-database.json"
+"""ProcTHOR's table of its assets' sizes, looked for beside a plan."""
+
 _FAR_M: Final = 100.0  # from every room: nobody sees it, and it may be a slip of a unit
 
 SourceKind = Literal[
@@ -92,6 +95,7 @@ class SourceRef(Record):
     dress_seed: what it is dressed by between reading and repair; its id then ends in `-d<seed>`.
     edits: what is changed of the repaired house, in order; its id then ends in `-e<digest>`.
     models: the folder of the models that the file names, "" = where its format keeps them.
+    part: of a plan's file, what is meant of it: `apartment=ID`, `floor=K`; "" = the whole file.
     """
 
     kind: SourceKind
@@ -102,6 +106,12 @@ class SourceRef(Record):
     dress_seed: int = 0  # 0 = as it was drawn
     edits: tuple[Edit, ...] = ()
     models: str = ""
+    part: str = ""
+
+    @property
+    def word(self) -> str:
+        """The word of a command line that names the source before dressing and edits."""
+        return f"{self.location}#{self.part}" if self.part else self.location
 
     @property
     def fingerprint(self) -> str:
@@ -152,6 +162,7 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     files: what was looked at before, for many words that share files. models: the folder of the
     models that a file of HSSD, 3D-FRONT or Holodeck names.
     """
+    word, part = _parted(word)
     path = Path(word)
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
@@ -184,7 +195,17 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     else:
         kind = "gltf" if path.suffix.lower() in (".glb", ".gltf") else "sweethome3d"
         word = str(real_path(path))
-    return _reference(kind, word, files or SourceFiles(), models and str(real_path(Path(models))))
+    if part and kind != "plan":
+        raise BadHouse(word, f"#{part}", "names a part of a file that is no floor plan")
+    folder = models and str(real_path(Path(models)))
+    return _reference(kind, word, files or SourceFiles(), folder, part)
+
+
+def _parted(word: str) -> tuple[str, str]:
+    """FILE#apartment=ID -> the file and the part of it; a file of that whole name goes first."""
+    file, _, part = word.rpartition("#")
+    is_part = bool(file) and part.startswith(("apartment=", "floor="))
+    return (file, part) if is_part and not Path(word).exists() else (word, "")
 
 
 def _is_utf8(word: str) -> bool:
@@ -196,7 +217,9 @@ def _is_utf8(word: str) -> bool:
     return "\0" not in word
 
 
-def _reference(kind: SourceKind, location: str, files: SourceFiles, models: str = "") -> SourceRef:
+def _reference(
+    kind: SourceKind, location: str, files: SourceFiles, models: str = "", part: str = ""
+) -> SourceRef:
     """The source at a location of a known kind, with the digests of its files."""
     if kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -231,6 +254,8 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles, models: str 
                 kind=kind, location=location, house_id=house_id, sha256=sha, companions=beside,
                 models=models,
             )  # fmt: skip
+        if kind == "plan":
+            return _plan(path, part, files)
         data, name = read_given(path, error=BadHouse), path.name
         companions = _companions(kind, path, data, files)
     # The house's id depends on its own file alone, so companions never rename a house.
@@ -239,6 +264,19 @@ def _reference(kind: SourceKind, location: str, files: SourceFiles, models: str 
     return SourceRef(
         kind=kind, location=location, house_id=house_id, sha256=sha, companions=companions
     )
+
+
+def _plan(path: Path, part: str, files: SourceFiles) -> SourceRef:
+    """The source of a floor plan; a table of the sizes of its things may lie beside it."""
+    sha = _sha256(path, files)
+    is_json = path.suffix.lower() == ".json"
+    beside = [name for name in (ASSETS,) if is_json and (path.parent / name).is_file()]
+    # Each part of a file is a house of its own.
+    digest, stem = (keys.digest(sha, part), f"{path.stem}-{part}") if part else (sha, path.stem)
+    return SourceRef(
+        kind="plan", location=str(path), house_id=keys.house_id(stem, digest), sha256=sha,
+        companions=files.digest(RootFolder(path.parent), beside) if beside else "", part=part,
+    )  # fmt: skip
 
 
 def _made(word: str) -> SourceRef:
@@ -426,7 +464,7 @@ def _read_object(source: SourceRef, fields: ReadFields) -> House:
 def check_unchanged(source: SourceRef) -> None:
     """Raise BadHouse or MachineFailed where a file is not what it was when the source was named."""
     # Name the source again and compare the digests, where both are known.
-    now = _reference(source.kind, source.location, SourceFiles(), source.models)
+    now = _reference(source.kind, source.location, SourceFiles(), source.models, source.part)
     is_known = source.companions is not None
     if now.sha256 == source.sha256 and (not is_known or now.companions == source.companions):
         return

@@ -104,7 +104,13 @@ _MADE_BY = "home: made by pbrs_farm, CC0"
 
 def house_of_source(source: SourceRef, fields: ReadFields) -> House:
     """The house as its source gives it, unrepaired. Raises BadHouse, BadInput, MachineFailed."""
-    return _made_house(source, fields) if source.kind == "made" else read_house(source, fields)
+    if source.kind == "made":
+        return _made_house(source, fields)
+    if source.kind == "plan":
+        from pbrs_farm.run.plan_house import house_of_plan
+
+        return house_of_plan(source, fields)
+    return read_house(source, fields)
 
 
 def _made_house(source: SourceRef, fields: ReadFields) -> House:

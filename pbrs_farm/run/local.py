@@ -233,7 +233,7 @@ class Schedule:
 
     def _command(self, event: Event) -> str:
         source = self._sources[event.house_id]
-        words = ["pbrs-farm", "step", event.step, source.location, "--out", self._run.store_url]
+        words = ["pbrs-farm", "step", event.step, source.word, "--out", self._run.store_url]
         if source.models:
             words += ["--models", source.models]
         if source.dress_seed:

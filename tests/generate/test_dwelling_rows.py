@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
 from pbrs_farm.generate.made import made_of_plan
-from pbrs_farm.generate.plans.own_plan import OwnPlan, plan_from_file
+from pbrs_farm.generate.plans.plan_files import Part, PlanFile, plan_from_file
 from pbrs_farm.read.sweethome3d.home import read_home
 
 COLUMNS = (
@@ -53,7 +53,9 @@ def written(folder: Path, rows: list[tuple[Any, ...]], columns: tuple[str, ...] 
     return path
 
 
-def plan(folder: Path, rows: list[tuple[Any, ...]] | None = None, apartment: str = "a1") -> OwnPlan:
+def plan(
+    folder: Path, rows: list[tuple[Any, ...]] | None = None, apartment: str = "a1"
+) -> PlanFile:
     return plan_from_file(written(folder, ROWS if rows is None else rows), apartment)
 
 
@@ -97,7 +99,6 @@ def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
         (ROWS, "", r"has 2 apartments: a1, a2.*--apartment a1"),
         (ROWS, "b9", r"has no apartment 'b9'"),
         ([], "", "has no row of the type area"),
-        ([*ROWS, area("ROOM", rect(10, 21, 5, 4), floor="8")], "a1", "2 floors; one storey works"),
         ([area("ROOM", "POLYGON ((0 0, 1")], "a1", "line 2: has a geometry that is no WKT polygon"),
         ([area("SHAFT", rect(0, 0, 1, 1))], "a1", "without rooms"),
     ],
@@ -120,3 +121,13 @@ def test_an_apartment_is_asked_of_a_table_alone(tmp_path: Path) -> None:
     path.write_text("{}")
     with pytest.raises(BadInput, match=r"names a row of a \.csv"):
         plan_from_file(path, "a1")
+
+
+def test_the_floors_of_an_apartment_are_storeys(tmp_path: Path) -> None:
+    upper = ("a1", "8", "area", "ROOM", rect(10, 21, 5, 4), 407.0, 2.4)
+    found = plan(tmp_path, [upper, *ROWS])
+    assert [s.plan.height for s in found.storeys] == [2.6, 2.4]
+    path = tmp_path / "geometries.csv"
+    assert len(plan_from_file(path, Part("a1", 1)).storeys) == 1
+    with pytest.raises(BadInput, match="has 2 storeys, no floor 2"):
+        plan_from_file(path, Part("a1", 2))

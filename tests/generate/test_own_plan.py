@@ -16,7 +16,7 @@ from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanRoom, PlanWall, RoomType
 from pbrs_farm.generate.made import made_of_plan, turned
-from pbrs_farm.generate.plans.own_plan import plan_from_file
+from pbrs_farm.generate.plans.plan_files import plan_from_file
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, Item, ItemKind
+from pbrs_farm.home.names import parted
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 
 _FURNITURE: Final = ("object", "lamp", "plant", "stairs", "person")
@@ -55,6 +55,5 @@ def told_item(
 
 
 def _spoken(name: str) -> str:
-    """TVStand, tv_stand -> TV stand, tv stand: words that the vocabulary of pieces knows."""
-    parted = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name)
-    return parted.replace("_", " ").replace("-", " ").strip()
+    """TVStand, tv_stand -> TV Stand, tv stand: words that the vocabulary of pieces knows."""
+    return parted(name).replace("_", " ").replace("-", " ").strip()

@@ -1,0 +1,84 @@
+"""Middle lines of walls -> the outlines that they close; no effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.ops import polygonize, unary_union
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
+
+Line = tuple[tuple[float, float], tuple[float, float]]
+
+MAX_LINES: Final = 2_000
+_SHORTEST_M: Final = 0.15
+_JOIN_M: Final = 0.1
+_LEAST_M2: Final = 1.0
+
+
+def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> list[Polygon]:
+    """The rooms that walls close, ends within join_m joined, the largest first.
+
+    Raises BadInput with the place of the least gap where they close none.
+    """
+    if len(lines) > MAX_LINES:
+        raise BadInput(path, "walls", f"has {len(lines)} walls, at most {MAX_LINES} are read")
+    kept = [line for line in lines if math.dist(*line) >= _SHORTEST_M]
+    ends = np.array([p for line in kept for p in line], np.float64).reshape(-1, 2)
+    if not len(ends) or not np.isfinite(ends).all() or np.abs(ends).max() > 1e9:
+        raise BadInput(path, "walls", "has no wall between two places in metres")
+    joined = _joined(ends, join_m).reshape(-1, 2, 2)
+    # Draw each wall out by a little, so that ends that stop short of a wall's middle meet it.
+    drawn = [_longer(a, b, join_m) for a, b in joined if np.hypot(*(b - a)) > 1e-6]
+    noded = unary_union(
+        [*drawn, *(LineString(pair) for pair in joined if (pair[0] != pair[1]).any())]
+    )
+    rooms = [p for p in polygonize(noded) if p.area >= _LEAST_M2]
+    if not rooms:
+        gap, at = _gap(ends)
+        text = f"walls close no room: the widest gap, {gap:.2f} m, is at ({at[0]:.2f}, {at[1]:.2f})"
+        raise BadInput(path, "walls", text, hint=f"ends within {join_m:g} m are joined")
+    whole = [Polygon(p.exterior) if not p.interiors else p for p in rooms]
+    return sorted((Polygon(p.exterior) for p in whole), key=lambda p: -p.area)
+
+
+def _joined(ends: F64, join_m: float) -> F64:
+    """The ends, each group of those near each other at one place."""
+    points = [Point(end) for end in ends]
+    first, second = shapely.STRtree(points).query(points, "dwithin", join_m)
+    group = np.arange(len(ends))
+    # The least number of a neighbour, again and again: groups grow together.
+    for _ in range(len(ends)):
+        least = group.copy()
+        np.minimum.at(least, first, group[second])
+        if (least == group).all():
+            break
+        group = least
+    sums = np.zeros((len(ends), 2))
+    np.add.at(sums, group, ends)
+    counts = np.bincount(group, minlength=len(ends))
+    return np.asarray((sums / np.maximum(counts, 1)[:, None])[group])
+
+
+def _longer(a: F64, b: F64, by: float) -> LineString:
+    way = (b - a) / np.hypot(*(b - a)) * by
+    return LineString([a - way, b + way])
+
+
+def _gap(ends: F64) -> tuple[float, F64]:
+    """The widest of the gaps from an end to the nearest end of another wall, and where it is."""
+    away = np.full(len(ends), np.inf)
+    for k in range(len(ends)):
+        others = np.delete(ends, [k, k ^ 1], axis=0)
+        if len(others):
+            away[k] = np.hypot(*(others - ends[k]).T).min()
+    finite = np.where(np.isfinite(away), away, 0.0)
+    k = int(np.argmax(finite))
+    return float(finite[k]), ends[k]

@@ -1,0 +1,243 @@
+"""A file of a floor plan, in any format -> storeys of a Plan and told things. Effects: reads the file.
+
+A plan of one's own:
+
+    {"height": 2.5,
+     "rooms": [{"type": "living", "name": "Salon", "polygon": [[0, 0], [5, 0], [5, 4], [0, 4]]}],
+     "doors": [{"at": [5, 2], "width": 0.9}, {"at": [0, 2], "entrance": true}],
+     "windows": [{"at": [2.5, 0], "width": 1.3, "height": 1.3, "sill": 0.9}]}
+
+GeoJSON says the same: polygons with the properties `type` and `name` are rooms, points with `kind`
+(door, entrance, passage, window, french_window) and the sizes are openings. x runs to the right and the
+second coordinate downwards on the page. Rooms may touch or leave room for the walls between. The other
+formats, a module each beside this one, are told by the file's suffix or by the keys of its JSON.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel, Field
+
+from pbrs_farm.core.checked_json import checked
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan
+from pbrs_farm.generate.made import turned_by, upright_angle
+from pbrs_farm.generate.plans.cubicasa import plan_of_svg
+from pbrs_farm.generate.plans.dwelling_rows import plan_of_rows
+from pbrs_farm.generate.plans.plan_value import plan_of_value
+from pbrs_farm.generate.plans.procthor import plan_of_procthor
+from pbrs_farm.generate.plans.react_planner import plan_of_react_planner
+from pbrs_farm.generate.plans.room_plan import plan_of_room_plan
+from pbrs_farm.generate.plans.spatial_lm import plan_of_layout
+from pbrs_farm.generate.plans.told_plan import MAX_THINGS, Thing, ToldPlan
+from pbrs_farm.generate.plans.zind import plan_of_zind
+from pbrs_farm.generate.programme import json_from_file
+
+
+@dataclass(frozen=True, slots=True)
+class PlanStorey:
+    """A storey: its plan, and the things that the file tells of it."""
+
+    plan: Plan
+    things: tuple[Thing, ...] = ()
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanFile:
+    """What a file holds, from below, and what of it is left out, a line each."""
+
+    storeys: tuple[PlanStorey, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def plan(self) -> Plan:
+        """Of the lowest storey."""
+        return self.storeys[0].plan
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Which part of a file is meant: an apartment of a table, a storey of the others."""
+
+    apartment: str = ""
+    floor: int | None = None  # from 0, the lowest; None = all
+
+    @property
+    def word(self) -> str:
+        """As it stands behind the # of a word of the command line; "" = the whole file."""
+        given = [f"apartment={self.apartment}"] * bool(self.apartment)
+        given += [f"floor={self.floor}"] * (self.floor is not None)
+        return ",".join(given)
+
+
+def part_of(word: str) -> Part:
+    """The part that a word names, `apartment=ID`, `floor=K`, both with a comma. Raises BadInput."""
+    part = Part()
+    for option in filter(None, word.split(",")):
+        key, _, value = option.partition("=")
+        if key == "apartment" and value:
+            part = replace(part, apartment=value)
+        elif key == "floor" and value.isascii() and value.isdigit() and len(value) < 5:
+            part = replace(part, floor=int(value))
+        else:
+            hint = "FILE#apartment=ID or FILE#floor=0"
+            raise BadInput(word, option, "names no part of a plan", hint=hint)
+    return part
+
+
+_Read = Callable[[Path, Any], ToldPlan]
+# Keys that tell a JSON plan of a machine by its uppermost names.
+_MACHINES: Final[tuple[tuple[frozenset[str], _Read], ...]] = (
+    (frozenset({"rooms", "walls", "objects", "doors"}), plan_of_procthor),
+    (frozenset({"walls", "objects"}), plan_of_room_plan),
+    (frozenset({"redraw"}), plan_of_zind),
+    (frozenset({"layers"}), plan_of_react_planner),
+)
+
+
+def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
+    """The plan of a file, or of a part of it; its longest walls run along x or z.
+
+    Raises BadInput, naming the room or opening. What a machine wrote and does not fit is left out.
+    """
+    part = Part(apartment=part) if isinstance(part, str) else part
+    suffix = path.suffix.lower()
+    if part.apartment and suffix != ".csv":
+        raise BadInput("--apartment", part.apartment, "names a row of a .csv", hint="leave it out")
+    if suffix == ".csv":
+        return _of_machine(path, plan_of_rows(path, part.apartment), part)
+    if suffix == ".svg":
+        return _of_machine(path, plan_of_svg(path), part)
+    if suffix == ".txt":
+        return _of_machine(path, plan_of_layout(path), part)
+    value = json_from_file(path)
+    names = frozenset(value) if isinstance(value, dict) else frozenset()
+    for keys, read in _MACHINES:
+        if keys <= names and not _is_own(value):
+            return _of_machine(path, read(path, value), part)
+    if names >= {"rooms"} and any(_has_walls(room) for room in _rows(value["rooms"])):
+        # A structure of several scans keeps the walls in its rooms alone.
+        return _of_machine(path, plan_of_room_plan(path, value), part)
+    if isinstance(value, dict) and value.get("type") == "FeatureCollection":
+        value = _from_geojson(path, value)
+    plan = plan_of_value(path, value)
+    return _chosen(path, (PlanStorey(plan),), (), part)
+
+
+def _rows(value: object) -> list[Any]:
+    return value[:1] if isinstance(value, list) else []
+
+
+def _has_walls(room: object) -> bool:
+    return isinstance(room, dict) and "walls" in room and "objects" in room
+
+
+def _is_own(value: dict[str, Any]) -> bool:
+    """Whether the first room is drawn as a plan of one's own draws it."""
+    return any(isinstance(room, dict) and "polygon" in room for room in _rows(value.get("rooms")))
+
+
+def _of_machine(path: Path, told: ToldPlan, part: Part) -> PlanFile:
+    from pbrs_farm.generate.plans.told_plan import LeftOut
+
+    left_out = LeftOut()
+    storeys = []
+    x, z = _origin(told)
+    for storey in told.storeys:
+        plan = plan_of_value(path, _moved_value(storey.value, -x, -z), left_out)
+        things = [t._replace(x=t.x - x, z=t.z - z) for t in storey.things if _is_sound(t)]
+        n_lost = len(storey.things) - len(things[:MAX_THINGS])
+        for _ in range(min(n_lost, 1)):
+            left_out.add(f"{n_lost} things have no sound box, or are beyond {MAX_THINGS}")
+        storeys.append(PlanStorey(plan, tuple(things[:MAX_THINGS]), storey.name))
+    return _chosen(path, tuple(storeys), (*told.left_out, *left_out.lines()), part)
+
+
+def _is_sound(thing: Thing) -> bool:
+    return all(
+        math.isfinite(v) and abs(v) < 1e9
+        for v in (thing.x, thing.z, thing.low, thing.width, thing.depth, thing.height, thing.turn_rad)
+    )  # fmt: skip
+
+
+def _origin(told: ToldPlan) -> tuple[float, float]:
+    """The least corner of all rooms: machines draw far from any origin."""
+    points = [p for s in told.storeys for room in s.value["rooms"] for p in room["polygon"]]
+    finite = [p for p in points if math.isfinite(p[0]) and math.isfinite(p[1])]
+    if not finite:
+        return 0.0, 0.0
+    return min(p[0] for p in finite), min(p[1] for p in finite)
+
+
+def _moved_value(value: dict[str, Any], dx: float, dz: float) -> dict[str, Any]:
+    def at(p: Any) -> list[float]:
+        return [p[0] + dx, p[1] + dz]
+
+    rooms = [room | {"polygon": [at(p) for p in room["polygon"]]} for room in value["rooms"]]
+    moved = {
+        key: [row | {"at": at(row["at"])} for row in value[key]] for key in ("doors", "windows")
+    }
+    walls = [w | {"start": at(w["start"]), "end": at(w["end"])} for w in value.get("walls", ())]
+    return value | moved | {"rooms": rooms, "walls": walls}
+
+
+def _chosen(
+    path: Path, storeys: tuple[PlanStorey, ...], left_out: tuple[str, ...], part: Part
+) -> PlanFile:
+    if part.floor is not None and part.floor >= len(storeys):
+        n = len(storeys)
+        text = f"has {n} storey{'s' * (n > 1)}, no floor {part.floor}"
+        raise BadInput(path, "", text, hint=f"#floor={n - 1} is the highest")
+    if part.floor is not None:
+        storeys = storeys[part.floor : part.floor + 1]
+    return PlanFile(storeys, left_out)
+
+
+def upright(file: PlanFile) -> PlanFile:
+    """The storeys turned about their origin so that most walls of the home run along x or z."""
+    angle = upright_angle([room for storey in file.storeys for room in storey.plan.rooms])
+    cos, sin = math.cos(angle), math.sin(angle)
+
+    def turned(t: Thing) -> Thing:
+        return t._replace(
+            x=t.x * cos - t.z * sin, z=t.x * sin + t.z * cos, turn_rad=t.turn_rad - angle
+        )
+
+    return replace(file, storeys=tuple(
+        replace(s, plan=turned_by(s.plan, angle), things=tuple(map(turned, s.things)))
+        for s in file.storeys
+    ))  # fmt: skip
+
+
+class _Geometry(BaseModel):
+    type: Literal["Polygon", "Point"]
+    coordinates: list[Any] = Field(min_length=1)
+
+
+class _Feature(BaseModel):
+    properties: dict[str, Any] | None
+    geometry: _Geometry
+
+
+def _from_geojson(path: Path, value: dict[str, Any]) -> dict[str, Any]:
+    plan: dict[str, Any] = {"rooms": [], "doors": [], "windows": []}
+    for place, given in _features(path, value):
+        row, at = given.properties or {}, given.geometry.coordinates
+        if given.geometry.type == "Polygon":
+            plan["rooms"].append(row | {"polygon": at[0]})
+            continue
+        kind = checked(OpeningKind, row.get("kind"), path, f"{place}, kind")
+        is_window = kind in (OpeningKind.WINDOW, OpeningKind.FRENCH_WINDOW)
+        plan["windows" if is_window else "doors"].append(row | {"at": at})
+    return plan if value.get("height") is None else plan | {"height": value["height"]}
+
+
+def _features(path: Path, value: dict[str, Any]) -> Iterator[tuple[str, _Feature]]:
+    for k, feature in enumerate(checked(list, value.get("features"), path, "features"), 1):
+        yield f"feature {k}", checked(_Feature, feature, path, f"feature {k}")

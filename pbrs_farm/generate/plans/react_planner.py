@@ -1,0 +1,204 @@
+"""A home drawn with react-planner (its JSON) -> a told plan; no effects.
+
+layers.<id> holds vertices, lines (walls), holes, areas and items; y is up on the page, lengths are in the
+file's unit (cm). A hole lies at `offset`, a share of its line.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Final, TypeGuard
+
+from pydantic import BaseModel, Field
+from shapely.geometry import Polygon
+
+from pbrs_farm.core.checked_json import checked
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
+from pbrs_farm.generate.plans.told_plan import (
+    LeftOut,
+    Thing,
+    ToldPlan,
+    ToldStorey,
+    footprint,
+    value_of,
+)
+from pbrs_farm.generate.plans.usual_sizes import usual_size
+
+_METRES: Final = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "mi": 1609.344}
+_MOST: Final = 5_000
+
+
+class _Layer(BaseModel):
+    vertices: dict[str, Any] = Field(default_factory=dict, max_length=20_000)
+    lines: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    holes: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    items: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    areas: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    altitude: float = 0.0
+    name: Any = ""
+
+
+class _File(BaseModel):
+    unit: str = "cm"
+    scale: float = 1.0
+    layers: dict[str, _Layer] = Field(min_length=1, max_length=50)
+
+
+def plan_of_react_planner(path: Path, value: Any) -> ToldPlan:
+    """What the file tells, a storey a layer. Raises BadInput, naming the place."""
+    given = checked(_File, value, path)
+    if given.unit not in _METRES:
+        raise BadInput(path, "unit", f"no such unit: {given.unit[:20]}", hint=", ".join(_METRES))
+    left_out = LeftOut()
+    layers = sorted(given.layers.items(), key=lambda row: row[1].altitude)
+    drawn = [
+        _Drawing(path, f"layers.{key}"[:60], layer, _METRES[given.unit], given.scale)
+        for key, layer in layers if layer.lines
+    ]  # fmt: skip
+    if not drawn:
+        raise BadInput(path, "layers", "has no layer with lines")
+    return ToldPlan(tuple(d.storey(left_out) for d in drawn), left_out.lines())
+
+
+class _Drawing:
+    """A layer in metres."""
+
+    def __init__(self, path: Path, place: str, layer: _Layer, metres: float, scale: float) -> None:
+        self.path, self.place, self.layer = path, place, layer
+        self.metres, self.scale = metres, scale
+
+    def storey(self, left_out: LeftOut) -> ToldStorey:
+        """The storey of the layer."""
+        lines, walls, heights = {}, [], []
+        for key, row in self.layer.lines.items():
+            line = self._line(key, row)
+            if line is None:
+                left_out.add("a line has no two ends", f"{self.place}.lines.{key}"[:80])
+                continue
+            lines[key] = line
+            kind = str(row.get("type", "wall"))
+            if kind in ("wall", "area_splitter"):
+                heights.append(self._length(row, "height", 2.6))
+            elif math.dist(*line) > 0.05:
+                walls.append({
+                    "start": list(line[0]), "end": list(line[1]),
+                    "thickness": min(max(self._length(row, "thickness", 0.1), 0.04), 2.0),
+                    "height": 1.0 if kind == "railing" else None,
+                })  # fmt: skip
+        openings = [
+            o
+            for k, row in self.layer.holes.items()
+            if (o := self._opening(k, row, lines, left_out))
+        ]
+        things = [t for k, row in self.layer.items.items() if (t := self._thing(k, row, left_out))]
+        areas = self._areas(lines, left_out)
+        windows = [o for o in openings if o["kind"] == "window"]
+        rooms = typed_rooms("react-planner", areas, things, windows, left_out)
+        value = value_of(rooms, openings, max(heights, default=2.6), walls)
+        return ToldStorey(value, tuple(things), str(self.layer.name)[:60])
+
+    def _areas(self, lines: dict[str, Line], left_out: LeftOut) -> list[DrawnArea]:
+        found = []
+        for key, row in self.layer.areas.items():
+            names = row.get("vertices") if isinstance(row, dict) else None
+            points = [self._vertex(n) for n in names] if isinstance(names, list) else []
+            ring = [p for p in points if p is not None]
+            if len(ring) < 3 or len(ring) < len(points):
+                left_out.add("an area names no three corners", f"{self.place}.areas.{key}"[:80])
+                continue
+            name = str(row.get("name") or "")
+            found.append(
+                DrawnArea(Polygon(ring), "", "" if name.lower().startswith("area") else name)
+            )
+        if found:
+            return found
+        return [DrawnArea(p, "") for p in closed_rings(self.path, list(lines.values()))]
+
+    def _line(self, key: str, row: Any) -> Line | None:
+        if not isinstance(row, dict):
+            raise BadInput(self.path, f"{self.place}.lines.{key}"[:80], "expected an object")
+        names = row.get("vertices")
+        if isinstance(names, list) and len(names) >= 2:
+            a, b = self._vertex(names[0]), self._vertex(names[1])
+            return (a, b) if a and b and a != b else None
+        points = [q for p in row.get("coordinates") or () if (q := self._point(p, self.scale))]
+        if len(points) < 3:
+            return None
+        box = footprint(Polygon(points))
+        dx, dz = math.cos(box.turn_rad) * box.width / 2, -math.sin(box.turn_rad) * box.width / 2
+        return (box.x - dx, box.z - dz), (box.x + dx, box.z + dz)
+
+    def _vertex(self, name: object) -> tuple[float, float] | None:
+        return self._point(self.layer.vertices.get(str(name)), 1.0)
+
+    def _point(self, given: Any, scale: float) -> tuple[float, float] | None:
+        x, y = (given.get("x"), given.get("y")) if isinstance(given, dict) else (None, None)
+        if isinstance(given, list) and len(given) >= 2:
+            x, y = given[:2]
+        if not _is_number(x) or not _is_number(y):
+            return None
+        factor = self.metres * scale
+        return float(x) * factor, -float(y) * factor
+
+    def _length(self, row: Any, name: str, usual: float) -> float:
+        """A property in metres: {"length": 20}, {"value": 20, "unit": "cm"} or 20."""
+        properties = row.get("properties") if isinstance(row, dict) else None
+        given = properties.get(name) if isinstance(properties, dict) else None
+        metres = self.metres
+        if isinstance(given, dict):
+            metres = _METRES.get(str(given.get("unit")), metres)
+            given = given.get("length", given.get("value"))
+        return float(given) * metres if _is_number(given) else usual
+
+    def _opening(
+        self, key: str, row: Any, lines: dict[str, Line], left_out: LeftOut
+    ) -> dict[str, Any] | None:
+        line = lines.get(str(row.get("line"))) if isinstance(row, dict) else None
+        if line is None:
+            left_out.add("a hole names no line", f"{self.place}.holes.{key}"[:80])
+            return None
+        offset = row.get("offset", 0.5)
+        t = float(offset) if _is_number(offset) and 0 <= offset <= 1 else 0.5
+        (x0, z0), (x1, z1) = line
+        kind = str(row.get("type", "door")).lower()
+        width = self._length(row, "width", self._length(row, "length", 0.9))
+        found: dict[str, Any] = {
+            "at": [x0 + t * (x1 - x0), z0 + t * (z1 - z0)], "width": max(width, 0.3), "kind": "door",
+        }  # fmt: skip
+        if "window" in kind or "curtain" in kind:
+            found |= {
+                "kind": "window", "height": max(self._length(row, "height", 1.3), 0.3),
+                "sill": max(self._length(row, "altitude", 0.9), 0.0),
+            }  # fmt: skip
+        elif "entrance" in kind:
+            found["kind"] = "entrance"
+        else:
+            found["height"] = max(min(self._length(row, "height", 2.05), 2.4), 1.6)
+        return found
+
+    def _thing(self, key: str, row: Any, left_out: LeftOut) -> Thing | None:
+        at = self._point(row, 1.0)
+        name = str(row.get("type", "")) if isinstance(row, dict) else ""
+        size = usual_size(name) or (0.6, 0.8, 0.6)
+        if at is None or name.lower() in ("stairs", "elevator", "shaft"):
+            left_out.add(
+                "an item has no place, or is stairs or a shaft", f"{self.place}.items.{key}"[:80]
+            )
+            return None
+        width = self._length(row, "width", self._length(row, "length", size[0]))
+        turn = row.get("rotation", 0)
+        return Thing(
+            "cubicasa-icon", name, *at, max(self._length(row, "altitude", 0.0), 0.0), max(width, 0.05),
+            max(self._length(row, "depth", size[2]), 0.05), max(self._length(row, "height", size[1]), 0.05),
+            math.radians(float(turn)) if _is_number(turn) else 0.0,
+        )  # fmt: skip
+
+
+def _is_number(value: object) -> TypeGuard[int | float]:
+    return (
+        isinstance(value, int | float) and not isinstance(value, bool)
+        and math.isfinite(value) and abs(value) < 1e9
+    )  # fmt: skip

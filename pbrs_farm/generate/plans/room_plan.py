@@ -1,0 +1,177 @@
+"""A scan of Apple's RoomPlan (CapturedRoom or CapturedStructure as JSON) -> a told plan; no effects.
+
+Metres, y up. A surface: dimensions [w, h, 0] and a transform, 16 numbers by column, its x along the
+wall, y up, its origin the middle. Older exports write the category as text and the transform as 4 rows.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from pydantic import BaseModel, Field
+from shapely.geometry import Point, Polygon
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import Finite, checked
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
+from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
+
+_MOST: Final = 3_000
+_JOIN_M: Final = 0.25  # scanned walls do not meet exactly
+_SPURIOUS_M: Final = 12.0
+_KINDS: Final = {"door": "door", "window": "window", "opening": "passage"}
+
+
+class _Surface(BaseModel):
+    category: Any = None
+    dimensions: list[Finite] = Field(min_length=2, max_length=3)
+    transform: list[Any] = Field(min_length=4, max_length=16)
+    polygonCorners: list[list[Finite]] = Field(default_factory=list, max_length=20_000)  # noqa: N815
+    completedEdges: list[Any] | None = None  # noqa: N815
+    story: Any = 0
+
+
+class _Section(BaseModel):
+    label: Any = ""
+    center: list[Finite] = Field(min_length=3, max_length=3)
+    story: Any = 0
+
+
+class _Scan(BaseModel):
+    walls: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    doors: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    windows: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    openings: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    objects: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    floors: list[_Surface] = Field(default_factory=list, max_length=_MOST)
+    sections: list[_Section] = Field(default_factory=list, max_length=_MOST)
+
+
+def plan_of_room_plan(path: Path, value: Any) -> ToldPlan:
+    """What the scan tells, a storey a `story` of it. Raises BadInput, naming the place."""
+    if not value.get("walls") and isinstance(value.get("rooms"), list):
+        # A structure of several scans: what each of them holds.
+        names = _Scan.model_fields
+        rooms = [r for r in value["rooms"] if isinstance(r, dict)]
+        value = {n: [x for r in rooms if isinstance(r.get(n), list) for x in r[n]] for n in names}
+    scan = checked(_Scan, value, path)
+    left_out = LeftOut()
+    stories = sorted({_story(s.story) for s in (*scan.walls, *scan.floors)})
+    if not scan.walls:
+        raise BadInput(path, "walls", "has no wall")
+    storeys = [_storey(path, _of(scan, story), left_out) for story in stories]
+    return ToldPlan(tuple(storeys), left_out.lines())
+
+
+def _story(value: object) -> int:
+    return value if isinstance(value, int) and abs(value) < 100 else 0
+
+
+def _of(scan: _Scan, story: int) -> _Scan:
+    parts = {
+        name: [s for s in getattr(scan, name) if _story(s.story) == story]
+        for name in _Scan.model_fields
+    }
+    return scan.model_copy(update=parts)
+
+
+def _storey(path: Path, scan: _Scan, left_out: LeftOut) -> ToldStorey:
+    walls, lines = [], []
+    for k, surface in enumerate(scan.walls, 1):
+        pose = _pose(path, f"wall {k}", surface)
+        edges = surface.completedEdges
+        if surface.dimensions[0] > _SPURIOUS_M and edges is not None and len(edges) < 2:
+            left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is no wall")
+            continue
+        walls.append((surface, pose))
+        lines.append(_line(surface, pose))
+    floor = _floor(path, scan, walls)
+    height = statistics.median([w.dimensions[1] for w, _ in walls] or [2.6])
+    outlines = [
+        shape for k, f in enumerate(scan.floors, 1)
+        if len(f.polygonCorners) >= 4 and (shape := _outline(path, f"floor {k}", f)).area >= 0.5
+    ]  # fmt: skip
+    outlines = outlines or closed_rings(path, lines, _JOIN_M)
+    openings = [
+        _opening(s, _pose(path, f"{kind} {k}", s), kind, floor)
+        for kind, surfaces in (("door", scan.doors), ("window", scan.windows), ("opening", scan.openings))
+        for k, s in enumerate(surfaces, 1)
+    ]  # fmt: skip
+    things = [
+        _thing(s, _pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
+    ]
+    areas = [DrawnArea(shape, _label(shape, scan.sections)) for shape in outlines]
+    windows = [o for o in openings if o["kind"] == "window"]
+    rooms = typed_rooms("roomplan", areas, things, windows, left_out)
+    return ToldStorey(value_of(rooms, openings, height), tuple(things))
+
+
+def _pose(path: Path, place: str, surface: _Surface) -> F64:
+    """(4, 4) world from local, of 16 numbers by column or of 4 rows."""
+    rows = surface.transform
+    flat = rows if len(rows) == 16 else [x for row in rows if isinstance(row, list) for x in row]
+    is_number = [isinstance(x, int | float) and math.isfinite(x) and abs(x) < 1e6 for x in flat]
+    if len(flat) != 16 or not all(is_number):
+        raise BadInput(path, f"{place}, transform", "expected 16 numbers")
+    pose = np.array(flat, np.float64).reshape(4, 4)
+    # The row 0 0 0 1 tells which way it is written.
+    return pose if np.allclose(pose[3], [0, 0, 0, 1]) and pose[:3, 3].any() else pose.T
+
+
+def _line(surface: _Surface, pose: F64) -> Line:
+    half = surface.dimensions[0] / 2 * pose[:3, 0]
+    a, b = pose[:3, 3] - half, pose[:3, 3] + half
+    return (float(a[0]), float(a[2])), (float(b[0]), float(b[2]))
+
+
+def _floor(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) -> float:
+    lows = [float(pose[1, 3]) - w.dimensions[1] / 2 for w, pose in walls]
+    floors = [float(_pose(path, "floor", f)[1, 3]) for f in scan.floors]
+    return statistics.median(floors or lows or [0.0])
+
+
+def _outline(path: Path, place: str, floor: _Surface) -> Polygon:
+    pose = _pose(path, place, floor)
+    local = np.array([(*c, 0.0, 0.0, 0.0)[:3] for c in floor.polygonCorners])
+    world = local @ pose[:3, :3].T + pose[:3, 3]
+    return Polygon(world[:, [0, 2]])
+
+
+def _category(surface: _Surface) -> str:
+    """{"bed": {}} or "bed" -> "bed"."""
+    given = surface.category
+    return str(next(iter(given), "")) if isinstance(given, dict) else str(given or "")
+
+
+def _opening(surface: _Surface, pose: F64, kind: str, floor: float) -> dict[str, Any]:
+    width, height = surface.dimensions[:2]
+    low = float(pose[1, 3]) - height / 2 - floor
+    row: dict[str, Any] = {
+        "at": [float(pose[0, 3]), float(pose[2, 3])], "width": max(width, 0.3),
+        "height": max(height, 0.3), "kind": _KINDS[kind],
+    }  # fmt: skip
+    if kind == "window":
+        row["sill"] = max(low, 0.0)
+    return row
+
+
+def _thing(surface: _Surface, pose: F64, floor: float) -> Thing:
+    width, height, depth = (*surface.dimensions, 0.5)[:3]
+    right = pose[:3, 0]
+    return Thing(
+        "roomplan", _category(surface), float(pose[0, 3]), float(pose[2, 3]),
+        float(pose[1, 3]) - height / 2 - floor, width, max(depth, 0.02), height,
+        math.atan2(-float(right[2]), float(right[0])),
+    )  # fmt: skip
+
+
+def _label(shape: Polygon, sections: list[_Section]) -> str:
+    inside = (s for s in sections if shape.contains(Point(s.center[0], s.center[2])))
+    found = next(inside, None)
+    return str(found.label) if found else ""

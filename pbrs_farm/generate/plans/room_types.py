@@ -1,0 +1,127 @@
+"""What rooms are for, by the words of other vocabularies, by what stands in them, by size; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import shapely
+from shapely.geometry import Point, Polygon
+
+from pbrs_farm.generate.floor_plan import RoomType
+from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ring_of
+from pbrs_farm.home.names import words_of
+from pbrs_farm.home.room_use import RoomKind, given_room_type, named_kind
+
+BY_FIXTURES: Final = "by its fixtures"
+NO_ROOM: Final = "none"
+LEAST_M2: Final = 0.5
+"""Of a room: what is smaller is a sliver."""
+
+_SMALL_BATH_M2: Final = 2.6  # a smaller one has no bath: a WC
+_NEAR_WINDOW_M: Final = 0.5
+_LIVING_M2, _ROOM_M2, _STORE_M2 = 18.0, 9.0, 3.0
+_TYPES: Final = {
+    RoomKind.DINING: "living", RoomKind.OFFICE: "bedroom", RoomKind.OUTDOOR: "balcony",
+    RoomKind.OTHER: "hall",
+}  # fmt: skip
+# Words of things that say what a room is for; the first row that one of them has a word of holds.
+_FIXTURES: Final = (
+    ("bath", {"bathtub", "tub", "shower", "jacuzzi"}), ("toilet", {"toilet", "wc", "urinal"}),
+    ("kitchen", {"kitchen", "stove", "oven", "cooker", "hob", "fridge", "refrigerator", "dishwasher"}),
+    ("bed", {"bed"}), ("sofa", {"sofa", "couch"}),
+)  # fmt: skip
+
+
+class DrawnArea(NamedTuple):
+    """An area of a file before it is known what it is for."""
+
+    shape: Polygon
+    word: str  # the vocabulary's, "" = none
+    name: str = ""
+    is_plain: bool = False  # a room to live in of which no more is told
+
+
+def typed_rooms(
+    source: str,
+    areas: Sequence[DrawnArea],
+    things: Sequence[Thing],
+    windows: Sequence[dict[str, Any]],
+    left_out: LeftOut,
+) -> list[dict[str, Any]]:
+    """The rows of the areas that are rooms, in their order.
+
+    Where none is to live in, the largest plain room is. Slivers and what is no room are left out.
+    """
+    kept: list[tuple[DrawnArea, str]] = []
+    sure = [_by_word(source, area) for area in areas]
+    largest = max((a.shape.area for a in areas), default=0.0)
+    places = shapely.STRtree([Point(t.x, t.z) for t in things]) if things else None
+    lights = [Point(w["at"]) for w in windows]
+    for area, kind in zip(areas, sure, strict=True):
+        if kind == NO_ROOM:
+            continue
+        if area.shape.area < LEAST_M2:
+            left_out.add(f"an area below {LEAST_M2} m2 is a sliver")
+            continue
+        if kind == BY_FIXTURES:
+            inside = places.query(area.shape, "contains").tolist() if places is not None else []
+            has = {_fixture(things[k].name) for k in inside}
+            is_lit = any(area.shape.distance(p) < _NEAR_WINDOW_M for p in lights)
+            kind = _by_fixtures(
+                area.shape.area, has, is_lit=is_lit, is_largest=area.shape.area == largest
+            )
+            area = area._replace(is_plain=area.is_plain or kind == "bedroom")
+        elif kind == "bathroom" and area.shape.area < _SMALL_BATH_M2:
+            kind = "wc"
+        kept.append((area, kind))
+    return [
+        {"type": kind, "polygon": ring_of(area.shape)} | ({"name": area.name} if area.name else {})
+        for area, kind in _with_living(kept)
+    ]  # fmt: skip
+
+
+def _by_word(source: str, area: DrawnArea) -> str:
+    given = given_room_type(source, area.word) if area.word else None
+    if given is not None:
+        # Stairs of a plan lead nowhere: a plain passage.
+        return "hall" if given == "stairs" else given
+    return type_by_words(area.name or area.word)
+
+
+def type_by_words(name: str) -> str:
+    """The room type that the words of a name say, in any of the languages of room_words.csv."""
+    said = named_kind(name)
+    if said is None:
+        return BY_FIXTURES
+    return "wc" if {"wc", "toilet"} & words_of(name) else _TYPES.get(said, said.value)
+
+
+def _fixture(name: str) -> str:
+    words = words_of(name.replace("_", " "))
+    return next((kind for kind, known in _FIXTURES if words & known), "")
+
+
+def _by_fixtures(m2: float, has: set[str], *, is_lit: bool, is_largest: bool) -> str:
+    if has & {"toilet", "bath"}:
+        return "bathroom" if m2 >= _SMALL_BATH_M2 or "bath" in has else "wc"
+    if "kitchen" in has:
+        return "living" if "sofa" in has else "kitchen"
+    if "bed" in has:
+        return "bedroom"
+    if "sofa" in has or (m2 >= _LIVING_M2 and is_largest):
+        return "living"
+    if is_lit and m2 >= _ROOM_M2:
+        return "bedroom"
+    return "store" if not is_lit and m2 < _STORE_M2 else "hall"
+
+
+def _with_living(kept: list[tuple[DrawnArea, str]]) -> list[tuple[DrawnArea, str]]:
+    types = [kind for _, kind in kept]
+    plain = [k for k, (area, kind) in enumerate(kept) if area.is_plain and kind == "bedroom"]
+    if {RoomType.LIVING, RoomType.STUDIO} & set(types) or not plain:
+        return kept
+    largest = max(plain, key=lambda k: (kept[k][0].shape.area, -k))
+    # One room to live and to sleep in, where no other is left to sleep in.
+    kind = "living" if types.count("bedroom") > 1 else "studio"
+    return [(a, kind if k == largest else t) for k, (a, t) in enumerate(kept)]

@@ -1,0 +1,169 @@
+"""What a file tells of a home before its walls stand: storeys of rooms, openings, things; frozen values.
+
+Plans of machines are told in whatever frame their format has; here x runs to the right, z downwards on
+the page, in metres, as in a Plan. Angles are about +y: at 0 a front looks to +z.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import shapely
+from shapely import affinity
+from shapely.geometry import MultiPolygon, Polygon
+
+from pbrs_farm.generate.plan_walls import largest_rectangle
+
+MAX_THINGS: Final = 3_000
+_FILLED: Final = 0.85  # of its rectangle: a shape that fills less is made of several boxes
+_MOST_CORNERS: Final = 12  # of a shape that is parted into boxes
+_LEAST_BOX_M2: Final = 0.08
+
+
+class Thing(NamedTuple):
+    """Something of which a file tells name and box alone."""
+
+    vocabulary: str  # whose word the name is (read/common/given_classes.csv)
+    name: str
+    x: float  # of its middle
+    z: float
+    low: float  # its lower edge above the storey's floor
+    width: float
+    depth: float
+    height: float
+    turn_rad: float
+    is_front_told: bool = False
+
+
+@dataclass(frozen=True)
+class ToldStorey:
+    """A storey as the JSON of a plan of one's own would say it, and the things on it."""
+
+    value: dict[str, Any]
+    things: tuple[Thing, ...] = ()
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class ToldPlan:
+    """All storeys from below, and what the file holds that was left out, a line each."""
+
+    storeys: tuple[ToldStorey, ...]
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass
+class LeftOut:
+    """Collects what is left out, many of a kind as one line; state: its counts."""
+
+    counts: dict[str, int] = field(default_factory=dict)
+    first: dict[str, str] = field(default_factory=dict)
+
+    def add(self, what: str, place: str = "") -> None:
+        """Remember one; what: a sentence that holds for all of its kind."""
+        self.counts[what] = self.counts.get(what, 0) + 1
+        self.first.setdefault(what, place)
+
+    def lines(self) -> tuple[str, ...]:
+        """A line a kind, with the first place."""
+        found = []
+        for what, n in self.counts.items():
+            place = f"{self.first[what]}: " if self.first[what] and n == 1 else ""
+            found.append(f"{place}{what}" + (f" ({n} times)" if n > 1 else ""))
+        return tuple(found)
+
+
+class Footprint(NamedTuple):
+    """A rectangle on the floor: width along the direction that turn_rad gives its right side."""
+
+    x: float
+    z: float
+    width: float
+    depth: float
+    turn_rad: float
+
+
+def footprint(shape: Polygon) -> Footprint:
+    """The least rectangle around a shape, its width the longer side."""
+    corners = shapely.get_coordinates(shape.minimum_rotated_rectangle)
+    if len(corners) < 4:
+        x, z = shape.centroid.coords[0]
+        return Footprint(x, z, 0.0, 0.0, 0.0)
+    a, b = corners[1] - corners[0], corners[2] - corners[1]
+    long, short = (a, b) if np.hypot(*a) >= np.hypot(*b) else (b, a)
+    middle = corners[:4].mean(0)
+    # The right side of a thing turned by t points to (cos t, -sin t).
+    turn = math.atan2(-float(long[1]), float(long[0]))
+    return Footprint(
+        float(middle[0]), float(middle[1]), float(np.hypot(*long)), float(np.hypot(*short)), turn
+    )
+
+
+def footprints(shape: Polygon) -> list[Footprint]:
+    """The rectangles that make up a shape: one, or several of an L or a U."""
+    whole = footprint(shape)
+    ground = largest_part(shape.simplify(0.03)) or shape
+    area = whole.width * whole.depth
+    if area <= 0 or shape.area > _FILLED * area or len(ground.exterior.coords) > _MOST_CORNERS:
+        return [whole]
+    # Turn it upright, and take the largest rectangle of what is left, again and again.
+    upright: Polygon | None = largest_part(
+        affinity.rotate(ground, whole.turn_rad, (0, 0), use_radians=True)
+    )
+    found: list[Footprint] = []
+    while len(found) < 4 and upright is not None and upright.area > _LEAST_BOX_M2:
+        x0, z0, x1, z1 = largest_rectangle(upright)
+        if (x1 - x0) * (z1 - z0) < _LEAST_BOX_M2:
+            break
+        back = affinity.rotate(
+            shapely.box(x0, z0, x1, z1), -whole.turn_rad, (0, 0), use_radians=True
+        )
+        found.append(footprint(back))
+        upright = largest_part(upright.difference(shapely.box(x0, z0, x1, z1).buffer(1e-6)))
+    return found or [whole]
+
+
+def largest_part(shape: object) -> Polygon | None:
+    """The largest polygon of a shape; None where it has none."""
+    if isinstance(shape, Polygon):
+        return None if shape.is_empty else shape
+    parts = getattr(shape, "geoms", ())
+    polygons = [p for p in parts if isinstance(p, Polygon | MultiPolygon)]
+    flat = [q for p in polygons for q in (p.geoms if isinstance(p, MultiPolygon) else [p])]
+    return max(flat, key=lambda p: p.area, default=None)
+
+
+def ring_of(shape: Polygon) -> list[list[float]]:
+    """The corners of a polygon as a plan's JSON has them."""
+    return [[float(x), float(z)] for x, z, *_ in shape.exterior.coords[:-1]]
+
+
+def opening(
+    shape: Footprint, kind: str, *, sill: float | None = None, height: float | None = None
+) -> dict[str, Any]:
+    """The row of a door or window whose ground is given; its width is the longer side."""
+    row: dict[str, Any] = {"at": [shape.x, shape.z], "width": shape.width, "kind": kind}
+    if height is not None:
+        row["height"] = height
+    if sill is not None:
+        row["sill"] = sill
+    return row
+
+
+def value_of(
+    rooms: Sequence[dict[str, Any]], openings: Iterable[dict[str, Any]], height: float,
+    walls: Sequence[dict[str, Any]] = (),
+) -> dict[str, Any]:  # fmt: skip
+    """A storey's value of rooms and openings of any kind."""
+    rows = list(openings)
+    glazed = ("window", "french_window")
+    return {
+        "height": min(max(height, 2.0), 6.0) if math.isfinite(height) else 2.6,
+        "rooms": list(rooms), "walls": list(walls),
+        "doors": [row for row in rows if row["kind"] not in glazed],
+        "windows": [row for row in rows if row["kind"] in glazed],
+    }  # fmt: skip

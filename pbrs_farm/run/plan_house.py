@@ -1,0 +1,127 @@
+"""A file of a floor plan becomes a House: its walls built, its things told; and a home to be furnished.
+
+Effects: reads the file. Told things are items without surfaces until run/stand_ins.py furnishes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.house import House, Item, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
+from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.generate.made import Made, made_of_storeys
+from pbrs_farm.generate.plans.plan_files import (
+    PlanFile,
+    PlanStorey,
+    part_of,
+    plan_from_file,
+    upright,
+)
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.told_items import told_item
+from pbrs_farm.read.source import SourceRef, check_unchanged, home_id
+from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.run.stand_ins import with_stand_ins
+
+LEFT_OUT = "plan-left-out"
+"""The kind of the notes of what a machine's plan holds and does not fit."""
+
+
+def house_of_plan(source: SourceRef, fields: ReadFields) -> House:
+    """The house of a plan, with its told things. Raises BadInput, naming the place in the file."""
+    check_unchanged(source)
+    path = Path(source.location)
+    file = upright(plan_from_file(path, part_of(source.part)))
+    notes = Notes(source.location, strict=fields.strict)
+    for line in file.left_out:
+        notes.add(LEFT_OUT, "", line)
+    house = _house(file, path.stem, fields)
+    items = told_items(house, file.storeys)
+    n_lost = sum(len(s.things) for s in file.storeys) - len(items)
+    if n_lost:
+        notes.add(
+            "told-left-out", "", f"{n_lost} told things are not drawn: by their class, or no box"
+        )
+    its_source = Source("plan", source.location, source.sha256)
+    return replace(
+        house, id=home_id(source), name=path.stem, source=its_source, cameras=(),
+        items=(*house.items, *items), notes=(*house.notes, *notes.all()),
+    )  # fmt: skip
+
+
+def _house(file: PlanFile, name: str, fields: ReadFields) -> House:
+    """The walls, floors, doors and windows of the storeys."""
+    storeys = [Storey(s.plan, ()) for s in file.storeys]
+    rng = np.random.default_rng(keys.seed("plan", repr([s.plan.walls for s in file.storeys])))
+    return read_home(home_file(storeys, EMPTY, rng, name=name), f"{name}.sh3d", fields=fields)
+
+
+def told_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
+    """An item for each told thing that is drawn, on the levels of the house, which go from below."""
+    levels = sorted(house.levels, key=lambda level: level.elevation)
+    found = []
+    for number, (level, storey) in enumerate(zip(levels, storeys, strict=True)):
+        for k, t in enumerate(storey.things):
+            centre = (t.x, level.elevation + t.low + t.height / 2, t.z)
+            item = told_item(
+                f"told_{number}_{k}", t.vocabulary, t.name, centre, (t.width, t.height, t.depth),
+                t.turn_rad, is_front_told=t.is_front_told, level_id=level.id,
+            )  # fmt: skip
+            if item is not None:
+                found.append(item)
+    return tuple(found)
+
+
+# A plan as a furnished home of its own file.
+
+
+def made_of_file(
+    file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
+) -> Made:
+    """A plan as a home's file: told things where they are told, other rooms furnished by a seed."""
+    plans = [s.plan for s in file.storeys]
+    key = repr(plans[0]) if len(plans) == 1 else repr(plans)
+    file = upright(file)
+    told = _told_pieces(file, catalogue)
+    return made_of_storeys(
+        [s.plan for s in file.storeys], told, catalogue, key, seed=seed, style=style, name=name
+    )
+
+
+def _told_pieces(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]]:
+    """The pieces that stand in for told things, a list a storey."""
+    found: list[list[PlacedPiece]] = [[] for _ in file.storeys]
+    if not catalogue.pieces or not any(s.things for s in file.storeys):
+        return found
+    house = _house(file, "home", ReadFields())
+    items = told_items(house, file.storeys)
+    stood = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
+    pieces = {f"piece:{p.id}": p for p in catalogue.pieces}
+    levels = sorted(house.levels, key=lambda level: level.elevation)
+    number = {level.id: k for k, level in enumerate(levels)}
+    for item in stood.items:
+        piece = next((pieces[tag] for tag in item.tags if tag in pieces), None)
+        if piece is None or item.box is None:
+            continue
+        level = number[item.level_id]
+        (x, z), front = item.box.centre[[0, 2]], item.box.axes[:, 2]
+        plan = file.storeys[level].plan
+        room = next((k for k, r in enumerate(plan.rooms) if r.contains((float(x), float(z)))), None)
+        if room is None:
+            continue
+        width, height, depth = (float(v) for v in 2 * item.box.half)
+        low = float(item.bounds[0, 1]) - levels[level].elevation
+        found[level].append(PlacedPiece(
+            piece, float(x), float(z), max(low, 0.0), math.atan2(-float(front[0]), float(front[2])),
+            width, depth, height, room,
+        ))  # fmt: skip
+    return found
