@@ -133,6 +133,9 @@ class StageNodes:
             node["mesh"] = mesh
         seen = self._class(prim, above, node)
         in_lamp = above.in_lamp or (seen is not None and seen.kind is ItemKind.LAMP)
+        in_lamp = in_lamp or bool(
+            prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
+        )  # says what its lights are
         if prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.BoundableLightBase):
             self._light(prim, node, is_part=above.in_lamp)
         self._nodes[above.node]["children"].append(len(self._nodes))
@@ -309,7 +312,7 @@ class StageNodes:
         if flux is None or not np.isfinite(flux):
             row["extras"]["assumed"] = True
         else:
-            row["intensity"] = float(flux) / (2 * np.pi * (1 - np.cos(cutoff)))
+            row["intensity"] = float(flux / (2 * np.pi * (1 - np.cos(cutoff))))
         node["extensions"] = {"KHR_lights_punctual": {"light": len(self._lights)}}
         self._lights.append(row)
 

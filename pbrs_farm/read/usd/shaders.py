@@ -92,10 +92,13 @@ class Shaders:
         if picture is not None:
             pbr["baseColorTexture"] = picture
         if rough_picture is not None:
-            pbr |= {"metallicRoughnessTexture": rough_picture, "roughnessFactor": 1.0}
+            times = _number((rough_picture.pop("scale_rgb", None) or (1.0,))[0], 1.0)
+            pbr |= {"metallicRoughnessTexture": rough_picture, "roughnessFactor": times}
         normal = self._input(shader, "normal", None)[1]
         if normal is not None:
-            row["normalTexture"] = normal
+            # The node's scale turns 0..1 into twice the map's own.
+            times = _finite((normal.pop("scale_rgb", None) or (2.0,))[0], 2.0) / 2
+            row["normalTexture"] = normal | ({"scale": times} if times != 1 else {})
         if alpha < 1 or opacity_picture is not None:
             row["alphaMode"] = "MASK" if threshold > 0 else "BLEND"
         glow = _triple(self._input(shader, "emissiveColor", (0, 0, 0))[0], (0.0, 0.0, 0.0))

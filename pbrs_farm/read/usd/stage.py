@@ -41,7 +41,7 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
 
     from pbrs_farm.read.usd.prims import StageNodes
     from pbrs_farm.read.usd.shaders import Shaders
-    from pbrs_farm.read.usd.stage_files import StageFolder, opened_stage
+    from pbrs_farm.read.usd.stage_files import FAULTS, StageFolder, damaged, opened_stage
 
     notes = Notes(path.name, strict=fields.strict)
     folder = StageFolder.of(path, models)
@@ -52,7 +52,10 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     scale = float(UsdGeom.GetStageMetersPerUnit(stage))
     is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
     rooms = _told_rooms(stage, folder, path, scale, is_z_up=is_z_up)
-    gltf = nodes.gltf({"rooms": rooms} if rooms else {})
+    try:
+        gltf = nodes.gltf({"rooms": rooms} if rooms else {})
+    except FAULTS as error:
+        raise damaged(path, error) from None
     sha256 = keys.sha256(path.read_bytes())
     house = house_of_gltf(
         gltf, Source("usd", path.name, sha256, attribution=_credit(stage)), path.stem, fields, notes,
@@ -68,11 +71,12 @@ def companions(path: Path, models: str, files: SourceFiles) -> str:
     """Digest of what reading opens beside the file; "" where there is none."""
     if not is_installed("pxr"):
         return ""
-    from pbrs_farm.read.usd.stage_files import StageFolder, files_of_stage
+    from pbrs_farm.read.usd.stage_files import StageFolder, files_of_stage, try_out
 
     folder = StageFolder.of(path, models)
     beside = [_beside(folder, path, name) for name in (*side_files(path), "rooms.json")]
     try:
+        try_out(folder)
         names = [name for name, _ in files_of_stage(folder)]
     except BadHouse:
         names = []

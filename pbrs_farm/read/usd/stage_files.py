@@ -1,13 +1,17 @@
 """The layers of an OpenUSD stage and what lies beside them; nothing outside the folder is read.
 
-Effects: reads files below one folder; the library opens layers that were looked at here first.
+Effects: reads files below one folder; opens the stage in a process that may die, then in this one.
 """
 
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -88,7 +92,7 @@ def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
 def _named_in(path: Path) -> list[str]:
     try:
         return [name for kind in UsdUtils.ExtractExternalReferences(str(path)) for name in kind]
-    except RuntimeError:  # Tf.ErrorException: a damaged layer, of which the stage will tell
+    except (RuntimeError, UnicodeDecodeError):  # a damaged layer, of which the stage will tell
         return []
 
 
@@ -130,17 +134,14 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
     path = folder.path
     if path.stat().st_size > MAX_SCENE_BYTES:
         raise BadHouse(path, "", f"is larger than {MAX_SCENE_BYTES / 1e6:.0f} MB")
+    try_out(folder)
     layers = [name for name, is_layer in files_of_stage(folder) if is_layer]
     said = UsdUtils.CoalescingDiagnosticDelegate()  # else the library writes to our terminal
     try:
         n_references = _check_size(folder, layers)
         stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as error:
-        found = _SAID.search(str(error))
-        text = " ".join((found[1] if found else "is no USD file").split())
-        for known in {str(path), str(path.parent) + "/"}:
-            text = text.replace(known, "")
-        raise BadHouse(path, "", f"damaged: {text.strip(': ')}") from None
+    except FAULTS as error:
+        raise damaged(path, error) from None
     for layer in stage.GetUsedLayers():
         real = layer.realPath.partition("[")[0]
         if real and folder.name_of(real) is None:
@@ -151,6 +152,65 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
         hint = "they name another machine's files: get them, too; " + _HINT
         raise BadHouse(path, "", text, hint=hint)
     return stage
+
+
+# Damaged binary layers may keep the library for ever, or kill it: try them in a process that may die.
+_TRIAL: Final = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
+from pxr import Usd, UsdUtils
+try:
+    UsdUtils.ExtractExternalReferences(sys.argv[1])
+    Usd.Stage.Open(sys.argv[1])
+except Exception:
+    pass  # told by the process that reads
+"""
+_TRIAL_S: Final = 8.0
+_BYTES_A_SECOND: Final = 10e6
+_BINARY: Final = frozenset({".usd", ".usdc", ".usdz"})
+
+
+def try_out(folder: StageFolder) -> None:
+    """Raise BadHouse where opening the stage does not end, or kills the process that does it."""
+    layers = [folder.path]
+    if folder.path.suffix.lower() == ".usda":
+        below = islice(folder.root.root.rglob("*"), _MOST_LAYERS)
+        layers = [p for p in below if p.suffix.lower() in _BINARY and p.is_file()]
+    if layers:
+        facts = folder.path.stat()
+        n_bytes = sum(p.stat().st_size for p in layers)
+        fault = _fault_of(str(folder.path), facts.st_size, facts.st_mtime_ns, n_bytes)
+        if fault:
+            raise BadHouse(folder.path, "", fault, hint="copy or export it again")
+
+
+@lru_cache(maxsize=64)
+def _fault_of(path: str, _size: int, _changed: int, n_bytes: int) -> str:
+    limit_s = _TRIAL_S + n_bytes / _BYTES_A_SECOND
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _TRIAL, path], timeout=limit_s, check=False,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return f"damaged: the library does not open it within {limit_s:.0f} s"
+    return "damaged: the library dies of it" if done.returncode < 0 else ""
+
+
+FAULTS: Final = (Tf.ErrorException, UnicodeDecodeError)
+"""What the library raises of damaged files; texts that are no UTF-8 fail in its own error."""
+
+
+def damaged(path: Path, error: Exception) -> BadHouse:
+    """What the library says of a damaged file, in one line."""
+    try:
+        found = _SAID.search(str(error))
+    except UnicodeDecodeError:
+        found = None
+    text = " ".join((found[1] if found else "is no USD file").split())
+    for known in {str(path), str(path.parent) + "/"}:
+        text = text.replace(known, "")
+    return BadHouse(path, "", f"damaged: {text.strip(': ')}")
 
 
 def _note_missing(said: Any, notes: Notes) -> int:

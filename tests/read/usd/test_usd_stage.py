@@ -258,6 +258,7 @@ DAMAGED = {
     "empty": (b"", "damaged"),
     "other": (b"PNG", "damaged"),
     "truncated": (b'#usda 1.0\ndef Xform "W" { def "x" ', "Expected }"),
+    "no text": (b'#usda 1.0\ndef Xform "W\xe3" {}\n', "damaged"),
     "no floor": (b'#usda 1.0\ndef Xform "W" {}\n', "has no floor"),
     "crate": (b"PXR-USDC" + b"\xff" * 200, "damaged"),
     "index": (
