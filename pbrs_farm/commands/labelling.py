@@ -22,14 +22,17 @@ FORMS = (
     "coco", "hdf5", "webdataset", "released", "yolo", "yolo-seg", "nerfstudio", "colmap", "tum", "kitti", "bop",
     "ply", "captions",
 )  # fmt: skip
+# Forms of homes, not of views: pbrs_farm/export/home_export.py writes them.
+HOME_FORMS = ("gltf",)
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
-    forms = (*FORMS, *plugins("exports"))
-    p = verb("export", _export, "finished views in the form another tool reads")
+    forms = (*FORMS, *HOME_FORMS, *plugins("exports"))
+    text = "finished views in the form another tool reads; or the homes, for simulators"
+    p = verb("export", _export, text)
     add = p.add_argument
     add("folder", type=Path)
     add("--to", required=True, choices=forms, help="docs/formats.md describes the forms")
@@ -69,6 +72,8 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
+    if args.to in HOME_FORMS:
+        return _export_homes(args)
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.export_views import export, remarks_of
@@ -89,6 +94,22 @@ def _export(args: argparse.Namespace) -> int:
     )
     echo(f"{out}: {n_views} views, {n_files} files")
     for remark in remarks_of(out):
+        warn(remark)
+    return 0
+
+
+def _export_homes(args: argparse.Namespace) -> int:
+    from pbrs_farm.export.home_export import export_homes
+
+    options = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
+    options |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
+    for option, value in options.items():
+        if value is not None:
+            raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
+    out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
+    n_homes, n_files, remarks = export_homes(args.folder, out, args.to)
+    echo(f"{out}: {counted(n_homes, 'home')}, {n_files} files")
+    for remark in remarks:
         warn(remark)
     return 0
 

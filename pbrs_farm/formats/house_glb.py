@@ -5,6 +5,7 @@ glTF measures v downwards. Textures repeat, so v is stored negated, which loses 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface
+from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface, Texture
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.serialise import json_from_value
 
@@ -39,23 +40,23 @@ def glb_from_house(house: House) -> bytes:
     meshes: list[dict[str, Any]] = []
     nodes = []
     for index, item in enumerate(house.items):
-        node: dict[str, Any] = {"name": item.id, "extras": _item_extras(item, index + 1)}
-        primitives = [_primitive(writer, house, item, s) for s in item.surfaces if len(s.positions)]
+        node: dict[str, Any] = {"name": item.id, "extras": item_extras(item, index + 1)}
+        primitives = [primitive(writer, house, item, s) for s in item.surfaces if len(s.positions)]
         if primitives:
             node["mesh"] = len(meshes)
             meshes.append({"name": item.name or item.id, "primitives": primitives})
         nodes.append(node)
-    images, kept = _write_textures(writer, house)
+    images, kept = write_textures(writer, house.textures)
     # glTF allows no empty list of nodes.
     scene = {"name": house.name} | ({"nodes": list(range(len(nodes)))} if nodes else {})
     return writer.glb(
         {
-            "asset": _asset(house),
+            "asset": gltf_asset(house),
             "scene": 0,
             "scenes": [scene],
             "nodes": nodes,
             "meshes": meshes,
-            "materials": [_gltf_material(m, images) for m in house.materials],
+            "materials": [gltf_material(m, images) for m in house.materials],
             "images": [image for image in kept if "name" in image],
             "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
             "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
@@ -64,7 +65,8 @@ def glb_from_house(house: House) -> bytes:
     )
 
 
-def _asset(house: House) -> dict[str, Any]:
+def gltf_asset(house: House) -> dict[str, Any]:
+    """asset of a file made from house, with its source and the credit that it asks for."""
     source = house.source
     asset: dict[str, Any] = {
         "version": "2.0",
@@ -76,7 +78,8 @@ def _asset(house: House) -> dict[str, Any]:
     return asset | {"copyright": line} if line else asset
 
 
-def _item_extras(item: Item, instance: int) -> dict[str, Any]:
+def item_extras(item: Item, instance: int) -> dict[str, Any]:
+    """extras of an item's node: what it is."""
     return {
         "instance": instance,
         "item": item.id,
@@ -88,7 +91,8 @@ def _item_extras(item: Item, instance: int) -> dict[str, Any]:
     }
 
 
-def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
+def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
+    """A surface as a primitive; BadHouse where a viewer could not open it."""
     # Refuse what a viewer could not open.
     place = f"item {item.id}, surface {s.name}"
     for array in (s.positions, s.uvs, s.normals):
@@ -103,20 +107,20 @@ def _primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> d
         attributes["NORMAL"] = writer.add_vertices(s.normals)
     if s.uvs is not None:
         attributes["TEXCOORD_0"] = writer.add_vertices(s.uvs * V_DOWN)
-    primitive: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
+    row: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
     if len(s.faces):
-        return primitive | {"indices": writer.add_faces(s.faces), "mode": _TRIANGLES}
+        return row | {"indices": writer.add_faces(s.faces), "mode": _TRIANGLES}
     # Keep vertices without faces as points.
-    return primitive | {"mode": _POINTS}
+    return row | {"mode": _POINTS}
 
 
-def _write_textures(
-    writer: glb.GlbWriter, house: House
+def write_textures(
+    writer: glb.GlbWriter, textures: Mapping[str, Texture]
 ) -> tuple[dict[str, int], list[dict[str, Any]]]:
     """(texture key -> glTF texture index, an image or a bare buffer view per texture)."""
     images: dict[str, int] = {}
     kept: list[dict[str, Any]] = []
-    for key, texture in house.textures.items():
+    for key, texture in textures.items():
         view: dict[str, Any] = {"bufferView": writer.add_bytes(texture.data)}
         if texture.media_type in GLTF_IMAGES:
             images[key] = len(images)
@@ -125,7 +129,8 @@ def _write_textures(
     return images, kept
 
 
-def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
+def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
+    """A material; images: texture id -> index of the glTF texture."""
     alpha, mode = _alpha(material)
     # Say what glTF knows of the material: colour, metal or not, roughness.
     pbr: dict[str, Any] = {
@@ -137,7 +142,7 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
         pbr["baseColorTexture"] = {"index": images[material.texture_id]}
     if material.roughness_texture_id in images:
         pbr["metallicRoughnessTexture"] = {"index": images[material.roughness_texture_id]}
-    gltf_material: dict[str, Any] = {
+    row: dict[str, Any] = {
         "name": material.name,
         "pbrMetallicRoughness": pbr,
         "doubleSided": True,
@@ -147,10 +152,10 @@ def _gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]
     if material.normal_texture_id in images:
         normal_map: dict[str, Any] = {"index": images[material.normal_texture_id]}
         scale = float(material.normal_scale)
-        gltf_material["normalTexture"] = normal_map | ({"scale": scale} if scale != 1 else {})
+        row["normalTexture"] = normal_map | ({"scale": scale} if scale != 1 else {})
     if material.kind is MaterialKind.BULB:
-        gltf_material["emissiveFactor"] = _linear(material.diffuse)
-    return gltf_material
+        row["emissiveFactor"] = _linear(material.diffuse)
+    return row
 
 
 def _roughness(material: Material) -> float:

@@ -13,13 +13,13 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.geometry.convex_parts import convex_parts, hull_of
 from pbrs_farm.scene.models import Model
 from pbrs_farm.scene.placing import Support, caster_of, level_area, level_triangles
 
@@ -65,7 +65,7 @@ def settled_poses(
         model = models[int(rng.integers(len(models)))]
         support = supports[int(rng.choice(len(supports), p=weights / weights.sum()))]
         things.append(_Body(model, support, np.eye(4)))
-    parts = {thing.model: convex_parts(thing.model) for thing in things}
+    parts = {thing.model: _parts_of(thing.model) for thing in things}
     statics = _static_solids(
         house, supports, max(float(np.linalg.norm(t.model.size_m)) for t in things)
     )
@@ -88,7 +88,7 @@ def penetration_m(
     """How deep the deepest contact is of models (model, world_from_model) at rest, metres."""
     mujoco = _mujoco()
     things = [_Body(model, supports[0], pose) for model, pose in placed]
-    parts = {thing.model: convex_parts(thing.model) for thing in things}
+    parts = {thing.model: _parts_of(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
     world = mujoco.MjModel.from_xml_string(
         _mjcf(things, parts, _static_solids(house, supports, size))
@@ -100,44 +100,9 @@ def penetration_m(
 
 
 @lru_cache(maxsize=256)
-def convex_parts(model: Model) -> tuple[F64, ...]:
+def _parts_of(model: Model) -> tuple[F64, ...]:
     """Convex parts of a model, (V, 3) vertices each in its frame; decomposed once a process."""
-    try:
-        import coacd
-    except ImportError:
-        raise _missing("coacd") from None
-    triangles = model.shape.triangles
-    points = triangles.reshape(-1, 3)
-    whole = _hull(points)
-    # What is nearly its hull needs no decomposition.
-    volume = float(
-        np.einsum("ij,ij->i", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])).sum() / 6
-    )
-    if whole is not None and abs(volume) > 0.95 * ConvexHull(whole).volume:
-        return (whole,)
-    vertices, faces = np.unique(points.round(7), axis=0, return_inverse=True)
-    coacd.set_log_level("error")
-    mesh = coacd.Mesh(vertices, faces.reshape(-1, 3).astype(np.int32))
-    found = coacd.run_coacd(mesh, threshold=0.05, max_convex_hull=24, seed=1)
-    parts = [
-        hull for vertices, _faces in found if (hull := _hull(np.asarray(vertices))) is not None
-    ]
-    return tuple(parts) or ((whole,) if whole is not None else (_thickened(points),))
-
-
-def _hull(points: F64) -> F64 | None:
-    try:
-        return np.asarray(points[ConvexHull(points).vertices])
-    except (QhullError, ValueError):
-        return None
-
-
-def _thickened(points: F64) -> F64:
-    """A flat thing as a box a millimetre thick around it."""
-    low, high = points.min(0) - 5e-4, points.max(0) + 5e-4
-    return np.array(
-        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
-    )
+    return convex_parts(model.shape.triangles)
 
 
 def _static_solids(house: House, supports: Sequence[Support], size_m: float) -> list[F64]:
@@ -156,7 +121,7 @@ def _static_solids(house: House, supports: Sequence[Support], size_m: float) -> 
         if id(item) in held or _is_hollow(item, triangles):
             near = triangles[((triangles.min(1) <= high) & (triangles.max(1) >= low)).all(1)]
             exact.append(near)
-        elif (hull := _hull(triangles.reshape(-1, 3))) is not None:
+        elif (hull := hull_of(triangles.reshape(-1, 3))) is not None:
             solids.append(hull)
     return solids + _prisms(np.concatenate([np.zeros((0, 3, 3)), *exact]))
 

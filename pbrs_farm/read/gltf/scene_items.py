@@ -179,7 +179,12 @@ def items_of_scene(
     # Part what shows a room or says by its materials what it is; tags of the file or user hold.
     centres = centres_of([item for _, _, item in found])
     for thing, place, item in found:
-        parts = planar_parts(item) if thing.seen.is_tagged else structure_parts(item, centres)
+        if thing.extras.get("solid") is True:
+            parts: tuple[Item, ...] = (item,)
+        elif thing.seen.is_tagged:
+            parts = planar_parts(item)
+        else:
+            parts = structure_parts(item, centres)
         if any(UNMAPPED in part.tags for part in parts):
             notes.add("unmapped-class", place, "names no class; it is otherprop")
         if sum(part.n_faces for part in parts) < item.n_faces:
@@ -276,8 +281,26 @@ def _item(
             surfaces.append(surface)
     if not surfaces and not lights:
         return None
+    if lights:
+        # Told lights are what its glowing surfaces of unknown strength send out.
+        unknown = [k for k, emission in shining.items() if emission.luminance == 0]
+        lights = _with_surfaces(lights, surfaces, unknown)
+        shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
     return _finished(thing, surfaces, lights, _box(thing, parts))
+
+
+def _with_surfaces(
+    lights: list[LightPart], surfaces: Sequence[Surface], glowing: Sequence[int]
+) -> list[LightPart]:
+    """The lights, each with the glowing surfaces that are nearest to it."""
+    places = np.array([light.position for light in lights])
+    owned: dict[int, list[int]] = {}
+    for k in glowing:
+        middle = surfaces[k].positions.astype(np.float64)
+        middle = (middle.min(0) + middle.max(0)) / 2
+        owned.setdefault(int(np.linalg.norm(places - middle, axis=1).argmin()), []).append(k)
+    return [replace(light, emitting=tuple(owned.get(n, ()))) for n, light in enumerate(lights)]
 
 
 def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> Box | None:

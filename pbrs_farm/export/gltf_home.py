@@ -1,0 +1,140 @@
+"""A home as one GLB: a node an item, its class in extras, lamps as lights. Effect: write writes it.
+
+`pbrs-farm run` reads it back: items, classes, boxes, rooms and the flux of lamps are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import House, ItemKind
+from pbrs_farm.export.home_export import ExportedHome, Lamp, Piece, rooms_json
+from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.formats.house_glb import (
+    gltf_asset,
+    gltf_material,
+    item_extras,
+    primitive,
+    write_textures,
+)
+
+_LIGHTS = "KHR_lights_punctual"
+_REPEAT = 10497  # OpenGL's number of a sampler's wrapping
+
+
+def write(home: ExportedHome, folder: Path) -> int:
+    """<house id>.glb; the number of files, 1."""
+    data = glb_of_pieces(home.house, home.pieces, with_lamps=True, rooms=rooms_json(home.house))
+    (folder / f"{home.house.id}.glb").write_bytes(data)
+    return 1
+
+
+def glb_of_pieces(
+    house: House,
+    pieces: Sequence[Piece],
+    *,
+    with_lamps: bool,
+    rooms: list[dict[str, Any]] | None = None,
+    in_place: bool = True,
+) -> bytes:
+    """A GLB of some of the pieces with their materials alone.
+
+    with_lamps: as KHR_lights_punctual, candela. in_place False: one piece in its own frame, so that
+    equal things have equal bytes: the node says class and kind, not which item it is.
+    """
+    writer = GlbWriter()
+    # Number the materials and textures that are used.
+    used = sorted({s.material for p in pieces for s in p.surfaces})
+    number = {old: new for new, old in enumerate(used)}
+    materials = [house.materials[k] for k in used]
+    names = {name for m in materials for name in m.texture_ids}
+    images, kept = write_textures(
+        writer, {key: t for key, t in house.textures.items() if key in names}
+    )
+    narrow = replace(house, materials=tuple(materials))
+    nodes: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    lights: list[dict[str, Any]] = []
+    instance = {id(item): k + 1 for k, item in enumerate(house.items)}
+    roots = []
+    for piece in pieces:
+        extras = item_extras(piece.item, instance[id(piece.item)])
+        if house.is_repaired and piece.item.kind is ItemKind.WALL:
+            extras["solid"] = True  # cut by repair: not to be parted by its planes
+        if not in_place:
+            extras = {key: extras[key] for key in ("kind", "nyu40", "class")}
+        node: dict[str, Any] = {"name": piece.name if in_place else piece.class_name}
+        node["extras"] = extras
+        if in_place:
+            node |= _placement(piece.world_from_local)
+        surfaces = [replace(s, material=number[s.material]) for s in piece.surfaces]
+        if surfaces:
+            node["mesh"] = len(meshes)
+            rows = [primitive(writer, narrow, piece.item, s) for s in surfaces]
+            meshes.append({"name": node["name"], "primitives": rows})
+        roots.append(len(nodes))
+        nodes.append(node)
+        if with_lamps and piece.lamps:
+            inside = np.asarray(np.linalg.inv(piece.world_from_local), np.float64)
+            children = range(len(nodes), len(nodes) + len(piece.lamps))
+            node["children"] = list(children)
+            nodes += [
+                _lamp_node(lamp, inside, len(lights) + k) for k, lamp in enumerate(piece.lamps)
+            ]
+            lights += [_light(lamp) for lamp in piece.lamps]
+    scene: dict[str, Any] = {"name": house.name} | ({"nodes": roots} if roots else {})
+    if rooms is not None:
+        scene["extras"] = {"rooms": rooms}
+    document: dict[str, Any] = {
+        "asset": gltf_asset(house), "scene": 0, "scenes": [scene], "nodes": nodes, "meshes": meshes,
+        "materials": [gltf_material(m, images) for m in materials],
+        "images": [image for image in kept if "name" in image],
+        "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
+        "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
+    }  # fmt: skip
+    if lights:
+        document |= {"extensions": {_LIGHTS: {"lights": lights}}, "extensionsUsed": [_LIGHTS]}
+    return writer.glb(document)
+
+
+def _placement(world_from_local: F64) -> dict[str, Any]:
+    """Translation and rotation of a node; nothing where it stands as it is."""
+    found: dict[str, Any] = {}
+    if world_from_local[:3, 3].any():
+        found["translation"] = world_from_local[:3, 3].tolist()
+    if not np.array_equal(world_from_local[:3, :3], np.eye(3)):
+        found["rotation"] = Rotation.from_matrix(world_from_local[:3, :3]).as_quat().tolist()
+    return found
+
+
+def _light(lamp: Lamp) -> dict[str, Any]:
+    light: dict[str, Any] = {"type": "spot" if lamp.spot else "point", "intensity": lamp.candela}
+    if lamp.is_coloured or min(lamp.rgb_linear) < 1:
+        light["color"] = [float(c) for c in lamp.rgb_linear]
+    if lamp.spot:
+        # glTF's cones end at a right angle.
+        outer = min(lamp.spot[1], np.pi / 2)
+        light["spot"] = {"innerConeAngle": 0.0, "outerConeAngle": float(outer)}
+        light["intensity"] = float(lamp.flux_lm / (2 * np.pi * (1 - np.cos(outer))))
+    return light
+
+
+def _lamp_node(lamp: Lamp, local_from_world: F64, light: int) -> dict[str, Any]:
+    place = local_from_world[:3, :3] @ lamp.position + local_from_world[:3, 3]
+    node: dict[str, Any] = {
+        "name": f"light {light}", "translation": place.tolist(),
+        "extensions": {_LIGHTS: {"light": light}},
+    }  # fmt: skip
+    if lamp.spot:
+        # A light looks along its node's -z.
+        looks = local_from_world[:3, :3] @ np.array(lamp.spot[0])
+        turn, _ = Rotation.align_vectors([looks], [[0.0, 0.0, -1.0]])
+        node["rotation"] = turn.as_quat().tolist()
+    return node

@@ -1,0 +1,348 @@
+"""`pbrs-farm export ROOT --to gltf | habitat | sdf | usd`: homes as scenes of other simulators.
+
+Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or
+not at all. What every form needs of a home is here: each item's meshes in a frame of its own, its
+class, collision parts, mass, lamps, names that files can have, and the floor that can be walked.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core import classes, keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import (
+    House,
+    Item,
+    ItemKind,
+    LightPart,
+    Room,
+    Surface,
+    corners_of_surfaces,
+)
+from pbrs_farm.core.lighting import LightForm, flux_lm
+from pbrs_farm.export.chosen_view import new_folder
+from pbrs_farm.formats.house_bundle import house_from_bundle
+from pbrs_farm.geometry.convex_parts import convex_parts, has_decomposition, hull_of, thickened
+from pbrs_farm.regular_files import fault_of, read_regular
+
+PARTS, HULLS = "convex parts by CoACD", "convex hulls: CoACD is not installed"
+_MOST_PARTS: Final = 12  # of an item
+_MOST_TRIANGLES: Final = 60_000  # of an item that is decomposed; a plant's leaves are not
+_KG_PER_M3: Final = 100.0  # of collision volume: furniture is mostly air
+_LEAST_KG, _MOST_KG = 0.1, 150.0
+_RESTING_M: Final = 0.03  # between a thing and what it stands on
+WALKER_M: Final = 0.2  # radius of what moves on the navigable floor
+_HEAD_M: Final = 1.6  # what begins higher above the floor is passed under
+_STEP_M: Final = 0.05  # what ends lower is passed over: rugs
+
+# Kinds that are the building: they stand still and are met as they are.
+BUILDING: Final = (
+    ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.DOOR, ItemKind.WINDOW,
+    ItemKind.STAIRS,
+)  # fmt: skip
+# Classes that are screwed to the building.
+_FIXED: Final = frozenset({
+    classes.NYU40_NAMES.index(name)
+    for name in ("cabinet", "counter", "sink", "toilet", "bathtub", "picture", "blinds", "curtain",
+                 "mirror", "shower curtain", "otherstructure", "whiteboard", "bookshelf", "dresser",
+                 "refrigerator", "wall", "floor", "ceiling", "door", "window")
+    if name in classes.NYU40_NAMES
+})  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lamp:
+    """A light source of an item as other programs know one."""
+
+    position: F64  # (3,) world, metres
+    flux_lm: float  # what leaves the lamp
+    rgb_linear: tuple[float, float, float]  # largest 1
+    radius_m: float
+    is_coloured: bool  # rgb_linear is told, also where it is white
+    spot: tuple[tuple[float, float, float], float] | None  # direction in the world, half angle rad
+
+    @property
+    def candela(self) -> float:
+        """The intensity of a point, or within the cone of a spot."""
+        cutoff = self.spot[1] if self.spot else np.pi
+        return float(self.flux_lm / (2 * np.pi * (1 - np.cos(cutoff))))
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """An item in a frame of its own: the middle of its box's bottom, axes of its box (right-handed).
+
+    The frame of walls, floors and ceilings is the world's, so that no bit of them moves.
+    """
+
+    item: Item
+    name: str  # unique in the home: letters, digits and _
+    world_from_local: F64  # (4, 4) rigid
+    surfaces: tuple[Surface, ...]  # local
+    size: F64  # (3,) of its box, metres
+    is_fixed: bool  # part of the building, screwed to it, or without a thing below it
+    lamps: tuple[Lamp, ...]
+
+    @property
+    def is_building(self) -> bool:
+        """Wall, floor, ceiling, ground, door, window or stairs: collides as its own mesh."""
+        return self.item.kind in BUILDING
+
+    @property
+    def class_name(self) -> str:
+        """Its NYU40 class."""
+        return classes.NYU40_NAMES[self.item.nyu40]
+
+    @cached_property
+    def colliders(self) -> tuple[F64, ...]:
+        """Convex parts (V, 3), local; () of the building and of what has no surface."""
+        triangles = corners_of_surfaces(self.surfaces)
+        if self.is_building or not len(triangles):
+            return ()
+        points = triangles.reshape(-1, 3)
+        if has_decomposition() and len(triangles) <= _MOST_TRIANGLES:
+            return convex_parts(triangles, most=_MOST_PARTS, threshold=0.1, quick=True)
+        whole = hull_of(points)
+        return (thickened(points) if whole is None else whole,)
+
+    @cached_property
+    def mass_kg(self) -> float:
+        """100 kg for each cubic metre of its collision parts, between 0.1 and 150 kg."""
+        volume = sum(_hull_volume(part) for part in self.colliders)
+        return float(np.clip(_KG_PER_M3 * volume, _LEAST_KG, _MOST_KG))
+
+    @property
+    def inertia(self) -> F64:
+        """(3,) kg m2 about the middle of its box: a solid box's."""
+        x, y, z = np.maximum(self.size, 0.01) ** 2
+        return np.asarray(self.mass_kg / 12 * np.array([y + z, x + z, x + y]))
+
+
+def _hull_volume(points: F64) -> float:
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return float(ConvexHull(points).volume)
+    except (QhullError, ValueError):
+        return 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ExportedHome:
+    """A home as the forms write it."""
+
+    house: House
+    pieces: tuple[Piece, ...]  # an item each, in the house's order
+
+    @property
+    def building(self) -> tuple[Piece, ...]:
+        """Walls, floors, ceilings, doors, windows, stairs."""
+        return tuple(p for p in self.pieces if p.is_building)
+
+    @property
+    def things(self) -> tuple[Piece, ...]:
+        """Everything else that has a surface or a lamp."""
+        return tuple(p for p in self.pieces if not p.is_building and (p.surfaces or p.lamps))
+
+    @property
+    def collision(self) -> str:
+        """How the things' collision parts were made."""
+        return PARTS if has_decomposition() else HULLS
+
+    @cached_property
+    def navigable(self) -> dict[str, list[F64]]:
+        """Room id -> outlines (N, 2) in plan of the floor where a disc of WALKER_M can stand."""
+        return {room.id: _walkable(room, self.pieces) for room in self.house.rooms}
+
+    @property
+    def credit(self) -> str:
+        """The line that the home's source asks every product to carry, or its author and licence."""
+        source = self.house.source
+        return source.attribution or ", ".join(x for x in (source.author, source.licence) if x)
+
+
+def exported_home(house: House) -> ExportedHome:
+    """The home in the frames of its items."""
+    names = _unique_names(house.items)
+    bounds = np.array([item.bounds for item in house.items]).reshape(-1, 2, 3)
+    floors = {room.id: room.floor_y for room in house.rooms}
+    found = [
+        _piece(item, name, _rests(k, house.items, bounds, floors))
+        for k, (item, name) in enumerate(zip(house.items, names, strict=True))
+    ]
+    return ExportedHome(house, tuple(found))
+
+
+def _unique_names(items: Iterable[Item]) -> list[str]:
+    """A name for each item that every file system and every scene format takes."""
+    taken: set[str] = set()
+    found = []
+    for item in items:
+        word = re.sub(r"[^A-Za-z0-9]+", "_", item.name)[:40].strip("_") or item.kind.value
+        name, k = (word if word[0].isalpha() else f"item_{word}"), 2
+        while name.lower() in taken:
+            name, k = f"{word}_{k}" if word[0].isalpha() else f"item_{word}_{k}", k + 1
+        taken.add(name.lower())
+        found.append(name)
+    return found
+
+
+def _piece(item: Item, name: str, is_resting: bool) -> Piece:
+    frame = np.eye(4)
+    box = item.oriented_box
+    size = 2 * box.half if item.surfaces else np.zeros(3)
+    if not item.kind.is_structure and item.surfaces:
+        axes = np.array(box.axes, np.float64)
+        if np.linalg.det(axes) < 0:
+            axes[:, 0] *= -1
+        frame[:3, :3] = axes
+        frame[:3, 3] = box.centre - axes[:, 1] * box.half[1]
+    local_from_world = np.asarray(np.linalg.inv(frame), np.float64)
+    surfaces = tuple(_moved(s, local_from_world) for s in item.surfaces if len(s.faces))
+    is_fixed = item.kind in BUILDING or item.nyu40 in _FIXED or not is_resting
+    return Piece(item, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights)))
+
+
+def _moved(surface: Surface, b_from_a: F64) -> Surface:
+    positions = transform_points(b_from_a, surface.positions).astype(np.float32)
+    normals = surface.normals
+    if normals is not None:
+        turned = normals.astype(np.float64) @ b_from_a[:3, :3].T
+        length = np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+        normals = (turned / length).astype(np.float32)
+    return replace(surface, positions=positions, normals=normals)
+
+
+def _lamp(light: LightPart) -> Lamp:
+    flux = flux_lm(light.power, light.unit, light.share)
+    if light.is_bare and light.escape is not None:
+        flux *= light.escape
+    is_spot = light.form is LightForm.SPOT and light.cutoff_rad < np.pi
+    spot = (light.direction, light.cutoff_rad) if is_spot else None
+    position = np.array(light.position, np.float64)
+    if light.position_end is not None:
+        position = (position + np.array(light.position_end)) / 2
+    return Lamp(position, flux, light.rgb_linear, light.radius_m, light.is_coloured, spot)
+
+
+def _rests(index: int, items: Sequence[Item], bounds: F64, floors: dict[str, float]) -> bool:
+    """Whether an item stands on its room's floor or on another item's highest place."""
+    low, high = bounds[index]
+    if not np.isfinite(low).all():
+        return False
+    floor = floors.get(items[index].room_id or "")
+    if floor is not None and abs(low[1] - floor) < _RESTING_M:
+        return True
+    below = np.abs(bounds[:, 1, 1] - low[1]) < _RESTING_M
+    plan = [0, 2]
+    meets = (bounds[:, 0][:, plan] < high[plan]) & (bounds[:, 1][:, plan] > low[plan])
+    below &= meets.all(1)
+    below[index] = False
+    return bool(below.any())
+
+
+def _walkable(room: Room, pieces: Sequence[Piece]) -> list[F64]:
+    free: Any = shapely.Polygon(room.polygon).buffer(-WALKER_M, join_style="mitre")
+    taken = []
+    for piece in pieces:
+        item = piece.item
+        if item.kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND) or not item.surfaces:
+            continue
+        low, high = item.bounds
+        if low[1] < room.floor_y + _HEAD_M and high[1] > room.floor_y + _STEP_M:
+            corners = item.oriented_box.corners[:, [0, 2]]
+            taken.append(shapely.MultiPoint(corners).convex_hull)
+    if taken and not free.is_empty:
+        near = [t for t in taken if t.distance(free) < WALKER_M]
+        free = free.difference(shapely.union_all([t.buffer(WALKER_M) for t in near]))
+    pieces_of_floor = [g for g in shapely.get_parts(free) if g.area > 0.01]
+    rings = [shapely.simplify(g, 0.01) for g in pieces_of_floor if g.geom_type == "Polygon"]
+    return [np.asarray(shapely.get_coordinates(g.exterior)[:-1]) for g in rings]
+
+
+# The homes of an output folder, and the forms.
+
+
+Writer = Callable[[ExportedHome, Path], int]  # writes into a new folder; the number of files
+
+
+def _writer(form: str) -> Writer:
+    if form == "gltf":
+        from pbrs_farm.export import gltf_home
+
+        return gltf_home.write
+    raise BadInput("--to", form, "no such form of a home", hint=f"of {', '.join(HOME_FORMS)}")
+
+
+HOME_FORMS: Final = ("gltf",)
+"""Forms that write homes, not views."""
+
+
+def export_homes(folder: Path, out: Path, form: str) -> tuple[int, int, list[str]]:
+    """Write every home of folder to out: (homes, files, what a user should know).
+
+    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home lies in a
+    folder of its id. Raises BadInput where folder holds no home, or out holds something.
+    """
+    write, remarks = _writer(form), []
+    found = house_folders(folder)
+    n_files = 0
+    with new_folder(out) as scratch:
+        for one in found:
+            home = exported_home(stored_house(one))
+            below = scratch / home.house.id
+            below.mkdir()
+            n_files += write(home, below)
+            if home.credit:
+                (below / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
+                n_files += 1
+            if form != "gltf":
+                remarks.append(f"{home.house.id}: collision by {home.collision}")
+    return len(found), n_files, remarks
+
+
+def house_folders(folder: Path) -> list[Path]:
+    """Folders that hold house.glb and house.json: folder itself, or those below its houses."""
+    below = folder / "houses"
+    found = sorted(below.iterdir()) if below.is_dir() else [folder]
+    found = [f for f in found if (f / "house.glb").is_file() and (f / "house.json").is_file()]
+    if not found:
+        hint = "an output folder of `run`, `dress` or `repair`"
+        raise BadInput(folder, "", "holds no house.glb and house.json", hint=hint)
+    return found
+
+
+def stored_house(folder: Path) -> House:
+    """The house of a folder's house.glb and house.json; BadInput where they are damaged."""
+    try:
+        data = {name: read_regular(folder / name) for name in ("house.glb", "house.json")}
+    except OSError as error:
+        raise BadInput(folder, "", fault_of(error)) from None
+    return house_from_bundle(data["house.glb"], data["house.json"])
+
+
+def rooms_json(house: House) -> list[dict[str, Any]]:
+    """The rooms as the room file of a glTF scene has them."""
+    return [
+        {
+            "name": room.name, "types": list(room.types), "floor_y": float(room.floor_y),
+            "ceiling_y": float(room.ceiling_y), "polygon": np.asarray(room.polygon).tolist(),
+        }
+        for room in house.rooms
+    ]  # fmt: skip
+
+
+def digest_name(data: bytes) -> str:
+    """A name for a file by its content, so that equal things are written once."""
+    return keys.sha256(data)[:16]

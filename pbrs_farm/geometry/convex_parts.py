@@ -1,0 +1,67 @@
+"""Convex parts of a mesh, for collision: by CoACD where it is installed; no effects."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.mesh import signed_volume
+
+_NEARLY_CONVEX = 0.95  # share of its hull that a mesh fills which needs no decomposition
+_FLAT_M = 5e-4  # half the thickness of a flat thing
+
+
+def has_decomposition() -> bool:
+    """Whether CoACD is installed."""
+    return importlib.util.find_spec("coacd") is not None
+
+
+def convex_parts(
+    triangles: F64, *, most: int = 24, threshold: float = 0.05, quick: bool = False
+) -> tuple[F64, ...]:
+    """Convex parts of triangles (F, 3, 3), (V, 3) vertices each; never none.
+
+    most: parts. threshold: concavity that stays (CoACD). quick: a coarser search, a third of the
+    time. Raises MachineFailed without coacd.
+    """
+    try:
+        import coacd
+    except ImportError:
+        hint = 'pip install "pbrs-farm[physics]"'
+        raise MachineFailed("physics needs coacd", hint=hint) from None
+    points = triangles.reshape(-1, 3)
+    whole = hull_of(points)
+    # What is nearly its hull needs no decomposition.
+    volume = abs(signed_volume(triangles, np.zeros(3)))
+    if whole is not None and volume > _NEARLY_CONVEX * ConvexHull(whole).volume:
+        return (whole,)
+    vertices, faces = np.unique(points.round(7), axis=0, return_inverse=True)
+    coacd.set_log_level("error")
+    mesh = coacd.Mesh(vertices, faces.reshape(-1, 3).astype(np.int32))
+    search = {"preprocess_resolution": 30, "mcts_iterations": 60, "resolution": 1000}
+    found = coacd.run_coacd(
+        mesh, threshold=threshold, max_convex_hull=most, seed=1, **(search if quick else {})
+    )
+    hulls = (hull_of(np.asarray(part, np.float64)) for part, _faces in found)
+    parts = tuple(hull for hull in hulls if hull is not None)
+    return parts or ((whole,) if whole is not None else (thickened(points),))
+
+
+def hull_of(points: F64) -> F64 | None:
+    """The corners (V, 3) of the convex hull of points; None where they lie in a plane."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except (QhullError, ValueError):
+        return None
+
+
+def thickened(points: F64) -> F64:
+    """A flat thing as the corners (8, 3) of a box a millimetre thicker than it on every side."""
+    low, high = points.min(0) - _FLAT_M, points.max(0) + _FLAT_M
+    return np.array(
+        [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]
+    )
