@@ -48,7 +48,7 @@ _SUFFIXES: Final = {
 _KEYS: Final = (
     ("scenestate", "sceneState", ("scene", "object", "arch")),
     ("scenestate", "sceneState", ("format", "scene")),
-    ("front3d", "3D-FRONT", ("furniture", "mesh", "scene")),
+    ("front3d", "3D-FRONT", ("furniture", "mesh")),
     ("habitat", "Habitat scene instance", ("stage_instance",)),
     (PLAN, "ProcTHOR", ("rooms", "walls", "objects")),
     (PLAN, "RoomPlan", ("walls", "doors", "windows", "objects")),

@@ -177,7 +177,11 @@ def test_a_companion_that_changed_since_submission_is_told(tmp_path: Path) -> No
         folder = tmp_path / kind
         folder.mkdir()
         source = write(folder, PNG)
-        (picture_file,) = [*folder.glob("picture.any"), *folder.glob("texture/wood.jpg")]
+        (picture_file,) = [
+            *folder.glob("picture.any"),
+            *folder.glob("texture/wood.jpg"),
+            *folder.glob("3D-FRONT-texture/*/texture.png"),
+        ]
         picture_file.write_bytes(PNG + b"\n")
         with pytest.raises(BadHouse, match="changed since the run began"):
             read_house(source, ReadFields())

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from benchmarks.inputs import scenestate_files
+from benchmarks.inputs import front3d_files, scenestate_files
 from benchmarks.inputs.usd_files import UsdHome, walls_of
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, resolve
@@ -79,6 +79,17 @@ def scenestate(folder: Path, picture: bytes | None) -> SourceRef:
     return resolve(str(path))
 
 
+def front3d(folder: Path, picture: bytes | None) -> SourceRef:
+    """A flat whose floors have the picture, which lies in the folder of textures."""
+    path = front3d_files.write_house(folder, picture=picture)
+    house = front3d_files.front_house(picture_jid="jid-oak")
+    house["scene"]["room"][0]["children"] = [
+        c for c in house["scene"]["room"][0]["children"] if c["ref"] != "99999/model"
+    ]
+    path.write_text(json.dumps(house))
+    return resolve(str(path))
+
+
 def single_object(folder: Path, picture: bytes | None) -> SourceRef:
     """An OBJ model without context and its MTL, which names the picture."""
     (folder / "thing.mtl").write_text(MTL)
@@ -101,6 +112,7 @@ FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "gltf": gltf,
     "usd": usd,
     "scenestate": scenestate,
+    "front3d": front3d,
     "object": single_object,
 }
 """Format -> writes a source with that picture (None: the file is missing) and names it."""

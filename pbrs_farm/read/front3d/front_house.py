@@ -1,20 +1,399 @@
-"""A 3D-FRONT house -> House. Effects: reads files."""
+"""A 3D-FRONT house -> House. Effects: reads the file, 3D-FUTURE's models and 3D-FRONT's textures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
+import shapely
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import CEILING, FLOOR, OTHERPROP, WALL
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import (
+    MAX_INSTANCES,
+    House,
+    Item,
+    ItemKind,
+    LightPart,
+    Material,
+    MaterialKind,
+    Room,
+    Source,
+    Surface,
+)
+from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
+from pbrs_farm.core.mesh import area_vectors, face_areas
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.home.given_rooms import NO_ROOM, given_room
+from pbrs_farm.home.names import parted
+from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
+from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
+from pbrs_farm.read.common.joinery import joinery_of, opening_of
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_floors import (
+    check_number,
+    check_rooms,
+    check_unit,
+    floor_height,
+    floor_polygon,
+)
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
+from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, told_holes
+from pbrs_farm.read.front3d.front_pieces import (
+    INFO,
+    FrontModels,
+    files_of_model,
+    light_items,
+    model_folder,
+)
+from pbrs_farm.read.front3d.front_walls import (
+    MAX_SHEETS,
+    WallPiece,
+    holes_of,
+    pieces_of,
+    sheets_of,
+    solid_of,
+)
+from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at
+from pbrs_farm.read.mesh.triangulate import horizontal
+from pbrs_farm.read.suncg.house_json import NAME
+from pbrs_farm.read.suncg.models import MAX_TEXTURE_BYTES, ModelMaterials
 
-
-def read(path: Path, fields: ReadFields, models: str) -> House:
-    """The House of the file. Raises BadHouse naming the place."""
-    raise BadHouse(path, "", "is not read yet")
+_TEXTURES: Final = (
+    "3D-FRONT-texture", "../3D-FRONT-texture", "../../3D-FRONT-texture", "texture",
+)  # fmt: skip
+# What the solids that are made and repair's slabs stand for.
+_MADE: Final = frozenset(
+    {"WallInner", "WallOuter", "WallTop", "WallBottom", "SlabTop", "SlabSide", "SlabBottom", *HOLE_TYPES}
+)  # fmt: skip
+_STOREY_M: Final = 2.7
+_LIGHT_BAND_LM: Final = 800.0
 
 
 def companions(path: Path, models: str, files: SourceFiles) -> str:
-    """Digest of what reading opens beside the file; "" where there is none."""
-    return ""
+    """Digest of the models and textures that reading may open; "" where there is none."""
+    try:
+        data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
+        house = front_file(data, path.name, Notes(path.name, strict=False))
+    except BadHouse:
+        return ""  # the reader will say what is wrong with it
+    found = []
+    folder = model_folder(path, models)
+    if folder is not None:
+        names = [n for jid in sorted({p.jid for p in house.pieces}) for n in files_of_model(jid)]
+        found.append(files.digest(folder, [INFO, *names]))
+    textures = _texture_folder(path, models)
+    if textures is not None:
+        jids = sorted({str(m.get("jid") or "") for m in house.materials.values()})
+        names = [f"{j}/texture.png" for j in jids if NAME.fullmatch(j) and ".." not in j]
+        found.append(files.digest(textures, names))
+    return keys.digest(*found) if any(found) else ""
+
+
+def read(path: Path, fields: ReadFields, models: str) -> House:
+    """The House of the file. models: 3D-FUTURE's folder, "" = beside or above the file.
+
+    Raises BadHouse naming the entry that is wrong, and for a file without meshes or rooms.
+    """
+    folder = RootFolder(path.parent)
+    data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
+    if data is None:
+        raise BadHouse(path, "", "no such file")
+    notes = Notes(path.name, strict=fields.strict)
+    house = front_file(data, path.name, notes)
+    check_number(sum(m.kind == "Floor" for m in house.meshes), path.name)
+    n_faces = sum(len(m.faces) for m in house.meshes)
+    if n_faces > fields.max_triangles:
+        text = f"{n_faces} triangles, more than {fields.max_triangles}"
+        raise BadHouse(path.name, "mesh", text, hint="limit: read.max_triangles")
+    model_root = model_folder(path, models)
+    materials = ModelMaterials(model_root or folder, notes)
+    paints = _Paints(house, materials, _texture_folder(path, models), notes)
+    structure = _Structure(house, paints, notes)
+    rooms, parts = structure.rooms(path.name)
+    levels, numbered = levels_of(rooms)
+    check_rooms(numbered, path.name)
+    renamed = dict(zip(structure.names, (r.id for r in numbered), strict=True))
+    holes, walls = structure.walls(path.name)
+    pieces = FrontModels(model_root, materials, notes, fields)
+    furniture = [
+        item
+        for k, p in enumerate(house.pieces)
+        if (item := pieces.item(p, f"piece_{k}")) is not None
+    ]
+    if pieces.n_missing:
+        text = (
+            f"{pieces.n_missing} pieces have no model: what their box and class tell stands there"
+        )
+        notes.add("missing-model", "furniture", f"{text}; --models DIR names 3D-FUTURE-model")
+    items = [*walls, *parts, *structure.trim(), *furniture]
+    areas = {r.id: float(shapely.Polygon(r.polygon).area) for r in rooms}
+    items += light_items(house.lights, items, areas, {r.id: r.ceiling_y for r in rooms})
+    items = [replace(i, room_id=renamed.get(i.room_id or "")) for i in items]
+    items = [
+        replace(
+            i, level_id=level_of(levels, _foot(i)),
+            tags=tuple(f"boundary_of:{renamed.get(t[12:], t[12:])}" if t.startswith("boundary_of:") else t for t in i.tags),
+        )
+        for i in items
+    ]  # fmt: skip
+    for hole in holes:
+        level = level_of(levels, hole.centre[1] - hole.size[1] / 2)
+        made = joinery_of(hole, materials.library, level, room_at(numbered, hole.centre))
+        items += [made] if made is not None else []
+    _check_limits(items, path.name, fields)
+    sha = keys.sha256(data)
+    return House(
+        id=keys.house_id(path.stem, sha),
+        name=house.uid or path.stem,
+        source=Source("front3d", path.name, sha, licence="research only"),
+        levels=levels,
+        rooms=numbered,
+        items=tuple(items),
+        materials=materials.library.materials,
+        textures=materials.library.textures,
+        openings=tuple(opening_of(h, level_of(levels, h.centre[1] - h.size[1] / 2)) for h in holes),
+        notes=notes.all(),
+    )
+
+
+def _foot(item: Item) -> float:
+    if item.surfaces:
+        return float(item.bounds[0, 1]) - (1.0 if item.kind is ItemKind.CEILING else 0.0)
+    if item.lights:
+        return item.lights[0].position[1] - 1.0
+    return 0.0 if item.box is None else float(item.box.corners[:, 1].min())
+
+
+def _check_limits(items: Sequence[Item], file: str, fields: ReadFields) -> None:
+    n_faces = sum(i.n_faces for i in items)
+    if len(items) > MAX_INSTANCES or n_faces > fields.max_triangles:
+        text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
+        raise BadHouse(file, "", text, hint="limit: read.max_triangles")
+    for item in items:
+        if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
+            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
+            raise BadHouse(file, item.id, text, hint="limit: read.max_extent_m")
+
+
+def _texture_folder(path: Path, models: str) -> RootFolder | None:
+    bases = [Path(models), Path(models).parent] if models else []
+    places = [b / "3D-FRONT-texture" for b in bases] + [path.parent / t for t in _TEXTURES]
+    return next((RootFolder(p) for p in places if p.is_dir()), None)
+
+
+class _Paints:
+    """The materials of the structure by their uid."""
+
+    def __init__(
+        self, house: FrontFile, materials: ModelMaterials, folder: RootFolder | None, notes: Notes
+    ) -> None:
+        self.library = materials.library
+        self._house, self._folder, self._notes = house, folder, notes
+        self._known: dict[str, int] = {}
+        if folder is None and any(m.get("jid") for m in house.materials.values()):
+            text = "3D-FRONT-texture does not lie beside or above the file: surfaces are painted"
+            notes.add("missing-texture", "material", text)
+
+    def index(self, uid: str) -> int:
+        """The material's index in the house's library."""
+        if uid not in self._known:
+            self._known[uid] = self.library.index(self._material(uid))
+        return self._known[uid]
+
+    def uvs(self, mesh: FrontMesh) -> F64 | None:
+        """The mesh's texture coordinates as its material turns and scales them."""
+        if mesh.uvs is None:
+            return None
+        turn = self._house.materials.get(mesh.material, {}).get("UVTransform")
+        try:
+            matrix = np.array(turn, np.float64).reshape(3, 3)[:2, :2]
+        except (ValueError, TypeError):
+            return mesh.uvs
+        is_sound = np.isfinite(matrix).all() and 1e-6 < abs(np.linalg.det(matrix)) < 1e6
+        return mesh.uvs @ matrix.T if is_sound else mesh.uvs
+
+    def _material(self, uid: str) -> Material:
+        row = self._house.materials.get(uid, {})
+        colour = _colour(row.get("color"))
+        jid = str(row.get("jid") or "")
+        found = None
+        if (
+            self._folder is not None
+            and NAME.fullmatch(jid)
+            and ".." not in jid
+            and not row.get("useColor")
+        ):
+            folder, name = self._folder, f"{jid}/texture.png"
+            found = self.library.texture(
+                f"3D-FRONT-texture/{name}", name=name, place=f"material {uid[:40]}",
+                load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+            )  # fmt: skip
+        if found is not None:
+            return Material(uid[:60], texture_id=found.texture.id, alpha_cutout=found.has_holes)
+        return Material(uid[:60], diffuse=colour or (1.0, 1.0, 1.0), is_default=colour is None)
+
+
+def _colour(value: Any) -> tuple[float, float, float] | None:
+    is_rgb = isinstance(value, list) and len(value) >= 3
+    if not is_rgb or not all(isinstance(v, int | float) and 0 <= v <= 255 for v in value[:3]):
+        return None
+    r, g, b = (float(v) / 255 for v in value[:3])
+    return r, g, b
+
+
+class _Structure:
+    """Rooms, walls and trim while they are built."""
+
+    def __init__(self, house: FrontFile, paints: _Paints, notes: Notes) -> None:
+        self._house, self._paints, self._notes = house, paints, notes
+        self.names: list[str] = []
+        by_room: dict[str, dict[str, list[FrontMesh]]] = {}
+        for mesh in house.meshes:
+            by_room.setdefault(mesh.room, {}).setdefault(mesh.kind, []).append(mesh)
+        self._by_room = by_room
+        self._areas: dict[str, Any] = {}
+
+    def rooms(self, file: str) -> tuple[list[Room], list[Item]]:
+        """The rooms that have a floor, and their floors and ceilings."""
+        rooms: list[Room] = []
+        parts: list[Item] = []
+        for told in self._house.rooms:
+            if given_room("3dfront", told.kind) == NO_ROOM:
+                continue
+            own = self._by_room.get(told.id, {})
+            floors = [self._level(m, up=True) for m in own.get("Floor", [])]
+            surfaces = [s for s in floors if s is not None]
+            polygon = floor_polygon(surfaces, []) if surfaces else None
+            low = floor_height(surfaces)
+            if polygon is None or low is None:
+                self._notes.add("empty-room", f"room {told.id}", "has no floor; left out")
+                continue
+            ceilings = [self._level(m, up=False) for m in own.get("Ceiling", [])]
+            over = [s for s in ceilings if s is not None]
+            tops = [float(m.points[:, 1].max()) for m in own.get("WallInner", [])]
+            high = min((float(s.positions[:, 1].min()) for s in over), default=0.0)
+            if high < low + 1.0:
+                high = float(np.median(tops)) if tops else low + _STOREY_M
+                high = high if high > low + 1.0 else low + _STOREY_M
+                material = self._paints.index("")
+                over = [horizontal("ceiling", [[polygon]], high, material, up=False)]
+            name = parted(told.kind) or "Room"
+            parts.append(_structure(f"{told.id}_floor", ItemKind.FLOOR, surfaces, told.id))
+            parts.append(_structure(f"{told.id}_ceiling", ItemKind.CEILING, over, told.id))
+            word = given_room("3dfront", told.kind)
+            rooms.append(
+                Room(
+                    id=told.id, name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
+                    types=(word or told.kind,) if told.kind else (),
+                )
+            )  # fmt: skip
+            self.names.append(told.id)
+            self._areas[told.id] = shapely.Polygon(polygon)
+        if not rooms:
+            raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")
+        check_unit(rooms, file, "mesh", "3D-FRONT is in metres")
+        return rooms, parts
+
+    def _level(self, mesh: FrontMesh, *, up: bool) -> Surface | None:
+        """The mesh with every face turned up, or down: winding tells nothing."""
+        corners = mesh.points[mesh.faces]
+        n = area_vectors(corners)[:, 1]
+        keep = face_areas(corners) > 1e-8
+        faces = np.where(((n > 0) == up)[:, None], mesh.faces, mesh.faces[:, ::-1])[keep]
+        if not len(faces):
+            return None
+        uvs = self._paints.uvs(mesh)
+        if uvs is None:
+            uvs = mesh.points[:, [0, 2]] * (np.array([1, -1]) if up else 1)
+        return Surface(
+            mesh.kind, mesh.points.astype(np.float32), np.ascontiguousarray(faces, np.int32),
+            self._paints.index(mesh.material), uvs.astype(np.float32),
+        )  # fmt: skip
+
+    def walls(self, file: str) -> tuple[list[Any], list[Item]]:
+        """(the holes, the walls as solids)."""
+        drawn = [
+            replace(m, uvs=self._paints.uvs(m)) for m in self._house.meshes
+            if m.kind in ("WallInner", "WallOuter")
+        ]  # fmt: skip
+        if len(drawn) > MAX_SHEETS:
+            raise BadHouse(file, "mesh", f"{len(drawn)} walls, at most {MAX_SHEETS} are read")
+        inner, outer = sheets_of(drawn, self._areas)
+        pieces = pieces_of(inner, outer)
+        if not pieces:
+            self._notes.add("missing-walls", "mesh", "no mesh of the type WallInner faces a room")
+        items = [self._wall(p, pieces, k) for k, p in enumerate(pieces)]
+        return told_holes(self._house, holes_of(pieces)), items
+
+    def _wall(self, piece: WallPiece, pieces: Sequence[WallPiece], k: int) -> Item:
+        sheet = piece.sheet
+        room = self._paints.index(sheet.mesh.material)
+        behind = room if piece.back is None else self._paints.index(piece.back.mesh.material)
+        surfaces = solid_of(piece, pieces, (room, behind, room))
+        item = _structure(f"wall_{k}", ItemKind.WALL, surfaces, sheet.room)
+        return replace(item, source_class="WallInner", tags=(f"boundary_of:{sheet.room}",))
+
+    def trim(self) -> list[Item]:
+        """Everything else that is drawn: skirting, dropped ceilings, columns, fitted cupboards."""
+        found: list[Item] = []
+        for mesh in self._house.meshes:
+            if mesh.kind in _MADE or (
+                mesh.kind in ("Floor", "Ceiling") and mesh.room in self._areas
+            ):
+                continue
+            seen = given_class("3dfront-mesh", mesh.kind) or class_by_words(parted(mesh.kind))
+            if seen is not None and seen.kind == LEFT_OUT:
+                continue
+            index = self._paints.index(mesh.material)
+            uvs = self._paints.uvs(mesh)
+            uvs = _planar_uvs(mesh.points) if uvs is None else uvs
+            is_lamp = seen is not None and seen.kind == "lamp"
+            if is_lamp:
+                material = replace(self.material(index), kind=MaterialKind.BULB)
+                index = self._paints.library.index(material)
+            surface = Surface(
+                mesh.kind, mesh.points.astype(np.float32), mesh.faces, index, uvs.astype(np.float32)
+            )
+            lights: tuple[LightPart, ...] = ()
+            if is_lamp:
+                x, y, z = (float(v) for v in mesh.points.mean(0))
+                lights = (
+                    LightPart(
+                        (x, y, z), BULB_RADIUS_M, _LIGHT_BAND_LM, PowerUnit.LUMEN, emitting=(0,)
+                    ),
+                )
+            found.append(
+                Item(
+                    id=f"mesh_{len(found)}", name=parted(mesh.kind).lower() or "mesh",
+                    kind=ItemKind.LAMP if is_lamp else ItemKind.OBJECT, level_id="0", surfaces=(surface,),
+                    nyu40=OTHERPROP if seen is None else max(seen.nyu40, 0), source_class=mesh.kind,
+                    room_id=mesh.room, lights=lights,
+                    tags=("structure",) if seen is not None and seen.nyu40 in (WALL, FLOOR, CEILING) else (),
+                )
+            )  # fmt: skip
+        return found
+
+    def material(self, index: int) -> Material:
+        """The material of an index."""
+        return self._paints.library.materials[index]
+
+
+def _planar_uvs(points: F64) -> F64:
+    """One metre a repeat on the plane that the mesh fills most."""
+    axes = np.sort(np.argsort(np.ptp(points, axis=0))[1:])
+    return np.asarray(points[:, axes], np.float64)
+
+
+def _structure(item_id: str, kind: ItemKind, surfaces: Sequence[Surface], room: str) -> Item:
+    nyu40 = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}[kind]
+    return Item(
+        id=item_id, name=kind.value, kind=kind, level_id="0", surfaces=tuple(surfaces), nyu40=nyu40,
+        source_class=kind.value.title(), room_id=room,
+    )  # fmt: skip

@@ -1,0 +1,166 @@
+"""What stands in the holes of a 3D-FRONT house: by its door list, its titles, its hole meshes; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.common.joinery import Hole, Style, merged
+from pbrs_farm.read.front3d.front_file import FrontFile, FrontPiece
+from pbrs_farm.read.front3d.front_walls import WallPiece
+
+HOLE_TYPES: Final = ("Door", "Window", "Hole", "BayWindow")
+_NEAR_M: Final = 0.4  # from a hole to the piece that tells it
+_LEAST_SILL_M: Final = 0.25
+_FLAT_M: Final = 0.1  # a lower hole mesh is a threshold
+_MOST_TOLD: Final = 2_000  # doors and windows of a house; a home has a dozen
+_WIDE_M: Final = 1.6  # a wider untold hole to the outside is a window
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Told:
+    at: F64  # (3,) its middle
+    kind: Literal["door", "window", "open"]
+    title: str
+    rank: int  # the lowest goes first
+    is_entry: bool = False
+    hinge: str = ""
+    is_mirrored: bool = False
+    box: F64 | None = None  # (2, 3) of a hole mesh
+
+
+def is_opening(piece: FrontPiece) -> bool:
+    """Whether a piece of furniture is a door or a window: their models were never released."""
+    seen = given_class("3dfront-title", piece.title)
+    return seen is not None and seen.kind in ("door", "window")
+
+
+def told_holes(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
+    """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too."""
+    told = _told(house)[:_MOST_TOLD]
+    found = []
+    for hole, piece in holes:
+        found.append(_kinded(hole, piece, _best(hole, told)))
+    found = merged(sorted(found, key=lambda h: h.kind == "open"))
+    # A hole mesh that stands over no gap cuts the wall itself.
+    extra = []
+    for one in told:
+        if one.box is not None and not any(_stands_in(one, hole) for hole in found):
+            extra.append(_of_mesh(one, told))
+    return merged([*found, *extra])
+
+
+def _told(house: FrontFile) -> list[_Told]:
+    doors = {ref: door for door in house.doors for ref in door.refs}
+    found = []
+    for mesh in house.meshes:
+        low, high = mesh.points.min(0), mesh.points.max(0)
+        if mesh.kind not in HOLE_TYPES or high[1] - low[1] < _FLAT_M:
+            continue
+        kind: Literal["door", "window", "open"] = "window"
+        if mesh.kind in ("Door", "Hole"):
+            kind = "door" if mesh.kind == "Door" else "open"
+        door = doors.get(mesh.uid)
+        box = None if mesh.kind == "BayWindow" else np.array([low, high])
+        if door is not None:
+            found.append(
+                _Told((low + high) / 2, "door", mesh.kind, 0, door.is_entry, door.hinge, box=box)
+            )
+        else:
+            found.append(_Told((low + high) / 2, kind, mesh.kind, 2, box=box))
+    for piece in house.pieces:
+        if not is_opening(piece) and piece.uid not in doors:
+            continue
+        seen = given_class("3dfront-title", piece.title)
+        height = (piece.size[1] if piece.size else 2.0) * float(abs(piece.scale[1]))
+        at = piece.world_from_model[:3, 3] + np.array([0.0, height / 2, 0.0])
+        door = doors.get(piece.uid)
+        is_window = seen is not None and seen.kind == "window"
+        found.append(
+            _Told(
+                at, "window" if is_window else "door", piece.title, 0 if door else 1,
+                bool(door and door.is_entry) or "entry" in piece.title, door.hinge if door else "",
+                is_mirrored=bool(piece.scale[0] < 0),
+            )
+        )  # fmt: skip
+    return found
+
+
+def _best(hole: Hole, told: Sequence[_Told]) -> _Told | None:
+    """What tells the hole best: the door list, a title, a mesh; the title of the nearest piece with one."""
+    near = [t for t in told if _stands_in(t, hole)]
+    best = min(near, key=lambda t: (t.rank, _away(t, hole)), default=None)
+    titled = min(
+        (t for t in near if "/" in t.title), key=lambda t: (t.rank, _away(t, hole)), default=None
+    )
+    if best is None or titled is None:
+        return best
+    hinge = best.hinge or titled.hinge
+    return replace(best, title=titled.title, is_mirrored=titled.is_mirrored, hinge=hinge)
+
+
+def _local(told: _Told, hole: Hole) -> F64:
+    return np.asarray(np.abs((told.at - hole.centre) @ hole.axes), np.float64)
+
+
+def _stands_in(told: _Told, hole: Hole) -> bool:
+    along, up, across = _local(told, hole)
+    half = np.array(hole.size) / 2
+    return bool(along < half[0] + 0.1 and up < half[1] + 0.5 and across < half[2] + _NEAR_M)
+
+
+def _away(told: _Told, hole: Hole) -> float:
+    return float(np.linalg.norm(_local(told, hole)[[0, 2]]))
+
+
+def _kinded(hole: Hole, piece: WallPiece, told: _Told | None) -> Hole:
+    width, _, _ = hole.size
+    sill = float(hole.centre[1] - hole.size[1] / 2 - piece.sheet.bounds[1])
+    if told is not None:
+        return _as_told(hole, told)
+    if sill > _LEAST_SILL_M:
+        return replace(hole, kind="window", source_class="Window")
+    if piece.is_outside:
+        return replace(hole, kind="door" if width < _WIDE_M else "window")
+    return replace(hole, source_class="Hole")
+
+
+def _as_told(hole: Hole, told: _Told) -> Hole:
+    title = told.title.lower()
+    style: Style = "swing"
+    if "sliding" in title:
+        style = "sliding"
+    elif "folding" in title:
+        style = "folding"
+    elif "double" in title:
+        style = "double"
+    name = told.kind if told.kind != "door" else "front door" if told.is_entry else "door"
+    return replace(
+        hole, kind=told.kind, name=name, source_class=told.title, style=style,
+        is_glazed="sliding" in title or "door window" in title or "glass" in title,
+        is_hinged_right=told.hinge.endswith("Right") != told.is_mirrored,
+    )  # fmt: skip
+
+
+def _of_mesh(told: _Told, every: Sequence[_Told]) -> Hole:
+    """The hole that a mesh of jambs shows: its thinner level side lies across the wall."""
+    assert told.box is not None
+    low, high = told.box
+    width, height, depth = (float(v) for v in high - low)
+    axes = np.eye(3)
+    if width < depth:
+        axes = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+        width, depth = depth, width
+    hole = Hole(
+        f"jambs_{told.at[0]:.2f}_{told.at[2]:.2f}",
+        "open",
+        (low + high) / 2,
+        (width, height, depth),
+        axes,
+    )
+    return _as_told(hole, _best(hole, every) or told)

@@ -1,0 +1,320 @@
+"""The walls of a 3D-FRONT house: sheets towards rooms -> solids as thick as what is behind, and their holes.
+
+No effects. Winding and normals are not believed: a sheet looks into the room beside it. A hole is a
+gap of a sheet; the sheet behind has it, too, or it is a niche. Solids meet in mitres, and repair
+cuts the holes, so that jambs are there whether a file has them or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Surface
+from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.geometry.solids import wall_prism
+from pbrs_farm.read.common.joinery import Hole
+from pbrs_farm.read.common.room_shells import plane_of_faces
+from pbrs_farm.read.front3d.front_file import FrontMesh
+
+_UPRIGHT: Final = 0.1  # |y| of a wall's normal, at most
+_BESIDE_M: Final = 0.06  # from a sheet to the floor that it looks at
+_DEPTHS_M: Final = (0.03, 0.5)  # from a sheet to the one behind it
+_DEPTH_M: Final = 0.12  # where nothing is behind
+_COLUMN_M: Final = 0.7  # a stretch without a sheet behind is no longer where a wall meets this one
+_LEAST_M: Final = 0.02
+_HOLE_M: Final = 0.2  # least width and height
+_FILLED: Final = 0.8  # share of a gap that the sheet behind fills: a niche
+_SAME_END_M: Final = 0.03
+_LONGEST_MITRE_M: Final = 0.8
+MAX_SHEETS: Final = 2_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheet:
+    """A plane of a wall mesh, in its own axes: along (to the right of who looks at it) and up."""
+
+    mesh: FrontMesh
+    normal: F64  # (3,) unit, into the room; of an outer sheet either way
+    along: F64
+    offset: float  # normal @ p
+    outline: Any  # shapely, (along, up)
+    room: str
+    uv: F64 | None  # (3, 2) of (along, up, 1)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Along from, up from, along to, up to."""
+        s0, y0, s1, y1 = self.outline.bounds
+        return float(s0), float(y0), float(s1), float(y1)
+
+    def point(self, s: float, y: float, behind: float = 0.0) -> F64:
+        """(3,) world."""
+        p = self.along * s + self.normal * (self.offset - behind)
+        return np.asarray(p + np.array([0.0, y, 0.0]), np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallPiece:
+    """A stretch of a sheet with one thickness."""
+
+    sheet: Sheet
+    s0: float
+    s1: float
+    depth: float  # of its own solid
+    through: float  # to the sheet behind
+    back: Sheet | None
+
+    @property
+    def is_outside(self) -> bool:
+        """Nothing, or the open air, is behind."""
+        return self.back is None or self.back.mesh.kind != "WallInner"
+
+
+def sheets_of(
+    meshes: Sequence[FrontMesh], floors: Mapping[str, Any]
+) -> tuple[list[Sheet], list[Sheet]]:
+    """(the sheets that look into rooms, the outer ones). floors: room -> plan area."""
+    inner: list[Sheet] = []
+    outer: list[Sheet] = []
+    tree, names = shapely.STRtree(list(floors.values())), list(floors)
+    for mesh in meshes:
+        for corners, uvs in _planes(mesh):
+            sheet = _sheet(mesh, corners, uvs)
+            if sheet is None:
+                continue
+            if mesh.kind != "WallInner":
+                outer.append(sheet)
+                continue
+            looking = _looking(sheet, floors, tree, names)
+            if looking is not None:
+                inner.append(looking)
+    return inner, outer
+
+
+def _planes(mesh: FrontMesh) -> list[tuple[F64, F64 | None]]:
+    """(corners (F, 3, 3), uv (F, 3, 2)) of each upright plane."""
+    surface = Surface("", mesh.points.astype(np.float32), mesh.faces, 0)
+    corners = mesh.points[mesh.faces]
+    uvs = None if mesh.uvs is None else mesh.uvs[mesh.faces]
+    plane = plane_of_faces([surface])
+    n = area_vectors(corners)
+    size = np.linalg.norm(n, axis=1)
+    upright = (np.abs(n[:, 1]) < _UPRIGHT * size) & (size > 1e-8)
+    found = []
+    for k in np.unique(plane[upright]):
+        mine = upright & (plane == k)
+        if size[mine].sum() / 2 > 0.01:
+            found.append((corners[mine], None if uvs is None else uvs[mine]))
+    return found
+
+
+def _sheet(mesh: FrontMesh, corners: F64, uvs: F64 | None) -> Sheet | None:
+    n = area_vectors(corners)
+    normal = n[np.linalg.norm(n, axis=1).argmax()] * [1, 0, 1]
+    normal /= np.linalg.norm(normal)
+    return _framed(mesh, normal, corners, uvs, "")
+
+
+def _framed(mesh: FrontMesh, normal: F64, corners: F64, uvs: F64 | None, room: str) -> Sheet | None:
+    along = np.array([normal[2], 0.0, -normal[0]])  # up x normal
+    plan = np.stack([corners @ along, corners[..., 1]], -1)
+    triangles: Any = shapely.polygons(plan)
+    triangles = triangles[shapely.area(triangles) > 1e-8]
+    if not len(triangles):
+        return None
+    outline = shapely.union_all(shapely.buffer(triangles, 1e-4, join_style="mitre"))
+    outline = shapely.simplify(outline.buffer(-1e-4, join_style="mitre"), 1e-3)
+    if outline.is_empty:
+        return None
+    uv = None
+    if uvs is not None:
+        flat = plan.reshape(-1, 2)
+        system = np.column_stack([flat, np.ones(len(flat))])
+        uv = np.linalg.lstsq(system, uvs.reshape(-1, 2), rcond=None)[0]
+    return Sheet(mesh, normal, along, float((corners @ normal).mean()), outline, room, uv)
+
+
+def _looking(sheet: Sheet, floors: Mapping[str, Any], tree: Any, names: list[str]) -> Sheet | None:
+    """The sheet with its normal into its own room, else into the room beside it."""
+    s0, _, s1, _ = sheet.bounds
+    y = 0.0
+    points = [(share, sign) for share in (0.5, 0.25, 0.75) for sign in (1.0, -1.0)]
+    own = floors.get(sheet.mesh.room)
+    beside: tuple[str, float] | None = None
+    for share, sign in points:
+        p = sheet.point(s0 + share * (s1 - s0), y, -sign * _BESIDE_M)
+        place = shapely.Point(p[0], p[2])
+        if own is not None and own.contains(place):
+            beside = (sheet.mesh.room, sign)
+            break
+        if beside is None:
+            hits = tree.query(place, predicate="within")
+            if len(hits):
+                beside = (names[int(hits[0])], sign)
+    if beside is None:
+        return None
+    room, sign = beside
+    if sign > 0:
+        return replace(sheet, room=room)
+    # Looked at from the other side: what ran to the right runs to the left.
+    turned = shapely.transform(sheet.outline, lambda p: p * [-1, 1])
+    uv = None if sheet.uv is None else sheet.uv * np.array([[-1.0], [1.0], [1.0]])
+    return Sheet(sheet.mesh, -sheet.normal, -sheet.along, -sheet.offset, turned, room, uv)
+
+
+def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]:
+    """Every inner sheet in stretches of one thickness."""
+    every = [*inner, *outer]
+    normals = np.array([s.normal for s in every]).reshape(-1, 3)
+    offsets = np.array([s.offset for s in every])
+    found: list[WallPiece] = []
+    for sheet in inner:
+        cosine = normals @ sheet.normal
+        behind = sheet.offset - np.sign(cosine) * offsets
+        fits = (np.abs(cosine) > 0.999) & (behind > _DEPTHS_M[0]) & (behind < _DEPTHS_M[1])
+        backs = [(float(behind[k]), every[k]) for k in np.flatnonzero(fits)]
+        found += _stretches(sheet, [(d, b, _span(b, sheet)) for d, b in backs])
+    return found
+
+
+def _span(other: Sheet, sheet: Sheet) -> tuple[float, float]:
+    """Where another sheet lies along this one."""
+    s0, _, s1, _ = other.bounds
+    ends = [float(other.point(s, 0.0) @ sheet.along) for s in (s0, s1)]
+    return min(ends), max(ends)
+
+
+def _stretches(
+    sheet: Sheet, backs: list[tuple[float, Sheet, tuple[float, float]]]
+) -> list[WallPiece]:
+    s0, _, s1, _ = sheet.bounds
+    cuts = sorted({s0, s1, *(float(np.clip(v, s0, s1)) for _, _, span in backs for v in span)})
+    runs: list[list[Any]] = []  # [from, to, distance, sheet behind]
+    for low, high in pairwise(cuts):
+        if high - low < 1e-6:
+            continue
+        middle = (low + high) / 2
+        here = [(d, b) for d, b, span in backs if span[0] < middle < span[1]]
+        nearest = min(here, key=lambda one: one[0], default=(0.0, None))
+        if runs and abs(runs[-1][2] - nearest[0]) < 1e-3:
+            runs[-1][1] = high
+        else:
+            runs.append([low, high, *nearest])
+    # Where another wall meets this one from behind nothing is behind: take what is beside.
+    known = [r for r in runs if r[3] is not None]
+    for k, run in enumerate(runs):
+        if run[3] is None and known and run[1] - run[0] < _COLUMN_M:
+            beside = [
+                runs[j] for j in (k - 1, k + 1) if 0 <= j < len(runs) and runs[j][3] is not None
+            ]
+            if beside:
+                run[2:] = min(beside, key=lambda r: r[2])[2:]
+    joined: list[list[Any]] = []
+    for run in runs:
+        is_short = run[1] - run[0] < _LEAST_M
+        if joined and (abs(joined[-1][2] - run[2]) < 1e-3 or is_short):
+            joined[-1][1] = run[1]
+        else:
+            joined.append(list(run))
+    found = []
+    for low, high, through, back in joined:
+        is_inner = back is not None and back.mesh.kind == "WallInner"
+        through = through if back is not None else _DEPTH_M
+        found.append(
+            WallPiece(sheet, low, high, through / 2 if is_inner else through, through, back)
+        )
+    return found
+
+
+def solid_of(
+    piece: WallPiece, pieces: Sequence[WallPiece], materials: tuple[int, int, int]
+) -> tuple[Surface, ...]:
+    """The piece as a closed solid without its holes. materials: towards the room, behind, the rest."""
+    sheet = piece.sheet
+    _, y0, _, y1 = sheet.bounds
+    front = [sheet.point(s, 0.0)[[0, 2]] for s in (piece.s0, piece.s1)]
+    back = [_back_corner(piece, s, front[k], pieces) for k, s in enumerate((piece.s0, piece.s1))]
+    top = np.full(2, y1)
+    room, behind, rest = materials
+    parts = wall_prism(np.array(back), np.array(front), y0, top, top, (behind, room, rest))
+    return tuple(_painted(s, sheet) if s.name == "right" else s for s in parts)
+
+
+def _painted(surface: Surface, sheet: Sheet) -> Surface:
+    """The side towards the room with the texture as the file lays it."""
+    if sheet.uv is None:
+        return surface
+    p = surface.positions.astype(np.float64)
+    system = np.column_stack([p @ sheet.along, p[:, 1], np.ones(len(p))])
+    return replace(surface, uvs=(system @ sheet.uv).astype(np.float32))
+
+
+def _back_corner(piece: WallPiece, s: float, corner: F64, pieces: Sequence[WallPiece]) -> F64:
+    """Plan (2,) of a solid's back at an end: mitred with the neighbour's of the same room."""
+    sheet = piece.sheet
+    straight = sheet.point(s, 0.0, piece.depth)[[0, 2]]
+    for other in pieces:
+        if other.sheet is sheet or other.sheet.room != sheet.room:
+            continue
+        if abs(other.sheet.normal @ sheet.normal) > 0.95:
+            continue
+        ends = [other.sheet.point(v, 0.0)[[0, 2]] for v in (other.s0, other.s1)]
+        if min(float(np.linalg.norm(e - corner)) for e in ends) > _SAME_END_M:
+            continue
+        lines = np.array([sheet.normal[[0, 2]], other.sheet.normal[[0, 2]]])
+        offsets = [sheet.offset - piece.depth, other.sheet.offset - other.depth]
+        met = np.linalg.solve(lines, np.array(offsets))
+        if np.linalg.norm(met - straight) < _LONGEST_MITRE_M:
+            return np.asarray(met, np.float64)
+    return np.asarray(straight, np.float64)
+
+
+def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
+    """The gaps of the sheets, with the piece that each stands in; kind "open" until more is known."""
+    by_sheet: dict[int, list[WallPiece]] = {}
+    for piece in pieces:
+        by_sheet.setdefault(id(piece.sheet), []).append(piece)
+    found: list[tuple[Hole, WallPiece]] = []
+    for own in by_sheet.values():
+        sheet = own[0].sheet
+        for s0, y0, s1, y1 in _gaps(sheet):
+            middle = (s0 + s1) / 2
+            piece = next((p for p in own if p.s0 <= middle <= p.s1), own[0])
+            if piece.back is not None and _is_filled(piece.back, sheet, (s0, y0, s1, y1)):
+                continue
+            axes = np.stack([sheet.along, [0.0, 1.0, 0.0], sheet.normal], 1)
+            hole = Hole(
+                id=f"hole_{len(found)}", kind="open",
+                centre=sheet.point(middle, (y0 + y1) / 2, piece.through / 2),
+                size=(s1 - s0, y1 - y0, piece.through), axes=axes,
+            )  # fmt: skip
+            found.append((hole, piece))
+    return found
+
+
+def _gaps(sheet: Sheet) -> list[tuple[float, float, float, float]]:
+    s0, y0, s1, y1 = sheet.bounds
+    rest = shapely.box(s0, y0, s1, y1).difference(sheet.outline)
+    # Slivers along the edge are no holes.
+    rest = rest.buffer(-0.02, join_style="mitre").buffer(0.02, join_style="mitre")
+    found = []
+    for part in shapely.get_parts(rest):
+        a, b, c, d = (float(v) for v in part.bounds)
+        if c - a >= _HOLE_M and d - b >= _HOLE_M and part.area > 0.6 * (c - a) * (d - b):
+            found.append((a, max(b, y0), c, d))
+    return found
+
+
+def _is_filled(back: Sheet, sheet: Sheet, gap: tuple[float, float, float, float]) -> bool:
+    """Whether the sheet behind a gap has no gap there."""
+    s0, y0, s1, y1 = gap
+    ends = [float(sheet.point(s, 0.0) @ back.along) for s in (s0, s1)]
+    area = shapely.box(min(ends), y0, max(ends), y1)
+    return bool(back.outline.intersection(area).area > _FILLED * area.area)

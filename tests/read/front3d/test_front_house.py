@@ -1,0 +1,265 @@
+"""3D-FRONT houses of three generations, whole and damaged."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from benchmarks.inputs import front3d_files as files
+from pbrs_farm.core.classes import LAMP, NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import FRONT_TOLD, TOLD, House, ItemKind, MaterialKind
+from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.run.steps import repaired_house
+
+
+def read(path: Path, models: str = "") -> House:
+    return read_house(resolve(str(path), models=models), ReadFields())
+
+
+def written(folder: Path, house: dict[str, Any]) -> Path:
+    path = folder / "flat.json"
+    path.write_text(json.dumps(house))
+    return path
+
+
+@pytest.mark.parametrize("generation", files.GENERATIONS)
+def test_a_repaired_house_of_each_generation_leaks_no_ray_and_keeps_walls_and_openings(
+    tmp_path: Path, generation: files.Generation
+) -> None:
+    path = files.write_house(tmp_path, generation, with_models=False)
+    house = read(path)
+    doors = [i for i in house.items if i.kind is ItemKind.DOOR]
+    windows = [i for i in house.items if i.kind is ItemKind.WINDOW]
+    assert (len(doors), len(windows), len(house.openings)) == (6, 5, 12)
+    assert sum(i.kind is ItemKind.WALL for i in house.items) == 24
+    if generation == "0.4":
+        return  # the others tell the same walls; one repair of jambs and one of gaps suffice
+    if generation == "0.10":
+        return
+    recipe = Recipe().model_copy(update={"read": ReadFields(stand_ins="none")})
+    repaired, report = repaired_house(resolve(str(path)), recipe)
+    assert report.leaks is not None
+    assert report.leaks.n_sky == 0
+    assert report.structure.walls_lost == ()
+    assert (report.structure.n_openings, report.structure.n_openings_cut) == (12, 12)
+    assert {str(room.enclosure) for room in repaired.rooms} == {"closed"}
+
+
+def test_rooms_have_the_types_and_areas_of_the_file(tmp_path: Path) -> None:
+    house = read(written(tmp_path, files.front_house()))
+    for room, (kind, x0, z0, x1, z1) in zip(house.rooms, files.ROOMS.values(), strict=True):
+        assert room.name.replace(" ", "") == kind
+        assert shapely.Polygon(room.polygon).area == pytest.approx((x1 - x0) * (z1 - z0), abs=0.02)
+    assert [r.types for r in house.rooms][:3] == [("living",), ("kitchen",), ("hall",)]
+
+
+def test_walls_are_as_thick_as_the_distance_of_their_faces(tmp_path: Path) -> None:
+    house = read(written(tmp_path, files.front_house("0.11 gaps")))
+    walls = [i for i in house.items if i.kind is ItemKind.WALL]
+    outside = min(walls, key=lambda i: float(i.bounds[0, 2]))
+    # Mitred: the back runs to the outer corner.
+    assert outside.bounds[0, 2] == pytest.approx(-0.24, abs=1e-4)
+    for opening, (_, _, (x, z), axis, width, low, high, depth, _d) in zip(
+        sorted(house.openings, key=lambda o: tuple(np.round(o.quad.mean(0), 2))),
+        sorted(files.HOLES, key=lambda h: (h[2][0], round((h[5] + h[6]) / 2, 2), h[2][1])),
+        strict=True,
+    ):
+        size = np.ptp(opening.quad, axis=0)
+        across = np.ptp(opening.cutter.positions, axis=0)[2 if axis == "x" else 0]
+        np.testing.assert_allclose(opening.quad.mean(0), [x, (low + high) / 2, z], atol=0.01)
+        assert size[0 if axis == "x" else 2] == pytest.approx(width, abs=0.01)
+        assert across == pytest.approx(depth + 0.04, abs=0.01)
+
+
+def test_ceilings_and_floors_look_into_the_room_however_they_are_wound(tmp_path: Path) -> None:
+    for generation in ("0.4", "0.11"):
+        house = read(written(tmp_path, files.front_house(generation)))
+        for item in house.items:
+            if item.kind in (ItemKind.FLOOR, ItemKind.CEILING):
+                for s in item.surfaces:
+                    a, b, c = (s.positions[s.faces[:, k]] for k in range(3))
+                    n = np.cross(b - a, c - a)[:, 1]
+                    assert ((n > 0) == (item.kind is ItemKind.FLOOR)).all()
+
+
+def test_titles_make_sliding_doors_of_glass_and_mirrored_doors_hang_on_the_other_side(
+    tmp_path: Path,
+) -> None:
+    house = read(written(tmp_path, files.front_house()))
+    doors = {i.source_class: i for i in house.items if i.kind is ItemKind.DOOR}
+    sliding = doors["door/double sliding door"]
+    kinds = [house.materials[s.material].kind for s in sliding.surfaces]
+    assert MaterialKind.PANE in kinds
+    plain = doors["door/single swing door"]
+    assert MaterialKind.PANE not in [house.materials[s.material].kind for s in plain.surfaces]
+    # Mirror a door's piece: its handle goes to the other side.
+    scene = files.front_house()
+    handles = []
+    for mirrored in (False, True):
+        if mirrored:
+            for room in scene["scene"]["room"]:
+                for child in room["children"]:
+                    if child["ref"] == "hole1/model":
+                        child["scale"] = [-1, 1, 1]
+            scene["extension"]["door"][1]["ref"] = ["hole1/model"]
+            scene["mesh"] = [m for m in scene["mesh"] if m["type"] != "Door"]
+        door = _door_at(read(written(tmp_path, scene)), 2.0, 4.06)
+        handle = next(s for s in door.surfaces if s.name == "handle")
+        handles.append(float(handle.positions[:, 0].mean()) - 2.0)
+    assert handles[0] * handles[1] < 0
+
+
+def _door_at(house: House, x: float, z: float) -> Any:
+    return next(
+        i for i in house.items if i.kind is ItemKind.DOOR
+        and np.abs(i.oriented_box.centre[[0, 2]] - [x, z]).max() < 0.1
+    )  # fmt: skip
+
+
+def test_pieces_stand_where_their_child_places_them_with_the_classes_of_the_tables(
+    tmp_path: Path,
+) -> None:
+    house = read(files.write_house(tmp_path))
+    pieces = [i for i in house.items if i.id.startswith("piece_")]
+    assert len(pieces) == files.N_DRAWN
+    sofa = next(i for i in pieces if "Sofa" in i.source_class)
+    np.testing.assert_allclose(sofa.bounds, [[0.15, 0, 2.95], [2.25, 0.8, 3.85]], atol=1e-4)
+    # Turned by 180 degrees: the lower half, its front, looks to -z.
+    high = np.concatenate([s.positions for s in sofa.surfaces])
+    assert high[high[:, 1] > 0.7][:, 2].min() == pytest.approx(3.4, abs=1e-4)
+    assert all(len(s.faces) != 2 for i in pieces for s in i.surfaces), "the shadow cards are gone"
+    assert sum("mirrored" in i.tags for i in pieces) == 1
+    for _, title, category, *_rest in files.PIECES[:-1]:
+        item = next(i for i in pieces if i.source_class == (category or title))
+        seen = given_class("3dfuture", category) or given_class("3dfront-title", title)
+        assert seen is not None
+        assert NYU40_NAMES[item.nyu40] == NYU40_NAMES[seen.nyu40]
+
+
+def test_without_models_every_piece_is_told_by_its_size_and_one_note_says_so(
+    tmp_path: Path,
+) -> None:
+    house = read(files.write_house(tmp_path, with_models=False))
+    told = [i for i in house.items if TOLD in i.tags]
+    assert len(told) == files.N_DRAWN
+    assert all(FRONT_TOLD in i.tags for i in told)
+    sofa = next(i for i in told if "sofa" in i.source_class)
+    assert sofa.box is not None
+    np.testing.assert_allclose(2 * sofa.box.half, [2.1, 0.8, 0.9])
+    np.testing.assert_allclose(sofa.box.centre, [1.2, 0.4, 3.4], atol=1e-9)
+    np.testing.assert_allclose(sofa.box.axes[:, 2], [0, 0, -1], atol=1e-9)
+    assert [n.kind for n in house.notes].count("missing-model") == 1
+
+
+def test_models_may_lie_in_a_folder_that_is_named(tmp_path: Path) -> None:
+    path = files.write_house(tmp_path / "a", with_models=False)
+    files.write_models(tmp_path / "b" / "3D-FUTURE-model")
+    for models in (tmp_path / "b", tmp_path / "b" / "3D-FUTURE-model"):
+        source = resolve(str(path), models=str(models))
+        assert source.companions
+        assert not any(TOLD in i.tags for i in read_house(source, ReadFields()).items)
+
+
+def test_a_told_light_is_a_lamp_where_no_lamp_stands_in_the_colour_it_has(tmp_path: Path) -> None:
+    house = read(files.write_house(tmp_path))
+    spots = [i for i in house.items if i.id.startswith("light_")]
+    assert len(spots) == 3
+    for spot in spots:
+        assert (spot.nyu40, house.room(spot.room_id or "").name) == (LAMP, "Hallway")
+        r, g, b = spot.lights[0].rgb_linear
+        assert r > g > b
+        assert spot.lights[0].position[1] < files.HEIGHT
+
+
+def test_missing_invalid_and_flat_pieces_are_notes_with_their_number(tmp_path: Path) -> None:
+    scene = files.front_house()
+    scene["furniture"][-1]["valid"] = False
+    scene["scene"]["room"][0]["children"][-2]["scale"] = [1, 0, 1]
+    house = read(written(tmp_path, scene))
+    texts = [n.text for n in house.notes if n.kind == "missing-piece"]
+    assert [t.split(":")[0] for t in texts] == [
+        "1 children name no entry", "1 children name an invalid piece", "1 children are flat or huge",
+    ]  # fmt: skip
+
+
+# What is refused: one line with the place.
+
+
+def _changed(path: list[Any], value: Any) -> dict[str, Any]:
+    scene = files.front_house()
+    at: Any = scene
+    for step in path[:-1]:
+        at = at[step]
+    at[path[-1]] = value
+    return scene
+
+
+FAULTS = {
+    "no mesh": (_changed(["mesh"], []), "mesh: is missing or empty"),
+    "no rooms": (_changed(["scene", "room"], []), r"scene\.room: is missing or empty"),
+    "text for a number": (_changed(["mesh", 3, "xyz"], ["a", 0, 0]), r"mesh\[3\]\.xyz"),
+    "nested": (_changed(["mesh", 3, "xyz"], [[0, 0, 0]]), r"mesh\[3\]\.xyz"),
+    "two numbers": (_changed(["mesh", 3, "xyz"], [0, 0]), r"mesh\[3\]\.xyz"),
+    "an index beyond": (_changed(["mesh", 3, "faces"], [0, 1, 10**9]), r"mesh\[3\]\.faces"),
+    "a huge number": (_changed(["mesh", 3, "xyz", 0], 1e30), r"mesh\[3\]\.xyz"),
+    "a short turn": (_changed(["scene", "room", 0, "children", 7, "rot"], [0, 1]), r"children\[7\]\.rot"),
+    "rooms are an object": (_changed(["scene", "room"], {"a": 1}), r"room.*list"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_damaged_house_is_refused_in_one_line_that_names_the_place(
+    tmp_path: Path, name: str
+) -> None:
+    scene, expected = FAULTS[name]
+    if name == "a short turn":
+        for child in scene["scene"]["room"][0]["children"]:
+            child["rot"] = [0, 1]
+        expected = r"children\[\d+\]\.rot"
+    with pytest.raises(BadHouse, match=expected) as error:
+        read(written(tmp_path, scene))
+    assert "\n" not in str(error.value)
+
+
+def test_truncated_files_nan_and_centimetres_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, files.front_house())
+    text = path.read_text()
+    for damaged in (text[: len(text) * 3 // 4], text.replace("2.7", "NaN")):
+        path.write_text(damaged)
+        with pytest.raises(BadHouse, match="no valid JSON"):
+            read(path)
+    scene = files.front_house()
+    for mesh in scene["mesh"]:
+        mesh["xyz"] = [100 * v for v in mesh["xyz"]]
+    with pytest.raises(BadHouse, match="looks like centimetres"):
+        read(written(tmp_path, scene))
+
+
+def test_ids_twice_and_names_that_lead_out_do_no_harm(tmp_path: Path) -> None:
+    scene = files.front_house()
+    scene["mesh"].append(scene["mesh"][0])
+    for piece in scene["furniture"]:
+        piece["jid"] = "../../../etc"
+    scene["material"][2]["jid"] = "../../secret"
+    house = read(written(tmp_path, scene))
+    assert "duplicate-id" in [n.kind for n in house.notes]
+    ids = [i.id for i in house.items]
+    assert len(ids) == len(set(ids))
+
+
+def test_a_million_entries_are_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "many.json"
+    path.write_text('{"furniture":[],"mesh":[' + '{"type":"Floor"},' * 10**6 + '{}],"scene":{"room":[{}]}}')  # fmt: skip
+    start = time.monotonic()
+    with pytest.raises(BadHouse, match="at most"):
+        read_house(resolve(str(path)), ReadFields())
+    assert time.monotonic() - start < 20
