@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics
 from pbrs_farm.core.checked_json import checked, exactly
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 
 # room_camera.txt, the published camera file (docs/spec/suncg.md section 3.3), as cameras.
 # Half-angles are in radians; yf is recomputed from xf and the picture's shape, and up is made
@@ -86,43 +87,73 @@ def _camera(words: list[str], file: str, line: int, width_px: int, height_px: in
 
 Vector = Annotated[tuple[float, float, float], exactly(3)]
 Row = Annotated[tuple[float, float, float, float], exactly(4)]
+Pose = Annotated[tuple[Row, Row, Row, Row], exactly(4, "rows")]
 
 
 class GivenCamera(BaseModel):
-    """One camera of the file: eye and towards (and up), or a 4x4 world_from_camera.
+    """One camera of the file: eye and towards (and up), or a 4x4 pose; hfov_rad, or K with its size.
 
-    Metres, y up. world_from_camera has OpenGL axes (x right, y up, looking along -z), row by row.
+    Metres, y up. world_from_camera has OpenGL axes (x right, y up, looking along -z), row by row;
+    world_from_camera_opencv x right, y down, looking along z. K is of a picture of width_px by
+    height_px, and is scaled to the image's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
     eye: Vector | None = None  # metres
     towards: Vector | None = None
     up: Vector = (0.0, 1.0, 0.0)
-    world_from_camera: Annotated[tuple[Row, Row, Row, Row], exactly(4, "rows")] | None = None
+    world_from_camera: Pose | None = None
+    world_from_camera_opencv: Pose | None = None
     room: str | None = None  # id of the room it belongs to; None = where it stands
     hfov_rad: Annotated[float, Field(gt=0, lt=3.1)] = PAPER_HFOV_RAD  # of the picture's width
+    K: Annotated[tuple[Vector, Vector, Vector], exactly(3, "rows")] | None = None
+    width_px: Annotated[int, Field(gt=0, le=16384)] | None = None  # of K's picture
+    height_px: Annotated[int, Field(gt=0, le=16384)] | None = None
 
     @model_validator(mode="after")
     def _has_one_pose(self) -> GivenCamera:
-        # Ask for exactly one of the two forms.
+        # Ask for exactly one of the three forms.
         looks = self.eye is not None and self.towards is not None
-        if looks == (self.world_from_camera is not None):
-            raise ValueError("give eye and towards, or world_from_camera")
+        poses = [p for p in (self.world_from_camera, self.world_from_camera_opencv) if p]
+        if looks + len(poses) != 1:
+            forms = "eye and towards, world_from_camera or world_from_camera_opencv"
+            raise ValueError(f"give one of {forms}")
         if looks and np.linalg.norm(np.cross(self.towards, self.up)) < 1e-9:  # type: ignore[arg-type]
             raise ValueError("towards and up are parallel or zero")
-        if self.world_from_camera is not None:
+        if poses:
             # Accept a rotation without mirroring or scale, to a ten-thousandth.
-            rotation = np.array(self.world_from_camera)[:3, :3]
+            rotation = np.array(poses[0])[:3, :3]
             proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-4)
             if not proper or np.linalg.det(rotation) < 0:
                 raise ValueError("world_from_camera is no rigid pose")
         return self
 
+    @model_validator(mode="after")
+    def _has_one_field_of_view(self) -> GivenCamera:
+        has_size = self.width_px is not None and self.height_px is not None
+        if (self.K is not None) != has_size:
+            raise ValueError("K needs width_px and height_px, and they need K")
+        if self.K is not None and "hfov_rad" in self.model_fields_set:
+            raise ValueError("give K or hfov_rad")
+        if self.K is not None:
+            (fx, skew, _cx), (_zero, fy, _cy), last = self.K
+            if min(fx, fy) <= 0 or abs(skew) > 1e-9 or last != (0, 0, 1):
+                raise ValueError("K is fx 0 cx, 0 fy cy, 0 0 1")
+        return self
+
     def camera(self, width_px: int, height_px: int) -> Camera:
         """On a grid of that size."""
-        intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
+        if self.K is None or self.width_px is None or self.height_px is None:
+            intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
+        else:
+            (fx, _skew, cx), (_zero, fy, cy), _last = self.K
+            own = Intrinsics(self.width_px, self.height_px, fx, fy, cx, cy)
+            intrinsics = own.resized(width_px, height_px)
         if self.world_from_camera is not None:
             return Camera(intrinsics, np.array(self.world_from_camera, np.float64))
+        if self.world_from_camera_opencv is not None:
+            pose = np.array(self.world_from_camera_opencv, np.float64)
+            return Camera(intrinsics, pose @ OPENCV_FROM_OPENGL)
         return Camera.look(
             intrinsics, np.array(self.eye, np.float64), np.array(self.towards, np.float64), self.up
         )

@@ -59,9 +59,30 @@ def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
     assert (room, no_room) == ("0_1", None)
 
 
+def test_each_camera_has_its_own_k_and_may_have_opencvs_axes() -> None:
+    text = """[
+      {"world_from_camera_opencv": [[1,0,0,1],[0,-1,0,1.5],[0,0,-1,2],[0,0,0,1]],
+       "K": [[600,0,650],[0,610,350],[0,0,1]], "width_px": 1280, "height_px": 720},
+      {"world_from_camera": [[1,0,0,1],[0,1,0,1.5],[0,0,1,2],[0,0,0,1]], "hfov_rad": 1.0}
+    ]"""
+    (own, _), (other, _) = cameras_from_file_text(text, "cams.json", 640, 480)
+    np.testing.assert_allclose(own.world_from_camera, other.world_from_camera, atol=1e-12)
+    # A point falls where K of the whole picture says, at whatever size it is drawn.
+    point = np.array([[1.2, 1.6, 0.0]])
+    x, y = own.with_size(1280, 720).pixels_of(point)[0]
+    assert (x, y) == pytest.approx((650 + 600 * 0.2 / 2, 350 - 610 * 0.1 / 2))
+    assert own.intrinsics.fx != other.intrinsics.fx
+
+
 @pytest.mark.parametrize(
     "text",
     [
+        '[{"eye": [1, 2, 3], "towards": [0, 0, 1], "K": [[9,0,4],[0,9,4],[0,0,1]]}]',
+        '[{"eye": [1, 2, 3], "towards": [0, 0, 1], "width_px": 8, "height_px": 8}]',
+        '[{"eye": [1, 2, 3], "towards": [0, 0, 1], "K": [[0,0,4],[0,9,4],[0,0,1]], "width_px": 8,'
+        ' "height_px": 8}]',
+        '[{"world_from_camera": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]],'
+        ' "world_from_camera_opencv": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]',
         '[{"eye": [1, 2, 3]}]',
         '[{"eye": [1, 2, 3], "towards": [0, 1, 0]}]',
         '[{"eye": [1, 2], "towards": [0, 0, 1]}]',
