@@ -50,12 +50,20 @@ def counted(n: int, noun: str) -> str:
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
+def options(p: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
+    """The parser's group of options of that title, in its help."""
+    for group in p._action_groups:
+        if group.title == title:
+            return group
+    return p.add_argument_group(title)
+
+
 MAX_SEEDS: Final = 100_000  # of one command
 
 
 def add_dress(p: argparse.ArgumentParser) -> None:
     """By which seeds each home is dressed, and with what."""
-    add = p.add_argument
+    add = options(p, "dressing").add_argument
     text = "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7"
     add("--dress", metavar="SEEDS", type=str, help=text)
     text = "furnish rooms that have nothing in them before the home is dressed (docs/homes.md)"
@@ -69,9 +77,11 @@ def add_catalogue(p: argparse.ArgumentParser) -> None:
         "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB;"
         " `generated` leaves out the furniture package"
     )
-    p.add_argument("--catalogue", action="append", default=[], metavar="LIBRARY", help=text)
+    options(p, "dressing").add_argument(
+        "--catalogue", action="append", default=[], metavar="LIBRARY", help=text
+    )
     text = "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG"
-    p.add_argument(
+    options(p, "dressing").add_argument(
         "--pictures", action="append", default=[], dest="catalogue", metavar="DIR", help=text
     )
 
@@ -114,7 +124,7 @@ def add_models(p: argparse.ArgumentParser) -> None:
 
 def add_cameras(p: argparse.ArgumentParser) -> None:
     """Where viewpoints come from (cameras.source)."""
-    add = p.add_argument
+    add = options(p, "viewpoints").add_argument
     text = "where viewpoints come from; walk: frames along a person's way (docs/motion.md)"
     add("--cameras", choices=("sampled", "stored", "walk"), help=text)
     text = "your own way: TUM rows t x y z qx qy qz qw (docs/motion.md)"
@@ -130,14 +140,14 @@ def add_cameras(p: argparse.ArgumentParser) -> None:
 def add_recipe(p: argparse.ArgumentParser, default: str = "fast") -> None:
     """The recipe by name, its seed, and what overrides its fields."""
     add_fields(p, default)
-    p.add_argument("--seed", type=int, help="the recipe's seed (default 0)")
+    options(p, "recipe").add_argument("--seed", type=int, help="the recipe's seed (default 0)")
 
 
 def add_fields(p: argparse.ArgumentParser, default: str = "fast") -> None:
     """The recipe by name, and what overrides its fields, the seed apart."""
     from pbrs_farm.core.recipe import RECIPE_NAMES
 
-    add = p.add_argument
+    add = options(p, "recipe").add_argument
     text = f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {default})"
     add("--recipe", default=default, help=text)
     add_set(p, "GROUP.FIELD=VALUE", "override a field")
@@ -147,12 +157,14 @@ def add_fields(p: argparse.ArgumentParser, default: str = "fast") -> None:
 
 def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
     """--set, repeatable: fields of the recipe."""
-    p.add_argument("--set", action="append", default=[], metavar=metavar, help=text)
+    options(p, "recipe").add_argument(
+        "--set", action="append", default=[], metavar=metavar, help=text
+    )
 
 
 def add_light(p: argparse.ArgumentParser) -> None:
     """How long light is traced and which groups are stored: short forms of the recipe's fields."""
-    add = p.add_argument
+    add = options(p, "light").add_argument
     add(
         "--noise", metavar="E",
         help="end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
@@ -171,7 +183,7 @@ def add_light(p: argparse.ArgumentParser) -> None:
 
 def add_output(p: argparse.ArgumentParser) -> None:
     """What of each house is made: lighting modes, label layers, number of views."""
-    add = p.add_argument
+    add = options(p, "what is made").add_argument
     modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)"
     add("--modes", nargs="+", default=[], metavar="MODE", help=modes)
     layers = "optional layers to write beside those that are there"

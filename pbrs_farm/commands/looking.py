@@ -6,6 +6,8 @@ import argparse
 import json
 import os
 import shlex
+import shutil
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Final
@@ -203,9 +205,9 @@ def _recipes(args: argparse.Namespace) -> int:
 
 
 def _layers(_args: argparse.Namespace) -> int:
-    from pbrs_farm.core.layers import table
+    from pbrs_farm.core.layers import table, text_table
 
-    echo(table())
+    echo(text_table(shutil.get_terminal_size().columns) if sys.stdout.isatty() else table())
     return 0
 
 

@@ -25,6 +25,7 @@ from pbrs_farm.commands.arguments import (
     dress_seeds,
     echo,
     home_arguments,
+    options,
     recipe_of,
     views_wanted,
     warn,
@@ -58,12 +59,17 @@ def add_verbs(verb: Verb) -> None:
     add("--home", action="append", default=[], metavar="PATH", help="the same, repeatable")
     text = "file with a SUNCG house id a line (HOME is the root)"
     add("--houses", metavar="LIST", help=text)
-    add("--out", required=True, help="output folder or store URL")
+    add("--out", help="output folder or store URL (default: out/ and the first home's name)")
     add_cameras(p)
     add_models(p)
-    add("--camera-file", type=Path, help="your own: JSON list, or room_camera.txt")
+    text = "your own: JSON list, or room_camera.txt"
+    options(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
     add_dress(p)
     _add_run(p)
+    p.usage = "%(prog)s HOME [HOME ...] [options]"
+    p.epilog = (
+        "example: pbrs-farm run Studio --dress 1 --recipe preview --views 4 --layers albedo depth_z"
+    )
 
     text = "single models without context: 20 views each (paper section 4.1)"
     p = verb("objects", _objects, text)
@@ -93,7 +99,7 @@ def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
     add_recipe(p, recipe)
     add_light(p)
     add_output(p)
-    add = p.add_argument
+    add = options(p, "the run").add_argument
     text = "processes (default 1, and a second one for most of all but light; each view uses all cores)"
     add("--jobs", type=int, default=1, metavar="N", help=text)
     text = "seconds a step may take (default 3600)"
@@ -114,7 +120,20 @@ def _run(args: argparse.Namespace) -> int:
     if not homes:
         hint = "a file, an example home's name, or builtin"
         raise BadInput("run", "", "no home given", hint=hint)
-    return _run_homes(args, homes)
+    if args.out is not None:
+        return _run_homes(args, homes)
+    args.out = _folder_of(homes[0])
+    code = _run_homes(args, homes)
+    if code == 0 and not args.json:
+        echo(f"in {args.out}; look at it: pbrs-farm sheet {args.out}")
+    return code
+
+
+def _folder_of(home: str) -> str:
+    """Where a run goes that is not told: out/ and the home's name, in small letters."""
+    name = Path(home.partition(":")[0] if home.startswith("made:") else home).stem
+    plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in name.lower()).strip("-")
+    return f"out/{plain or 'home'}"
 
 
 def _run_homes(
@@ -204,12 +223,14 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         echo(_summary_line(summary, seconds))
         return
     lost = f"{counted(len(summary.walls_lost), 'wall')} LOST, " if summary.walls_lost else ""
-    echo(
-        f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: {lost}"
-        f"{counted(summary.n_done, 'step')} done, "
-        f"{summary.n_kept} already there, {len(summary.failures)} failed; "
-        f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
-    )
+    # Where nothing was made, the reason alone is worth a line.
+    if summary.houses or summary.n_done or summary.n_kept or not summary.failures:
+        echo(
+            f"{counted(len(summary.houses), 'house')}, {counted(summary.n_views, 'view')}: {lost}"
+            f"{counted(summary.n_done, 'step')} done, "
+            f"{summary.n_kept} already there, {len(summary.failures)} failed; "
+            f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
+        )
     for house, reason in summary.leaks:
         warn(f"{house}: LIGHT LEAKS IN: {reason}; see repair.json, or `pbrs-farm repair`")
     for house, reason in summary.walls_lost:
@@ -274,7 +295,16 @@ def _demo(args: argparse.Namespace) -> int:
 
         code = _run_homes(args, [home], observe=observe)
         write_sheets(Path(args.out), 24, parts)
+    if not args.json:
+        echo(_NEXT.format(out=args.out))
     return code
+
+
+_NEXT = """
+Open {out}/index.html in a browser. What to do next:
+  pbrs-farm board {out}                  every layer, sliders for daylight and lamps, the home in 3D
+  pbrs-farm verify {out}                 a certificate for the labels
+  pbrs-farm run MY-HOME.sh3d --dress 1   a home of your own; `pbrs-farm homes` lists nine"""
 
 
 def _demo_dressing(args: argparse.Namespace) -> str | None:

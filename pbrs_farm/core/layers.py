@@ -194,5 +194,22 @@ def table() -> str:
     return "\n".join(rows)
 
 
+def text_table(width: int) -> str:
+    """The layers in columns for a terminal so wide; what does not fit is cut with an ellipsis."""
+    heads = ("--layers", "file", "type", "unit")
+    rows = [
+        (x.name if x.optional else "-", x.file, f"{x.dtype} {x.channels.split()[0][:12]}", x.unit)
+        for x in LAYERS
+    ]
+    widths = [max(len(row[k]) for row in (heads, *rows)) for k in range(3)]
+    left = max(width - sum(widths) - 6, 16)
+    lines = []
+    for row in (heads, *rows):
+        cells = [cell.ljust(n) for cell, n in zip(row[:3], widths, strict=True)]
+        unit = row[3] if len(row[3]) <= left else row[3][: left - 1] + "\u2026"
+        lines.append("  ".join([*cells, unit]).rstrip())
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
     sys.stdout.write(table() + "\n")

@@ -26,9 +26,8 @@ LAYERS = (
 Plant = Callable[[Path], None]
 
 
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = tmp_path_factory.mktemp("finished")
+def make_finished(root: Path) -> Path:
+    """The built-in home as a run leaves it: one small view in all modes, with LAYERS."""
     settings = {
         "image.width_px": "160", "image.height_px": "120", "light.spp": "2", "light.pilot_spp": "0",
         "light.denoise": "false", "cameras.cell_m": "1.0",
@@ -37,6 +36,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recipe = recipe_from_name("preview", settings)
     assert run_local(Run(["builtin"], str(root), recipe, wanted((), LAYERS, 1))).failures == []
     return root
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_finished(tmp_path_factory.mktemp("finished"))
 
 
 @pytest.fixture
@@ -225,14 +229,17 @@ def test_a_finished_root_is_clean_and_says_what_was_looked_at(finished: Path) ->
     assert all(str(f.relative_to(view)) in told for f in view.rglob("*") if f.is_file())
 
 
-@pytest.mark.parametrize("kind", FALSEHOODS)
-def test_a_falsehood_with_all_hashes_mended_is_found(root: Path, kind: str) -> None:
-    plant, check = FALSEHOODS[kind]
+def planted(root: Path, kind: str) -> set[str]:
+    """The checks that fail once a falsehood is planted in a root, with its hashes mended."""
+    plant, _check = FALSEHOODS[kind]
     plant(view_of(root))
     sign(root, house_of(root))
-    certificate = verify(root)
-    failed = {name for name, count in certificate.counts.items() if count.failed}
-    assert check in failed, certificate.text()
+    return {name for name, count in verify(root).counts.items() if count.failed}
+
+
+@pytest.mark.parametrize("kind", FALSEHOODS)
+def test_a_falsehood_with_all_hashes_mended_is_found(root: Path, kind: str) -> None:
+    assert FALSEHOODS[kind][1] in planted(root, kind)
 
 
 def test_at_least_twenty_six_kinds_of_falsehood_are_planted() -> None:

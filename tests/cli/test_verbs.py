@@ -14,7 +14,9 @@ from pbrs_farm import doctor, images
 from pbrs_farm.assets import homes_package
 from pbrs_farm.cli import main
 from pbrs_farm.commands import explaining
+from pbrs_farm.commands.making import _folder_of
 from pbrs_farm.core import keys
+from pbrs_farm.core.layers import LAYERS, text_table
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -304,3 +306,29 @@ def test_select_names_a_wrong_word_and_a_missing_file(root, tmp_path, capsys):
     assert "no.npz" in printed(capsys, *words, code=1)
     error = printed(capsys, *words, "--set", "light.spp=4", code=1)
     assert "expected histogram.FIELD=value or selection.FIELD=value" in error
+
+
+def test_a_run_goes_to_a_folder_of_the_homes_name_where_none_is_told() -> None:
+    assert [_folder_of(h) for h in ("Studio", "some/My Home.sh3d", "made:1..5", "builtin")] == [
+        "out/studio", "out/my-home", "out/made", "out/builtin",
+    ]  # fmt: skip
+
+
+def test_the_options_of_run_stand_in_groups_below_an_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    text = capsys.readouterr().out
+    places = [
+        text.index(f"\n{t}:") for t in ("viewpoints", "dressing", "recipe", "light", "the run")
+    ]
+    assert places == sorted(places)
+    assert "example: pbrs-farm run Studio" in " ".join(text.split())
+
+
+def test_the_layers_on_a_terminal_are_columns_that_fit_it() -> None:
+    lines = text_table(100).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert len(lines) == len(LAYERS) + 1
+    assert any(line.startswith("depth_z") for line in lines)
