@@ -282,10 +282,14 @@ def _writer(form: str) -> Writer:
         from pbrs_farm.export import gltf_home
 
         return gltf_home.write
+    if form in ("usd", "usdz"):
+        from pbrs_farm.export import usd_home
+
+        return usd_home.write if form == "usd" else usd_home.write_package
     raise BadInput("--to", form, "no such form of a home", hint=f"of {', '.join(HOME_FORMS)}")
 
 
-HOME_FORMS: Final = ("gltf",)
+HOME_FORMS: Final = ("gltf", "usd", "usdz")
 """Forms that write homes, not views."""
 
 

@@ -312,7 +312,9 @@ def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]
         return across_last(box) if box else None
     world = thing.root.world_from_node
     is_opening = thing.seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
-    if not filled or not is_opening or abs(np.linalg.det(world[:3, :3])) < 1e-12:
+    # An item of several meshes has a box of its own where its file says so.
+    has_frame = is_opening or thing.extras.get("has_frame") is True
+    if not filled or not has_frame or abs(np.linalg.det(world[:3, :3])) < 1e-12:
         return None
     # Bring a frame and its panes into the frame of the node that holds them.
     node_from_world = np.linalg.inv(world).astype(np.float64)

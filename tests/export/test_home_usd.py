@@ -1,0 +1,69 @@
+"""A home as an OpenUSD stage: what is written is read back, and the library's validators pass."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils, UsdValidation
+
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.export import home_export, usd_home
+from pbrs_farm.export.home_export import exported_home
+from pbrs_farm.read.source import read_house, resolve
+from tests.export.homes import differences, repaired_home
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The built-in home in both forms."""
+    folder = tmp_path_factory.mktemp("usd")
+    home = exported_home(repaired_home())
+    with pytest.MonkeyPatch.context() as patch:
+        # One hull a piece: taking pieces apart has tests of its own.
+        patch.setattr(home_export, "has_decomposition", lambda: False)
+        assert usd_home.write(home, folder) == 1 + len(home.house.textures)
+        assert usd_home.write_package(home, folder) == 1
+    return {form: folder / f"{home.house.id}.{form}" for form in ("usdc", "usdz")}
+
+
+@pytest.mark.parametrize("form", ["usdc", "usdz"])
+def test_a_written_home_is_read_back_equal(written: dict[str, Path], form: str) -> None:
+    got = read_house(resolve(str(written[form])), ReadFields())
+    assert differences(repaired_home(), got) == []
+    assert [n for n in got.notes if n.kind != "outer-side"] == []
+    assert len(got.textures) == len(repaired_home().textures)
+    kinds = [{m.kind for m in house.materials} for house in (repaired_home(), got)]
+    assert kinds[0] == kinds[1]
+
+
+@pytest.mark.parametrize("form", ["usdc", "usdz"])
+def test_the_validators_of_usd_find_no_fault(written: dict[str, Path], form: str) -> None:
+    said = UsdUtils.CoalescingDiagnosticDelegate()
+    stage = Usd.Stage.Open(str(written[form]))
+    registry = UsdValidation.ValidationRegistry()
+    context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
+    errors = [f"{e.GetName()}: {e.GetMessage()}" for e in context.Validate(stage)]
+    assert errors == []
+    assert said.TakeUncoalescedDiagnostics() == []
+
+
+def test_pieces_collide_loose_ones_have_a_mass_and_lamps_shine(written: dict[str, Path]) -> None:
+    stage = Usd.Stage.Open(str(written["usdc"]))
+    assert UsdGeom.GetStageMetersPerUnit(stage) == 1
+    assert UsdGeom.GetStageUpAxis(stage) == "Z"
+    home = exported_home(repaired_home())
+    lamps = 0.0
+    for piece in home.pieces:
+        prim = stage.GetPrimAtPath(f"/Home/Items/{piece.name}")
+        assert prim.GetAttribute("semantics:labels:class").Get()[0] == piece.class_name
+        below = list(Usd.PrimRange(prim))
+        assert any(p.HasAPI(UsdPhysics.CollisionAPI) for p in below) == bool(piece.surfaces)
+        is_loose = bool(piece.surfaces) and not piece.is_fixed
+        assert prim.HasAPI(UsdPhysics.RigidBodyAPI) == is_loose
+        for light in (UsdLux.SphereLight(p) for p in below if p.IsA(UsdLux.SphereLight)):
+            radius, nits = light.GetRadiusAttr().Get(), light.GetIntensityAttr().Get()
+            lamps += 4 * np.pi**2 * radius**2 * nits
+    expected = sum(lamp.flux_lm for piece in home.pieces for lamp in piece.lamps)
+    assert lamps == pytest.approx(expected, rel=1e-4)
