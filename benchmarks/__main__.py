@@ -45,6 +45,7 @@ OWN_TARGET: Final = {
     "board": "board.board_pages",
     "motion": "motion.motion",
     "python": "python_api",
+    "truth": "truth",
 }
 
 
