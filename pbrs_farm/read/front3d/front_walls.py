@@ -33,7 +33,7 @@ _HOLE_M: Final = 0.2  # least width and height
 _FILLED: Final = 0.8  # share of a gap that the sheet behind fills: a niche
 _SAME_END_M: Final = 0.03
 _LONGEST_MITRE_M: Final = 0.8
-MAX_SHEETS: Final = 2_000
+MAX_SHEETS: Final = 1_200
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -49,6 +49,7 @@ from pbrs_farm.read.scenestate.scene_walls import StandingWall, standing_walls
 from pbrs_farm.read.suncg.arch_json import SLAB_DEPTH_M, Arch, Element, slab_surfaces, wall_surfaces
 from pbrs_farm.read.suncg.wall_holes import LEAST_HOLE_M
 
+MAX_WALLS, MAX_SLABS, MAX_HOLES = 3_000, 1_500, 2_000
 _AS_IT_STANDS: Final = Arch(np.eye(4), {})
 _STOREY_M: Final = 2.7
 _ON_FLOOR_M: Final = 0.02  # an object whose origin is so near to a height stands at it
@@ -80,6 +81,7 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
         raise BadHouse(path, "", "no such file")
     notes = Notes(path.name, strict=fields.strict)
     document = scene_document(data, path.name, notes)
+    _check_number(document, path.name)
     materials = ArchMaterials(document.pictures, folder, notes)
     shell = _Shell(document, materials, notes)
     rooms, parts = shell.rooms(path.name)
@@ -136,6 +138,21 @@ def _objects(
         items,
         f"{n} objects are left out: no model ({most}.glb) and no objects.csv; --models DIR",
     )
+
+
+def _check_number(document: SceneDocument, file: str) -> None:
+    """Raise BadHouse for more walls, slabs or holes than are united in bounded time."""
+    n_walls = sum(e.element.kind == "Wall" for e in document.elements)
+    n_slabs = len(document.elements) - n_walls
+    n_holes = sum(len(e.element.holes) for e in document.elements)
+    counts = (
+        (n_walls, MAX_WALLS, "walls"),
+        (n_slabs, MAX_SLABS, "slabs"),
+        (n_holes, MAX_HOLES, "holes"),
+    )
+    for n, most, what in counts:
+        if n > most:
+            raise BadHouse(file, "scene.arch.elements", f"{n} {what}, at most {most} are read")
 
 
 def _check_limits(items: Sequence[Item], file: str, fields: ReadFields) -> None:

@@ -214,6 +214,19 @@ def test_ids_twice_cyclic_parents_and_names_that_lead_out_do_no_harm(tmp_path: P
     assert len(ids) == len(set(ids))
 
 
+@pytest.mark.parametrize("what", ["walls", "slabs", "holes"])
+def test_more_walls_slabs_or_holes_than_a_home_has_are_refused(tmp_path: Path, what: str) -> None:
+    scene = files.rent3d_like()
+    elements = scene["scene"]["arch"]["elements"]
+    wall, floor = elements[2], elements[0]
+    if what == "holes":
+        wall["holes"] *= 4_000
+    else:
+        elements += [(wall if what == "walls" else floor) | {"id": f"e{k}"} for k in range(4_000)]
+    with pytest.raises(BadHouse, match=rf"\d+ {what}, at most"):
+        read(written(tmp_path, scene))
+
+
 def test_a_million_elements_are_refused_at_once(tmp_path: Path) -> None:
     path = tmp_path / "many.scenestate.json"
     element = '{"type":"Wall","points":[[0,0,0],[1,0,0]],"height":1},'
