@@ -272,6 +272,28 @@ FAULTS: dict[str, tuple[Callable[[Path], Path], str]] = {
 }  # fmt: skip
 
 
+def _crossing(folder: Path) -> Path:
+    lines = [f"wall_{k}=Wall({k / 5},0,0,{60 - k / 5},50,0,2.6,0)" for k in range(300)]
+    lines += [f"wall_{k}x=Wall(0,{k / 5},0,60,{50 - k / 5},0,2.6,0)" for k in range(250)]
+    return _written(folder / "p.txt", "\n".join(lines))
+
+
+def _many_rooms(folder: Path) -> Path:
+    path = write_zind(folder)
+    value = json.loads(path.read_text())
+    room = value["redraw"]["floor_01"]["room_00"]
+    value["redraw"]["floor_01"] = {f"r{k}": room for k in range(2000)}
+    return _written(path, value)
+
+
+FAULTS["walls that cross"] = _crossing, r"cross \d+ times: no plan"
+FAULTS["two thousand rooms"] = _many_rooms, "has 2000 rooms, at most 60"
+FAULTS["deep groups"] = (
+    lambda d: _written(d / "p.svg", "<svg>" + "<g>" * 30_000 + "</g>" * 30_000 + "</svg>"),
+    "no group of the class Space",
+)
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_file_that_is_no_plan_is_one_line_soon(tmp_path: Path, fault: str) -> None:
     write, message = FAULTS[fault]

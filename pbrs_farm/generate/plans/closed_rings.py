@@ -17,7 +17,8 @@ from pbrs_farm.core.errors import BadInput
 
 Line = tuple[tuple[float, float], tuple[float, float]]
 
-MAX_LINES: Final = 2_000
+MAX_LINES: Final = 600
+_MOST_CROSSINGS: Final = 2_000
 _SHORTEST_M: Final = 0.15
 _JOIN_M: Final = 0.1
 _LEAST_M2: Final = 1.0
@@ -37,6 +38,12 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     joined = _joined(ends, join_m).reshape(-1, 2, 2)
     # Draw each wall out by a little, so that ends that stop short of a wall's middle meet it.
     drawn = [_longer(a, b, join_m) for a, b in joined if np.hypot(*(b - a)) > 1e-6]
+    if not drawn:
+        raise BadInput(path, "walls", "has walls so near each other that no room is between them")
+    crossings = len(shapely.STRtree(drawn).query(drawn, "intersects")[0]) // 2
+    if crossings > _MOST_CROSSINGS + len(drawn):
+        text = f"its {len(drawn)} walls cross {crossings} times: no plan"
+        raise BadInput(path, "walls", text)
     noded = unary_union(
         [*drawn, *(LineString(pair) for pair in joined if (pair[0] != pair[1]).any())]
     )

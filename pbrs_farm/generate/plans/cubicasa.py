@@ -40,7 +40,7 @@ from pbrs_farm.generate.plans.usual_sizes import usual_size
 from pbrs_farm.home.names import parted
 from pbrs_farm.regular_files import read_given
 
-_MOST_BYTES: Final = 32 * 2**20
+_MOST_BYTES: Final = 12 * 2**20
 _MOST_PARTS: Final = 20_000
 _MOST_POINTS: Final = 20_000  # of one polygon
 _UNIT_M: Final = 0.01

@@ -38,6 +38,7 @@ from pbrs_farm.generate.plans.told_plan import (
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, open_regular
 
 _NEEDED: Final = ("entity_type", "entity_subtype", "geometry", "apartment_id", "floor_id")
+_MORE: Final = ("elevation", "height")
 _OPENINGS: Final = {"DOOR": "door", "ENTRANCE_DOOR": "entrance", "WINDOW": "window"}
 _DRAWN: Final = {
     "opening": tuple(_OPENINGS), "separator": ("RAILING", "COLUMN"),
@@ -109,15 +110,18 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     csv.field_size_limit(_LONGEST_FIELD)
     try:
         with open_regular(path, MAX_DIGEST_BYTES) as file:
-            reader = csv.DictReader(io.TextIOWrapper(file, "utf-8"), restval="")
-            names = ["geometry" if n == "geom" else n for n in reader.fieldnames or ()]
-            reader.fieldnames = names
+            reader = csv.reader(io.TextIOWrapper(file, "utf-8"))
+            names = ["geometry" if n == "geom" else n for n in next(reader, [])]
             missing = [c for c in _NEEDED if c not in names]
             if missing:
                 text = f"has no column {missing[0]}"
                 raise BadInput(path, "", text, hint=f"columns {', '.join(_NEEDED)}")
+            # Tables have millions of rows: take the columns that are asked for, no more.
+            places = [(c, names.index(c)) for c in (*_NEEDED, *_MORE) if c in names]
+            least = max(place for _, place in places)
             for row in reader:
-                yield reader.line_num, row
+                if len(row) > least:
+                    yield reader.line_num, {c: row[place] for c, place in places}
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     except (csv.Error, UnicodeDecodeError) as error:

@@ -15,6 +15,7 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.plan_value import MAX_ROOMS
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, ToldPlan, ToldStorey, value_of
 
@@ -35,7 +36,12 @@ class _Room(BaseModel):
 
 def plan_of_zind(path: Path, value: Any) -> ToldPlan:
     """What the file tells, a storey a floor. Raises BadInput, naming the place."""
-    floors = checked(dict[str, dict[str, _Room]], value["redraw"], path, "redraw")
+    redraw = checked(dict[str, dict[str, Any]], value["redraw"], path, "redraw")
+    for name, rooms in redraw.items():
+        if len(rooms) > MAX_ROOMS:
+            text = f"has {len(rooms)} rooms, at most {MAX_ROOMS} are read"
+            raise BadInput(path, f"redraw.{name}"[:80], text)
+    floors = checked(dict[str, dict[str, _Room]], redraw, path, "redraw")
     scales = value.get("scale_meters_per_coordinate")
     left_out = LeftOut()
     storeys = []
