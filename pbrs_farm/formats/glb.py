@@ -183,7 +183,7 @@ def view_bytes(gltf: Gltf, index: Any) -> bytes:
 
 
 def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
-    """(count, components) array of accessor index in its own dtype; sparse accessors are refused.
+    """(count, components) array of accessor index in its own dtype, sparse values put in.
 
     Raises BadHouse for an accessor that is damaged or not of geometry.
     """
@@ -193,7 +193,7 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     if dtype is None or width is None:
         raise BadHouse(gltf.file, place, "is of a type that no mesh uses")
     if "sparse" in accessor:
-        raise BadHouse(gltf.file, place, "is sparse, which is not read")
+        return _sparse_array(gltf, accessor, place, dtype, width)
     if "bufferView" not in accessor:
         text, hint = "holds no data: its mesh is compressed", "export again without compression"
         raise BadHouse(gltf.file, place, text, hint=hint)
@@ -209,6 +209,38 @@ def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     if n == 0:
         return np.zeros((0, width), dtype)
     return np.ndarray((n, width), dtype, data, start, (stride, dtype.itemsize)).copy()
+
+
+_MOST_SPARSE: Final = 20_000_000  # elements of an accessor without data of its own
+
+
+def _sparse_array(
+    gltf: Gltf, accessor: dict[str, Any], place: str, dtype: np.dtype[Any], width: int
+) -> NDArray[Any]:
+    """Zeros, or the accessor's own data, with some elements replaced (glTF 2.0, section 3.6.2.3)."""
+    sparse = accessor["sparse"]
+    held = sparse if isinstance(sparse, dict) else {}
+    parts: list[dict[str, Any]] = [held.get(k, {}) for k in ("indices", "values")]
+    if not all(isinstance(part, dict) and part for part in parts):
+        raise BadHouse(gltf.file, f"{place}.sparse", "expected indices and values")
+    n, n_given = count(gltf, accessor, "count", place), count(gltf, sparse, "count", place)
+    if n > _MOST_SPARSE or n_given > n:
+        raise BadHouse(gltf.file, f"{place}.sparse", "has an impossible number of elements")
+    # Read both lists as accessors of their own.
+    kinds = ("SCALAR", accessor.get("type"))
+    types = (parts[0].get("componentType"), accessor.get("componentType"))
+    rows = [
+        part | {"count": n_given, "type": kind, "componentType": number}
+        for part, kind, number in zip(parts, kinds, types, strict=True)
+    ]
+    base = {key: value for key, value in accessor.items() if key != "sparse"}
+    whole = Gltf(gltf.document | {"accessors": [*rows, base]}, gltf.buffers, gltf.file)
+    places, values = accessor_array(whole, 0)[:, 0], accessor_array(whole, 1)
+    if places.dtype.kind != "u" or (len(places) and places.max() >= n):
+        raise BadHouse(gltf.file, f"{place}.sparse", "replaces an element that does not exist")
+    found = accessor_array(whole, 2) if "bufferView" in base else np.zeros((n, width), dtype)
+    found[places] = values
+    return found
 
 
 def _hashable(value: Any) -> Any:

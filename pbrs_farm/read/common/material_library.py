@@ -127,8 +127,12 @@ class MaterialLibrary:
     def _load(
         self, key: str, name: str, place: str, load: Callable[[], bytes | None]
     ) -> LoadedTexture | None:
-        data = load()
         shown = key[:120]
+        try:
+            data = load()
+        except ValueError as error:
+            self._notes.add("unreadable-texture", place, f"{shown}: {error}")
+            return None
         if data is None:
             self._notes.add("missing-texture", place, f"{shown} does not exist; the colour is kept")
             return None

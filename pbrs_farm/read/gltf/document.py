@@ -13,11 +13,13 @@ from typing import Any, Final
 from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, view_bytes
+from pbrs_farm.read.gltf.compressed import draco_arrays
 from pbrs_farm.read.mesh.obj import Mesh
 
 # A relative name -> the bytes of that file beside the scene, or None if there is none.
@@ -31,6 +33,7 @@ UNDERSTOOD: Final = frozenset({
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
     "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_texture_basisu",
 })  # fmt: skip
 
 
@@ -263,19 +266,21 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise BadHouse(gltf.file, place, "has no positions", hint="or they are compressed")
-    positions = _floats(gltf, attributes["POSITION"], 3, f"{place}.POSITION")
-    faces = _faces(gltf, primitive, len(positions), place)
+    draco = draco_arrays(gltf, primitive, place)
+    known = draco.attributes if draco else {}
+    positions = _floats(gltf, attributes["POSITION"], 3, f"{place}.POSITION", known.get("POSITION"))
+    faces = _faces(gltf, primitive, len(positions), place, draco.order if draco else None)
     if not len(faces):
         return None
     # Take the texture coordinates that the leading picture uses.
     leading = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
     name, uvs = f"TEXCOORD_{leading.get('texCoord', 0)}", None
     if name in attributes:
-        uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD")
+        uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
         uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up
     normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
     if "NORMAL" in attributes:
-        normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL")
+        normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", known.get("NORMAL"))
     # One value per vertex, or none.
     for array in (uvs, normals):
         if array is not None and len(array) != len(positions):
@@ -283,8 +288,10 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     return Mesh("", "", positions, faces, uvs, normals)
 
 
-def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> F64:
-    raw = accessor_array(gltf, accessor)
+def _floats(
+    gltf: Gltf, accessor: Any, width: int, place: str, decoded: NDArray[Any] | None = None
+) -> F64:
+    raw = accessor_array(gltf, accessor) if decoded is None else decoded
     if raw.shape[1] != width:
         raise BadHouse(gltf.file, place, f"expected {width} components, got {raw.shape[1]}")
     # A signalling NaN sets a flag in the cast; what is not finite is refused below.
@@ -298,7 +305,15 @@ def _floats(gltf: Gltf, accessor: Any, width: int, place: str) -> F64:
     return values
 
 
-def _faces(gltf: Gltf, primitive: dict[str, Any], n: int, place: str) -> I32:
+def _faces(
+    gltf: Gltf, primitive: dict[str, Any], n: int, place: str, decoded: I64 | None = None
+) -> I32:
+    if decoded is not None:
+        order = decoded
+        if len(order) and not 0 <= order.min() <= order.max() < n:
+            raise BadHouse(gltf.file, place, "a face names a vertex that does not exist")
+        # Draco's are triangles, whatever was drawn as a strip.
+        return order.reshape(-1, 3).astype(np.int32)
     if "indices" in primitive:
         raw = accessor_array(gltf, primitive["indices"])
         if raw.shape[1] != 1 or raw.dtype.kind != "u":

@@ -15,6 +15,7 @@ from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.gltf.compressed import BASISU, decoded_picture
 from pbrs_farm.read.gltf.document import (
     Fetch,
     MissingFile,
@@ -168,7 +169,8 @@ class SceneMaterials:
         texture = entry(self._gltf, "textures", info.get("index"))
         # Prefer the WebP picture: the other is a fallback for readers without it.
         webp = object_at(object_at(texture, "extensions"), "EXT_texture_webp")
-        source = webp.get("source", texture.get("source"))
+        basisu = object_at(object_at(texture, "extensions"), BASISU)
+        source = webp.get("source", texture.get("source", basisu.get("source")))
         if type(source) is not int:
             self._notes.add("unreadable-texture", place, "its picture is of an unknown kind")
             return None
@@ -184,7 +186,7 @@ class SceneMaterials:
 
     def _picture(self, source: int) -> bytes | None:
         try:
-            return image_bytes(self._gltf, source, self._fetch)
+            return decoded_picture(image_bytes(self._gltf, source, self._fetch))
         except MissingFile:
             return None
 

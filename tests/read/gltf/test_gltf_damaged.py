@@ -35,7 +35,7 @@ def _edited(edit: Any) -> bytes:
         (lambda s: s.meshes[4]["primitives"][0].update(indices=0), "meshes[4].primitives[0].indices"),
         (lambda s: s.meshes[4]["primitives"][0].pop("attributes"), "meshes[4].primitives[0]"),
         (lambda s: s.meshes[4].update(primitives=3), "meshes[4].primitives"),
-        (lambda s: s.more.update(extensionsRequired=["KHR_draco_mesh_compression"]), "extensionsRequired"),
+        (lambda s: s.more.update(extensionsRequired=["EXT_meshopt_compression"]), "extensionsRequired"),
         (lambda s: s.more.update(scene=5), "scenes[5]"),
         (lambda s: s.nodes[0].update(name="thing"), "scene"),
     ],
