@@ -1,20 +1,397 @@
-"""A Habitat scene instance -> House. Effects: reads files."""
+"""A Habitat scene instance -> House. Effects: reads files below its data set's folder.
+
+Stage and objects are put into one glTF scene, which the glTF reader reads. Articulated objects and
+lighting configs are not read: a note says how many.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import posixpath
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any, Final
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.gltf.document import gltf_document, meshes_of, numbers, placed_nodes
+from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.scene import house_of_gltf
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
+
+_CONFIG: Final = "*.scene_dataset_config.json"
+_LEVELS_UP: Final = 6  # from a scene to its data set's config
+_MOST_INSTANCES: Final = 20_000
+_MOST_JSON_BYTES: Final = 64 * 2**20
+_MOST_FILES: Final = 200_000
+_BAKED: Final = "baked"
+_ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", "textures", "images",
+                  "samplers", "nodes")  # fmt: skip
 
 
 def read(path: Path, fields: ReadFields, models: str) -> House:
-    """The House of the file. Raises BadHouse naming the place."""
-    raise BadHouse(path, "", "is not read yet")
+    """The House of a scene instance. Raises BadHouse naming file and place."""
+    dataset = _Dataset(path, models)
+    scene = dataset.json(dataset.scene)
+    notes = Notes(path.name, strict=fields.strict)
+    built = _Built(path.name)
+    stage = scene.get("stage_instance")
+    template = stage.get("template_name") if isinstance(stage, dict) else None
+    if not isinstance(template, str):
+        raise BadHouse(path, "stage_instance.template_name", "expected a name")
+    if _BAKED in template.lower():
+        text = "its stage has light baked into its pictures; it cannot be lit anew"
+        raise BadHouse(path, f"stage_instance: {template}", text, hint="take the unbaked data set")
+    _add_stage(dataset, template, built)
+    rows = scene.get("object_instances", [])
+    if not isinstance(rows, list) or len(rows) > _MOST_INSTANCES:
+        text = f"expected a list of at most {_MOST_INSTANCES}"
+        raise BadHouse(path, "object_instances", text)
+    origin = scene.get("translation_origin", "COM")
+    missing = 0
+    for k, row in enumerate(rows):
+        missing += not _add_object(dataset, row, origin, f"object_instances[{k}]", built)
+    if missing:
+        notes.add(
+            "missing-model", "object_instances", f"{missing} of {len(rows)} have no model here"
+        )
+    if rows and missing > len(rows) / 3:
+        text = f"{missing} of {len(rows)} objects have no model below {dataset.folder.root}"
+        raise BadHouse(
+            path, "object_instances", text, hint="get the data set's objects, or --models"
+        )
+    n = len(scene.get("articulated_object_instances") or ())
+    if n:
+        notes.add("unread-part", "articulated_object_instances", f"{n} (URDF) are not read")
+    gltf = built.gltf()
+    data = dataset.folder.read(dataset.scene, max_bytes=_MOST_JSON_BYTES) or b""
+    source = Source("habitat", path.name, keys.sha256(data))
+    stem = path.name.split(".")[0]
+    rooms = _rooms(dataset, scene.get("semantic_scene_instance"), stem)
+    return house_of_gltf(
+        gltf, source, stem, fields, notes, mapping=Mapping(), fetch=built.fetch, rooms=rooms
+    )
 
 
 def companions(path: Path, models: str, files: SourceFiles) -> str:
-    """Digest of what reading opens beside the file; "" where there is none."""
-    return ""
+    """Digest of the configs and models that the scene names; "" where there is none."""
+    try:
+        dataset = _Dataset(path, models)
+        scene = dataset.json(dataset.scene)
+        names = set()
+        rows = [scene.get("stage_instance"), *(scene.get("object_instances") or [])]
+        templates = {r.get("template_name") for r in rows if isinstance(r, dict)}
+        for template in sorted(t for t in templates if isinstance(t, str)):
+            for kind in ("stage", "object"):
+                name = dataset.config(template, kind)
+                if name is not None:
+                    asset = dataset.json(name).get("render_asset")
+                    names |= {name} | ({dataset.asset(name, asset)} if asset else set())
+        names |= set(dataset.named("*.semantic_config.json")) | set(dataset.named("*objects.csv"))
+    except (BadHouse, OSError, AttributeError, TypeError):
+        return ""
+    return files.digest(dataset.folder, names)
+
+
+class _Dataset:
+    """The files below the folder of a data set's config; state: what was parsed."""
+
+    def __init__(self, path: Path, models: str) -> None:
+        above = [path.parent, *path.parents[1:_LEVELS_UP]]
+        found = next((f for f in above if next(f.glob(_CONFIG), None)), None)
+        if found is None:
+            hint = "keep the scene below the folder of its data set"
+            raise BadHouse(path, "", f"no {_CONFIG} lies above it", hint=hint)
+        self.folder = RootFolder(found)
+        self.scene = path.relative_to(found).as_posix()
+        self._parsed: dict[str, dict[str, Any]] = {}
+        self._files = sorted(_names_below(found))
+        self._by_name: dict[str, str] = {}
+        for name in self._files:
+            self._by_name.setdefault(posixpath.basename(name), name)
+        self._classes: dict[str, str] | None = None
+
+    def named(self, pattern: str) -> list[str]:
+        """Files whose name fits a pattern."""
+        return [n for n in self._files if fnmatchcase(posixpath.basename(n), pattern)]
+
+    def json(self, name: str) -> dict[str, Any]:
+        """The JSON object of a file; BadHouse where it is none."""
+        if name not in self._parsed:
+            data = self.folder.read(name, max_bytes=_MOST_JSON_BYTES)
+            value = json_from_bytes(data or b"", name)
+            if not isinstance(value, dict):
+                raise BadHouse(name, "", "expected a JSON object")
+            self._parsed[name] = value
+        return self._parsed[name]
+
+    def config(self, template: str, kind: str) -> str | None:
+        """The config of a template's name; its folders may be left out."""
+        self.folder.name_from("", template)  # a name that leads out is refused
+        base = posixpath.basename(template).removesuffix(f".{kind}_config.json")
+        return self._by_name.get(f"{base}.{kind}_config.json")
+
+    def asset(self, config: str, reference: Any) -> str:
+        """The name below the root of an asset that a config names."""
+        if not isinstance(reference, str):
+            raise BadHouse(config, "render_asset", "expected a name")
+        return self.folder.name_from(posixpath.dirname(config), reference)
+
+    def class_of(self, template: str) -> str:
+        """What objects.csv calls a model: its category, "" where it says nothing."""
+        if self._classes is None:
+            self._classes = {}
+            for name in self.named("*objects.csv"):
+                data = self.folder.read(name, max_bytes=_MOST_JSON_BYTES) or b""
+                for row in csv.DictReader(io.StringIO(data.decode("utf-8", "replace"))):
+                    words = [row.get(k) for k in ("main_category", "category", "name")]
+                    known = next((w for w in words if w), "")
+                    self._classes[next(iter(row.values())) or ""] = str(known)
+        return self._classes.get(posixpath.basename(template), "")
+
+
+def _names_below(root: Path) -> list[str]:
+    found = []
+    for path in root.rglob("*"):
+        found.append(path.relative_to(root).as_posix())
+        if len(found) > _MOST_FILES:
+            raise BadHouse(root, "", f"holds more than {_MOST_FILES} files")
+    return found
+
+
+@dataclass(slots=True)
+class _Built:
+    """One glTF document of all assets, each once; state: what was added."""
+
+    file: str
+    document: dict[str, Any] = field(default_factory=dict)
+    buffers: list[bytes] = field(default_factory=list)
+    roots: list[int] = field(default_factory=list)
+    assets: dict[str, tuple[list[int], Gltf]] = field(default_factory=dict)
+    folders: dict[str, tuple[RootFolder, str]] = field(default_factory=dict)
+
+    def fetch(self, name: str) -> bytes | None:
+        """A picture beside an asset: its name below the root."""
+        at = next(iter(self.folders.values()))[0]
+        return at.read(name, max_bytes=MAX_SCENE_BYTES)
+
+    def asset(self, dataset: _Dataset, name: str) -> tuple[list[int], Gltf] | None:
+        """Root nodes of an asset in the document, added where it is new; None without the file."""
+        if name in self.assets:
+            return self.assets[name]
+        data = dataset.folder.read(name, max_bytes=MAX_SCENE_BYTES)
+        if data is None:
+            return None
+        at = posixpath.dirname(name)
+        self.folders[name] = (dataset.folder, at)
+
+        def beside(reference: str) -> bytes | None:
+            inner = dataset.folder.name_from(at, reference)
+            return dataset.folder.read(inner, max_bytes=MAX_SCENE_BYTES)
+
+        gltf = gltf_document(data, name, beside)
+        self.assets[name] = (self._added(gltf, dataset, at), gltf)
+        return self.assets[name]
+
+    def _added(self, gltf: Gltf, dataset: _Dataset, at: str) -> list[int]:
+        own = gltf.document
+        start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
+        own = {k: own.get(k, []) for k in _ARRAYS} | {"scenes": own.get("scenes", [])}
+        if not all(isinstance(own[k], list) for k in own):
+            raise BadHouse(gltf.file, "", "has lists that are none")
+        copy = json.loads(json.dumps(own))
+        _shifted(copy, start)
+        for image in copy["images"]:
+            uri = image.get("uri") if isinstance(image, dict) else None
+            if isinstance(uri, str) and not uri.startswith("data:"):
+                image["uri"] = dataset.folder.name_from(at, uri)
+        for key in _ARRAYS:
+            self.document[key] += copy[key]
+        self.buffers += gltf.buffers
+        scene = gltf.document.get("scene", 0)
+        scenes = copy["scenes"]
+        fits = type(scene) is int and 0 <= scene < len(scenes) and isinstance(scenes[scene], dict)
+        nodes = scenes[scene].get("nodes", []) if fits else []
+        return [n + start["nodes"] for n in nodes if type(n) is int]
+
+    def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
+        """Set an asset's roots below a node of its own."""
+        node = {
+            "name": name, "matrix": matrix.T.reshape(-1).tolist(), "children": roots, "extras": extras
+        }  # fmt: skip
+        self.roots.append(len(self.document["nodes"]))
+        self.document["nodes"].append(node)
+
+    def gltf(self) -> Gltf:
+        """The whole."""
+        whole = self.document | {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": self.roots}]
+        }  # fmt: skip
+        return Gltf(whole, tuple(self.buffers), self.file)
+
+
+# Where one entry names another by number -> the list it means.
+_NUMBERS: Final = {"buffer": "buffers", "bufferView": "bufferViews", "mesh": "meshes",
+                   "material": "materials", "sampler": "samplers", "source": "images",
+                   "indices": "accessors"}  # fmt: skip
+
+
+def _shifted(copy: dict[str, Any], start: dict[str, int]) -> None:
+    """Add to every number that names an entry the number of those before it."""
+    for key in _ARRAYS:
+        for row in copy[key]:
+            _shift(row, start, key)
+
+
+def _shift(row: Any, start: dict[str, int], where: str) -> None:
+    if isinstance(row, list):
+        for value in row:
+            _shift(value, start, where)
+    if not isinstance(row, dict):
+        return
+    for key, value in row.items():
+        if key == "extras":
+            continue
+        if key == "attributes" and isinstance(value, dict) and "bufferView" not in row:
+            row[key] = {k: _plus(v, start["accessors"]) for k, v in value.items()}
+        elif key == "children" and isinstance(value, list):
+            row[key] = [_plus(v, start["nodes"]) for v in value]
+        elif key == "index" and where == "materials":
+            row[key] = _plus(value, start["textures"])
+        elif key in _NUMBERS and not isinstance(value, (dict, list)):
+            row[key] = _plus(value, start[_NUMBERS[key]])
+        else:
+            _shift(value, start, where)
+
+
+def _plus(value: Any, by: int) -> Any:
+    return value + by if type(value) is int else value
+
+
+def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
+    config = dataset.config(template, "stage")
+    if config is None:
+        raise BadHouse(dataset.scene, f"stage_instance: {template}", "has no stage_config.json")
+    row = dataset.json(config)
+    name = dataset.asset(config, row.get("render_asset"))
+    if _BAKED in name.lower():
+        text = "has light baked into its pictures; it cannot be lit anew"
+        raise BadHouse(config, "render_asset", text, hint="take the unbaked data set")
+    found = built.asset(dataset, name)
+    if found is None:
+        raise BadHouse(config, "render_asset", f"{name} does not exist")
+    matrix = _upright(row, found[1], config)
+    # Each root of the stage stays by itself, so that its names and extras tell what it is.
+    for root in found[0]:
+        built.place([root], matrix, "", {})
+
+
+def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Built) -> bool:
+    """Whether an object instance has a model here; it is placed."""
+    if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
+        raise BadHouse(dataset.scene, f"{place}.template_name", "expected a name")
+    template = row["template_name"]
+    config = dataset.config(template, "object")
+    settings = dataset.json(config) if config else {}
+    found = None
+    if config and settings.get("render_asset"):
+        found = built.asset(dataset, dataset.asset(config, settings["render_asset"]))
+    if found is None:
+        return False
+    roots, gltf = found
+    where = Gltf({}, (), dataset.scene)
+    moved = numbers(where, row.get("translation", [0, 0, 0]), 3, f"{place}.translation")
+    w, x, y, z = numbers(where, row.get("rotation", [1, 0, 0, 0]), 4, f"{place}.rotation")
+    if not 0.5 < float(np.linalg.norm([w, x, y, z])) < 2:
+        raise BadHouse(dataset.scene, f"{place}.rotation", "is no unit quaternion")
+    (size,) = numbers(where, [row.get("uniform_scale", 1.0)], 1, f"{place}.uniform_scale")
+    sizes = numbers(where, row.get("non_uniform_scale", [1, 1, 1]), 3, f"{place}.non_uniform_scale")
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes)
+    matrix[:3, 3] = moved
+    inner = _upright(settings, gltf, config or "")
+    if str(row.get("translation_origin", origin)).lower() != "asset_local":
+        centre = _centre(gltf, inner, settings, config or "")
+        inner = inner.copy()
+        inner[:3, 3] -= centre
+    name = dataset.class_of(template) or str(settings.get("name") or posixpath.basename(template))
+    told = row.get("user_defined")
+    extras = dict(told) if isinstance(told, dict) else {}
+    built.place(roots, matrix @ inner, name, extras)
+    return True
+
+
+def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F64:
+    """What the instance's translation moves: the told centre of mass, else the box's middle."""
+    if "COM" in settings:
+        return numbers(Gltf({}, (), config), settings["COM"], 3, "COM")
+    points = []
+    for node in placed_nodes(gltf):
+        mesh = gltf.document["nodes"][node.index].get("mesh")
+        if mesh is not None:
+            for _number, one in meshes_of(gltf, mesh, max_triangles=2_000_000):
+                points.append(transform_points(inner @ node.world_from_node, one.positions))
+    if not points:
+        return np.zeros(3)
+    every = np.concatenate(points)
+    return np.asarray((every.min(0) + every.max(0)) / 2)
+
+
+def _upright(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
+    """(4, 4) that turns an asset's up and front to +y and -z and scales it."""
+    where = Gltf({}, (), config)
+    up = numbers(where, row.get("up", [0, 1, 0]), 3, "up")
+    front = numbers(where, row.get("front", [0, 0, -1]), 3, "front")
+    lengths = np.linalg.norm(up), np.linalg.norm(front)
+    if min(lengths) < 1e-6 or abs(up @ front) > 0.01 * lengths[0] * lengths[1]:
+        raise BadHouse(config, "up, front", "are not at right angles")
+    up, back = up / lengths[0], -front / lengths[1]
+    scale = numbers(where, row.get("scale", [1, 1, 1]), 3, "scale")
+    (unit,) = numbers(where, [row.get("units_to_meters", 1.0)], 1, "units_to_meters")
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.stack([np.cross(up, back), up, back]) * (scale * unit)
+    return matrix
+
+
+def _rooms(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
+    """The regions of the scene's semantic config as a room file; None where there are none."""
+    base = posixpath.basename(named) if isinstance(named, str) else stem
+    base = base.removesuffix(".semantic_config.json")
+    found = next((n for n in dataset.named(f"{base}.semantic_config.json")), None)
+    if found is None:
+        return None
+    rows = dataset.json(found).get("region_annotations")
+    rooms = []
+    for k, row in enumerate(rows if isinstance(rows, list) else []):
+        place = f"region_annotations[{k}]"
+        loop = row.get("poly_loop") if isinstance(row, dict) else None
+        if not isinstance(loop, list) or len(loop) < 3:
+            raise BadHouse(found, place, "has no poly_loop of three corners or more")
+        where = Gltf({}, (), found)
+        corners = [numbers(where, corner, 3, f"{place}.poly_loop") for corner in loop]
+        floor = row.get("floor_height", float(min(c[1] for c in corners)))
+        high = row.get("extrusion_height")
+        (floor_y,) = numbers(where, [floor], 1, f"{place}.floor_height")
+        label = str(row.get("label") or row.get("name") or "")[:60]
+        room: dict[str, Any] = {
+            "name": str(row.get("name") or label)[:60], "types": [label] if label else [],
+            "polygon": [[float(c[0]), float(c[2])] for c in corners], "floor_y": float(floor_y),
+        }  # fmt: skip
+        if type(high) in (int, float) and 0.5 < high < 50:
+            room["ceiling_y"] = float(floor_y + high)
+        rooms.append(room)
+    return json.dumps({"rooms": rooms}).encode() if rooms else None
