@@ -31,6 +31,7 @@ from pbrs_farm.core.mesh import area_vectors, face_areas
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import parted
+from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 from pbrs_farm.read.common.joinery import joinery_of, opening_of
@@ -284,10 +285,12 @@ class _Structure:
                 high = high if high > low + 1.0 else low + _STOREY_M
                 material = self._paints.index("")
                 over = [horizontal("ceiling", [[polygon]], high, material, up=False)]
-            name = parted(told.kind) or "Room"
             parts.append(_structure(f"{told.id}_floor", ItemKind.FLOOR, surfaces, told.id))
             parts.append(_structure(f"{told.id}_ceiling", ItemKind.CEILING, over, told.id))
             word = given_room("3dfront", told.kind)
+            name = parted(told.kind) or "Room"
+            if word and named_kind(f"{word} {name}") is not named_kind(word):
+                name = f"{word} room"  # a LivingDiningRoom is to live in, whatever else it names
             rooms.append(
                 Room(
                     id=told.id, name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
