@@ -46,6 +46,7 @@ OWN_TARGET: Final = {
     "motion": "motion.motion",
     "python": "python_api",
     "truth": "truth",
+    "inputs": "inputs",
 }
 
 

@@ -26,6 +26,7 @@ from benchmarks.hostile import (
     file_cases,
     gltf_cases,
     gltf_companion_cases,
+    input_cases,
     model_cases,
     mutation_cases,
     object_cases,
@@ -43,14 +44,14 @@ from benchmarks.hostile.verdict import Verdict, judge
 MODULES: Final = (
     shape_cases, text_cases, file_cases, container_cases, plan_cases, model_cases, suncg_cases,
     arch_cases, gltf_cases, gltf_companion_cases, object_cases, command_cases, stored_cases,
-    mutation_cases, crowd_cases,
+    mutation_cases, crowd_cases, input_cases,
 )  # fmt: skip
 N_PROCESSES: Final = 2
 STRIDES: Final = {
     "suncg": 5, "stored": 8, "gltf": 5, "plan": 5, "mutation": 5, "set": 5, "shape": 2, "file": 4,
     "objects": 5, "model": 4, "text": 4, "xml": 4, "arch": 5, "cameras": 5, "words": 5, "zip": 4,
     "glb": 4, "rooms": 4, "classes": 4, "texture": 3, "mtl": 4,
-    "crowd": 1,
+    "crowd": 1, "input": 9,
 }  # fmt: skip
 """Of a family of cases, every n-th is run unless all are asked for: what fits 12 minutes."""
 
@@ -77,6 +78,17 @@ def main(parts: Sequence[str] = ()) -> None:
     Chosen are those whose names hold one of the parts; without parts some of every family, or,
     where the environment says FULL=1, all (more than 800, about an hour).
     """
+    _write(*verdicts_of(parts))
+
+
+def counted(parts: Sequence[str]) -> tuple[int, int]:
+    """How many cases whose names hold one of the parts there are, and how many have a fault."""
+    verdicts, _alone_s = verdicts_of(parts)
+    return len(verdicts), sum(bool(v.what) for v in verdicts)
+
+
+def verdicts_of(parts: Sequence[str]) -> tuple[list[Verdict], float]:
+    """The verdicts on the chosen cases, as main says; what the sound home alone takes, s."""
     cases = unique(case for module in MODULES for case in module.cases())
     if parts or os.environ.get("FULL"):
         chosen = [c for c in cases if not parts or any(part in c.name for part in parts)]
@@ -99,7 +111,7 @@ def main(parts: Sequence[str] = ()) -> None:
                 verdicts[k] = min(verdict, again, key=lambda v: v.seconds)
                 if "over_20_s" in verdicts[k].what:
                     _tell(verdicts[k], ("over_20_s",))
-    _write(verdicts, done.seconds)
+    return verdicts, done.seconds
 
 
 def some_of(cases: Sequence[Case]) -> list[Case]:

@@ -1,1 +1,90 @@
-"""Houses in formats of others, written in code for tests and the benchmark of inputs."""
+"""What the formats that people have cost to read, and what becomes of them -> out/bench/inputs.json.
+
+`python -m benchmarks inputs`: one realistic house of each format, written here, is read, furnished,
+repaired and looked at, each in a process of its own; then hostile ones of the same formats.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any, Final
+
+from benchmarks.figures import write_report
+
+UNITS: Final = {
+    "inputs.formats": "formats whose realistic house is read and becomes closed rooms",
+    "inputs.leaks": "rays that reach the sky through a wall, over all of them",
+    "inputs.walls_lost": "walls of which repair took more than a tenth",
+    "inputs.openings_kept": "share of told doors and windows that are openings, of the worst format",
+    "inputs.class_agreement": "share of the names of the class tables that are read as their class",
+    "inputs.roundtrip": "1 = homes written as usd, habitat and gltf are read back equal",
+    "inputs.seconds": "s to read and repair the slowest house of about 300,000 triangles",
+    "inputs.hostile_cases": "hostile files of these formats",
+    "inputs.hostile": "of them ended otherwise than in one line, a note, 20 s and 2 GB",
+}
+
+
+def main() -> None:
+    """Measure every format and write the report."""
+    from benchmarks import hostile
+    from benchmarks.inputs.sound_files import sound_files
+
+    rows = {title: _measured(title) for title in sound_files()}
+    good = [row for row in rows.values() if "error" not in row]
+    kept = [r["openings"] / r["told"] for r in good if r["told"]]
+    cases, failed = hostile.counted(("input/",))
+    figures = {
+        "inputs.formats": sum(r["closed_rooms"] > 0 for r in good) + _READ_ELSEWHERE,
+        "inputs.leaks": sum(r["leaks"] for r in good),
+        "inputs.walls_lost": sum(r["walls_lost"] for r in good),
+        "inputs.openings_kept": round(min(kept, default=0.0), 3),
+        "inputs.class_agreement": class_agreement(),
+        "inputs.roundtrip": roundtrip(),
+        "inputs.seconds": max((r["seconds"] for r in good), default=0.0),
+        "inputs.hostile_cases": cases,
+        "inputs.hostile": failed,
+    }
+    write_report("inputs", figures, UNITS)
+
+
+_READ_ELSEWHERE: Final = 3  # Sweet Home 3D, SUNCG, glTF: `python -m benchmarks houses`
+
+
+def _measured(title: str) -> dict[str, Any]:
+    command = [sys.executable, "-m", "benchmarks.inputs.measured_format", title]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    lines = done.stdout.splitlines()
+    error = (done.stderr.strip().splitlines() or ["no answer"])[-1]
+    row: dict[str, Any] = json.loads(lines[-1]) if done.returncode == 0 else {"error": error}
+    print(
+        f"{title:<24}", row.get("error") or " ".join(f"{k} {v}" for k, v in row.items()), flush=True
+    )
+    return row
+
+
+def class_agreement() -> float:
+    """Share of the rows of given_classes.csv whose class a thing of that name gets when it is read."""
+    import csv
+    from importlib.resources import files
+
+    from pbrs_farm.core.classes import NYU40_NAMES
+    from pbrs_farm.read.common.given_classes import given_class
+
+    text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
+    rows = [row for row in csv.DictReader(text.splitlines()) if row["nyu40"] in NYU40_NAMES]
+    found = [given_class(row["source"], row["name"]) for row in rows]
+    right = [f is not None and NYU40_NAMES[f.nyu40] == r["nyu40"] for f, r in zip(found, rows)]
+    return round(sum(right) / len(right), 4)
+
+
+def roundtrip() -> int:
+    """1 where the tests of the ways out pass: homes read back equal."""
+    tests = [
+        "tests/export/test_home_gltf.py",
+        "tests/export/test_home_habitat.py",
+        "tests/export/test_home_usd.py",
+    ]
+    command = [sys.executable, "-m", "pytest", "-q", *tests]
+    return int(subprocess.run(command, capture_output=True, check=False).returncode == 0)

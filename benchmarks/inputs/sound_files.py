@@ -1,0 +1,46 @@
+"""The realistic house of each format that is read, by the title of pbrs_farm/read/formats.csv. Effects: files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+N_TRIANGLES: Final = 300_000
+
+
+class SoundFile(NamedTuple):
+    """How a house of a format is written, and how many doors and windows it tells."""
+
+    write: Callable[[Path], Path]  # folder -> the file to be read
+    n_openings: int = 0  # 0 = the format's writer does not say
+    models: Callable[[Path], Path] | None = None  # the file -> the folder of its models
+
+
+def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
+    """Title of a format -> its house; meshes have about as many triangles where the format has any."""
+    from benchmarks.inputs import ifc_files, plan_files, scenestate_files, usd_files
+    from benchmarks.inputs.front3d_files import front_house
+    from benchmarks.inputs.habitat_files import habitat_scene
+
+    plans = {
+        "plan of one's own": plan_files.write_own,
+        "Swiss Dwellings": plan_files.write_swiss,
+        "ProcTHOR and Holodeck": plan_files.write_procthor,
+        "SpatialLM": plan_files.write_spatial_lm,
+        "RoomPlan": plan_files.write_room_plan,
+        "CubiCasa5k": plan_files.write_cubicasa,
+        "ZInD": plan_files.write_zind,
+        "react-planner": plan_files.write_react_planner,
+    }
+    each = max(n_triangles // 20, 12)
+    return {
+        "sceneState": SoundFile(
+            lambda folder: scenestate_files.hssd_like(folder, triangles=each),
+            scenestate_files.N_OPENINGS, lambda file: file.parent / "models",
+        ),
+        "3D-FRONT": SoundFile(lambda folder: front_house(folder, n_triangles)),
+        "Habitat": SoundFile(lambda folder: habitat_scene(folder, n_triangles)),
+        "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
+        "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
+    } | {title: SoundFile(write, len(plan_files.HOLES)) for title, write in plans.items()}  # fmt: skip
