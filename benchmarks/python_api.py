@@ -6,6 +6,9 @@ PBRS_SCATTERINGS scatterings (default 40; the gate is of 200), what people ask f
 
 from __future__ import annotations
 
+import ast
+import csv
+import io
 import os
 import re
 import statistics
@@ -13,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tokenize
 import warnings
 from pathlib import Path
 from typing import Any, Final
@@ -63,6 +67,7 @@ UNITS: Final = {
     "python.render_equal": "1 = every file of a saved frame but markers equals that of `run`",
     "python.warm_overhead": "seconds a warm view takes over those of its steps in `run`",
     "python.examples": "scripts under examples/",
+    "python.shorter": "share of the peers' examples that ours answer in fewer lines of code",
     "python.physics_scatterings": "scatterings of 20 things on a table, seeds 0...",
     "python.physics_settled": "share of them that came to rest",
     "python.physics_penetration_mm": "mm, deepest contact of any, as MuJoCo measures it",
@@ -79,6 +84,7 @@ def main() -> None:
         "python.import_ms": import_ms(),
         "python.first_picture_lines": first_picture_lines(),
         "python.examples": len(list(EXAMPLES.glob("*.py"))),
+        "python.shorter": shorter(),
     }
     figures |= against_run()
     figures |= of_physics(int(os.environ.get("PBRS_SCATTERINGS", "40")))
@@ -104,6 +110,31 @@ def first_picture_lines() -> int:
     text = (REPO / "docs/python.md").read_text(encoding="utf-8")
     found = re.search(r"```python\n(.*?frame = [^\n]*)\n", text, re.DOTALL)
     return len([line for line in found[1].splitlines() if line.strip()]) if found else 0
+
+
+def shorter() -> float:
+    """Share of the rows of peer_examples.csv with an answer of ours that has fewer lines of code."""
+    with (REPO / "benchmarks/peer_examples.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["ours"]]
+    return round(
+        sum(code_lines(EXAMPLES / f"{r['ours']}.py") < int(r["lines"]) for r in rows) / len(rows), 3
+    )
+
+
+def code_lines(path: Path) -> int:
+    """Lines that hold code: no blank ones, comments or docstrings."""
+    text = path.read_text(encoding="utf-8")
+    nothing = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT}
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    held = {
+        line for t in tokens if t.type not in nothing | {tokenize.ENDMARKER}
+        for line in range(t.start[0], t.end[0] + 1)
+    }  # fmt: skip
+    for node in ast.walk(ast.parse(text)):
+        value = node.value if isinstance(node, ast.Expr) else None
+        if isinstance(value, ast.Constant) and isinstance(value.value, str):
+            held -= set(range(value.lineno, (value.end_lineno or value.lineno) + 1))
+    return len(held)
 
 
 def against_run() -> dict[str, Any]:
