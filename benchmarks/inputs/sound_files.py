@@ -19,9 +19,7 @@ class SoundFile(NamedTuple):
 
 def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     """Title of a format -> its house; meshes have about as many triangles where the format has any."""
-    from benchmarks.inputs import ifc_files, plan_files, scenestate_files, usd_files
-    from benchmarks.inputs.front3d_files import front_house
-    from benchmarks.inputs.habitat_files import habitat_scene
+    from benchmarks.inputs import front3d_files, ifc_files, plan_files, scenestate_files, usd_files
 
     plans = {
         "plan of one's own": plan_files.write_own,
@@ -37,10 +35,11 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     return {
         "sceneState": SoundFile(
             lambda folder: scenestate_files.hssd_like(folder, triangles=each),
-            scenestate_files.N_OPENINGS, lambda file: file.parent / "models",
+            scenestate_files.N_OPENINGS, lambda file: file.parent / "objects",
         ),
-        "3D-FRONT": SoundFile(lambda folder: front_house(folder, n_triangles)),
-        "Habitat": SoundFile(lambda folder: habitat_scene(folder, n_triangles)),
+        "3D-FRONT": SoundFile(
+            lambda folder: front3d_files.write_house(folder, n_more=n_triangles), 12
+        ),
         "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
         "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
     } | {title: SoundFile(write, len(plan_files.HOLES)) for title, write in plans.items()}  # fmt: skip
