@@ -47,7 +47,7 @@ def glb_of_pieces(
     """A GLB of some of the pieces with their materials alone.
 
     with_lamps: as KHR_lights_punctual, candela. in_place False: one piece in its own frame, so that
-    equal things have equal bytes: the node says class and kind, not which item it is.
+    equal things have equal bytes: the node does not say which item it is.
     """
     writer = GlbWriter()
     # Number the materials and textures that are used.
@@ -69,7 +69,7 @@ def glb_of_pieces(
         if house.is_repaired and piece.item.kind is ItemKind.WALL:
             extras["solid"] = True  # cut by repair: not to be parted by its planes
         if not in_place:
-            extras = {key: extras[key] for key in ("kind", "nyu40", "class")}
+            extras = {}
         node: dict[str, Any] = {"name": piece.name if in_place else piece.class_name}
         node["extras"] = extras
         if in_place:

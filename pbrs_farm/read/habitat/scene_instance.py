@@ -28,7 +28,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.gltf.document import gltf_document, meshes_of, numbers, placed_nodes
+from pbrs_farm.read.gltf.document import gltf_document, meshes_of, numbers, object_at, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene import house_of_gltf
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
@@ -39,6 +39,7 @@ _MOST_INSTANCES: Final = 20_000
 _MOST_JSON_BYTES: Final = 64 * 2**20
 _MOST_FILES: Final = 200_000
 _BAKED: Final = "baked"
+_LIGHTS: Final = "KHR_lights_punctual"
 _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", "textures", "images",
                   "samplers", "nodes")  # fmt: skip
 
@@ -215,6 +216,7 @@ class _Built:
             raise BadHouse(gltf.file, "", "has lists that are none")
         copy = json.loads(json.dumps(own))
         _shifted(copy, start)
+        self._add_lights(gltf, copy["nodes"])
         for image in copy["images"]:
             uri = image.get("uri") if isinstance(image, dict) else None
             if isinstance(uri, str) and not uri.startswith("data:"):
@@ -227,6 +229,20 @@ class _Built:
         fits = type(scene) is int and 0 <= scene < len(scenes) and isinstance(scenes[scene], dict)
         nodes = scenes[scene].get("nodes", []) if fits else []
         return [n + start["nodes"] for n in nodes if type(n) is int]
+
+    def _add_lights(self, gltf: Gltf, nodes: list[Any]) -> None:
+        """Take an asset's lights, and let its nodes name them by their new numbers."""
+        own = object_at(object_at(gltf.document, "extensions"), _LIGHTS).get("lights")
+        lights = self.document.setdefault("extensions", {_LIGHTS: {"lights": []}})[_LIGHTS][
+            "lights"
+        ]
+        for node in nodes:
+            row = (
+                object_at(object_at(node, "extensions"), _LIGHTS) if isinstance(node, dict) else {}
+            )
+            if "light" in row:
+                row["light"] = _plus(row["light"], len(lights))
+        lights += own if isinstance(own, list) else []
 
     def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
         """Set an asset's roots below a node of its own."""

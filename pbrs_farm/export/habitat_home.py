@@ -1,0 +1,117 @@
+"""A home as a Habitat data set of one scene: stage, objects, regions. Effect: write writes it.
+
+The building is the stage; each thing an object with collision parts of its own. `pbrs-farm run` reads
+the scene back.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.export.gltf_home import glb_of_pieces
+from pbrs_farm.export.home_export import ExportedHome, Piece, digest_name
+from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.formats.house_glb import item_extras
+
+
+def write(home: ExportedHome, folder: Path) -> int:
+    """The data set below folder; the number of files."""
+    house, files = home.house, {}
+    files[f"stages/{house.id}.glb"] = glb_of_pieces(house, home.building, with_lamps=False)
+    files[f"stages/{house.id}.stage_config.json"] = _json({"render_asset": f"{house.id}.glb"})
+    instances = []
+    for piece in home.things:
+        data = glb_of_pieces(house, [piece], with_lamps=True, in_place=False)
+        name = f"{piece.class_name.replace(' ', '_')}_{digest_name(data)}"
+        if f"objects/{name}.glb" not in files:
+            files[f"objects/{name}.glb"] = data
+            config: dict[str, Any] = {"render_asset": f"{name}.glb", "mass": piece.mass_kg}
+            if piece.colliders:
+                files[f"objects/{name}.collision.glb"] = _collision(piece.colliders)
+                config |= {
+                    "collision_asset": f"{name}.collision.glb",
+                    "join_collision_meshes": False,
+                }
+            files[f"objects/{name}.object_config.json"] = _json(
+                config | {"semantic_id": piece.item.nyu40}
+            )
+        instances.append(_instance(home, piece, name))
+    files[f"scenes/{house.id}.scene_instance.json"] = _json({
+        "stage_instance": {"template_name": f"stages/{house.id}"},
+        "object_instances": instances, "semantic_scene_instance": house.id,
+        "translation_origin": "asset_local",
+        "user_defined": {"collision": home.collision},
+    })  # fmt: skip
+    files[f"semantics/{house.id}.semantic_config.json"] = _json(
+        {"region_annotations": _regions(home)}
+    )
+    files[f"navigable/{house.id}.json"] = _json({
+        room: [ring.tolist() for ring in rings] for room, rings in home.navigable.items()
+    })  # fmt: skip
+    files[f"{house.id}.scene_dataset_config.json"] = _json({
+        "stages": {"paths": {".json": ["stages"]}}, "objects": {"paths": {".json": ["objects"]}},
+        "scene_instances": {"paths": {".json": ["scenes"]}},
+        "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
+    })  # fmt: skip
+    for name, data in files.items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(data)
+    return len(files)
+
+
+def _json(value: Any) -> bytes:
+    return json.dumps(value, indent=1, allow_nan=False).encode()
+
+
+def _instance(home: ExportedHome, piece: Piece, name: str) -> dict[str, Any]:
+    x, y, z, w = Rotation.from_matrix(piece.world_from_local[:3, :3]).as_quat().tolist()
+    number = next(k for k, p in enumerate(home.pieces) if p is piece) + 1
+    return {
+        "template_name": name, "translation": piece.world_from_local[:3, 3].tolist(),
+        "rotation": [w, x, y, z], "translation_origin": "asset_local",
+        "motion_type": "STATIC" if piece.is_fixed else "DYNAMIC",
+        "user_defined": item_extras(piece.item, number),
+    }  # fmt: skip
+
+
+def _regions(home: ExportedHome) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": room.name, "label": room.types[0] if room.types else room.name,
+            "floor_height": float(room.floor_y),
+            "extrusion_height": float(room.ceiling_y - room.floor_y),
+            "poly_loop": [[float(x), float(room.floor_y), float(z)] for x, z in room.polygon],
+        }
+        for room in home.house.rooms
+    ]  # fmt: skip
+
+
+def _collision(parts: tuple[F64, ...]) -> bytes:
+    """A GLB with a mesh for each convex part."""
+    writer, meshes = GlbWriter(), []
+    for part in parts:
+        faces = np.asarray(ConvexHull(part).simplices, np.int32)
+        row = {
+            "attributes": {
+                "POSITION": writer.add_vertices(part.astype(np.float32), with_bounds=True)
+            }
+        }
+        meshes.append({"primitives": [row | {"indices": writer.add_faces(faces)}]})
+    nodes = [{"mesh": k, "name": f"part {k}"} for k in range(len(parts))]
+    scene = {"nodes": list(range(len(nodes)))}
+    return writer.glb(
+        {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [scene],
+            "nodes": nodes,
+            "meshes": meshes,
+        }
+    )
