@@ -95,24 +95,14 @@ class _Writer:
         )
 
 
-def front_house(
-    generation: Generation = "0.11", *, picture_jid: str = "", n_more: int = 0
-) -> dict[str, Any]:
-    """A furnished flat of six rooms, twelve openings and 19 pieces in one generation's ways.
-
-    n_more: triangles that the floors have besides, as fine as real ones.
-    """
+def front_house(generation: Generation = "0.11", *, picture_jid: str = "") -> dict[str, Any]:
+    """A furnished flat of six rooms, twelve openings and 19 pieces in one generation's ways."""
     w = _Writer(generation)
     for name, (_, x0, z0, x1, z1) in ROOMS.items():
         ends = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
         for k in range(4):
             w.mesh("WallInner", _wall(ends[k], ends[(k + 1) % 4], flip=k % 2 == 1), name, "paint")
-        w.mesh(
-            "Floor",
-            _level(x0, z0, x1, z1, 0.0, up=True, n=n_more // (2 * len(ROOMS))),
-            name,
-            "floor",
-        )
+        w.mesh("Floor", _level(x0, z0, x1, z1, 0.0, up=True), name, "floor")
         up = generation == "0.4"
         w.mesh("Ceiling", _level(x0, z0, x1, z1, HEIGHT, up=up), name, "white")
     x0, z0, x1, z1 = OUTER
@@ -273,30 +263,33 @@ def _jambs(a: Any, b: Any, axis: str, low: float, high: float) -> Any:
 
 def write_house(
     folder: Path, generation: Generation = "0.11", *, with_models: bool = True, picture: bytes | None = None,
-    n_more: int = 0,
+    n_triangles: int = 0,
 ) -> Path:  # fmt: skip
-    """3D-FRONT/<uid>.json with 3D-FUTURE-model, and with 3D-FRONT-texture where a picture is given."""
+    """3D-FRONT/<uid>.json with 3D-FUTURE-model, and with 3D-FRONT-texture where a picture is given.
+
+    n_triangles: of all the models together.
+    """
     place = folder / "3D-FRONT"
     place.mkdir(parents=True, exist_ok=True)
     jid = "jid-oak" if picture is not None else ""
     path = place / "0003d406.json"
-    path.write_text(json.dumps(front_house(generation, picture_jid=jid, n_more=n_more)))
+    path.write_text(json.dumps(front_house(generation, picture_jid=jid)))
     if picture is not None:
         texture = folder / "3D-FRONT-texture" / jid / "texture.png"
         texture.parent.mkdir(parents=True, exist_ok=True)
         texture.write_bytes(picture)
     if with_models:
-        write_models(folder / "3D-FUTURE-model")
+        write_models(folder / "3D-FUTURE-model", n_triangles // len(PIECES))
     return path
 
 
-def write_models(folder: Path) -> None:
-    """An OBJ with a shadow card below it for each piece, and model_info.json."""
+def write_models(folder: Path, n_triangles: int = 0) -> None:
+    """An OBJ of so many triangles with a shadow card below it for each piece, and model_info.json."""
     info = []
     for jid, _, category, above, size, *_rest in PIECES:
         place = folder / f"jid-{jid}"
         place.mkdir(parents=True, exist_ok=True)
-        (place / "raw_model.obj").write_text(_obj(size))
+        (place / "raw_model.obj").write_text(_obj(size, n_triangles))
         (place / "model.mtl").write_text(
             "newmtl paint\nKd 0.5 0.4 0.3\nKe 9 9 9\nnewmtl shadow\nKd 0 0 0\n"
         )
@@ -310,29 +303,32 @@ def write_models(folder: Path) -> None:
     (folder / "model_info.json").write_text(json.dumps(info))
 
 
-def _obj(size: tuple[float, float, float]) -> str:
-    """A box whose origin is the middle of its bottom; its front half is lower, so that it has a front."""
+def _obj(size: tuple[float, float, float], n_triangles: int = 0) -> str:
+    """Two boxes whose origin is the middle of their bottom; the front one is lower: so it has a front."""
     width, depth, height = size
-    lines = ["mtllib model.mtl"]
     boxes = [
         ((-width / 2, 0, -depth / 2), (width / 2, height, 0)),
         ((-width / 2, 0, 0), (width / 2, height / 2, depth / 2)),
     ]
-    n = 0
-    lines.append("usemtl paint")
+    lines, n = ["mtllib model.mtl", "usemtl paint"], 0
+    # Each of the twelve sides is a grid of quads.
+    side = max(1, round((n_triangles / 24) ** 0.5))
+    steps = np.linspace(0.0, 1.0, side + 1)
     for low, high in boxes:
-        for k in range(8):
-            lines.append("v " + " ".join(f"{(high if k >> i & 1 else low)[i]:g}" for i in range(3)))
+        corners = np.array([[(high if k >> i & 1 else low)[i] for i in range(3)] for k in range(8)])
         for quad in (
-            (0, 4, 6, 2),
-            (1, 3, 7, 5),
-            (0, 1, 5, 4),
-            (2, 6, 7, 3),
-            (0, 2, 3, 1),
-            (4, 5, 7, 6),
-        ):
-            lines.append("f " + " ".join(str(n + v + 1) for v in quad))
-        n += 8
+            (0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6),
+        ):  # fmt: skip
+            a, b, c, d = corners[list(quad)]
+            for u in steps:
+                for v in steps:
+                    at = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)
+                    lines.append("v " + " ".join(f"{x:g}" for x in at))
+            for i in range(side):
+                for j in range(side):
+                    k = n + i * (side + 1) + j + 1
+                    lines.append(f"f {k} {k + side + 1} {k + side + 2} {k + 1}")
+            n += (side + 1) ** 2
     lines += [
         "usemtl shadow",
         *(

@@ -38,7 +38,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
             scenestate_files.N_OPENINGS, lambda file: file.parent / "objects",
         ),
         "3D-FRONT": SoundFile(
-            lambda folder: front3d_files.write_house(folder, n_more=n_triangles), 12
+            lambda folder: front3d_files.write_house(folder, n_triangles=n_triangles), 12
         ),
         "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
         "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
