@@ -58,7 +58,7 @@ ASKED: Final = {
     "Jupyter, own Python": "first_picture",
     "loader, epochs": "training_batch",
     "own floor plan": "floor_plan",
-    "USD, Isaac, Unity out": "",
+    "USD, Isaac, Unity out": "home_for_simulators",
 }
 UNITS: Final = {
     "python.asked": f"of {len(ASKED)} things that people ask for, with an example that a test runs",

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.export.gltf_home import glb_of_pieces
-from pbrs_farm.export.home_export import ExportedHome, Piece, digest_name
+from pbrs_farm.export.home_export import COLLISION, ExportedHome, Piece, digest_name
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import item_extras
 
@@ -47,7 +47,7 @@ def write(home: ExportedHome, folder: Path) -> int:
         "stage_instance": {"template_name": f"stages/{house.id}"},
         "object_instances": instances, "semantic_scene_instance": house.id,
         "translation_origin": "asset_local",
-        "user_defined": {"collision": home.collision},
+        "user_defined": {"collision": COLLISION},
     })  # fmt: skip
     files[f"semantics/{house.id}.semantic_config.json"] = _json(
         {"region_annotations": _regions(home)}

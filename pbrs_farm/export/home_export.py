@@ -33,12 +33,11 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.export.chosen_view import new_folder
 from pbrs_farm.formats.house_bundle import house_from_bundle
-from pbrs_farm.geometry.convex_parts import convex_parts, has_decomposition, hull_of, thickened
+from pbrs_farm.geometry.convex_parts import hulls_of_parts
 from pbrs_farm.regular_files import fault_of, read_regular
 
-PARTS, HULLS = "convex parts by CoACD", "convex hulls: CoACD is not installed"
+COLLISION: Final = "the convex hull of each part that hangs together"
 _MOST_PARTS: Final = 12  # of an item
-_MOST_TRIANGLES: Final = 60_000  # of an item that is decomposed; a plant's leaves are not
 _KG_PER_M3: Final = 100.0  # of collision volume: furniture is mostly air
 _LEAST_KG, _MOST_KG = 0.1, 150.0
 _RESTING_M: Final = 0.03  # between a thing and what it stands on
@@ -110,11 +109,7 @@ class Piece:
         triangles = corners_of_surfaces(self.surfaces)
         if self.is_building or not len(triangles):
             return ()
-        points = triangles.reshape(-1, 3)
-        if has_decomposition() and len(triangles) <= _MOST_TRIANGLES:
-            return convex_parts(triangles, most=_MOST_PARTS, threshold=0.1, quick=True)
-        whole = hull_of(points)
-        return (thickened(points) if whole is None else whole,)
+        return hulls_of_parts(triangles, most=_MOST_PARTS)
 
     @cached_property
     def mass_kg(self) -> float:
@@ -154,11 +149,6 @@ class ExportedHome:
     def things(self) -> tuple[Piece, ...]:
         """Everything else that has a surface or a lamp."""
         return tuple(p for p in self.pieces if not p.is_building and (p.surfaces or p.lamps))
-
-    @property
-    def collision(self) -> str:
-        """How the things' collision parts were made."""
-        return PARTS if has_decomposition() else HULLS
 
     @cached_property
     def navigable(self) -> dict[str, list[F64]]:
@@ -309,15 +299,26 @@ def export_homes(folder: Path, out: Path, form: str) -> tuple[int, int, list[str
     with new_folder(out) as scratch:
         for one in found:
             home = exported_home(stored_house(one))
-            below = scratch / home.house.id
-            below.mkdir()
-            n_files += write(home, below)
-            if home.credit:
-                (below / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
-                n_files += 1
+            n_files += _write_home(home, scratch / home.house.id, write)
             if form != "gltf":
-                remarks.append(f"{home.house.id}: collision by {home.collision}")
+                remarks.append(f"{home.house.id}: things collide as {COLLISION}")
     return len(found), n_files, remarks
+
+
+def export_house(house: House, out: Path, form: str) -> int:
+    """Write one house to a new folder: the number of files. Raises BadInput where out holds something."""
+    write = _writer(form)
+    with new_folder(out) as scratch:
+        return _write_home(exported_home(house), scratch, write)
+
+
+def _write_home(home: ExportedHome, folder: Path, write: Writer) -> int:
+    folder.mkdir(exist_ok=True)
+    n_files = write(home, folder)
+    if home.credit:
+        (folder / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
+        n_files += 1
+    return n_files
 
 
 def house_folders(folder: Path) -> list[Path]:

@@ -1,10 +1,10 @@
-"""Convex parts of a mesh, for collision: by CoACD where it is installed; no effects."""
+"""Convex parts of a mesh, for collision: exact ones by CoACD, quick ones by what hangs together; no effects."""
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from pbrs_farm.core.arrays import F64
@@ -15,18 +15,28 @@ _NEARLY_CONVEX = 0.95  # share of its hull that a mesh fills which needs no deco
 _FLAT_M = 5e-4  # half the thickness of a flat thing
 
 
-def has_decomposition() -> bool:
-    """Whether CoACD is installed."""
-    return importlib.util.find_spec("coacd") is not None
+def hulls_of_parts(triangles: F64, *, most: int = 12) -> tuple[F64, ...]:
+    """The convex hull (V, 3) of each part of triangles (F, 3, 3) that hangs together; never none.
+
+    A table is its top and its legs, a chair its seat, back and legs, in milliseconds; a part that is
+    hollow is filled. The `most` largest parts are kept.
+    """
+    points = triangles.reshape(-1, 3)
+    corners = np.unique(points.round(5), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
+    graph = coo_array((np.ones(len(ends)), ends.T), shape=(corners.max() + 1,) * 2)
+    _, part_of = connected_components(graph, directed=False)
+    part_of_face = part_of[corners[:, 0]]
+    groups = [triangles[part_of_face == k].reshape(-1, 3) for k in np.unique(part_of_face)]
+    hulls = [hull for group in groups if (hull := hull_of(group)) is not None]
+    largest = sorted(hulls, key=lambda hull: -ConvexHull(hull).volume)[:most]
+    return tuple(largest) or (thickened(points),)
 
 
-def convex_parts(
-    triangles: F64, *, most: int = 24, threshold: float = 0.05, quick: bool = False
-) -> tuple[F64, ...]:
+def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> tuple[F64, ...]:
     """Convex parts of triangles (F, 3, 3), (V, 3) vertices each; never none.
 
-    most: parts. threshold: concavity that stays (CoACD). quick: a coarser search, a third of the
-    time. Raises MachineFailed without coacd.
+    most: parts. threshold: concavity that stays (CoACD). Raises MachineFailed without coacd.
     """
     try:
         import coacd
@@ -42,10 +52,7 @@ def convex_parts(
     vertices, faces = np.unique(points.round(7), axis=0, return_inverse=True)
     coacd.set_log_level("error")
     mesh = coacd.Mesh(vertices, faces.reshape(-1, 3).astype(np.int32))
-    search = {"preprocess_resolution": 30, "mcts_iterations": 60, "resolution": 1000}
-    found = coacd.run_coacd(
-        mesh, threshold=threshold, max_convex_hull=most, seed=1, **(search if quick else {})
-    )
+    found = coacd.run_coacd(mesh, threshold=threshold, max_convex_hull=most, seed=1)
     hulls = (hull_of(np.asarray(part, np.float64)) for part, _faces in found)
     parts = tuple(hull for hull in hulls if hull is not None)
     return parts or ((whole,) if whole is not None else (thickened(points),))

@@ -139,6 +139,17 @@ class Home:
         _ = home.house
         return home
 
+    def export(self, folder: str | Path, to: str = "gltf") -> Path:
+        """Write the home itself for another program: to = gltf, habitat, usd or usdz; the new folder.
+
+        Each thing is one node or prim with its class, a collider, its lamps; docs/formats.md describes
+        the forms, and `pf.load` reads each of them. Raises BadInput where the folder holds something.
+        """
+        from pbrs_farm.export.home_export import export_house
+
+        export_house(self.house, Path(folder), to)
+        return Path(folder)
+
     def set(self, **fields: Any) -> Home:
         """The home under other recipe fields: home.set(**{"light.spp": 64}).
 

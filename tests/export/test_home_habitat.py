@@ -5,18 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
-
 from pbrs_farm.cli import main
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.source import read_house, resolve
 from tests.export.homes import differences, repaired_home, stored
 
 
-def test_a_home_reads_back_equal_from_its_data_set(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("pbrs_farm.export.home_export.has_decomposition", lambda: False)
+def test_a_home_reads_back_equal_from_its_data_set(tmp_path: Path) -> None:
     house = repaired_home()
     root = stored(tmp_path / "root", house)
     assert main(["export", str(root), "--to", "habitat", "--out", str(tmp_path / "out")]) == 0

@@ -9,7 +9,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils, UsdValidation
 
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.export import home_export, usd_home
+from pbrs_farm.export import usd_home
 from pbrs_farm.export.home_export import exported_home
 from pbrs_farm.read.source import read_house, resolve
 from tests.export.homes import differences, repaired_home
@@ -20,11 +20,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The built-in home in both forms."""
     folder = tmp_path_factory.mktemp("usd")
     home = exported_home(repaired_home())
-    with pytest.MonkeyPatch.context() as patch:
-        # One hull a piece: taking pieces apart has tests of its own.
-        patch.setattr(home_export, "has_decomposition", lambda: False)
-        assert usd_home.write(home, folder) == 1 + len(home.house.textures)
-        assert usd_home.write_package(home, folder) == 1
+    assert usd_home.write(home, folder) == 1 + len(home.house.textures)
+    assert usd_home.write_package(home, folder) == 1
     return {form: folder / f"{home.house.id}.{form}" for form in ("usdc", "usdz")}
 
 
