@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 import builtins
+import io
 import struct
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import accessor_array, gltf_from_glb
@@ -102,3 +105,28 @@ def test_a_sparse_accessor_replaces_what_it_names() -> None:
     accessor["sparse"]["indices"]["componentType"] = 5126
     with pytest.raises(BadHouse, match=r"accessors\["):
         read(scene)
+
+
+# An 8 x 8 picture of four plain quarters, made for this test, in both of Basis' codecs.
+UASTC = (
+    "q0tUWCAyMLsNChoKAAAAAAEAAAAIAAAACAAAAAAAAAAAAAAAAQAAAAEAAAAAAAAAaAAAACwAAACUAAAALAAAAAAA"
+    "AAAAAAAAAAAAAAAAAADAAAAAAAAAAEAAAAAAAAAAQAAAAAAAAAAsAAAAAAAAAAIAKACmAQIAAwMAABAAAAAAAAAA"
+    "AAB/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFzaXMgVW5pdmVyc2FsIDIuNTAAAAQAAAB/fwAAl5sW5T/a"
+    "tgAAAAAAAAAAAJeCFuU/GrYAAAAAAAAAAACX2wPlP9qkAAAAAAAAAAAAl8ID5T9RiwEAAAAAAAAAAA=="
+)
+ETC1S = (
+    "q0tUWCAyMLsNChoKAAAAAAEAAAAIAAAACAAAAAAAAAAAAAAAAQAAAAEAAAABAAAAaAAAACwAAACUAAAAJAAAALgA"
+    "AAAAAAAAjgAAAAAAAABGAQAAAAAAAAEAAAAAAAAAAAAAAAAAAAAsAAAAAAAAAAIAKACjAQIAAwMAAAgAAAAAAAAA"
+    "AAA/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFzaXMgVW5pdmVyc2FsIDIuNTAAAAQAAgAwAAAACQAAAC0A"
+    "AAAAAAAAAAAAAAAAAAABAAAAAAAAAAAAAAAaQNwAAAAAQAgvNKUCmBAAAAAAAIE+UAIwAwAAAAAAgEgIwBQAAAAA"
+    "AAiURe3U4QCsqqqqUlVVVQUAwUQAAAAAAADyX40AmAEAAAAAAEDCEDAhQAAAAACA5JoAYAIAAAAAAAABBAAE"
+)
+
+
+@pytest.mark.parametrize("text", [UASTC, ETC1S], ids=["uastc", "etc1s"])
+def test_a_ktx2_picture_has_the_colours_that_were_encoded(text: str) -> None:
+    picture = Image.open(io.BytesIO(decoded_picture(base64.b64decode(text))))
+    assert (picture.size, picture.mode) == ((8, 8), "RGB")
+    corners = np.asarray(picture).astype(int)[[0, 0, 7, 7], [0, 7, 0, 7]]
+    expected = [(220, 180, 40), (20, 180, 40), (220, 30, 40), (20, 30, 40)]
+    assert abs(corners - np.array(expected)).max() <= 2
