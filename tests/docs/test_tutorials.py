@@ -73,7 +73,7 @@ def test_the_packagers_table_names_the_extras_that_there_are() -> None:
     assert rows.keys() == extras.keys() - {"study-peers", "notebooks", "bench", "docs", "dev"}
     for extra, said in rows.items():
         if extra != "all":
-            packages = [re.split(r"[\[>]", words)[0] for words in extras[extra]]
+            packages = [re.split(r"[\[>=]", words)[0] for words in extras[extra]]
             assert set(said.split(", ")) <= {p.removesuffix("-cpu") for p in packages}
 
 
