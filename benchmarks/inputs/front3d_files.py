@@ -101,16 +101,18 @@ def front_house(generation: Generation = "0.11", *, picture_jid: str = "") -> di
     for name, (_, x0, z0, x1, z1) in ROOMS.items():
         ends = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
         for k in range(4):
-            w.mesh("WallInner", _wall(ends[k], ends[(k + 1) % 4], flip=k % 2 == 1), name, "paint")
-        w.mesh("Floor", _level(x0, z0, x1, z1, 0.0, up=True), name, "floor")
+            w.mesh(
+                "WallInner", wall_face(ends[k], ends[(k + 1) % 4], flip=k % 2 == 1), name, "paint"
+            )
+        w.mesh("Floor", level_face(x0, z0, x1, z1, 0.0, up=True), name, "floor")
         up = generation == "0.4"
-        w.mesh("Ceiling", _level(x0, z0, x1, z1, HEIGHT, up=up), name, "white")
+        w.mesh("Ceiling", level_face(x0, z0, x1, z1, HEIGHT, up=up), name, "white")
     x0, z0, x1, z1 = OUTER
     ends = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
     for k in range(4):
-        w.mesh("WallOuter", _wall(ends[k], ends[(k + 1) % 4]), "OtherRoom-0", "paint")
-    w.mesh("SlabTop", _level(x0, z0, x1, z1, HEIGHT + 0.1, up=True), "OtherRoom-0", "white")
-    w.mesh("Baseboard", _level(0.01, 0.01, 4.9, 0.03, 0.08, up=True), "LivingRoom-1", "white")
+        w.mesh("WallOuter", wall_face(ends[k], ends[(k + 1) % 4]), "OtherRoom-0", "paint")
+    w.mesh("SlabTop", level_face(x0, z0, x1, z1, HEIGHT + 0.1, up=True), "OtherRoom-0", "white")
+    w.mesh("Baseboard", level_face(0.01, 0.01, 4.9, 0.03, 0.08, up=True), "LivingRoom-1", "white")
     furniture: list[dict[str, Any]] = []
     doors: list[dict[str, Any]] = []
     for k, hole in enumerate(HOLES):
@@ -179,25 +181,25 @@ def _add_hole(
     a, b = np.array([x, z]) - half, np.array([x, z]) + half
     if w.generation != "0.11 gaps":
         uid = f"{len(w.meshes)}/mesh"
-        w.mesh(kind, _jambs(a, b, axis, low, high), _room_at(x, z, axis), "white")
+        w.mesh(kind, jambs(a, b, axis, low, high), room_at(x, z, axis), "white")
         refs.append(uid)
         if w.generation in ("0.4", "0.10") and low == 0.0:
             w.mesh(
-                kind, _level(a[0], a[1], b[0], b[1], 0.0, up=True), _room_at(x, z, axis), "white"
+                kind, level_face(a[0], a[1], b[0], b[1], 0.0, up=True), room_at(x, z, axis), "white"
             )
     if title and w.generation != "0.4":
         uid = f"hole{k}/model"
         furniture.append(
             {"uid": uid, "jid": "", "title": title, "size": [width, depth, high - low]}
         )
-        w.child(uid, _room_at(x, z, axis), [x, low, z], 0.0 if axis == "x" else 90.0)
+        w.child(uid, room_at(x, z, axis), [x, low, z], 0.0 if axis == "x" else 90.0)
         refs.append(uid)
     if kind == "Door":
         kind_of_door = "entryDoor" if "entry" in title else "interiorDoor"
         doors.append({"type": kind_of_door, "roomId": "", "dir": direction, "ref": refs})
 
 
-def _room_at(x: float, z: float, axis: str) -> str:
+def room_at(x: float, z: float, axis: str) -> str:
     """A room beside a hole."""
     for name, (_, x0, z0, x1, z1) in ROOMS.items():
         if x0 - 0.3 < x < x1 + 0.3 and z0 - 0.3 < z < z1 + 0.3:
@@ -205,7 +207,7 @@ def _room_at(x: float, z: float, axis: str) -> str:
     raise ValueError(f"no room at {x}, {z}, {axis}")
 
 
-def _wall(a: tuple[float, float], b: tuple[float, float], *, flip: bool = False) -> Any:
+def wall_face(a: tuple[float, float], b: tuple[float, float], *, flip: bool = False) -> Any:
     """The triangles of a wall's face between two corners, less the holes that it has."""
     along = "x" if a[1] == b[1] else "z"
     k, across = (0, a[1]) if along == "x" else (1, a[0])
@@ -232,7 +234,9 @@ def _wall(a: tuple[float, float], b: tuple[float, float], *, flip: bool = False)
     return found[:, ::-1] if flip else found
 
 
-def _level(x0: float, z0: float, x1: float, z1: float, y: float, *, up: bool, n: int = 2) -> Any:
+def level_face(
+    x0: float, z0: float, x1: float, z1: float, y: float, *, up: bool, n: int = 2
+) -> Any:
     side = max(int(np.sqrt(n / 2)), 1)
     xs, zs = np.linspace(x0, x1, side + 1), np.linspace(z0, z1, side + 1)
     a, b = np.meshgrid(np.arange(side), np.arange(side))
@@ -247,7 +251,7 @@ def _level(x0: float, z0: float, x1: float, z1: float, y: float, *, up: bool, n:
     return found if up else found[:, ::-1]
 
 
-def _jambs(a: Any, b: Any, axis: str, low: float, high: float) -> Any:
+def jambs(a: Any, b: Any, axis: str, low: float, high: float) -> Any:
     """The two sides and the lintel of a hole, a sill where it does not reach the floor."""
     quads = [
         [[a[0], low, a[1]], [b[0], low, a[1]], [b[0], high, a[1]], [a[0], high, a[1]]],

@@ -19,7 +19,14 @@ class SoundFile(NamedTuple):
 
 def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     """Title of a format -> its house; meshes have about as many triangles where the format has any."""
-    from benchmarks.inputs import front3d_files, ifc_files, plan_files, scenestate_files, usd_files
+    from benchmarks.inputs import (
+        front3d_files,
+        habitat_files,
+        ifc_files,
+        plan_files,
+        scenestate_files,
+        usd_files,
+    )
 
     plans = {
         "plan of one's own": plan_files.write_own,
@@ -39,6 +46,9 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         ),
         "3D-FRONT": SoundFile(
             lambda folder: front3d_files.write_house(folder, n_triangles=n_triangles), 12
+        ),
+        "Habitat": SoundFile(
+            lambda folder: habitat_files.habitat_scene(folder, n_triangles), habitat_files.N_OPENINGS
         ),
         "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
         "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
