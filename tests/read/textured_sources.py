@@ -11,7 +11,8 @@ from benchmarks.inputs import front3d_files, scenestate_files
 from benchmarks.inputs.usd_files import UsdHome, walls_of
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.read.source import SourceRef, object_source, resolve
-from tests.read.gltf.gltf_scenes import two_rooms
+from tests.read.gltf.gltf_scenes import Scene, two_rooms
+from tests.read.habitat.habitat_sets import dataset
 from tests.read.suncg import suncg_root
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, home_xml, piece, sh3d
 
@@ -55,12 +56,15 @@ def suncg(folder: Path, picture: bytes | None) -> SourceRef:
 
 def gltf(folder: Path, picture: bytes | None) -> SourceRef:
     """A .glb of two rooms with a sofa whose picture lies beside the file."""
-    scene = two_rooms()
-    colour = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "MASK"}
-    scene.materials.append(colour)
-    scene.more |= {"textures": [{"source": 0}], "images": [{"uri": "picture.any"}]}
-    scene.node("Sofa", mesh=scene.box([1, 0, 1], [2, 1, 2], 0))
-    return _with_picture(folder, "scene.glb", scene.glb(), picture)
+    return _with_picture(folder, "scene.glb", _textured_rooms().glb(), picture)
+
+
+def habitat(folder: Path, picture: bytes | None) -> SourceRef:
+    """A data set whose stage has a sofa with a picture that lies beside the stage."""
+    path = dataset(folder, _textured_rooms())
+    if picture is not None:
+        (folder / "stages/picture.any").write_bytes(picture)
+    return resolve(str(path))
 
 
 def usd(folder: Path, picture: bytes | None) -> SourceRef:
@@ -90,6 +94,15 @@ def front3d(folder: Path, picture: bytes | None) -> SourceRef:
     return resolve(str(path))
 
 
+def _textured_rooms() -> Scene:
+    scene = two_rooms()
+    colour = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "MASK"}
+    scene.materials.append(colour)
+    scene.more |= {"textures": [{"source": 0}], "images": [{"uri": "picture.any"}]}
+    scene.node("Sofa", mesh=scene.box([1, 0, 1], [2, 1, 2], 0))
+    return scene
+
+
 def single_object(folder: Path, picture: bytes | None) -> SourceRef:
     """An OBJ model without context and its MTL, which names the picture."""
     (folder / "thing.mtl").write_text(MTL)
@@ -110,6 +123,7 @@ FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "sweethome3d": sweethome3d,
     "suncg": suncg,
     "gltf": gltf,
+    "habitat": habitat,
     "usd": usd,
     "scenestate": scenestate,
     "front3d": front3d,

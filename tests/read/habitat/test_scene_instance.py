@@ -2,60 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from benchmarks.inputs.habitat_files import written
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.run.steps import repaired_house
-from tests.read.gltf.gltf_scenes import Scene, item, two_rooms
-
-REGIONS = [
-    {"name": "k", "label": "kitchen", "floor_height": 0.0, "extrusion_height": 2.6,
-     "poly_loop": [[0, 0, 0], [4, 0, 0], [4, 0, 3], [0, 0, 3]]},
-    {"name": "b", "label": "bedroom", "floor_height": 0.0, "extrusion_height": 2.6,
-     "poly_loop": [[4, 0, 0], [6, 0, 0], [6, 0, 3], [4, 0, 3]]},
-]  # fmt: skip
-
-
-def write(folder: Path, name: str, value: Any) -> Path:
-    path = folder / name
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(value if isinstance(value, bytes) else json.dumps(value).encode())
-    return path
-
-
-def dataset(folder: Path, **scene: Any) -> Path:
-    """A data set with a stage of two rooms and a sofa modelled with z up in centimetres."""
-    write(folder, "x.scene_dataset_config.json", {"stages": {"paths": {".json": ["stages/*"]}}})
-    write(folder, "stages/flat.stage_config.json", {"render_asset": "flat.glb"})
-    write(folder, "stages/flat.glb", two_rooms().glb())
-    sofa = Scene()
-    sofa.node("mesh 7", mesh=sofa.box([0, 0, 0], [200, 80, 60]))
-    write(folder, "objects/ab12.glb", sofa.glb())
-    config = {
-        "render_asset": "ab12.glb",
-        "up": [0, 0, 1],
-        "front": [0, -1, 0],
-        "units_to_meters": 0.01,
-    }
-    write(folder, "objects/ab12.object_config.json", config)
-    write(folder, "metadata/objects.csv", b"id,name,main_category\nab12,thing,couch\n")
-    write(folder, "semantics/flat.semantic_config.json", {"region_annotations": REGIONS})
-    half = float(np.sqrt(0.5))
-    instance = {
-        "template_name": "ab12", "translation": [2, 0.3, 1.5], "rotation": [half, 0, half, 0],
-        "translation_origin": "COM",
-    }  # fmt: skip
-    full = {"stage_instance": {"template_name": "stages/flat"}, "object_instances": [instance],
-            "semantic_scene_instance": "flat"} | scene  # fmt: skip
-    return write(folder, "scenes/one.scene_instance.json", full)
+from tests.read.gltf.gltf_scenes import item, two_rooms
+from tests.read.habitat.habitat_sets import dataset
 
 
 def house(path: Path) -> House:
@@ -111,6 +70,6 @@ def test_a_damaged_scene_is_one_line_with_its_place(tmp_path: Path, scene: dict,
 
 
 def test_a_scene_outside_its_data_set_is_told_so(tmp_path: Path) -> None:
-    path = write(tmp_path, "one.scene_instance.json", {"stage_instance": {"template_name": "a"}})
+    path = written(tmp_path / "one.scene_instance.json", {"stage_instance": {"template_name": "a"}})
     with pytest.raises(BadHouse, match="scene_dataset_config"):
         house(path)
