@@ -23,7 +23,7 @@ FORMS = (
     "ply", "captions",
 )  # fmt: skip
 # Forms of homes, not of views: pbrs_farm/export/home_export.py writes them.
-HOME_FORMS = ("gltf", "habitat", "usd", "usdz")
+HOME_FORMS = ("gltf", "habitat", "sdf", "usd", "usdz")
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
@@ -19,6 +18,7 @@ from pbrs_farm.export.gltf_home import glb_of_pieces
 from pbrs_farm.export.home_export import COLLISION, ExportedHome, Piece, digest_name
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import item_extras
+from pbrs_farm.geometry.convex_parts import hull_faces
 
 
 def write(home: ExportedHome, folder: Path) -> int:
@@ -97,7 +97,7 @@ def _collision(parts: tuple[F64, ...]) -> bytes:
     """A GLB with a mesh for each convex part."""
     writer, meshes = GlbWriter(), []
     for part in parts:
-        faces = np.asarray(ConvexHull(part).simplices, np.int32)
+        faces = hull_faces(part).astype(np.int32)
         row = {
             "attributes": {
                 "POSITION": writer.add_vertices(part.astype(np.float32), with_bounds=True)

@@ -1,4 +1,4 @@
-"""`pbrs-farm export ROOT --to gltf | habitat`: homes as scenes of other simulators.
+"""`pbrs-farm export ROOT --to gltf | habitat | sdf | usd`: homes as scenes of other simulators.
 
 Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or
 not at all. What every form needs of a home is here: each item's meshes in a frame of its own, its
@@ -276,6 +276,10 @@ def _writer(form: str) -> Writer:
         from pbrs_farm.export import habitat_home
 
         return habitat_home.write
+    if form == "sdf":
+        from pbrs_farm.export import sdf_home
+
+        return sdf_home.write
     if form in ("usd", "usdz"):
         from pbrs_farm.export import usd_home
 
@@ -283,7 +287,7 @@ def _writer(form: str) -> Writer:
     raise BadInput("--to", form, "no such form of a home", hint=f"of {', '.join(HOME_FORMS)}")
 
 
-HOME_FORMS: Final = ("gltf", "habitat", "usd", "usdz")
+HOME_FORMS: Final = ("gltf", "habitat", "sdf", "usd", "usdz")
 """Forms that write homes, not views."""
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
@@ -21,6 +20,7 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind, Surface
 from pbrs_farm.export.home_export import ExportedHome, Lamp, Piece, rooms_json
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
+from pbrs_farm.geometry.convex_parts import hull_faces
 from pbrs_farm.installation import need
 
 _SUFFIXES: Final = {"image/png": ".png", "image/jpeg": ".jpg"}
@@ -178,7 +178,7 @@ class _Stage:
         from pxr import UsdGeom, UsdPhysics, Vt
 
         for k, part in enumerate(piece.colliders):
-            triangles = _hull_faces(part)
+            triangles = hull_faces(part)
             if not len(triangles):
                 continue
             mesh = UsdGeom.Mesh.Define(self._stage, f"{path}/Collider_{k}")
@@ -316,16 +316,3 @@ def _matrix(b_from_a: F64) -> Any:
     from pxr import Gf
 
     return Gf.Matrix4d(*np.asarray(b_from_a, np.float64).T.ravel().tolist())
-
-
-def _hull_faces(points: F64) -> Any:
-    """(F, 3) triangles of the convex hull of points, looking outwards."""
-    try:
-        hull = ConvexHull(points)
-    except (ValueError, RuntimeError):
-        return np.zeros((0, 3), np.int64)
-    faces = hull.simplices.astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(1) < 0
-    faces[inward] = faces[inward][:, ::-1]
-    return faces

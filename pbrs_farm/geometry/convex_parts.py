@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.mesh import signed_volume
 
@@ -64,6 +64,19 @@ def hull_of(points: F64) -> F64 | None:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):
         return None
+
+
+def hull_faces(points: F64) -> I64:
+    """(F, 3) triangles of the convex hull of points, looking outwards; none where they lie in a plane."""
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return np.zeros((0, 3), np.int64)
+    faces = hull.simplices.astype(np.int64)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(1) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return faces
 
 
 def thickened(points: F64) -> F64:

@@ -140,10 +140,10 @@ class Home:
         return home
 
     def export(self, folder: str | Path, to: str = "gltf") -> Path:
-        """Write the home itself for another program: to = gltf, habitat, usd or usdz; the new folder.
+        """Write the home itself for another program: to = gltf, habitat, sdf, usd or usdz; the new folder.
 
-        Each thing is one node or prim with its class, a collider, its lamps; docs/formats.md describes
-        the forms, and `pf.load` reads each of them. Raises BadInput where the folder holds something.
+        Each thing is one node, prim or model with a collider and its lamps; docs/formats.md describes
+        the forms, and `pf.load` reads each of them but sdf. Raises BadInput where the folder holds something.
         """
         from pbrs_farm.export.home_export import export_house
 

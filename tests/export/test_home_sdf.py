@@ -1,0 +1,210 @@
+"""A home as a world of Gazebo: models where the items are, with meshes, masses, lamps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import corners_of_surfaces
+from pbrs_farm.export import sdf_home
+from pbrs_farm.export.home_export import ExportedHome, Piece, export_house, exported_home
+from pbrs_farm.formats.glb import gltf_from_glb
+from pbrs_farm.geometry.convex_parts import hull_faces
+from tests.export.homes import repaired_home, stored
+
+_HOME = exported_home(repaired_home())
+
+
+def turned(piece: Piece) -> Piece:
+    """The piece about a slanting axis, so that no sign or order of axes can hide."""
+    frame = np.eye(4)
+    frame[:3, :3] = Rotation.from_rotvec([0.3, 0.9, -0.5]).as_matrix()
+    frame[:3, 3] = [1.0, 2.0, -3.0]
+    return replace(piece, world_from_local=frame @ piece.world_from_local)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built-in home as a document."""
+    folder = tmp_path_factory.mktemp("sdf")
+    assert sdf_home.write(_HOME, folder) == sum(p.is_file() for p in folder.rglob("*"))
+    return folder / f"{_HOME.house.id}.sdf"
+
+
+def world_of(path: Path) -> ET.Element:
+    (world,) = ET.parse(path).getroot().findall("world")
+    return world
+
+
+def numbers(element: ET.Element, path: str) -> list[float]:
+    return [float(x) for x in (element.findtext(path) or "").split()]
+
+
+def pose(element: ET.Element) -> np.ndarray:
+    """The matrix of an element's pose, a unit matrix without one."""
+    found = np.eye(4)
+    told = element.find("pose")
+    if told is not None:
+        assert told.get("rotation_format") == "quat_xyzw"
+        values = numbers(element, "pose")
+        found[:3, 3] = values[:3]
+        found[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()
+    return found
+
+
+def placed(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def z_up(points: np.ndarray) -> np.ndarray:
+    x, y, z = np.moveaxis(np.asarray(points), -1, 0)
+    return np.stack([x, -z, y], -1)
+
+
+def bounds_of_glb(path: Path) -> np.ndarray:
+    """Of its vertices, where no node moves them."""
+    document = gltf_from_glb(path.read_bytes(), path.name).document
+    assert not any(
+        {"matrix", "translation", "rotation"} & node.keys() for node in document["nodes"]
+    )
+    told = [row for row in document["accessors"] if "min" in row]
+    return np.array(
+        [np.min([row["min"] for row in told], 0), np.max([row["max"] for row in told], 0)]
+    )
+
+
+def test_the_verb_writes_a_world_whose_models_are_the_building_and_the_things(
+    tmp_path: Path,
+) -> None:
+    root = stored(tmp_path / "root", repaired_home())
+    assert main(["export", str(root), "--to", "sdf", "--out", str(tmp_path / "out")]) == 0
+    (path,) = (tmp_path / "out").glob("*/*.sdf")
+    assert path.parent.name == path.stem == repaired_home().id
+    assert ET.parse(path).getroot().get("version") == "1.9"
+    assert numbers(world_of(path), "gravity") == [0.0, 0.0, -9.81]
+    models = {m.get("name"): m for m in world_of(path).findall("model")}
+    assert list(models) == ["building", *(piece.name for piece in _HOME.things)]
+    assert models["building"].findtext("static") == "true"
+    for piece in _HOME.things:
+        static = models[piece.name].findtext("static")
+        assert static == ("true" if piece.is_fixed else "false")
+    assert {m.findtext("static") for m in models.values()} == {"true", "false"}
+
+
+def test_every_link_has_what_it_needs_and_every_mesh_exists(written: Path) -> None:
+    pieces = {piece.name: piece for piece in _HOME.things}
+    for model in world_of(written).findall("model"):
+        (link,) = model.findall("link")
+        names = [child.get("name") for child in link if child.get("name")]
+        assert len(names) == len(set(names))
+        piece = pieces.get(model.get("name") or "")
+        if piece is not None:
+            assert len(link.findall("collision")) == len(piece.colliders) > 0
+            assert numbers(link, "inertial/mass") == pytest.approx([piece.mass_kg])
+            moments = [numbers(link, f"inertial/inertia/{k}")[0] for k in ("ixx", "iyy", "izz")]
+            assert min(moments) > 0
+            assert 2 * max(moments) <= sum(moments) * (1 + 1e-6)
+        assert len(link.findall("visual")) == 1
+    uris = {uri.text or "" for uri in world_of(written).iter("uri")}
+    assert all((written.parent / uri).stat().st_size > 0 for uri in uris)
+    assert uris == {f"meshes/{p.name}" for p in (written.parent / "meshes").iterdir()}
+
+
+def test_poses_put_the_vertices_of_a_mesh_where_the_item_has_them(tmp_path: Path) -> None:
+    things = tuple(turned(piece) for piece in _HOME.things[:4])
+    home = ExportedHome(_HOME.house, (*_HOME.building, *things))
+    sdf_home.write(home, tmp_path)
+    models = world_of(tmp_path / f"{home.house.id}.sdf").findall("model")
+    for piece, model in zip(things, models[1:], strict=True):
+        (link,) = model.findall("link")
+        (visual,) = link.findall("visual")
+        local = corners_of_surfaces(piece.surfaces).reshape(-1, 3)
+        mesh = bounds_of_glb(tmp_path / (visual.findtext("geometry/mesh/uri") or ""))
+        assert np.allclose(mesh, [local.min(0), local.max(0)], atol=1e-5)
+        world = z_up(placed(piece.world_from_local, local))
+        assert np.allclose(placed(pose(model) @ pose(visual), local), world, atol=1e-5)
+        for part, collision in zip(piece.colliders, link.findall("collision"), strict=True):
+            path = tmp_path / (collision.findtext("geometry/mesh/uri") or "")
+            rows = [line.split() for line in path.read_text().splitlines()]
+            corners = np.array([row[1:] for row in rows if row[0] == "v"], np.float64)
+            expected = z_up(placed(piece.world_from_local, part))
+            got = placed(pose(model) @ pose(collision), corners)
+            assert np.allclose(got, expected, atol=1e-5)
+        middle = placed(piece.world_from_local, np.array([0, piece.size[1] / 2, 0]))
+        centre = numbers(link, "inertial/pose")[:3]
+        assert np.allclose(placed(pose(model), np.array(centre)), z_up(middle), atol=1e-5)
+        turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+        moments = np.diag(turn @ np.diag(piece.inertia) @ turn.T)
+        told = [numbers(link, f"inertial/inertia/{k}")[0] for k in ("ixx", "iyy", "izz")]
+        assert np.allclose(told, moments)
+
+
+def test_the_building_stands_where_it_is(written: Path) -> None:
+    model = world_of(written).findall("model")[0]
+    corners = np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 0.0]])
+    for tag in ("visual", "collision"):
+        shape = model.find(f"link/{tag}")
+        assert shape is not None
+        assert np.allclose(placed(pose(model) @ pose(shape), corners), z_up(corners))
+
+
+def test_lamps_hang_where_they_are_with_their_colour_and_range(written: Path) -> None:
+    models = {m.get("name"): m for m in world_of(written).findall("model")}
+    lit = [piece for piece in _HOME.things if piece.lamps]
+    assert lit
+    for piece in lit:
+        lights = models[piece.name].findall("link/light")
+        for lamp, light in zip(piece.lamps, lights, strict=True):
+            place = (pose(models[piece.name]) @ pose(light))[:3, 3]
+            assert np.allclose(place, z_up(lamp.position), atol=1e-5)
+            assert light.get("type") == ("spot" if lamp.spot else "point")
+            assert numbers(light, "diffuse") == pytest.approx([*lamp.rgb_linear, 1])
+            strength, reach = numbers(light, "intensity")[0], numbers(light, "attenuation/range")[0]
+            assert strength == pytest.approx(lamp.candela / 100)
+            assert reach == 1.0 or strength / reach**2 == pytest.approx(0.01)
+
+
+def test_a_spot_looks_where_its_lamp_looks(tmp_path: Path) -> None:
+    piece = turned(next(piece for piece in _HOME.things if piece.lamps))
+    looks = (0.6, -0.8, 0.0)
+    piece = replace(piece, lamps=(replace(piece.lamps[0], spot=(looks, 0.5)),))
+    sdf_home.write(ExportedHome(_HOME.house, (piece,)), tmp_path)
+    (model,) = world_of(tmp_path / f"{_HOME.house.id}.sdf").findall("model")[1:]
+    light = model.find("link/light")
+    assert light is not None
+    direction = np.array(numbers(light, "direction"))
+    got = (pose(model) @ pose(light))[:3, :3] @ direction
+    assert np.allclose(got, z_up(np.array(looks)), atol=1e-6)
+    assert numbers(light, "spot/outer_angle") == [1.0]
+
+
+def test_no_model_has_a_name_that_sdf_or_the_building_has(tmp_path: Path) -> None:
+    names = ("world", "building", "building_thing")
+    things = tuple(replace(p, name=n) for p, n in zip(_HOME.things, names, strict=False))
+    sdf_home.write(ExportedHome(_HOME.house, things), tmp_path)
+    models = world_of(tmp_path / f"{_HOME.house.id}.sdf").findall("model")
+    got = [model.get("name") for model in models]
+    assert len(set(got)) == 4
+    assert "world" not in got
+
+
+def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(BadInput):
+        export_house(repaired_home(), tmp_path, "sdf")
+    assert [p.name for p in tmp_path.iterdir()] == ["mine"]
+
+
+def test_faces_of_a_hull_look_outwards() -> None:
+    points = np.random.default_rng(3).normal(size=(30, 3))
+    a, b, c = (points[hull_faces(points)[:, k]] for k in range(3))
+    outwards = (np.cross(b - a, c - a) * (a + b + c - 3 * points.mean(0))).sum(1)
+    assert (outwards > 0).all()
+    assert len(hull_faces(np.zeros((4, 3)))) == 0
