@@ -12,6 +12,7 @@ from typing import Final
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
+from pbrs_farm.core.made_home import made_homes
 from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.read.common.source_files import SourceFiles
@@ -66,10 +67,16 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
         if place != path:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
-    if any(ref.kind in ("example", "sweethome3d", "made", "plugin") for ref in refs):
+    drawn = ("example", "sweethome3d", "plugin")
+    if any(ref.kind in drawn or _is_furnished(ref) for ref in refs):
         _upload_package(store, homes_package.PACKAGE)
-    if any(ref.kind in ("made", "plugin") for ref in refs):
+    if any(ref.kind == "plugin" or _is_furnished(ref) for ref in refs):
         _upload_package(store, furniture_package.PACKAGE)
+
+
+def _is_furnished(ref: SourceRef) -> bool:
+    """A home that its seed makes and furnishes."""
+    return ref.kind == "made" and made_homes(ref.location)[0].furniture
 
 
 def needed_plugins(

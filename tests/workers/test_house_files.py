@@ -101,6 +101,9 @@ def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.Mo
 def test_made_homes_put_no_file_into_the_store(cache: Path):
     # The package is in the cache of each machine, or goes into the store by itself.
     words = [f"made:{seed},furniture=none" for seed in range(1, 4)]
+    # An empty home needs none, also where it is cached.
+    cache.mkdir(parents=True, exist_ok=True)
+    (cache / f"{furniture_package.PACKAGE}_1.8-1_all.deb").write_bytes(b"deb")
     found = entries_from_arguments(words)
     assert [SourceRef.model_validate_json(e.source).location for e, _ref in found] == words
     store = MemoryStore()
