@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.ops import unary_union
@@ -162,7 +163,9 @@ def _read(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
     # Ask for the form first: the parser of WKT follows nesting without an end.
     if _IS_POLYGON.match(text) and _depth(text) <= _MOST_NESTED:
         try:
-            shape = shapely.from_wkt(text.partition(";")[2] if text[:5] == "SRID=" else text)
+            # A NaN or a number beyond all floats is refused below, without the library's own words.
+            with np.errstate(all="ignore"):
+                shape = shapely.from_wkt(text.partition(";")[2] if text[:5] == "SRID=" else text)
         except shapely.errors.ShapelyError:
             shape = None
     if isinstance(shape, MultiPolygon):
