@@ -1,7 +1,7 @@
 """A Habitat scene instance -> House. Effects: reads files below its data set's folder.
 
-Stage and objects are put into one glTF scene, which the glTF reader reads. Articulated objects and
-lighting configs are not read: a note says how many.
+Stage, objects and point lights are put into one glTF scene, which the glTF reader reads. Articulated
+objects are not read: a note says how many.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from pbrs_farm.regular_files import MAX_SCENE_BYTES
 _CONFIG: Final = "*.scene_dataset_config.json"
 _LEVELS_UP: Final = 6  # from a scene to its data set's config
 _MOST_INSTANCES: Final = 20_000
+_MOST_LIGHTS: Final = 1_000
 _MOST_JSON_BYTES: Final = 64 * 2**20
 _MOST_FILES: Final = 200_000
 _BAKED: Final = "baked"
@@ -75,6 +76,7 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
         raise BadHouse(
             path, "object_instances", text, hint="get the data set's objects, or --models"
         )
+    _add_lights(dataset, scene.get("default_lighting"), built, notes)
     n = len(scene.get("articulated_object_instances") or ())
     if n:
         notes.add("unread-part", "articulated_object_instances", f"{n} (URDF) are not read")
@@ -102,7 +104,8 @@ def companions(path: Path, models: str, files: SourceFiles) -> str:
                 if name is not None:
                     asset = dataset.json(name).get("render_asset")
                     names |= {name} | ({dataset.asset(name, asset)} if asset else set())
-        names |= set(dataset.named("*.semantic_config.json")) | set(dataset.named("*objects.csv"))
+        for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
+            names |= set(dataset.named(pattern))
     except (BadHouse, OSError, AttributeError, TypeError):
         return ""
     return files.digest(dataset.folder, names)
@@ -252,6 +255,18 @@ class _Built:
         self.roots.append(len(self.document["nodes"]))
         self.document["nodes"].append(node)
 
+    def light(self, row: dict[str, Any], position: F64, name: str) -> None:
+        """Set a light of KHR_lights_punctual at a point."""
+        empty: dict[str, Any] = {_LIGHTS: {"lights": []}}
+        lights = self.document.setdefault("extensions", empty)[_LIGHTS]["lights"]
+        node = {
+            "name": name, "translation": position.tolist(),
+            "extensions": {_LIGHTS: {"light": len(lights)}},
+        }  # fmt: skip
+        lights.append(row)
+        self.roots.append(len(self.document["nodes"]))
+        self.document["nodes"].append(node)
+
     def gltf(self) -> Gltf:
         """The whole."""
         whole = self.document | {
@@ -349,6 +364,37 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     extras = dict(told) if isinstance(told, dict) else {}
     built.place(roots, matrix @ inner, name, extras)
     return True
+
+
+def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> None:
+    """Place the point lights of a lighting config; a note counts those of other kinds.
+
+    Habitat's intensities have no unit: each light is as strong as a bulb.
+    """
+    config = dataset.config(named, "lighting") if isinstance(named, str) and named else None
+    if config is None:
+        return
+    rows = dataset.json(config).get("lights", {})
+    if not isinstance(rows, dict) or len(rows) > _MOST_LIGHTS:
+        raise BadHouse(config, "lights", f"expected an object of at most {_MOST_LIGHTS}")
+    where = Gltf({}, (), config)
+    n_left_out = 0
+    for key, row in rows.items():
+        place = f"lights[{key[:20]}]"
+        if not isinstance(row, dict):
+            raise BadHouse(config, place, "expected an object")
+        (strength,) = numbers(where, [row.get("intensity", 1.0)], 1, f"{place}.intensity")
+        is_fixed = row.get("position_model", "global") == "global"
+        if row.get("type", "point") != "point" or strength <= 0 or not is_fixed:
+            n_left_out += 1
+            continue
+        position = numbers(where, row.get("position", [0, 0, 0]), 3, f"{place}.position")
+        colour = numbers(where, row.get("color", [1, 1, 1]), 3, f"{place}.color").tolist()
+        bulb = {"type": "point", "color": colour, "extras": {"assumed": True}}
+        built.light(bulb, position, f"lamp {key[:20]}")
+    if n_left_out:
+        text = f"{n_left_out} are directional, dark or not of the room; left out"
+        notes.add("unread-part", f"{config}: lights", text)
 
 
 def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F64:

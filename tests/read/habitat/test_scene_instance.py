@@ -42,11 +42,42 @@ def test_a_repaired_scene_leaks_nothing_and_loses_no_wall(tmp_path: Path) -> Non
     assert report.structure.n_walls_thickened > 0
 
 
-def test_a_changed_model_changes_the_source(tmp_path: Path) -> None:
+def test_a_changed_model_or_lighting_changes_the_source(tmp_path: Path) -> None:
     path = dataset(tmp_path)
     before = resolve(str(path)).fingerprint
     (tmp_path / "objects/ab12.glb").write_bytes(two_rooms().glb())
-    assert resolve(str(path)).fingerprint != before
+    changed = resolve(str(path)).fingerprint
+    written(tmp_path / "lighting/day.lighting_config.json", {"lights": {}})
+    assert len({before, changed, resolve(str(path)).fingerprint}) == 3
+
+
+def lit(folder: Path, lights: object) -> House:
+    written(folder / "lighting/day.lighting_config.json", {"lights": lights})
+    return house(dataset(folder, default_lighting="lighting/day"))
+
+
+def test_point_lights_are_lamps_of_a_bulb_each_and_others_are_told(tmp_path: Path) -> None:
+    rows = {
+        "0": {"type": "point", "position": [1, 2.3, 1], "intensity": 1.0, "color": [1, 0.5, 0.25]},
+        "1": {"type": "point", "position": [5, 2.3, 1], "intensity": 3.0, "color": [1, 1, 1]},
+        "2": {"type": "point", "position": [2, 2.3, 1], "intensity": -1.0},
+        "3": {"type": "directional", "direction": [0, -1, 0], "intensity": 2.0},
+        "4": {"type": "point", "position": [0, 0, 0], "position_model": "camera"},
+    }
+    found = lit(tmp_path, rows)
+    first, second = (light for thing in found.items for light in thing.lights)
+    assert (first.power, second.power) == (800, 800)
+    assert first.position == pytest.approx((1, 2.3, 1))
+    assert first.rgb_linear == pytest.approx((1, 0.5, 0.25))
+    assert [n.text for n in found.notes if "lights" in n.place] == [
+        "3 are directional, dark or not of the room; left out"
+    ]
+
+
+@pytest.mark.parametrize("lights", [[1], {"0": 3}, {"0": {"intensity": "x"}}])
+def test_damaged_lights_are_one_line(tmp_path: Path, lights: object) -> None:
+    with pytest.raises(BadHouse, match="lights"):
+        lit(tmp_path, lights)
 
 
 @pytest.mark.parametrize(
