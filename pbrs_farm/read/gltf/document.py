@@ -27,6 +27,7 @@ Fetch = Callable[[str], bytes | None]
 
 MAX_NODES: Final = 200_000  # of the scene; a node may stand in it more than once
 MAX_DEPTH: Final = 200  # levels of the node tree
+_MOVES: Final = frozenset({"matrix", "rotation", "scale", "translation"})  # keys of a node
 
 # Extensions that a file may require.
 UNDERSTOOD: Final = frozenset({
@@ -146,8 +147,10 @@ def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
     stack = [Placed(i, (i,), np.eye(4)) for i in reversed(roots)]
     n = 0
     while stack:
+        # Those that wait count too, so that a broad tree of too many ends at once.
+        n_known = n + len(stack)
         top, n = stack.pop(), n + 1
-        if n > MAX_NODES or len(top.path) > MAX_DEPTH:
+        if n_known > MAX_NODES or len(top.path) > MAX_DEPTH:
             text = f"more than {MAX_NODES} nodes or {MAX_DEPTH} levels"
             raise BadHouse(gltf.file, f"nodes[{top.index}]", text)
         node = entry(gltf, "nodes", top.index)
@@ -163,11 +166,15 @@ def _indices(gltf: Gltf, holder: dict[str, Any], place: str, key: str) -> list[i
     value = holder.get(key, [])
     if not isinstance(value, list) or not all(type(v) is int for v in value):
         raise BadHouse(gltf.file, f"{place}.{key}", "expected a list of node numbers")
+    if len(value) > MAX_NODES:
+        raise BadHouse(gltf.file, f"{place}.{key}", f"more than {MAX_NODES} nodes")
     return value
 
 
 def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
     place = f"nodes[{index}]"
+    if not _MOVES & node.keys():
+        return np.eye(4)
     if "matrix" in node:
         m = numbers(gltf, node["matrix"], 16, f"{place}.matrix").reshape(4, 4).T  # column by column
         if not np.allclose(m[3], [0, 0, 0, 1], atol=1e-6):

@@ -9,6 +9,8 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.read.gltf.document import MAX_NODES, placed_nodes
 from pbrs_farm.read.gltf.scene import read_gltf, read_gltf_file
 from tests.read.gltf.gltf_scenes import Scene, two_rooms
 
@@ -82,3 +84,20 @@ def test_names_that_lead_out_of_the_folder_are_refused(tmp_path: Path) -> None:
     (inner / "a.gltf").write_text(json.dumps(document))
     with pytest.raises(BadHouse, match="link that leads out"):
         read_gltf_file(inner / "a.gltf", ReadFields())
+
+
+@pytest.mark.parametrize("is_flat", [True, False])
+def test_too_many_nodes_are_refused_before_one_of_them_is_read(
+    is_flat: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read_nodes: list[int] = []
+    monkeypatch.setattr(
+        "pbrs_farm.read.gltf.document._parent_from_node",
+        lambda _gltf, _node, index: read_nodes.append(index) or np.eye(4),
+    )
+    many = [1] * (MAX_NODES + 1)
+    nodes = [{}, {}] if is_flat else [{"children": many}, {}]
+    document = {"nodes": nodes, "scenes": [{"nodes": many if is_flat else [0]}]}
+    with pytest.raises(BadHouse, match=f"more than {MAX_NODES} nodes"):
+        list(placed_nodes(Gltf(document, (), "scene.glb")))
+    assert len(read_nodes) < 2
