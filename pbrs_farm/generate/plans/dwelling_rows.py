@@ -168,6 +168,8 @@ def _read(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
                 shape = shapely.from_wkt(text.partition(";")[2] if text[:5] == "SRID=" else text)
         except shapely.errors.ShapelyError:
             shape = None
+    if shape is not None and not np.isfinite(shapely.get_coordinates(shape)).all():
+        raise BadInput(path, f"line {line}", "has a coordinate that is no place in metres")
     if isinstance(shape, MultiPolygon):
         shape = max(shape.geoms, key=lambda part: part.area, default=None)
     if not isinstance(shape, Polygon) or shape.is_empty:
