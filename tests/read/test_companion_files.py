@@ -179,6 +179,7 @@ def test_a_companion_that_changed_since_submission_is_told(tmp_path: Path) -> No
         source = write(folder, PNG)
         (picture_file,) = [
             *folder.glob("picture.any"),
+            *folder.glob("stages/picture.any"),
             *folder.glob("texture/wood.jpg"),
             *folder.glob("3D-FRONT-texture/*/texture.png"),
         ]

@@ -28,7 +28,14 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.gltf.document import gltf_document, meshes_of, numbers, object_at, placed_nodes
+from pbrs_farm.read.gltf.document import (
+    files_of_gltf,
+    gltf_document,
+    meshes_of,
+    numbers,
+    object_at,
+    placed_nodes,
+)
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene import house_of_gltf
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
@@ -103,7 +110,7 @@ def companions(path: Path, models: str, files: SourceFiles) -> str:
                 name = dataset.config(template, kind)
                 if name is not None:
                     asset = dataset.json(name).get("render_asset")
-                    names |= {name} | ({dataset.asset(name, asset)} if asset else set())
+                    names |= {name} | (dataset.files_of(name, asset) if asset else set())
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
     except (BadHouse, OSError, AttributeError, TypeError):
@@ -154,6 +161,13 @@ class _Dataset:
         if not isinstance(reference, str):
             raise BadHouse(config, "render_asset", "expected a name")
         return self.folder.name_from(posixpath.dirname(config), reference)
+
+    def files_of(self, config: str, reference: Any) -> set[str]:
+        """An asset that a config names, and the buffers and pictures outside it."""
+        asset = self.asset(config, reference)
+        data = self.folder.read(asset, max_bytes=MAX_SCENE_BYTES) or b""
+        at = posixpath.dirname(asset)
+        return {asset, *(self.folder.name_from(at, uri) for uri in files_of_gltf(data, asset))}
 
     def class_of(self, template: str) -> str:
         """What objects.csv calls a model: its category, "" where it says nothing."""
