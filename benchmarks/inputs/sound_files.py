@@ -27,6 +27,8 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         scenestate_files,
         usd_files,
     )
+    from pbrs_farm.export.home_export import export_house
+    from pbrs_farm.read.builtin.builtin_home import builtin_home
 
     plans = {
         "plan of one's own": plan_files.write_own,
@@ -39,7 +41,13 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         "react-planner": plan_files.write_react_planner,
     }
     each = max(n_triangles // 20, 12)
+
+    def write_gltf(folder: Path) -> Path:
+        export_house(builtin_home(), folder / "home", "gltf")
+        return next((folder / "home").glob("*.glb"))
+
     return {
+        "glTF": SoundFile(write_gltf),
         "sceneState": SoundFile(
             lambda folder: scenestate_files.hssd_like(folder, triangles=each),
             scenestate_files.N_OPENINGS, lambda file: file.parent / "objects",
