@@ -14,6 +14,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
+import anyio
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
@@ -39,22 +40,31 @@ class Buckets:
 
     def takes(self, address: str) -> bool:
         """Whether the address may ask once more now; if so, it has."""
-        now = self._clock()
-        left, since = self._left.pop(address, (self._burst, now))
-        left = min(self._burst, left + (now - since) * self._per_s)
+        now, left = self._clock(), self._filled(address)
         may = left >= 1
+        self._left.pop(address, None)
         self._left[address] = (left - 1 if may else left, now)
         while len(self._left) > _MAX_ADDRESSES:
             self._left.popitem(last=False)
         return may
+
+    def would_take(self, address: str) -> bool:
+        """Whether the address may ask once more now; asking this costs nothing."""
+        return self._filled(address) >= 1
+
+    def _filled(self, address: str) -> float:
+        now = self._clock()
+        left, since = self._left.get(address, (self._burst, now))
+        return min(self._burst, left + (now - since) * self._per_s)
 
 
 # What every request passes before a route sees it.
 
 
 LOGIN: Final = "/login"
+HEALTH: Final = "/health"
 _READS: Final = ("GET", "HEAD")
-_OPEN: Final = ("/static/", "/health", LOGIN)  # readable by everybody who may reach the board
+_OPEN: Final = ("/static/", HEALTH, LOGIN)  # readable by everybody who may reach the board
 _CSP: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
     " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
@@ -98,7 +108,8 @@ class Guard:
         """The answer to a request that may not pass, None to one that may."""
         headers, method, path = Headers(scope=scope), scope["method"], scope["path"]
         address = (scope.get("client") or ("", 0))[0]
-        if not self._rates.takes(address):
+        # Who looks whether the board lives is answered whatever else its address asks.
+        if path != HEALTH and not self._rates.takes(address):
             return _told(429, "too many requests: wait a little", {"Retry-After": "2"})
         if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
             return _told(414, "the address is too long")
@@ -110,7 +121,14 @@ class Guard:
         cookie = _cookie(headers.get("cookie", ""))
         session = cookie if cookie and self._sessions.is_open(cookie) else ""
         scheme, _, word = headers.get("authorization", "").partition(" ")
-        is_script = scheme.lower() == "bearer" and self._sessions.knows(word)
+        is_script = False
+        if scheme.lower() == "bearer":
+            # A wrong one counts as a wrong login; after too many the right one waits, too.
+            if not self._logins.would_take(address):
+                return _too_many_tries()
+            is_script = self._sessions.knows(word)
+            if not is_script:
+                self._logins.takes(address)
         scope["session"] = session
         scope["may_change"] = (bool(session) or is_script) and not self._options.is_readonly
         if method in _READS:
@@ -129,13 +147,18 @@ class Guard:
         is_login = path == LOGIN
         if self._options.is_readonly and not is_login:
             return _told(403, "this board was started with --readonly")
-        body = await _body(receive, self._options.limits.body_bytes)
+        limits = self._options.limits
+        try:
+            with anyio.fail_after(limits.receive_s):
+                body = await _body(receive, limits.body_bytes)
+        except TimeoutError:
+            return _told(408, "the form did not come in time", {"Connection": "close"})
         if body is None:
             return _told(413, "the form is too large")
         scope["board_body"] = body
         if is_login:
             if not self._logins.takes((scope.get("client") or ("", 0))[0]):
-                return _told(429, "too many tries: wait a minute", {"Retry-After": "60"})
+                return _too_many_tries()
             return None
         if is_script:
             return None
@@ -216,6 +239,10 @@ def _with_headers(send: Send) -> Send:
         await send(message)
 
     return sending
+
+
+def _too_many_tries() -> Response:
+    return _told(429, "too many tries: wait a minute", {"Retry-After": "60"})
 
 
 def _told(status: int, text: str, headers: dict[str, str] | None = None) -> Response:

@@ -66,6 +66,8 @@ class LiveFarm:
     clock: Callable[[], float] = time.monotonic
     _kept: dict[str, _KeptAnswer] = field(default_factory=dict)
     _asking: threading.Lock = field(default_factory=threading.Lock)
+    _finished: set[str] = field(default_factory=set)
+    _n_finished: dict[str, int] = field(default_factory=dict)  # of each job, when asked last
 
     def now(self) -> FarmNow:
         """All jobs and workers; says so where the farm does not answer."""
@@ -79,6 +81,20 @@ class LiveFarm:
         """The end of a task's stored log. Raises BadInput where there is none."""
         text = self.farm.logs(job, task)
         return text[-_MAX_LOG:]
+
+    def finished_houses(self) -> set[str]:
+        """The houses of every job that need no more work; those known before if Redis is silent."""
+        try:
+            for job in self.farm.ledger.known_jobs():
+                view = self.farm.ledger.view(job)
+                n = int(view.counts.get("houses:done", 0)) if view is not None else 0
+                # Ask only where a house was finished since.
+                if n and n != self._n_finished.get(job):
+                    self._finished |= self.farm.finished_houses(job, besides=self._finished)
+                    self._n_finished[job] = n
+        except PbrsError as error:
+            _LOG.warning("the farm does not say which houses are done: %s", error)
+        return self._finished
 
     def forget(self) -> None:
         """Ask anew next time: something was changed."""

@@ -20,6 +20,9 @@ class BoardLimits:
     burst: float = 600.0  # requests at once, of one address
     logins_per_s: float = 0.1
     login_burst: float = 5.0
+    connections: int = 512  # at once; this machine's own come on top
+    connections_per_address: int = 128
+    receive_s: float = 10.0  # until a request's header is whole, and its form
     body_bytes: int = 16_384  # of a form
     target_bytes: int = 4_096  # of a path with its query
     streams: int = 64  # pages that listen for changes

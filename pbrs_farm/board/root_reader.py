@@ -17,6 +17,7 @@ from pbrs_farm.store.object_store import Store, check_key
 
 MAX_JSON_BYTES = 64 * 2**20  # of a view.json, house.json, cameras.json
 MAX_PICTURE_BYTES = 256 * 2**20  # of a layer that is shown
+PIECE_BYTES = 2**20  # of an object that is handed on as it is read
 
 
 class RootReader:
@@ -42,14 +43,16 @@ class RootReader:
 
     def get(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes:
         """The object's bytes. Raises StoreFailed, ObjectMissing where there is none of that size."""
-        self._check_inside(key)
-        head = self.store.head(key)
-        if head is None:
-            raise ObjectMissing(key, "no such object")
-        if head.n_bytes > most_bytes:
-            text = f"has {head.n_bytes / 1e6:.0f} MB, at most {most_bytes / 1e6:.0f} MB are read"
-            raise StoreFailed(key, text)
+        self._size_within(key, most_bytes)
         return self.store.get(key)
+
+    def pieces(self, key: str, most_bytes: int) -> tuple[int, Iterator[bytes]]:
+        """The object's size and its bytes piece by piece. Raises as get."""
+        n_bytes = self._size_within(key, most_bytes)
+        starts = range(0, n_bytes, PIECE_BYTES)
+        return n_bytes, (
+            self.store.get_range(key, at, min(PIECE_BYTES, n_bytes - at)) for at in starts
+        )
 
     def get_or_none(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes | None:
         """The object's bytes, None where they cannot be had."""
@@ -70,6 +73,16 @@ class RootReader:
     def list(self, prefix: str) -> Iterator[str]:
         """Keys below the folder prefix."""
         return self.store.list(prefix)
+
+    def _size_within(self, key: str, most_bytes: int) -> int:
+        self._check_inside(key)
+        head = self.store.head(key)
+        if head is None:
+            raise ObjectMissing(key, "no such object")
+        if head.n_bytes > most_bytes:
+            text = f"has {head.n_bytes / 1e6:.0f} MB, at most {most_bytes / 1e6:.0f} MB are read"
+            raise StoreFailed(key, text)
+        return head.n_bytes
 
     def _check_inside(self, key: str) -> None:
         check_key(key)

@@ -19,6 +19,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from pbrs_farm.board.board_state import Board
+from pbrs_farm.board.connections import connection_class
 from pbrs_farm.board.guard import Guard
 from pbrs_farm.board.pages import farming, house_scene, lists, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
@@ -128,7 +129,7 @@ def server_of(board: Board) -> uvicorn.Server:
             access_log=False,
             server_header=False,
             proxy_headers=False,
-            limit_concurrency=256,
+            http=connection_class(board.options.limits),
             timeout_keep_alive=15,
             timeout_graceful_shutdown=5,
             h11_max_incomplete_event_size=32_768,

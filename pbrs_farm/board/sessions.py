@@ -19,7 +19,7 @@ from pbrs_farm.store.secret import Secret
 COOKIE: Final = "pbrs_board"
 _MAX_SESSIONS: Final = 1000
 _LIFE_S: Final = 12 * 3600.0
-_MAX_WORD: Final = 200  # characters of a token or cookie that are looked at
+_MAX_WORD: Final = 200  # characters of a form's word that are looked at
 
 
 class Sessions:
@@ -33,9 +33,9 @@ class Sessions:
 
     def knows(self, token: str) -> bool:
         """Whether a word is the token; takes the same time for every wrong one."""
-        given = token[:_MAX_WORD].encode("utf-8", "replace")
-        expected = self._token.reveal().encode()
-        return bool(expected) and hmac.compare_digest(given, expected)
+        # Digests are of one length, whatever the words' is.
+        expected = self._token.reveal()
+        return bool(expected) and hmac.compare_digest(_digest(token), _digest(expected))
 
     def open(self) -> str:
         """A new session's word."""
@@ -67,8 +67,8 @@ class Sessions:
         return hmac.compare_digest(word[:_MAX_WORD].encode("utf-8", "replace"), expected)
 
 
-def _digest(session: str) -> str:
-    return hashlib.sha256(session[:_MAX_WORD].encode("utf-8", "replace")).hexdigest()
+def _digest(word: str) -> str:
+    return hashlib.sha256(word.encode("utf-8", "replace")).hexdigest()
 
 
 def new_token() -> Secret:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
-from pbrs_farm.regular_files import MAX_DIGEST_BYTES, read_regular
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, open_regular, read_regular
 from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
 T = TypeVar("T")
@@ -77,6 +77,16 @@ class FolderStore:
     def get(self, key: str) -> bytes:
         try:
             return read_regular(self._path(key), MAX_DIGEST_BYTES)
+        except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+            raise ObjectMissing(key, f"no such object in {self.root}") from None
+        except OSError as error:
+            raise self._failure(key, error) from error
+
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        try:
+            with open_regular(self._path(key), MAX_DIGEST_BYTES) as file:
+                file.seek(start)
+                return file.read(n_bytes)
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
             raise ObjectMissing(key, f"no such object in {self.root}") from None
         except OSError as error:

@@ -59,6 +59,10 @@ class Store(Protocol):
         """The object's bytes; ObjectMissing if there is none."""
         ...
 
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        """n_bytes of the object from a byte of it on, which it must have; else as get."""
+        ...
+
     def head(self, key: str) -> Head | None:
         """Size of the object, None if there is none."""
         ...
@@ -129,6 +133,9 @@ class MemoryStore:
             return self._objects[check_key(key)]
         except KeyError:
             raise ObjectMissing(key, "no such object in memory") from None
+
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        return self.get(key)[start : start + n_bytes]
 
     def head(self, key: str) -> Head | None:
         data = self._objects.get(check_key(key))

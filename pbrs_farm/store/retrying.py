@@ -68,6 +68,9 @@ class RetryingStore:
     def get(self, key: str) -> bytes:
         return self._call(lambda: self._store.get(key))
 
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        return self._call(lambda: self._store.get_range(key, start, n_bytes))
+
     def head(self, key: str) -> Head | None:
         return self._call(lambda: self._store.head(key))
 

@@ -112,6 +112,12 @@ class S3Store:
     def get(self, key: str) -> bytes:
         return self._call(key, lambda _tries: bytes(self._obstore.get(self._client, key).bytes()))
 
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        def part(_tries: int) -> bytes:
+            return bytes(self._obstore.get_range(self._client, key, start=start, length=n_bytes))
+
+        return self._call(key, part)
+
     def head(self, key: str) -> Head | None:
         try:
             found = self._call(key, lambda _tries: self._obstore.head(self._client, key))

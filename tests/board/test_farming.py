@@ -77,6 +77,20 @@ def test_jobs_and_workers_are_listed_with_what_runs(client: httpx.Client, drive:
     assert "running" in html
 
 
+def test_the_farm_says_which_homes_are_finished(farm: Farm) -> None:
+    job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
+    drive, live = Drive(farm.ledger, farm.spec(job)), LiveFarm(farm)
+    assert live.finished_houses() == set()
+    first, *others = drive.dispatch()
+    drive.run(first)
+    drive.run_all()
+    assert live.finished_houses() == {first.partition("/")[0]}
+    for task in others:
+        drive.run(task)
+    drive.run_all()
+    assert live.finished_houses() == {"h0", "h1", "h2"}
+
+
 def test_a_job_shows_stages_and_failures_with_the_command_that_reproduces(
     client: httpx.Client, drive: Drive
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
@@ -13,8 +14,11 @@ import pytest
 
 from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
 from pbrs_farm.board.index.refresh import Refresher
+from pbrs_farm.board.index.stored_houses import StoredHouses
 from pbrs_farm.board.index.view_index import HouseRow, ViewIndex, ViewRow
 from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.core import keys
+from pbrs_farm.core.keys import canonical_json
 from pbrs_farm.images import array_from_png, decode_photo
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.store.folder import FolderStore
@@ -104,6 +108,65 @@ def test_what_a_run_adds_or_removes_is_seen_at_the_next_look(tmp_path: Path) -> 
     refresher.refresh()
     assert queries.home("c-3") is None
     assert queries.n_views() == 2
+
+
+class CountingStore(MemoryStore):
+    """A store in memory that counts what is listed of it."""
+
+    n_listings = 0
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        self.n_listings += 1
+        return super().list(prefix)
+
+
+def test_a_store_with_a_manifest_or_a_farm_is_never_listed(tmp_path: Path) -> None:
+    store = CountingStore()
+
+    def finish(house: str, *views: str) -> bytes:
+        files = [keys.house_key(house, "house.json")]
+        files += [keys.view_key(house, v, f) for v in views for f in ("view.json", "depth.png")]
+        for key in files:
+            store.put(key, b"{}")
+        rows = [canonical_json({"key": key, "sha256": "", "bytes": 2}) for key in sorted(files)]
+        manifest = "".join(f"{row}\n" for row in rows).encode()
+        store.put(keys.house_key(house, keys.MANIFEST), manifest)
+        return manifest
+
+    store.put(keys.MANIFEST, finish("a-1", "0_0_1") + finish("b-2", "0_0_1", "0_0_2"))
+    finished: set[str] = set()
+    index = ViewIndex(tmp_path / "index.sqlite")
+    refresher = Refresher(RootReader(store), index, lambda: finished)
+    queries = Queries(index)
+    refresher.refresh()
+    assert queries.n_views() == 3
+    # A house that the farm finishes before the root's manifest is merged again.
+    finish("c-3", "0_0_7")
+    finished.add("c-3")
+    refresher.refresh()
+    found = queries.view("c-3", "0_0_7")
+    assert found is not None
+    assert found.has("depth")
+    # The merged manifest says of each house what its own says: nothing is read again.
+    generation = index.generation
+    store.put(keys.MANIFEST, b"".join(store.get(f"houses/{h}/manifest.jsonl") for h in HOMES))
+    refresher.refresh()
+    assert (index.generation, store.n_listings) == (generation, 0)
+
+
+HOMES = ("a-1", "b-2", "c-3")
+
+
+def test_a_store_with_neither_is_listed_seldom(root: Path) -> None:
+    store, now = CountingStore(), [0.0]
+    store.put("houses/a-1/house.json", b"{}")
+    houses = StoredHouses(RootReader(store), clock=lambda: now[0])
+    for now[0] in (0.0, 60.0, 120.0):
+        assert list(houses.fingerprints()) == ["a-1"]
+    n = store.n_listings
+    now[0] = 700.0
+    houses.fingerprints()
+    assert store.n_listings == 2 * n
 
 
 def test_a_store_that_is_no_folder_is_listed_alike(root: Path, tmp_path: Path) -> None:

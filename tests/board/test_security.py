@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import httpx
@@ -215,8 +218,72 @@ def test_a_view_json_of_nonsense_is_shown_as_far_as_it_goes(tmp_path: Path) -> N
 def test_who_asks_too_often_waits(root: Path, tmp_path: Path) -> None:
     limits = BoardLimits(requests_per_s=0.001, burst=5)
     with served(str(root), tmp_path, limits=limits) as client:
-        codes = [client.get("/health").status_code for _ in range(7)]
+        codes = [client.get("/login").status_code for _ in range(7)]
         assert codes == [200] * 5 + [429] * 2
+        assert client.get("/health").status_code == 200
+
+
+@contextmanager
+def half_open(client: httpx.Client, n: int, sent: bytes) -> Iterator[list[socket.socket]]:
+    """n connections that sent so much and say no more."""
+    address = (client.base_url.host, client.base_url.port or 0)
+    with ExitStack() as stack:
+        held = [stack.enter_context(socket.create_connection(address)) for _ in range(n)]
+        for one in held:
+            one.sendall(sent)
+        yield held
+
+
+def test_three_hundred_half_open_connections_keep_nobody_out(root: Path, tmp_path: Path) -> None:
+    with served(str(root), tmp_path) as client, half_open(client, 300, b"GET / HTTP/1.1\r\n"):
+        assert [client.get(path).status_code for path in ("/", "/health", VIEW)] == [200] * 3
+
+
+def test_who_connects_must_ask_in_time(root: Path, tmp_path: Path) -> None:
+    limits = BoardLimits(receive_s=0.2)
+    form = b"POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\ntoken"
+    with served(str(root), tmp_path, limits=limits) as client:
+        for sent in (b"", b"GET / HTTP/1.1\r\nHost: loc"):
+            with half_open(client, 1, sent) as (one,):
+                one.settimeout(5)
+                with suppress(ConnectionResetError):
+                    assert one.recv(100) == b""
+        with half_open(client, 1, form) as (one,):
+            one.settimeout(5)
+            assert one.recv(100).startswith(b"HTTP/1.1 408")
+
+
+def test_a_wrong_bearer_counts_as_a_wrong_login(root: Path, tmp_path: Path) -> None:
+    with served(str(root), tmp_path, host="0.0.0.0") as client:
+
+        def asked(token: str) -> int:
+            return client.get("/views", headers={"Authorization": f"Bearer {token}"}).status_code
+
+        assert [asked(TOKEN) for _ in range(9)] == [200] * 9
+        assert [asked(f"guess {k}") for k in range(6)] == [303] * 5 + [429]
+        assert asked(TOKEN) == 429
+        assert log_in(client).status_code == 429
+
+
+def test_two_long_tokens_that_begin_alike_are_two(root: Path, tmp_path: Path) -> None:
+    long = "t" * 3000
+    sessions = Sessions(Secret(long))
+    assert sessions.knows(long)
+    assert not sessions.knows(long[:-1])
+    with served(str(root), tmp_path, token=Secret(long)) as client:
+        assert log_in(client, long[:200]).status_code == 403
+        assert log_in(client, long).status_code == 303
+
+
+def test_a_file_comes_in_pieces_and_whole(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pbrs_farm.board.root_reader.PIECE_BYTES", 100)
+    stored = (root / "houses/a-1/views/0_0_1/depth.png").read_bytes()
+    with served(str(root), tmp_path) as client:
+        answer = client.get(f"{VIEW}/file/depth")
+    assert len(stored) > 100
+    assert (answer.content, int(answer.headers["content-length"])) == (stored, len(stored))
 
 
 def test_tokens_cannot_be_guessed_quickly(root: Path, tmp_path: Path) -> None:

@@ -47,6 +47,14 @@ def test_what_was_put_is_what_is_got(store: Store) -> None:
     assert head.n_bytes == 2
 
 
+def test_a_part_of_an_object_is_got_by_itself(store: Store) -> None:
+    store.put("a", b"0123456789")
+    assert store.get_range("a", 3, 4) == b"3456"
+    assert store.get_range("a", 8, 2) == b"89"
+    with pytest.raises(ObjectMissing):
+        store.get_range("b", 0, 1)
+
+
 def test_a_later_put_replaces_an_earlier_one(store: Store) -> None:
     store.put("a", b"long first version")
     store.put("a", b"")

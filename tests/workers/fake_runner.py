@@ -54,6 +54,10 @@ class UnhealthyStore:
         self._check(key)
         return self._store.get(key)
 
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        self._check(key)
+        return self._store.get_range(key, start, n_bytes)
+
     def head(self, key: str) -> Head | None:
         self._check(key)
         return self._store.head(key)

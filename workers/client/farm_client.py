@@ -351,6 +351,14 @@ class Farm:
         rows = explain(self.ledger, self.registry, self.view(job), text)
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
+    def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
+        """The job's houses that are done, but for those known already."""
+        from workers.job import houses_from_lines
+
+        entries = houses_from_lines(self.store.get(job_key(check_job_id(job), "houses.jsonl")))
+        asked = (e.house_id for e in entries if e.house_id not in besides)
+        return set(self.ledger.finished(job, asked))
+
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
         """The stored log of a task's attempt (the last one by default); BadInput when none."""
         task = task_from_text(text)

@@ -312,6 +312,18 @@ class RedisLedger:
         with self.errors():
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
+    def finished(self, job: str, houses: Iterable[str]) -> list[str]:
+        """Those of the houses that are done."""
+        done: list[str] = []
+        for chunk in _chunks(houses):
+            with self.errors():
+                pipe = self.client.pipeline(transaction=False)
+                for house in chunk:
+                    pipe.hget(f"{self._p(job)}h:{house}", "s")
+                states = pipe.execute()
+            done += [house for house, s in zip(chunk, states, strict=True) if s == "done"]
+        return done
+
     def batches(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
         """The house's batches of views, () before they are known."""
         with self.errors():

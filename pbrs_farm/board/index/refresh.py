@@ -8,10 +8,10 @@ import time
 from dataclasses import dataclass
 from typing import Final
 
+from pbrs_farm.board.index.stored_houses import FinishedHouses, StoredHouses
 from pbrs_farm.board.index.view_index import (
     HouseRow,
     ViewIndex,
-    house_fingerprints,
     read_house,
     selection_fingerprint,
     verdicts,
@@ -23,7 +23,7 @@ from pbrs_farm.store.folder import FolderStore
 _LOG: Final = logging.getLogger(__name__)
 _CHUNK_VIEWS: Final = 500  # entered in one transaction
 _FOLDER_S: Final = 5.0  # between two looks at a folder
-_STORE_S: Final = 60.0  # between two listings of a store, which cost
+_STORE_S: Final = 60.0  # between two looks at a store, which cost
 _SHARE: Final = 0.1  # of the time that looking may take at most
 
 
@@ -39,8 +39,11 @@ class Progress:
 class Refresher:
     """Looks at the root again and again; `progress` says how far it is."""
 
-    def __init__(self, reader: RootReader, index: ViewIndex) -> None:
+    def __init__(
+        self, reader: RootReader, index: ViewIndex, finished: FinishedHouses | None = None
+    ) -> None:
         self._reader, self._index = reader, index
+        self._houses = StoredHouses(reader, finished)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="board-index", daemon=True)
         self.progress = Progress()
@@ -70,7 +73,7 @@ class Refresher:
     def refresh(self) -> None:
         """Enter what is new or changed, forget what is gone."""
         known = self._index.fingerprints()
-        now = dict(house_fingerprints(self._reader))
+        now = self._houses.fingerprints()
         changed = [house for house, print_ in now.items() if known.get(house) != print_]
         gone = known.keys() - now.keys()
         if gone:

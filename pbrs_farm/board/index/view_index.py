@@ -6,24 +6,22 @@ thread has a connection of its own.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sqlite3
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
+from pbrs_farm.board.index.stored_houses import view_keys
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import PbrsError, StoreFailed
+from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.object_store import check_key
 
 # The houses of an output root and the rows of their views, read from the store. Effects: reads
 # it.
@@ -32,7 +30,6 @@ from pbrs_farm.store.object_store import check_key
 LAYER_BIT: Final = {layer.name: 1 << k for k, layer in enumerate(LAYERS)}
 _BIT_OF_FILE: Final = {layer.file: 1 << k for k, layer in enumerate(LAYERS)}
 _MAX_WARNINGS: Final = 8  # of a view that are kept
-_WATCHED: Final = ("done", "views", "house.json")  # what a house's step changes
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,54 +54,6 @@ class HouseRow:
     views: tuple[ViewRow, ...]
 
 
-def house_fingerprints(reader: RootReader) -> Iterator[tuple[str, str]]:
-    """(house id, a text that changes when the house does), by id.
-
-    In a folder: the times of its own folders, which every finished step touches. Elsewhere: the
-    names of its objects, so a rewritten object of the same name is not noticed.
-    """
-    store = reader.store
-    for root in keys.FOLDERS:
-        if isinstance(store, FolderStore):
-            yield from _folder_fingerprints(store.root / root)
-        else:
-            yield from _listed_fingerprints(reader.list(f"{root}/"))
-
-
-def _folder_fingerprints(folder: Path) -> Iterator[tuple[str, str]]:
-    try:
-        names = sorted(path.name for path in folder.iterdir() if path.is_dir())
-    except OSError:
-        return
-    for name in names:
-        if _is_id(name):
-            yield name, ":".join(_time(folder / name / part) for part in _WATCHED)
-
-
-def _time(path: Path) -> str:
-    try:
-        return f"{path.stat().st_mtime_ns:x}"
-    except OSError:
-        return ""
-
-
-def _listed_fingerprints(found: Iterator[str]) -> Iterator[tuple[str, str]]:
-    parts = (key.split("/", 2) for key in found)
-    in_houses = (p for p in parts if len(p) == 3)
-    for house, group in groupby(sorted(in_houses), key=lambda p: p[1]):
-        digest = hashlib.sha256("\n".join(p[2] for p in group).encode()).hexdigest()
-        yield house, digest
-
-
-def _is_id(name: str) -> bool:
-    """Whether the name of a folder can be part of a key; what cannot was not written by us."""
-    try:
-        check_key(name)
-    except StoreFailed:
-        return False
-    return True
-
-
 def read_house(reader: RootReader, house: str) -> HouseRow:
     """The house and its views; what is damaged is left out, the rest stands."""
     facts = reader.json_object(keys.house_key(house, "house.json"))
@@ -113,7 +62,7 @@ def read_house(reader: RootReader, house: str) -> HouseRow:
     rooms = _room_names(facts.get("rooms"))
     # Every file of a view is a key below views/<view>/.
     prefix = keys.house_key(house, "views/")
-    named = (key.removeprefix(prefix).partition("/") for key in reader.list(prefix))
+    named = (key.removeprefix(prefix).partition("/") for key in view_keys(reader, house))
     views = [
         _view_row(reader, house, view, {file for _view, _slash, file in group}, rooms)
         for view, group in groupby(sorted(p for p in named if p[2]), key=lambda p: p[0])

@@ -146,6 +146,6 @@ def asset(request: Request) -> Response:
     return Response(data, media_type=found.content_type, headers=headers)
 
 
-def health(_request: Request) -> Response:
-    """GET /health: the board answers."""
+async def health(_request: Request) -> Response:
+    """GET /health: the board answers, even while every thread is busy."""
     return PlainTextResponse("ok\n")

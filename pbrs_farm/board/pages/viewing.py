@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
@@ -140,11 +140,13 @@ def file(request: Request) -> Response:
     found, layer = asked_view(request), _asked_layer(request)
     board = board_of(request)
     key = keys.view_key(found.house, found.id, LAYER[layer].file)
-    data = board.reader.get_or_none(key, board.options.limits.file_bytes)
-    if data is None:
-        raise HTTPException(404, "This file is not in the root any more.")
+    try:
+        n_bytes, pieces = board.reader.pieces(key, board.options.limits.file_bytes)
+    except PbrsError:
+        raise HTTPException(404, "This file is not in the root any more.") from None
     name = f"{found.house}-{found.id}-{LAYER[layer].file.replace('/', '-')}"
-    return download(data, name)
+    headers = {**_saved_as(name), "Content-Length": str(n_bytes)}
+    return StreamingResponse(pieces, media_type=content_type(name), headers=headers)
 
 
 def view_json(request: Request) -> Response:
@@ -179,10 +181,13 @@ def zipped(data: bytes, cache: str = FOREVER) -> Response:
 
 def download(data: bytes, name: str) -> Response:
     """Bytes that a browser saves under a name and never shows."""
+    return Response(data, media_type=content_type(name), headers=_saved_as(name))
+
+
+def _saved_as(name: str) -> dict[str, str]:
     # A key's segments hold no quote and no line end; what is not ASCII is not ours.
     ascii_name = name.encode("ascii", "replace").decode().replace('"', "_")
-    headers = {"Content-Disposition": f'attachment; filename="{ascii_name}"'}
-    return Response(data, media_type=content_type(name), headers=headers)
+    return {"Content-Disposition": f'attachment; filename="{ascii_name}"'}
 
 
 def _asked_layer(request: Request) -> str:
