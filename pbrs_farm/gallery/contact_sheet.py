@@ -40,6 +40,7 @@ _FILES: Final = (
 )  # fmt: skip
 """Fonts that are used where they are installed, the preferred first."""
 
+_MOST_LETTERS: Final = 1000  # of a line
 _ASCENT: Final = 0.78  # of the size: from the top of Pillow's own letters down to the base line
 _UNKNOWN: Final = "\u0378"  # an unassigned code point: drawn as a font's box for what it lacks
 
@@ -52,12 +53,13 @@ def draw_line(
     fill: tuple[int, int, int],
     size: int,
 ) -> float:
-    """Draw a line whose letters' top left is at; its length in px. text: as `shown` gives it.
+    """Draw a line whose letters' top left is at; its length in px.
 
     A letter that no font has is "?"; joiners and variation selectors of pictographs are left out
     where the font before them lacks them.
     """
     x, y = at
+    text = shown(text, _MOST_LETTERS)
     if text.isascii():
         draw.text(at, text, fill, _own(size))
         return float(draw.textlength(text, _own(size)))

@@ -128,6 +128,7 @@ COLOURS: Final = {
 }
 
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a panel, border
+_MOST_LETTERS: Final = 200  # of a line of text
 _ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0  # px
 _GAZE_M = 0.45  # length of the lines of gaze along a walk
 _ROOM, _FURNITURE, _WALL, _INK = "#fbf7ee", "#cfd6dd", "#3b3b3b", "#222222"
@@ -343,7 +344,8 @@ def _middle(polygon: F64) -> tuple[float, float]:
 
 
 def _text(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
-    return Mark("text", ((x, y),), colour, size, text=text)
+    # Ids are strangers' words, too, and a line end stops the drawing.
+    return Mark("text", ((x, y),), colour, size, text=shown(text, _MOST_LETTERS))
 
 
 def _shifted(mark: Mark, dx: float) -> Mark:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from pbrs_farm import images
 from pbrs_farm.commands.using import write_sheets
@@ -22,6 +22,7 @@ from pbrs_farm.gallery import contact_sheet as sheet
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.view_tiles import TILES, Tile
+from pbrs_farm.sample import camera_map
 
 
 def write_view(folder: Path, *, without: tuple[str, ...] = (), size: tuple[int, int] = (60, 80)):
@@ -234,6 +235,16 @@ def test_names_that_strangers_give_do_not_stop_the_sheet(tmp_path: Path) -> None
     html = gallery(tmp_path)
     assert "\u202e" not in html
     assert "x" * 700 not in html
+
+
+def test_a_line_end_in_any_text_of_a_sheet_is_a_space() -> None:
+    draw = ImageDraw.Draw(Image.new("RGB", (200, 40)))
+    lengths = [
+        contact_sheet.draw_line(draw, (0, 0), text, fill=(0, 0, 0), size=12)
+        for text in ("one\ntwo", "one two", "é\r\nb")
+    ]
+    assert lengths[0] == lengths[1]
+    assert camera_map._text(0, 0, "Level 1\n2").text == "Level 1 2"
 
 
 def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> None:

@@ -96,18 +96,21 @@ def _stored(shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader) 
 def _given(path: Path, notes: LibraryNotes) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
+    found: Found | None
+    n_before = len(notes.found)
     if path.is_dir():
         found = _folder(path, notes)
-        if not found.pieces and not found.pictures:
-            first = next((n.text for n in notes.found if n.place.startswith(path.name)), "")
-            raise BadInput(path, "", "holds nothing that can be used", hint=first)
-        return found
-    if path.suffix.lower() == ".sh3t":
-        return _textures(path, notes, TEXTURES)
-    if path.suffix.lower() == ".sh3f":
-        return _furniture(path, notes, FURNITURE)
-    hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
-    raise BadInput(path, "", "is no catalogue", hint=hint)
+    elif path.suffix.lower() == ".sh3t":
+        found = _textures(path, notes, TEXTURES)
+    elif path.suffix.lower() == ".sh3f":
+        found = _furniture(path, notes, FURNITURE)
+    else:
+        hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
+        raise BadInput(path, "", "is no catalogue", hint=hint)
+    if found is None or not (found.pieces or found.pictures):
+        why = next((n.text for n in [*notes.found][n_before:]), "")
+        raise BadInput(path, "", "holds nothing that can be used", hint=why)
+    return found
 
 
 def _folder(path: Path, notes: LibraryNotes) -> Found:

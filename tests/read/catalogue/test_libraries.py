@@ -96,17 +96,22 @@ def test_a_model_that_cannot_be_used_is_no_shape(tmp_path: Path, model: bytes) -
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\3\4 damaged", b"no zip at all"])
-def test_a_damaged_library_becomes_a_note(tmp_path: Path, data: bytes) -> None:
+def test_a_damaged_library_of_the_packages_becomes_a_note(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "bad.sh3f"
     path.write_bytes(data)
-    catalogue = catalogue_from([], given=[path])
+    catalogue = catalogue_from([path])
     assert not catalogue.pieces
     assert [n.kind for n in catalogue.notes] == ["damaged-library"]
+    # Of the user's own nothing passes in silence.
+    with pytest.raises(BadInput, match="holds nothing that can be used"):
+        catalogue_from([], given=[path])
 
 
-def test_a_library_without_a_known_class_becomes_a_note(tmp_path: Path) -> None:
-    catalogue = catalogue_from([], given=[library(tmp_path, [entry("Zzz")])])
-    assert [n.kind for n in catalogue.notes] == ["no-classes"]
+def test_a_library_of_one_s_own_without_a_known_class_is_refused(tmp_path: Path) -> None:
+    path = library(tmp_path, [entry("Zzz")])
+    assert [n.kind for n in catalogue_from([path]).notes] == ["no-classes"]
+    with pytest.raises(BadInput, match=r"nothing that can be used \(no piece"):
+        catalogue_from([], given=[path])
 
 
 def test_a_catalogue_that_does_not_exist_is_one_clear_line(tmp_path: Path) -> None:

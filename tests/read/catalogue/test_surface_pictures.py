@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 from pbrs_farm.read.catalogue.surface_pictures import MOST_OF_A_GROUP, TEXTURES, surface_group
 from tests.read.catalogue.small_library import library_bytes
@@ -57,10 +58,11 @@ def test_a_large_library_gives_some_of_each_kind(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\3\4 damaged", library_bytes([])])
-def test_a_damaged_texture_library_becomes_a_note(tmp_path: Path, data: bytes) -> None:
+def test_a_damaged_texture_library_is_refused(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "bad.sh3t"
     path.write_bytes(data)
-    assert [n.kind for n in catalogue_from([], given=[path]).notes] == ["damaged-library"]
+    with pytest.raises(BadInput, match="nothing that can be used"):
+        catalogue_from([], given=[path])
 
 
 @pytest.mark.parametrize(
