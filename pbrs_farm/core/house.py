@@ -122,6 +122,19 @@ def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
     return np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
+def part_of(surface: Surface, faces: I32, name: str) -> Surface:
+    """Some faces of a surface with the vertices they use, as a surface of its own."""
+    used, numbers = np.unique(faces, return_inverse=True)
+    return Surface(
+        name=name,
+        positions=surface.positions[used],
+        faces=numbers.reshape(-1, 3).astype(np.int32),
+        material=surface.material,
+        uvs=None if surface.uvs is None else surface.uvs[used],
+        normals=None if surface.normals is None else surface.normals[used],
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
     """An oriented box."""

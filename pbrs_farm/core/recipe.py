@@ -156,7 +156,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "blur": tuple(BlurFields.model_fields),
     "lens": tuple(LensFields.model_fields),
     "sensor": tuple(SensorFields.model_fields),
-    "repair": ("lamp_in_every_room", "lamp_lx"),
+    "repair": ("lamp_in_every_room", "lamp_lx", "add_ceilings"),
     "selection": ("min_room_lx", "black_modes"),
     "tone": ("pictures", "white", "glare"),
     "sky": (
@@ -191,7 +191,7 @@ _PHOTO: Mapping[str, Any] = {
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
-        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
+        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 10},
@@ -199,7 +199,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
-        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0},
+        "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "cameras": _PHOTO,
         "light": {"spp": 28},
         "sky": {"time": "drawn"},

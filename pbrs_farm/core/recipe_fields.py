@@ -104,6 +104,9 @@ class RepairFields(FieldGroup):
         le=1_000,
         description="on the floor, that an added lamp aims at by the room's area; 0 = 1,600 lm each",
     )
+    add_ceilings: bool = Field(
+        False, description="a ceiling at the walls' height over rooms that have walls and none"
+    )
     shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
     min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
     bulb_radius_m: float = Field(BULB_RADIUS_M, gt=0, le=1, description="where none is given")

@@ -39,6 +39,11 @@ from pbrs_farm.repair.repair_report import (
     StructureReport,
 )
 from pbrs_farm.repair.structure import plan_geometry as plan
+from pbrs_farm.repair.structure.added_ceilings import (
+    rooms_with_added_ceilings,
+    with_ceilings,
+    with_undersides,
+)
 from pbrs_farm.repair.structure.booleans import MIN_AREA_M2
 from pbrs_farm.repair.structure.cut_openings import with_frames_apart
 from pbrs_farm.repair.structure.walls import BASEBOARD
@@ -62,6 +67,11 @@ def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[Hous
         if i.kind in kinds
     ]
     return house.with_items(i for i in house.items if i.kind not in kinds), removed
+
+
+def with_rooms_closed(house: House, fields: RepairFields) -> House:
+    """The house with ceilings over walled rooms that have none, where the recipe asks for them."""
+    return with_ceilings(house) if fields.add_ceilings else house
 
 
 def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
@@ -174,6 +184,7 @@ def repair(
 
     # Remove what does not belong, and what is unsound.
     house, removed = without_persons_and_plants(house, fields)
+    house = with_rooms_closed(house, fields)
     house, faces = with_sound_faces(house)
     house, n_white = with_white_walls(house, fields.default_wall_rgb)
     house, mirrors = with_mirrors(house)
@@ -182,6 +193,7 @@ def repair(
     structure = repaired_structure(house, fields.wall_thickness_m)
     house, swallowed = with_structure(house, structure)
     house = replace(house, notes=(*house.notes, *_lost(structure.report)))
+    house = with_undersides(house)
     house, n_apart = with_frames_apart(house)
 
     house, sources, given = _with_light(house, fields, occluder_from)
@@ -205,6 +217,7 @@ def repair(
         sources=tuple(sources),
         fallback_lights=given.fallback,
         added_lamps=given.added,
+        added_ceilings=rooms_with_added_ceilings(house),
         rooms=_audit(house.rooms, structure.spaces),
         is_leaking=None if leaks is None else leaks.n_sky > 0,
         leaks=leaks,

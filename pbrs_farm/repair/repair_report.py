@@ -161,6 +161,7 @@ class RepairReport(Record):
     sources: tuple[SourceRepair, ...] = ()
     fallback_lights: tuple[str, ...] = ()  # ids of the rooms that got one: nothing lit them
     added_lamps: tuple[str, ...] = ()  # ids of rooms with no lamp, or too weak ones
+    added_ceilings: tuple[str, ...] = ()  # ids of rooms that had walls and no ceiling
     rooms: tuple[RoomAudit, ...] = ()
     is_leaking: bool | None = None  # None = not measured
     leaks: LeakReport | None = None
@@ -228,6 +229,8 @@ def _structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(s.n_joints_closed, 'place')} where walls missed each other closed."
     if s.n_stairwells_closed:
         yield f"{_n(s.n_stairwells_closed, 'floor or ceiling', 'floors or ceilings')} carried on over stairwells without a room."  # fmt: skip
+    if report.added_ceilings:
+        yield f"{_n(len(report.added_ceilings), 'room')} had walls and no ceiling and got one at the walls' height: {_some(report.added_ceilings)}."
     if s.n_openings:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
     if s.n_frames_moved:

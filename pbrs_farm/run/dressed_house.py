@@ -69,11 +69,12 @@ def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, Dre
     if not seed:
         return house, None
     from pbrs_farm.dress.dressing import dress
-    from pbrs_farm.repair.repair_house import without_persons_and_plants
+    from pbrs_farm.repair.repair_house import with_rooms_closed, without_persons_and_plants
 
     doing(source.location, "dress")
-    # Nothing makes way for people and plants that repair will take out.
+    # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.
     bare, _removed = without_persons_and_plants(house, recipe.repair)
+    bare = with_rooms_closed(bare, recipe.repair)
     return dress(bare, catalogue_of(recipe.dress), recipe.dress, seed)
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from pbrs_farm.core.house import Enclosure, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.geometry.solids import quads_surface
-from pbrs_farm.read.mesh.triangulate import horizontal
 from pbrs_farm.repair import repair
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, solid_from_patches
 from tests.repair.embree import EmbreeOccluder

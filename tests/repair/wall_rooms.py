@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Room, Source, Surface
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.geometry.solids import quads_surface, wall_prism
-from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
 
 HEIGHT_M = 2.5
 WALL, FLOOR, CEILING = 0, 1, 2

@@ -38,10 +38,10 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.record import Nyu40, Record, read_toml
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.geometry.solids import box, box_quads, lathe, quads_surface, sphere, wall_prism
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
 
 # Tiny pictures made in code, as PNG bytes, for the built-in home.
 

@@ -26,7 +26,8 @@ _PRIMITIVES: Final = frozenset(
 _PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
 # What follows these words describes the thing; the thing itself is named before them.
 _ASIDES: Final = """with and on of for from under without in mit und auf fur von aus ohne avec et
-    sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для"""
+    sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для
+    two three four five six"""
 _ASIDE: Final = frozenset(_ASIDES.split())
 _MODIFIERS: Final = frozenset({"wall", "kitchen"})  # say where an unknown thing stands
 _HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages that name the thing first

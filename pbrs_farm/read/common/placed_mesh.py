@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F32, F64, I32
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Box, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
@@ -62,16 +62,3 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
         axes = axes * np.array([-1.0, 1.0, 1.0])
     centre = world_from_model[:3, :3] @ ((low + high) / 2) + world_from_model[:3, 3]
     return Box(centre, scale * (high - low) / 2, axes)
-
-
-def part_of(surface: Surface, faces: I32, name: str) -> Surface:
-    """Some faces of a surface with the vertices they use, as a surface of its own."""
-    used, numbers = np.unique(faces, return_inverse=True)
-    return Surface(
-        name=name,
-        positions=surface.positions[used],
-        faces=numbers.reshape(-1, 3).astype(np.int32),
-        material=surface.material,
-        uvs=None if surface.uvs is None else surface.uvs[used],
-        normals=None if surface.normals is None else surface.normals[used],
-    )

@@ -17,9 +17,8 @@ from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
-from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces
+from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces, part_of
 from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
-from pbrs_farm.read.common.placed_mesh import part_of
 
 # A mesh of several planar walls -> an item per plane, so that repair can thicken each.
 

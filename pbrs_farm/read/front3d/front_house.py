@@ -29,6 +29,7 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import area_vectors, face_areas
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import parted
 from pbrs_farm.home.room_use import named_kind
@@ -62,7 +63,6 @@ from pbrs_farm.read.front3d.front_walls import (
     solid_of,
 )
 from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at
-from pbrs_farm.read.mesh.triangulate import horizontal
 from pbrs_farm.read.suncg.house_json import NAME
 from pbrs_farm.read.suncg.models import MAX_TEXTURE_BYTES, ModelMaterials
 

@@ -31,6 +31,7 @@ from pbrs_farm.core.house import (
     Surface,
 )
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
@@ -46,7 +47,6 @@ from pbrs_farm.read.gltf.scene_items import across_last, assumed_light
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.mesh.triangulate import horizontal
 from pbrs_farm.read.suncg.wall_holes import openings
 
 Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import mapbox_earcut
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, I32, I64, Bools, Points2
-from pbrs_farm.core.house import Surface
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.mesh import area_vectors
 
 # Polygons of more corners become fans: ear cutting may take the square of their number.
@@ -82,61 +79,3 @@ def _ear_cut(polygon: F64) -> I64:
     against = area_vectors(polygon[cut]) @ normal < 0
     cut[against] = cut[against][:, [0, 2, 1]]
     return cut
-
-
-# Horizontal polygons as triangle surfaces: floors and ceilings.
-
-
-def signed_area(polygon: Points2) -> float:
-    """Area of (N, 2), positive if counter-clockwise with the second axis up."""
-    x, z = polygon[:, 0], polygon[:, 1]
-    return float(0.5 * np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))
-
-
-def counter_clockwise(polygon: Points2) -> Points2:
-    """polygon (N, 2), reversed if it runs clockwise."""
-    return polygon if signed_area(polygon) >= 0 else polygon[::-1].copy()
-
-
-def triangulated(rings: Sequence[Points2]) -> tuple[Points2, I32]:
-    """Points (V, 2) and counter-clockwise triangles (F, 3) of an outline and its holes."""
-    points = np.concatenate([np.asarray(r, np.float64) for r in rings])
-    ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
-    faces = np.asarray(mapbox_earcut.triangulate_float64(points, ends), np.int32).reshape(-1, 3)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    # Turn all triangles one way round and drop those without area.
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces[turn < 0] = faces[turn < 0][:, [0, 2, 1]]
-    return points, faces[turn != 0]
-
-
-def horizontal(
-    name: str, polygons: Sequence[Sequence[Points2]], y: float, material: int, *, up: bool
-) -> Surface:
-    """Polygons (each an outline and its holes, plan points) at height y, facing up or down.
-
-    uv = plan (x, -z) in metres for a floor, (x, z) for a ceiling, so that neither is mirrored.
-    """
-    # Cut each polygon and number its corners after those before it.
-    points: list[Points2] = []
-    faces: list[I32] = []
-    n = 0
-    for rings in polygons:
-        p, f = triangulated(rings)
-        points.append(p)
-        faces.append(f + n)
-        n += len(p)
-    plan = np.concatenate(points) if points else np.zeros((0, 2))
-    triangles = np.concatenate(faces) if faces else np.zeros((0, 3), np.int32)
-    # Counter-clockwise in plan (x right, z up) faces down: the world's y is x cross z, negated.
-    if up:
-        triangles = triangles[:, [0, 2, 1]]
-    positions = np.stack([plan[:, 0], np.full(len(plan), y), plan[:, 1]], -1)
-    uvs = np.stack([plan[:, 0], -plan[:, 1] if up else plan[:, 1]], -1)
-    return Surface(
-        name,
-        positions.astype(np.float32),
-        np.ascontiguousarray(triangles, np.int32),
-        material,
-        uvs.astype(np.float32),
-    )

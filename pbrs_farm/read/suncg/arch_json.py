@@ -21,10 +21,10 @@ from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_byte
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Opening, Surface
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial
-from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal
 from pbrs_farm.read.suncg.house_json import (
     Axes,
     Given,

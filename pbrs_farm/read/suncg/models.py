@@ -14,13 +14,12 @@ from scipy.sparse.csgraph import connected_components
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import LightPart, Material, MaterialKind, Surface
+from pbrs_farm.core.house import LightPart, Material, MaterialKind, Surface, part_of
 from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.placed_mesh import part_of
 from pbrs_farm.read.common.source_files import RootFolder, read_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial, parse_obj
 from pbrs_farm.read.suncg.house_json import Override

@@ -15,7 +15,7 @@ from svgelements import Arc, Close, CubicBezier, Line, Move, Path, QuadraticBezi
 
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.house import Opening, Surface
-from pbrs_farm.read.mesh.triangulate import counter_clockwise
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, HomeWall, PlanPiece
 from pbrs_farm.read.sweethome3d.home_file.parse_home import FULL_CUT_OUT
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials

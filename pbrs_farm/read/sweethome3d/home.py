@@ -40,6 +40,7 @@ from pbrs_farm.read.sweethome3d.home_rooms import (
     plane_items,
     read_rooms,
     room_nouns,
+    rooms_between_walls,
     staircase_cuts,
 )
 from pbrs_farm.read.sweethome3d.open_doors import StandingPiece, opened_doors
@@ -119,7 +120,7 @@ def _crossings(walls: Sequence[HomeWall]) -> int:
 # A Sweet Home 3D home -> House.
 
 
-_NO_ROOMS = "draw rooms (Plan > Create rooms) and save the home again"
+_NO_ROOMS = "no walls enclose any; draw rooms (Plan > Create rooms) and save the home again"
 _HIDDEN_ROOMS = "every room is on a level saved as hidden: --set read.hidden_levels=true"
 SAME_LEVEL_M = 0.1  # levels no farther apart in height are versions of one
 ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
@@ -151,6 +152,12 @@ def read_home(
     house_level = _house_levels(plan, notes)
     outlines = outlines_of(plan.walls)
     rooms = read_rooms(plan, materials, house_level)
+    if not rooms and not plan.rooms:
+        # Nobody drew rooms: they are what walls enclose.
+        plan = replace(plan, rooms=rooms_between_walls(plan, outlines))
+        rooms = read_rooms(plan, materials, house_level)
+        if rooms:
+            notes.add("rooms-from-walls", file, f"no rooms are drawn: {len(rooms)} between walls")
     if not rooms:
         raise BadHouse(file, "", "no rooms", hint=_why_no_rooms(plan))
     # Build walls, floors and ceilings; staircases cut the last two.

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import shapely
-from scipy.spatial import ConvexHull, QhullError
 
-from pbrs_farm.core.arrays import F64, I32, I64, Points2
+from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
-from pbrs_farm.read.mesh.triangulate import counter_clockwise, horizontal, triangulated
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal, level_or_sloped
 from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,
@@ -26,87 +24,6 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import (
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, frame_of
 from pbrs_farm.read.sweethome3d.wall_solids import Outline, picture_uvs, top_heights
-
-# A polygon with a height at each corner -> the triangles of the ceiling over it.
-
-
-FIT_M = 0.02  # how far a roof may lie above a given height
-ROOF_SLIVER_M2 = 1e-6  # pieces of less area are left out
-
-
-class Roof(NamedTuple):
-    """Plan points (N, 2), their heights (N,), triangles (F, 3) counter-clockwise in plan."""
-
-    points: Points2
-    heights: F64
-    faces: I32
-
-
-def roof_over(rings: Sequence[Points2], heights: F64) -> Roof:
-    """The ceiling over an outline and its holes; heights: of all their points in order.
-
-    A roof that bends only downwards (gable, hip, shed) is spanned over the corners and ridge ends
-    like a cloth, to within FIT_M of every given height; any other is cut by its plan alone.
-    """
-    points = np.concatenate([np.asarray(r, np.float64) for r in rings])
-    cloth = _cloth(points, heights)
-    if cloth is not None:
-        spanned = _spanned(rings, points, heights, cloth)
-        if spanned is not None:
-            return spanned
-    return Roof(points, heights, triangulated(rings)[1])
-
-
-def _cloth(points: Points2, heights: F64) -> I64 | None:
-    # Triangles of the upper side of the convex hull of the points in space.
-    # Add a point far below: the faces without it are the upper side.
-    n = len(points)
-    below = [*points.mean(0), heights.min() - 10.0 * float(np.ptp(points) + np.ptp(heights))]
-    try:
-        hull = ConvexHull(np.vstack([np.column_stack([points, heights]), below]))
-    except (QhullError, ValueError):
-        return None
-    faces = hull.simplices[(hull.simplices < n).all(1)].astype(np.int64)
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces = np.where(turn[:, None] < 0, faces[:, [0, 2, 1]], faces)[
-        np.abs(turn) > 2 * ROOF_SLIVER_M2
-    ]
-    return faces[np.lexsort(faces.T[::-1])] if len(faces) else None
-
-
-def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64) -> Roof | None:
-    # The cloth cut along the outline; None if a given height lies too far under it.
-    outline = shapely.Polygon(rings[0], list(rings[1:]))
-    all_points, all_heights, all_faces, n = [], [], [], 0
-    worst = 0.0
-    for face in cloth:
-        corners = points[face]
-        # Fit the plane height = a x + b z + c through the triangle's corners.
-        plane = np.linalg.solve(np.column_stack([corners, np.ones(3)]), heights[face])
-        triangle = shapely.Polygon(corners)
-        # Measure how far it lies above the heights given there.
-        on_it = shapely.intersects_xy(triangle.buffer(1e-9), points)
-        over = points[on_it] @ plane[:2] + plane[2] - heights[on_it]
-        worst = max(worst, float(over.max(initial=0.0)))
-        # Keep the part of it inside the outline.
-        for part in shapely.get_parts(shapely.intersection(triangle, outline)):
-            if part.geom_type != "Polygon" or part.area < ROOF_SLIVER_M2:
-                continue
-            inner = [shapely.get_coordinates(r)[:-1] for r in (part.exterior, *part.interiors)]
-            plan, faces = triangulated(inner)
-            all_points.append(plan)
-            all_heights.append(plan @ plane[:2] + plane[2])
-            all_faces.append(faces + n)
-            n += len(plan)
-    if worst > FIT_M or not all_points:
-        return None
-    return Roof(
-        np.concatenate(all_points),
-        np.concatenate(all_heights),
-        np.concatenate(all_faces).astype(np.int32),
-    )
-
 
 # How high a room's ceiling is: its level's height, or the tops of the walls around.
 
@@ -155,20 +72,7 @@ class CeilingHeights:
         """The ceiling over polygons (each an outline and its holes), facing down."""
         bent = [[self._with_kinks(level, ring, is_flat) for ring in rings] for rings in parts]
         heights = [self.heights(level, np.concatenate(rings), is_flat) for rings in bent]
-        every = np.concatenate(heights)
-        # A level ceiling needs no roof.
-        if np.ptp(every) < 1e-4:
-            return horizontal("ceiling", parts, level.elevation + every[0], material, up=False)
-        # Span a roof over each polygon, and number its corners after those before it.
-        positions, faces, n = [], [], 0
-        for rings, tops in zip(bent, heights, strict=True):
-            plan, y, triangles = roof_over(rings, tops)
-            positions.append(np.stack([plan[:, 0], level.elevation + y, plan[:, 1]], -1))
-            faces.append(triangles + n)
-            n += len(plan)
-        world = np.concatenate(positions).astype(np.float32)
-        numbers = np.concatenate(faces).astype(np.int32)
-        return Surface("ceiling", world, numbers, material, world[:, [0, 2]])
+        return level_or_sloped("ceiling", bent, [level.elevation + h for h in heights], material)
 
     def _with_kinks(self, level: PlanLevel, ring: Points2, is_flat: bool) -> Points2:
         # The ring with the points where the walls' tops beside one of its edges bend.
@@ -215,6 +119,9 @@ def _nearest(point: Points2, segments: F64, tops: F64) -> float:
 
 
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
+LEAST_ROOM_M2 = 1.0  # of what walls enclose: smaller is a shaft
+LEAST_WALL_M = 1.8  # lower walls enclose no room
+GAP_M = 0.1  # between walls that were meant to meet
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
 MAX_CORNERS = 300  # of a room: what is more is a curve drawn too finely, and costs its square
 
@@ -248,6 +155,36 @@ def read_rooms(
         counts[level_id] = number + 1
         rooms.append(ReadRoom(f"{level_id}_{number}", room, level, level_id, outline))
     return rooms
+
+
+def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[HomeRoom, ...]:
+    """Rooms where walls of visible levels enclose something, for a plan in which none is drawn.
+
+    Gaps of ends that miss each other are closed; parapets and fences enclose nothing.
+    """
+    found: list[HomeRoom] = []
+    for level_id in dict.fromkeys(wall.level for wall in plan.walls):
+        feet = [
+            shapely.make_valid(shapely.Polygon(outlines[wall.id].polygon))
+            for wall in plan.walls
+            if wall.level == level_id
+            and wall.id in outlines
+            and max(wall.height, wall.height_end or 0.0) >= LEAST_WALL_M
+        ]
+        standing = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
+        standing = standing.buffer(-GAP_M / 2, join_style="mitre")
+        # What lies within the walls' outer edge, and under no wall.
+        whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(standing)])
+        inside = _polygons(shapely.difference(whole, shapely.union_all([standing, *feet])))
+        found += [
+            HomeRoom(
+                place=f"walls of level {level_id or '0'}", level=level_id, name="", points=_ring(p.exterior),
+                has_floor=True, has_ceiling=True, floor=Paint(), ceiling=Paint(), is_ceiling_flat=False,
+            )
+            for p in sorted(inside, key=lambda p: (p.bounds, p.area))
+            if p.area >= LEAST_ROOM_M2
+        ]  # fmt: skip
+    return tuple(found)
 
 
 def _simple(room: HomeRoom, materials: HomeMaterials) -> shapely.Polygon | None:
