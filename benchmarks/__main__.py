@@ -42,6 +42,7 @@ OWN_TARGET: Final = {
     "loading": "study.loading",
     "study": "study.study_figures",
     "lived_in": "study.lived_in",
+    "tone": "study.picture_tone",
     "board": "board.board_pages",
     "motion": "motion.motion",
     "python": "python_api",

@@ -58,6 +58,22 @@ def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally:
     told = view.table.get("modes", {}).get("develop", {})
     for mode in modes:
         _check_mode(view, mode, arrays[mode], light, told.get(mode, {}), view.recipe, tally)
+    _check_tone(view, view.recipe, told.get("tone"), tally)
+
+
+def _check_tone(view: StoredView, recipe: Recipe, told: Any, tally: Tally) -> None:
+    """What view.json tells of the choices drawn for the view is what the recipe draws."""
+    if recipe.tone.spread == 0 and told is None:
+        return
+    tone = _tone_of(view, recipe)
+    names = ("exposure_ev", "contrast", "black", "white")
+    drawn = {name: getattr(tone, name) for name in names} if recipe.tone.spread > 0 else None
+    what = f"view.json tells of its tone {told}, the recipe draws {drawn}"
+    tally.expect("light developed", view.place, told == drawn, what)
+
+
+def _tone_of(view: StoredView, recipe: Recipe) -> ToneFields:
+    return recipe.tone_of(view.folder.parent.parent.name, view.folder.name)
 
 
 def _check_mode(
@@ -70,7 +86,7 @@ def _check_mode(
     tally: Tally,
 ) -> None:
     place = f"{view.place}/{mode}.png"
-    tone, sensor = recipe.tone, recipe.sensor
+    tone, sensor = _tone_of(view, recipe), recipe.sensor
     total = sum((light[g] for g in _GROUPS[mode]), np.zeros_like(light["outdoor"]))
     total = _glared(total, tone.glare)
     gains = _white_balance(total, light["albedo"], tone.white_balance)
@@ -207,7 +223,8 @@ def _exposure(balanced: Floats, tone: ToneFields) -> float:
     if not level.size:
         return 1.0
     bright = float(np.percentile(level, 98))
-    return tone.key / float(np.exp(np.log(np.clip(level, bright / 1000, bright)).mean()))
+    average = float(np.exp(np.log(np.clip(level, bright / 1000, bright)).mean()))
+    return float(tone.key / average * 2**tone.exposure_ev)
 
 
 def _toned(
@@ -231,7 +248,19 @@ def _toned(
         linear = _rolled(light, white)
     linear = np.clip(linear, 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * srgb), np.uint8)
+    return np.asarray(np.rint(255 * _curved(srgb, tone)), np.uint8)
+
+
+def _curved(srgb: Floats, tone: ToneFields) -> Floats:
+    """Luma by an S whose odds go to a power, then by the line that begins at the black level."""
+    if tone.preset == "released" or (tone.contrast == 1 and tone.black == 0):
+        return srgb
+    luma = srgb @ [0.299, 0.587, 0.114]
+    with np.errstate(divide="ignore"):
+        s_shaped = 1 / (1 + (np.maximum(1 / luma - 1, 0)) ** tone.contrast)
+    ends = np.maximum((s_shaped - tone.black) / (1 - tone.black), 0)
+    chroma = np.minimum(np.divide(ends, luma, out=np.zeros_like(luma), where=luma > 0), 1)
+    return np.asarray(np.clip(ends[..., None] + (srgb - luma[..., None]) * chroma[..., None], 0, 1))
 
 
 def _vignette(light: Floats, sensor: SensorFields) -> Floats:

@@ -88,6 +88,12 @@ def right_id(left: str) -> str:
     return f"{left}_right"
 
 
+def take_id(view: str) -> str:
+    """What a camera takes at one setting: all frames of a house's clip, both eyes of a pair."""
+    left = view.removesuffix("_right")
+    return "clip" if left.startswith("frame_") else left
+
+
 def house_key(house: str, file: str = "") -> str:
     """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
     return f"{FOLDERS[is_object(house)]}/{house}/{file}"

@@ -110,6 +110,10 @@ class Recipe(FieldGroup):
             )
         return self
 
+    def tone_of(self, house_id: str, view_id: str) -> ToneFields:
+        """The tone of one view: drawn for it where the recipe has a spread."""
+        return self.tone.drawn(keys.seed(house_id, keys.take_id(view_id), "tone", self.seed))
+
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
 
@@ -150,6 +154,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
         "walk_turn_dps",
         "walk_shake",
         "stereo_m",
+        "roll_sd_deg",
     ),
     "dress": tuple(DressFields.model_fields),
     "read": ("doors", "stand_ins"),
@@ -158,7 +163,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx", "add_ceilings"),
     "selection": ("min_room_lx", "black_modes"),
-    "tone": ("pictures", "white", "glare"),
+    "tone": ("pictures", "white", "glare", "exposure_ev", "contrast", "black", "spread"),
     "sky": (
         "sun_elevation_deg",
         "sun_azimuth_deg",
@@ -175,7 +180,8 @@ _PHOTO: Mapping[str, Any] = {
     "height_min_m": 1.2,
     "height_max_m": 1.65,
     "tilt_deg": 8.0,
-    "tilt_sd_deg": 6.0,
+    "tilt_sd_deg": 10.0,
+    "roll_sd_deg": 4.0,
     "clearance_m": 0.15,
     "min_objects": 0,
     "max_item_fraction": 0.5,
@@ -194,15 +200,17 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
-        "light": {"spp": 10},
+        "light": {"spp": 10, "filter": "box"},
         "sky": {"time": "drawn"},
+        "tone": {"spread": 1.0},
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "cameras": _PHOTO,
-        "light": {"spp": 28},
+        "light": {"spp": 28, "filter": "box"},
         "sky": {"time": "drawn"},
+        "tone": {"spread": 1.0},
         "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},

@@ -131,6 +131,9 @@ class CameraFields(FieldGroup):
         le=30,
         description="of a normal spread about tilt_deg; 0 = fixed, as in the paper",
     )
+    roll_sd_deg: float = Field(
+        0.0, ge=0, le=30, description="of a normal spread of the roll about level; 0 = level"
+    )
     clearance_m: float = Field(
         0.10, ge=0, le=10, description="from any obstacle, in three dimensions"
     )
@@ -339,6 +342,18 @@ class ToneFields(FieldGroup):
         64.0, ge=1, le=1e6, description="photo: radiance over a matt white's that becomes 255"
     )
     glare: Share = Field(0.0, description="of the light, spread wide about what is bright")
+    exposure_ev: float = Field(0.0, ge=-8, le=8, description="photo: stops above the key")
+    contrast: float = Field(
+        1.0, ge=0.25, le=4, description="photo: slope of encoded tones about the middle; 1 = none"
+    )
+    black: float = Field(
+        0.0, ge=0, le=0.5, description="photo: encoded luma, 0..1, that becomes black"
+    )
+    spread: Share = Field(
+        0.0,
+        description="photo: how far exposure, contrast, black and white are drawn view by view, as"
+        " cameras and their owners choose them; 0 = all alike",
+    )
     pictures: str = Field(
         "", max_length=256, description="plugins' pictures beside the modes', ':' between"
     )
@@ -347,6 +362,39 @@ class ToneFields(FieldGroup):
     @classmethod
     def _pictures_are_known(cls, value: str) -> str:
         return checked_names("pictures", value)
+
+    def drawn(self, seed: int) -> ToneFields:
+        """These fields for one view: what its camera and its owner chose, and no spread left.
+
+        The same seed gives the same choice; without a spread it is these fields.
+        """
+        if self.spread == 0:
+            return self
+        deviates = np.random.default_rng(seed).normal(size=len(TONE_CHOICES))
+        ev, contrast, black, white = (
+            self.spread * (mean + sd * float(z))
+            for (mean, sd), z in zip(TONE_CHOICES.values(), deviates, strict=True)
+        )
+        return self.model_copy(
+            update={
+                "spread": 0.0,
+                "exposure_ev": round(min(max(self.exposure_ev + ev, -8.0), 8.0), 4),
+                "contrast": round(min(max(self.contrast * 2**contrast, 0.25), 4.0), 4),
+                "black": round(min(max(self.black + black, 0.0), 0.5), 4),
+                "white": round(max(self.white * 2**white, 1.0), 4),
+            }
+        )
+
+
+# What tone.spread = 1 draws: mean and standard deviation of stops of exposure, of the binary
+# logarithms of contrast and white, and of the black level. Set so that pictures of homes have the
+# spread, the dark and the bright pixels of photographs of rooms (`make bench NAME=tone`).
+TONE_CHOICES: Final[Mapping[str, tuple[float, float]]] = {
+    "exposure_ev": (0.3, 0.6),
+    "contrast": (0.6, 0.25),
+    "black": (0.08, 0.04),
+    "white": (-4.7, 1.0),
+}
 
 
 class RasterFields(FieldGroup):

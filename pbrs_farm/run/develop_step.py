@@ -15,7 +15,8 @@ from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.plugins import plugin
-from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.core.recipe import HistogramFields, ToneFields
+from pbrs_farm.core.recipe_fields import TONE_CHOICES
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
@@ -50,23 +51,27 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
     denoise = work.recipe.light.denoise
-    if work.recipe.tone.pictures and denoise:
+    tone = work.recipe.tone_of(work.house_id, work.view_id or "")
+    if tone.pictures and denoise:
         # Denoise once for the modes and for the plugins' pictures.
         aovs, denoise = denoised(aovs, wraps=_wraps(work)), False
     shot = _sensor_shot(work, cached)
-    images = develop(aovs, work.recipe.tone, denoise=denoise, shot=shot, wraps=_wraps(work))
+    images = develop(aovs, tone, denoise=denoise, shot=shot, wraps=_wraps(work))
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
-    for name in filter(None, work.recipe.tone.pictures.split(":")):
-        files[LAYER[name].file] = layer_bytes(name, _picture_of_plugin(name, aovs, work), credit)
-    denoise = work.recipe.light.denoise
-    return StepOutput(files, {"denoised": denoise} | {m: i.facts() for m, i in images.items()})
+    for name in filter(None, tone.pictures.split(":")):
+        files[LAYER[name].file] = layer_bytes(name, _picture_of_plugin(name, aovs, tone), credit)
+    facts: dict[str, Any] = {"denoised": work.recipe.light.denoise}
+    facts |= {m: i.facts() for m, i in images.items()}
+    if work.recipe.tone.spread > 0:
+        facts["tone"] = tone.model_dump(include=set(TONE_CHOICES))
+    return StepOutput(files, facts)
 
 
-def _picture_of_plugin(name: str, light: LinearAovs, work: Work) -> Srgb8Image:
+def _picture_of_plugin(name: str, light: LinearAovs, tone: ToneFields) -> Srgb8Image:
     """(H, W, 3) uint8 of a plugin's function; BadInput where it gives anything else."""
-    picture = np.asarray(plugin("pictures", name).load()(light, work.recipe.tone))
+    picture = np.asarray(plugin("pictures", name).load()(light, tone))
     if picture.dtype != np.uint8 or picture.shape != light.outdoor.shape:
         got = f"gave {picture.dtype} of shape {picture.shape}"
         raise BadInput(f"picture {name}", "", f"{got}, expected uint8 of {light.outdoor.shape}")
@@ -97,7 +102,8 @@ def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
         and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
     ]  # fmt: skip
     earlier.sort(key=lambda v: v.time_s or 0.0)
-    tone, denoise = work.recipe.tone, work.recipe.light.denoise
+    tone = work.recipe.tone_of(work.house_id, view.id)
+    denoise = work.recipe.light.denoise
     wanted = [
         wanted_exposures(_glance(work, house, v), tone, denoise=denoise, wraps=_wraps(work))
         for v in earlier

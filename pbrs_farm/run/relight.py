@@ -91,9 +91,11 @@ def relit(
             relit_light = indoor_from_lamps(layers, factors, aovs.indoor.shape)
         clean = replace(clean, indoor=relit_light)
     # Develop it as the run would have, with the recipe's tone.
-    tone = recipe_from_json(read_given(root / "recipe.json"), str(root / "recipe.json")).tone
+    recipe = recipe_from_json(read_given(root / "recipe.json"), str(root / "recipe.json"))
+    house_id = view.resolve().parents[1].name
+    tone = recipe.tone_of(house_id, view.resolve().name)
     images = develop(clean, tone, denoise=False, indoor=indoor, outdoor=outdoor)
-    credit = attribution(FolderStore(root), view.resolve().parents[1].name)
+    credit = attribution(FolderStore(root), house_id)
     return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)
 
 

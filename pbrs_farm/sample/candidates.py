@@ -27,13 +27,16 @@ class Candidates:
     sector: I32  # (N,)
     cell: I32  # (N, 2) column along x, row along z
     zoom: F64  # (N,) times the focal length
+    roll: F64  # (N,) radians about the optical axis, clockwise as the photographer turns
 
     def __len__(self) -> int:
         return len(self.sector)
 
     def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
         """The candidates numbered by which (M,), as cameras; intrinsics: those of zoom 1."""
-        plain = cameras_looking(intrinsics, self.eye[which], self.towards[which])
+        plain = cameras_looking(
+            intrinsics, self.eye[which], self.towards[which], roll=self.roll[which]
+        )
         lenses = {zoom: intrinsics.zoomed(zoom) for zoom in set(self.zoom[which].tolist())}
         zooms = self.zoom[which].tolist()
         return [
@@ -46,14 +49,23 @@ def cameras_looking(
     eyes: F64,
     towards: F64,
     up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+    *,
+    roll: F64 | None = None,
 ) -> list[Camera]:
-    """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up."""
+    """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up.
+
+    roll: (N,) radians by which each is turned clockwise about its axis; upright when None.
+    """
     # Build OpenGL axes: x right, y up, z back.
     back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)
     right = np.cross(np.array(up), back)
     right /= np.linalg.norm(right, axis=1, keepdims=True)
+    above = np.cross(back, right)
+    if roll is not None and roll.any():
+        cos, sin = np.cos(roll)[:, None], np.sin(roll)[:, None]
+        right, above = cos * right - sin * above, cos * above + sin * right
     poses = np.zeros((len(eyes), 4, 4))
-    poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = right, np.cross(back, right), back
+    poses[:, :3, 0], poses[:, :3, 1], poses[:, :3, 2] = right, above, back
     poses[:, :3, 3], poses[:, 3, 3] = eyes, 1.0
     return [Camera(intrinsics, pose) for pose in poses]
 
@@ -74,18 +86,18 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
 
     Position uniform in the cell, azimuth uniform in the sector (measured from +x towards +z),
     height uniform between the fields' bounds above the grid's base, a fixed tilt downwards (or a
-    normal one about it, held to two standard deviations, when tilt_sd_deg is above 0). The focal
-    length takes one of five values within hfov_spread of the fields'.
+    normal one about it, held to two standard deviations, when tilt_sd_deg is above 0), a roll
+    likewise about 0. The focal length takes one of five values within hfov_spread of the fields'.
     names: what the randomness is hashed from besides sector and cell.
     """
     n_x, n_z = n_cells(grid, fields.cell_m)
     row, column = np.divmod(np.arange(n_x * n_z, dtype=np.int64), n_x)
     cell = np.stack([column, row], axis=1).astype(np.int32)
     step = 2 * np.pi / fields.n_sectors
-    eyes, directions, zooms = [], [], []
+    eyes, directions, zooms, rolls = [], [], [], []
     for sector in range(fields.n_sectors):
-        # Draw seven numbers per cell: x, z, azimuth, height, two for the tilt, one for the lens.
-        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 7)
+        # Draw nine numbers per cell: x, z, azimuth, height, two for the tilt, the lens, two for the roll.
+        u = uniforms(int(keys.digest(*names, sector)[:16], 16), cell, 9)
         x = grid.x_min + (column + u[:, 0]) * fields.cell_m
         z = grid.z_min + (row + u[:, 1]) * fields.cell_m
         height = fields.height_min_m + u[:, 3] * (fields.height_max_m - fields.height_min_m)
@@ -93,6 +105,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal(u[:, 4], u[:, 5]))
         # Few focal lengths: pictures of one are traced together.
         zooms.append(1 + fields.hfov_spread * (np.floor(5 * u[:, 6]) - 2) / 2)
+        rolls.append(np.deg2rad(fields.roll_sd_deg * _normal(u[:, 7], u[:, 8])))
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
         # Look along the azimuth, tilted down.
         directions.append(
@@ -107,6 +120,7 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         sector=np.repeat(np.arange(fields.n_sectors, dtype=np.int32), len(cell)),
         cell=np.tile(cell, (fields.n_sectors, 1)),
         zoom=np.concatenate(zooms),
+        roll=np.concatenate(rolls),
     )
 
 

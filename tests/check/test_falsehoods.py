@@ -203,6 +203,9 @@ FALSEHOODS: dict[str, tuple[Plant, str]] = {
     "light brightened": (picture("mlt_il_ol.png", scaled(1.05)), "light developed"),
     "light patched": (picture("mlt_ol.png", patch(20)), "light developed"),
     "light brightened, and its facts": (brighter_with_its_facts, "light developed"),
+    "another tone told": (
+        table(lambda t: t["modes"]["develop"]["tone"].update(contrast=1.0)), "light developed",
+    ),
     "radiance of one colour scaled": (
         exr("radiance.exr", lambda a: a * (1 + np.arange(a.shape[1]) / 320)), "light developed",
     ),

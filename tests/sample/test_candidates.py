@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.candidates import Grid, grid_candidates, uniforms
 
@@ -85,3 +86,22 @@ def test_a_spread_of_tilts_is_normal_about_the_given_one_and_moves_nothing_else(
     np.testing.assert_array_equal(c.eye, fixed.eye)
     azimuth, same = (np.arctan2(x.towards[:, 2], x.towards[:, 0]) for x in (c, fixed))
     np.testing.assert_allclose(azimuth, same)
+
+
+def test_a_spread_of_rolls_turns_cameras_about_their_axis_and_moves_nothing_else() -> None:
+    rolled = FIELDS.model_copy(update={"roll_sd_deg": 4.0})
+    fixed, c = (grid_candidates(GRID, f, (0, "h", "r")) for f in (FIELDS, rolled))
+    assert not fixed.roll.any()
+    roll = np.rad2deg(c.roll)
+    inside = np.abs(roll) < 7.9
+    assert stats.kstest(roll[inside], stats.truncnorm(-1.975, 1.975, 0, 4).cdf).pvalue > 1e-3
+    np.testing.assert_array_equal(c.eye, fixed.eye)
+    np.testing.assert_array_equal(c.towards, fixed.towards)
+    # Clockwise by r degrees: the horizon falls to the right, so the camera's right points down.
+    number = np.array([int(np.argmax(c.roll))])
+    level, turned = (x.cameras(number, Intrinsics.from_hfov(64, 48))[0] for x in (fixed, c))
+    a, b = level.world_from_camera, turned.world_from_camera
+    np.testing.assert_allclose(b[:3, 2], a[:3, 2], atol=1e-12)
+    assert float(b[1, 0]) < 0
+    angle = np.degrees(np.arccos(float(a[:3, 0] @ b[:3, 0])))
+    assert angle == pytest.approx(float(roll.max()))

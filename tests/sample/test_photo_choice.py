@@ -44,6 +44,7 @@ def room(
             sector=np.array([row[0] for row in rows], np.int32),
             cell=np.zeros((n, 2), np.int32),
             zoom=np.ones(n),
+            roll=np.zeros(n),
         ),
         verdict=np.full(n, Verdict.LOWER_SCORE, np.uint8),
         score=np.array([row[1] for row in rows]),

@@ -72,7 +72,8 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
     from pbrs_farm.run.relight import relight_layers
     from pbrs_farm.transport.develop.tone_mapping import exposure_of
 
-    tone = recipe_from_json(recipe, "recipe.json").tone
+    place = json.loads(view_json)
+    tone = recipe_from_json(recipe, "recipe.json").tone_of(place["house"], place["view"])
     rows = lamp_rows(view_json)
     layers = relight_layers(radiance_from_exr(radiance, "radiance.exr"), rows, denoise=denoise)
     light = {"outdoor": layers.aovs.outdoor}
@@ -131,6 +132,7 @@ def _tone_facts(tone: ToneFields) -> dict[str, Any]:
     from pbrs_farm.transport.develop.tone_mapping import knee_of
 
     facts = {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
+    facts |= {"exposure_ev": tone.exposure_ev, "contrast": tone.contrast, "black": tone.black}
     return facts | {"knee": knee_of(tone.white)}
 
 

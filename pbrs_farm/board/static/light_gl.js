@@ -29,7 +29,7 @@ vec3 summed() {
 }`;
 
 const TONE = `
-uniform float u_exposure, u_white, u_knee;
+uniform float u_exposure, u_white, u_knee, u_contrast, u_black;
 uniform vec3 u_gains;
 uniform bool u_released;
 
@@ -52,11 +52,21 @@ vec3 reinhard(vec3 rgb) {
   return rgb * (luminance > 0.0 ? mapped / luminance : 0.0);
 }
 
+vec3 curved(vec3 rgb) {
+  if (u_contrast == 1.0 && u_black <= 0.0) return rgb;
+  float luma = dot(rgb, vec3(0.299, 0.587, 0.114));
+  if (luma <= 0.0) return vec3(0.0);
+  float light = pow(luma, u_contrast), dark = pow(max(1.0 - luma, 0.0), u_contrast);
+  float tone = max((light / (light + dark) - u_black) / (1.0 - u_black), 0.0);
+  return clamp(tone + (rgb - luma) * min(tone / luma, 1.0), 0.0, 1.0);
+}
+
 vec4 toned(vec3 light) {
   vec3 rgb = max(light * u_gains, 0.0);
   vec3 linear = clamp(u_released ? reinhard(rgb) : rolledOff(rgb * u_exposure), 0.0, 1.0);
   vec3 low = 12.92 * linear, high = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
-  return vec4(mix(high, low, vec3(lessThanEqual(linear, vec3(0.0031308)))), 1.0);
+  vec3 encoded = mix(high, low, vec3(lessThanEqual(linear, vec3(0.0031308))));
+  return vec4(u_released ? encoded : curved(clamp(encoded, 0.0, 1.0)), 1.0);
 }`;
 
 // All layers, toned: the picture as `relight` writes it.
@@ -159,11 +169,13 @@ export class LightGl {
     gl.uniform1f(at.u_height, this.height);
   }
 
-  #setTone(at, { gains, exposure, white, knee }, isReleased) {
+  #setTone(at, { gains, exposure, white, knee, contrast, black }, isReleased) {
     const { gl } = this;
     gl.uniform1f(at.u_exposure, exposure);
     gl.uniform1f(at.u_white, white);
     gl.uniform1f(at.u_knee, knee);
+    gl.uniform1f(at.u_contrast, contrast);
+    gl.uniform1f(at.u_black, black);
     gl.uniform3fv(at.u_gains, gains);
     gl.uniform1i(at.u_released, isReleased ? 1 : 0);
   }

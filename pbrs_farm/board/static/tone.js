@@ -11,12 +11,12 @@ const BURN = 0.2, LOG_FLOOR = 1e-3;
 export function toneOf(light, albedo, fields) {
   const gains = whiteBalance(light, albedo, fields.white_balance).map(Math.fround);
   const n = light.length / 3;
-  const exposure = fields.preset === "released" ? releasedExposure(light, gains, n, fields.key) : photoExposure(light, gains, n, fields.key);
+  const exposure = fields.preset === "released" ? releasedExposure(light, gains, n, fields.key) : photoExposure(light, gains, n, fields.key) * 2 ** fields.exposure_ev;
   let largest = 0;
   if (fields.preset === "released") {
     for (let k = 0; k < n; k++) largest = Math.max(largest, dot(light, k, gains, MITSUBA_LUMINANCE));
   }
-  return { gains, exposure, white: largest * exposure * (1 - BURN) ** 2, knee: fields.knee };
+  return { gains, exposure, white: largest * exposure * (1 - BURN) ** 2, knee: fields.knee, contrast: fields.contrast, black: fields.black };
 }
 
 function dot(light, k, gains, weights) {

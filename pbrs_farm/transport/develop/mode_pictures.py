@@ -15,11 +15,17 @@ from PIL import Image
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F32, F64, RadianceImage, Srgb8Image, UnitVectors
-from pbrs_farm.core.frames import LM_PER_W, LUMINANCE, srgb_from_linear
+from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import SensorFields, ToneFields
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone, with_glare
+from pbrs_farm.transport.develop.tone_mapping import (
+    encoded,
+    exposure_of,
+    rolled_off,
+    tone,
+    with_glare,
+)
 
 # A camera's sensor: from linear light to 8 bits by electrons, a mosaic, noise and JPEG.
 # The order is a camera's own: lens (lateral aberration, vignetting), exposure, Bayer mosaic,
@@ -72,11 +78,18 @@ def lagged_exposure(wanted: Sequence[float], times_s: Sequence[float], lag_s: fl
 
 
 def sensed(
-    radiance: RadianceImage, gains: F32, exposure: Exposure, sensor: SensorFields, *, seed: int
+    radiance: RadianceImage,
+    gains: F32,
+    exposure: Exposure,
+    sensor: SensorFields,
+    fields: ToneFields,
+    *,
+    seed: int,
 ) -> Srgb8Image:
     """(H, W, 3) uint8 sRGB as the sensor takes radiance (H, W, 3); gains (3,): its white balance.
 
-    Equal seeds give equal bits.
+    fields: contrast and black level of its curve, whose white is where the sensor saturates. Equal
+    seeds give equal bits.
     """
     rng = np.random.default_rng(seed)
     # Saturation is white in all channels after the gains: scale them to 1 at least.
@@ -86,7 +99,7 @@ def sensed(
     rgb = demosaiced(raw) if sensor.mosaic else raw
     # Balance white, hold to what saturates, and let that be the curve's end.
     balanced = np.clip(rgb * scaled, 0, sensor.headroom)
-    picture = _toned(balanced, sensor.headroom)
+    picture = encoded(rolled_off(balanced, sensor.headroom), fields)
     return jpeg_loss(picture, sensor.jpeg_quality) if sensor.jpeg_quality > 0 else picture
 
 
@@ -168,12 +181,6 @@ def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random
     black = round(sensor.black_level * steps) / steps
     read = np.rint(np.clip(black + electrons / well * (1 - black), 0, 1) * steps) / steps
     return np.asarray((read - black) / (1 - black) * sensor.headroom)
-
-
-def _toned(rgb: F64, headroom: float) -> Srgb8Image:
-    """The curve of tone preset `photo`, which is white where the sensor saturates."""
-    linear = rolled_off(rgb, headroom)
-    return np.rint(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
 
 
 def jpeg_loss(picture: Srgb8Image, quality: int) -> Srgb8Image:
@@ -274,7 +281,7 @@ def develop(
             exposure = exposure_of(total * gains, fields)
             if shot is not None:
                 taken = shot.exposure(mode.value, exposure)
-                rgb = sensed(total, gains, taken, shot.fields, seed=shot.seed)
+                rgb = sensed(total, gains, taken, shot.fields, fields, seed=shot.seed)
                 images[mode.value] = ToneMappedImage(rgb, gains, taken.factor, taken)
                 continue
             rgb = tone(total * gains, fields, exposure=exposure)

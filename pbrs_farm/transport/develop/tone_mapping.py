@@ -18,6 +18,7 @@ from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.recipe import ToneFields
 
 _MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])  # of Mitsuba's tone mapper
+_LUMA: Final = np.array([0.299, 0.587, 0.114])  # of encoded colours, ITU-R BT.601
 _BURN: Final = 0.2  # of Reinhard's operator: how far highlights may burn out
 _LOG_FLOOR: Final = 1e-3  # added before the logarithm, as Mitsuba's tone mapper does
 _SHOULDER: Final = 0.6  # of photo: the curve is straight below
@@ -39,13 +40,32 @@ def tone(
     else:
         factor = exposure_of(radiance, fields) if exposure is None else exposure
         linear = rolled_off(rgb * factor, fields.white)
-    return np.round(np.clip(srgb_from_linear(linear), 0, 1) * 255).astype(np.uint8)
+    return encoded(linear, fields)
+
+
+def encoded(linear: F64, fields: ToneFields) -> Srgb8Image:
+    """(H, W, 3) uint8 sRGB of linear light; `photo` with its contrast and black level.
+
+    Both act on the encoded luma, as a camera's own curve does: the contrast is an S through the
+    middle of the range (its odds to a power), the black level a line. Colours keep their chroma
+    where they get lighter, and their saturation where they get darker.
+    """
+    rgb = np.clip(srgb_from_linear(linear), 0, 1)
+    if fields.preset == "photo" and (fields.contrast != 1 or fields.black > 0):
+        luma = (rgb @ _LUMA)[..., None]
+        light, dark = luma**fields.contrast, (1 - luma).clip(0) ** fields.contrast
+        curved = (light / (light + dark) - fields.black) / (1 - fields.black)
+        curved = np.maximum(curved, 0)
+        ratio = np.divide(curved, luma, out=np.zeros_like(luma), where=luma > 0)
+        rgb = np.clip(curved + (rgb - luma) * np.minimum(ratio, 1), 0, 1)
+    return np.round(rgb * 255).astype(np.uint8)
 
 
 def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     """The factor that brings an image's log-average luminance to the key; 1 for a black one.
 
-    For `photo` luminance is clamped to 0.001..1 of its 98th percentile (windows and bulbs are above).
+    For `photo` luminance is clamped to 0.001..1 of its 98th percentile (windows and bulbs are above),
+    and the factor is higher by the fields' stops.
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":
@@ -57,7 +77,7 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     luminance = luminance[luminance > 0]  # leave out pixels that hit nothing
     bright = float(np.percentile(luminance, 98))
     clipped = np.clip(luminance, bright / 1000, bright)
-    return fields.key / float(np.exp(np.mean(np.log(clipped))))
+    return 2**fields.exposure_ev * fields.key / float(np.exp(np.mean(np.log(clipped))))
 
 
 def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pbrs_farm.core.recipe import SensorFields, recipe_from_name
+from pbrs_farm.core.recipe import SensorFields, ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.mode_pictures import (
     Exposure,
     _electrons_read,
@@ -44,7 +44,7 @@ def test_a_flat_colour_survives_the_mosaic() -> None:
 def test_noise_is_that_of_the_electrons(iso: float) -> None:
     # Without a mosaic and at many bits the values are electrons over the well.
     fields = PLAIN.model_copy(update={"mosaic": False, "bits": 16, "headroom": 1.0})
-    picture = sensed(grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, seed=1)
+    picture = sensed(grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, ToneFields(), seed=1)
     back = (picture / 255.0).astype(float)
     well = fields.full_well_e * 100 / iso
     electrons = 0.25 * well
@@ -53,7 +53,7 @@ def test_noise_is_that_of_the_electrons(iso: float) -> None:
     step = 0.02
     low, high = (
         sensed(grey(v, 256), ONES, Exposure(0.01, 1.0, 1.0),
-               fields.model_copy(update={"full_well_e": 1e7, "read_noise_e": 0.0}), seed=1)
+               fields.model_copy(update={"full_well_e": 1e7, "read_noise_e": 0.0}), ToneFields(), seed=1)
         for v in (0.25 - step, 0.25 + step)
     )  # fmt: skip
     slope = (high.mean() - low.mean()) / 255 / (2 * step)
@@ -90,7 +90,7 @@ def test_automatic_exposure_makes_up_63_percent_of_a_step_after_its_lag() -> Non
 
 def test_saturated_light_is_white_whatever_the_gains() -> None:
     gains = np.array([0.7, 1.0, 1.8], np.float32)
-    picture = sensed(grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, seed=3)
+    picture = sensed(grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, ToneFields(), seed=3)
     assert (picture[4:-4, 4:-4] >= 254).all()
 
 
@@ -118,7 +118,7 @@ def test_aberration_parts_red_from_blue_at_the_edge_and_not_in_the_middle() -> N
 def test_equal_seeds_give_equal_bits_and_other_seeds_other_noise() -> None:
     shot = Exposure(0.02, 800, 1.0)
     fields = SensorFields(preset="phone")
-    a, b, c = (sensed(grey(0.2), ONES, shot, fields, seed=s) for s in (5, 5, 6))
+    a, b, c = (sensed(grey(0.2), ONES, shot, fields, ToneFields(), seed=s) for s in (5, 5, 6))
     assert (a == b).all()
     assert (a != c).any()
 

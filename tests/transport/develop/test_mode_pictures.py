@@ -2,9 +2,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.core.recipe import ToneFields
+from pbrs_farm.core import keys
+from pbrs_farm.core.recipe import ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised, wanted_exposures
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, rolled_off, tone, with_glare
+from pbrs_farm.transport.develop.tone_mapping import (
+    encoded,
+    exposure_of,
+    rolled_off,
+    tone,
+    with_glare,
+)
 
 
 def grey(level: float) -> np.ndarray:
@@ -51,6 +58,50 @@ def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
     assert tone(grey(64.0), ToneFields(white=64), exposure=1.0)[0, 0, 0] == 255
     assert tone(grey(4.0), ToneFields(white=4), exposure=1.0)[0, 0, 0] == 255
     assert tone(grey(0.99), ToneFields(white=1), exposure=1.0)[0, 0, 0] < 255
+
+
+def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
+    ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
+    linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
+    values = encoded(linear, ToneFields(contrast=2.0))[0, :, 0].astype(int)
+    assert (values[0], values[255]) == (0, 255)
+    assert abs(values[128] - 128) <= 1
+    assert abs((values[144] - values[112]) / 32 - 2.0) < 0.05
+    assert (np.diff(values) >= 0).all()
+
+
+def test_what_is_below_the_black_level_is_black_and_white_stays() -> None:
+    ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
+    linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
+    values = encoded(linear, ToneFields(black=0.2))[0, :, 0]
+    assert (values[:51] == 0).all()
+    assert values[53] > 0
+    assert values[255] == 255
+
+
+def test_contrast_keeps_the_hue_and_saturates_no_shadow() -> None:
+    dim = np.array([[[0.15, 0.075, 0.0375]]])
+    before, after = (encoded(dim, ToneFields(contrast=c))[0, 0].astype(float) for c in (1.0, 2.0))
+    assert after.max() < before.max()
+    np.testing.assert_allclose(after / after.max(), before / before.max(), atol=0.05)
+
+
+def test_a_spread_draws_one_tone_a_view_and_none_without_it() -> None:
+    plain, spread = ToneFields(), ToneFields(spread=1.0)
+    assert plain.drawn(1) is plain
+    assert spread.drawn(1) == spread.drawn(1) != spread.drawn(2)
+    assert spread.drawn(1).spread == 0
+    half = ToneFields(spread=0.5).drawn(1)
+    assert abs(half.exposure_ev - spread.drawn(1).exposure_ev / 2) < 1e-3
+
+
+def test_frames_of_a_clip_and_both_eyes_have_one_tone() -> None:
+    recipe = recipe_from_name("fast")
+    frames = {recipe.tone_of("h", keys.frame_id(k)) for k in range(9)}
+    assert len(frames) == 1
+    assert recipe.tone_of("h", "0_1_2") == recipe.tone_of("h", keys.right_id("0_1_2"))
+    assert recipe.tone_of("h", "0_1_2") != recipe.tone_of("h", "0_1_3")
+    assert recipe.tone_of("h", "0_1_2") != recipe.tone_of("g", "0_1_2")
 
 
 def test_glare_spreads_light_and_neither_adds_nor_takes_any() -> None:
