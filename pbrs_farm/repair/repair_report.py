@@ -57,7 +57,7 @@ class StructureReport(Record):
     n_stairwells_closed: int = 0  # floors and ceilings over stairwells that no room covers
     n_openings: int = 0
     n_openings_cut: int = 0  # the others touch no wall
-    n_frames_moved: int = 0  # doors and windows that lay in the faces of their walls
+    n_frames_moved: int = 0  # doors, windows and things that lay in the faces of walls or floors
     left_as_is: tuple[LeftAsIs, ...] = ()
     areas: tuple[SideArea, ...] = ()  # of every wall, floor and ceiling
     walls_lost: tuple[WallLoss, ...] = ()
@@ -234,7 +234,7 @@ def _structure(report: RepairReport) -> Iterator[str]:
     if s.n_openings:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
     if s.n_frames_moved:
-        yield f"{_n(s.n_frames_moved, 'door or window', 'doors and windows')} lay in the faces of walls: moved 0.5 mm out."
+        yield f"{_n(s.n_frames_moved, 'piece')} lay in the faces of walls: moved 0.5 mm out."
     for wall in s.walls_lost:
         yield (
             f"WALL LOST: of wall {wall.item_id} repair left {wall.after_m2:.1f} of "

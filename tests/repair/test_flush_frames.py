@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import House, Item, ItemKind, Opening
+from pbrs_farm.core.house import House, Item, ItemKind, Opening, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import repair, summary_of_report
@@ -38,7 +39,7 @@ def test_a_frame_as_thick_as_its_wall_is_moved_out_on_both_sides() -> None:
     assert low[2] == pytest.approx(-0.2 - MOVED_M, abs=1e-6)
     assert (high - low)[:2] == pytest.approx([1.2, 1.2], abs=1e-6)
     assert report.structure.n_frames_moved == 1
-    assert "1 door or window lay in the faces of walls" in summary_of_report(report)
+    assert "1 piece lay in the faces of walls" in summary_of_report(report)
 
 
 @pytest.mark.parametrize("depth_m", [0.1, 0.1996, 0.21])
@@ -59,3 +60,21 @@ def test_moving_apart_twice_is_moving_once() -> None:
     once, n = with_frames_apart(with_window(0.2))
     assert n == 1
     assert with_frames_apart(once)[1] == 0
+
+
+@pytest.mark.parametrize(("centre", "half", "axis", "moved_to"), [
+    ([1.0, 1.4, 0.0], [0.3, 0.4, 0.0], 2, MOVED_M),  # a picture drawn on the wall below z = 0
+    ([2.0, 0.0, 1.5], [0.6, 0.0, 0.4], 1, MOVED_M),  # a rug drawn on the floor
+])  # fmt: skip
+def test_a_thing_drawn_on_a_wall_or_floor_is_moved_out_of_it(
+    centre: list[float], half: list[float], axis: int, moved_to: float
+) -> None:
+    r = room("0_0", RECT)
+    sheet = box("sheet", np.array(centre), np.maximum(half, 1e-9), WALL)
+    facing = area_vectors(corners_of_surfaces([sheet]))[:, axis] > 1e-6
+    thing = Item("sheet", "sheet", ItemKind.OBJECT, "0", (replace(sheet, faces=sheet.faces[facing]),), nyu40=11)  # fmt: skip
+    after, report = repair(house([*walls_around(RECT), *covers(r), thing], [r]), RepairFields())
+    low, high = next(i for i in after.items if i.id == "sheet").bounds
+    assert low[axis] == pytest.approx(moved_to, abs=1e-6)
+    assert high[axis] == pytest.approx(moved_to, abs=1e-6)
+    assert report.structure.n_frames_moved == 1

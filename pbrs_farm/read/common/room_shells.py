@@ -103,8 +103,8 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     if not len(corners):
         return (item,)
     # Take the connected shells that look inward, else closed ones that look outward.
-    shell_of_face = _components(corners)
-    bounds = _bounds_of_shells(corners, shell_of_face)
+    shell_of_face = components(corners)
+    bounds = bounds_of_shells(corners, shell_of_face)
     large = np.flatnonzero(_is_large(bounds[:, 0], bounds[:, 1]))  # a plant has 60,000 leaves
     shells = [shell_of_face == k for k in large]
     facing = [_facing(corners[faces], others) for faces in shells]
@@ -121,11 +121,11 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     # Leave walls that stand around a room and are nothing else as they are.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
         return (item,)
-    kept = _picked(item, rest)
+    kept = picked(item, rest)
     return (*parts, replace(item, surfaces=kept, lights=(), box=None)) if kept else parts
 
 
-def _components(corners: F64) -> I64:
+def components(corners: F64) -> I64:
     """(F,) number of the connected mesh each face belongs to, corners at one place joined."""
     keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
     _, place = np.unique(keys, axis=0, return_inverse=True)
@@ -164,7 +164,7 @@ def _is_large(low: F64, high: F64) -> Bools:
     return np.asarray(fits & (side.max(-1) <= _LARGEST_SIDE_M))
 
 
-def _bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
+def bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
     """(S, 2, 3) lowest and highest corner of each shell."""
     order = np.argsort(shell_of_face, kind="stable")
     starts = np.searchsorted(shell_of_face[order], np.arange(int(shell_of_face.max()) + 1))
@@ -183,7 +183,7 @@ def _split(item: Item, chosen: Bools) -> list[Bools]:
     return np.split(chosen, np.cumsum([len(s.faces) for s in item.surfaces])[:-1])
 
 
-def _picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
+def picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
     """The item's surfaces with the chosen faces alone, empty ones left out."""
     pairs = zip(item.surfaces, _split(item, chosen), strict=True)
     return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
@@ -223,7 +223,7 @@ def _parts(item: Item, shown: Bools) -> tuple[Item, ...]:
             found.append(
                 replace(
                     item, id=f"{item.id}.{len(found)}", name=f"{item.name} {kind}".strip(),
-                    kind=kind, nyu40=CLASS_OF_STRUCTURE[kind], surfaces=_picked(item, own), lights=(),
+                    kind=kind, nyu40=CLASS_OF_STRUCTURE[kind], surfaces=picked(item, own), lights=(),
                     box=None, tags=tuple(t for t in item.tags if t != "unmapped"),
                 )
             )  # fmt: skip

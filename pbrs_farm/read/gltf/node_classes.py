@@ -32,6 +32,7 @@ from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, nyu40_of
 from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts
+from pbrs_farm.read.gltf.room_fittings import parted_fittings
 
 _WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
 _CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"
@@ -185,8 +186,8 @@ def centres_of(items: Sequence[Item]) -> F64:
 def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
     """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
 
-    others: centres_of all items. A room seen from inside is parted by how its faces look, what is
-    no room by the names of its materials; open walls are parted plane by plane. A node whose name
+    others: centres_of all items. A room seen from inside is parted by how its faces look, after
+    what is fitted into it (room_fittings); what is no room by the names of its materials; open walls are parted plane by plane. A node whose name
     holds the word window or door ("Room with windows") may be a room, too, where it is as large,
     and so may one called "Ground" or "Ground floor".
     """
@@ -194,10 +195,17 @@ def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
     may_be_room = item.kind in (*_STRUCTURE, ItemKind.GROUND) or is_unknown
     if not (may_be_room or _is_too_large_for_an_opening(item)):
         return (item,)
-    parts = room_parts(item, others)
-    if parts[0] is item and (is_unknown or item.kind is ItemKind.WALL):
-        parts = _by_materials(item)
-    return tuple(p for part in parts for p in planar_parts(part))
+    # What names and connected parts tell apart is no room's side, whichever way its faces look.
+    own, fittings = parted_fittings(item, by_shape=True)
+    parts = room_parts(own, others)
+    if fittings and parts[0] is own:
+        own, fittings = item, ()
+        if item.kind is ItemKind.WALL:
+            own, fittings = parted_fittings(item, by_shape=False)
+        parts = room_parts(own, others)
+    if parts[0] is own and (is_unknown or item.kind is ItemKind.WALL):
+        parts = _by_materials(own)
+    return (*(p for part in parts for p in planar_parts(part)), *fittings)
 
 
 def _is_too_large_for_an_opening(item: Item) -> bool:

@@ -184,7 +184,7 @@ def items_of_scene(
         elif thing.seen.is_tagged:
             parts = planar_parts(item)
         else:
-            parts = structure_parts(item, centres)
+            parts = tuple(_glazed(part, item, materials) for part in structure_parts(item, centres))
         if any(UNMAPPED in part.tags for part in parts):
             notes.add("unmapped-class", place, "names no class; it is otherprop")
         if sum(part.n_faces for part in parts) < item.n_faces:
@@ -199,6 +199,24 @@ def items_of_scene(
             if n_items > MAX_INSTANCES:
                 raise BadHouse(gltf.file, place, f"more than {MAX_INSTANCES} items")
             yield replace(part, id=unique)
+
+
+def _glazed(part: Item, whole: Item, materials: SceneMaterials) -> Item:
+    """A window or door that was part of a room's mesh, its glass as panes."""
+    openings = (ItemKind.WINDOW, ItemKind.DOOR)
+    if part.kind not in openings or whole.kind in openings:
+        return part
+    surfaces = []
+    for s in part.surfaces:
+        material = materials.library.materials[s.material]
+        is_opaque = material.kind is MaterialKind.OPAQUE
+        if material.kind is MaterialKind.GLASS or (is_opaque and names_glass(s.name)):
+            opacity = PANE_OPACITY if is_opaque else material.opacity
+            pane = replace(material, kind=MaterialKind.PANE, opacity=opacity)
+            surfaces.append(replace(s, material=materials.library.index(pane)))
+        else:
+            surfaces.append(s)
+    return replace(part, surfaces=tuple(surfaces))
 
 
 def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from manifold3d import Manifold
+from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Opening, Surface, corners_of_surfaces
@@ -99,16 +100,18 @@ def _cutter(opening: Opening, wall: Wall, table: TagTable) -> Manifold | None:
     return solid_from_patches([replace(patch, tag=wall.tag(REVEAL))], table)
 
 
-# Door and window frames moved half a millimetre out of the faces of their walls.
-# A frame as thick as its wall lies in the wall's own faces: a ray meets either of the two there,
-# and no label is the only right one.
+# Things moved half a millimetre out of the faces of walls, floors and ceilings.
+# A frame as thick as its wall lies in the wall's own faces, and so does a picture drawn on it: a ray
+# meets either of the two there, and no label is the only right one.
 
 
 MOVED_M = 5e-4
-"""How far a frame is moved out of its wall's face."""
+"""How far a thing is moved out of the face it lies in."""
 
+_FACED = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
 _COINCIDE_M = 1e-4  # faces nearer than this are one to a ray
 _PARALLEL = 0.9999  # cosine
+_TURN = 0.015  # between unit normals whose cosine is that
 _LEAST_AREA_M2 = 1e-5  # that two faces must share
 
 
@@ -119,17 +122,17 @@ class _Faces:
 
 
 def with_frames_apart(house: House) -> tuple[House, int]:
-    """The house with the corners of such frames moved out of the wall, and how many pieces were.
+    """The house with the corners of such things moved out of the wall, and how many pieces were.
 
-    A frame is moved where a face of it shares area with a face of a wall that looks the same way.
-    Where another face of it or of a wall lies within reach, it stays.
+    A thing is moved where a face of it shares area with a face of a wall, a floor or a ceiling that
+    looks the same way. Where another face of it or of a wall lies within reach, it stays.
     """
-    walls = [i for i in house.items if i.kind is ItemKind.WALL and i.n_faces]
+    walls = [i for i in house.items if i.kind in _FACED and i.n_faces]
     bounds = np.array([w.bounds for w in walls]).reshape(-1, 2, 3)
     items, n_moved = [], 0
     for item in house.items:
         moved = item
-        if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.n_faces:
+        if not item.kind.is_structure and item.n_faces:
             low, high = item.bounds
             near = (bounds[:, 0] < high + MOVED_M) & (bounds[:, 1] > low - MOVED_M)
             moved = _apart(item, [walls[k] for k in np.flatnonzero(near.all(1))])
@@ -174,7 +177,11 @@ def _shared_planes(own: _Faces, around: _Faces) -> Iterator[tuple[F64, float]]:
     """Normal and offset of every plane in which faces of both look one way and share area."""
     offsets = np.einsum("fi,fi->f", around.normals, around.corners[:, 0])
     keys = np.round(np.column_stack([around.normals * 1e3, offsets / _COINCIDE_M]))
-    for first in np.sort(np.unique(keys, axis=0, return_index=True)[1]):
+    planes = np.sort(np.unique(keys, axis=0, return_index=True)[1])
+    # Of the walls' planes those in which the piece has a face at all.
+    tree = cKDTree(_scaled(own.normals, np.einsum("fi,fi->f", own.normals, own.corners[:, 0])))
+    near = tree.query(_scaled(around.normals[planes], offsets[planes]), p=np.inf)[0] <= 1.0
+    for first in planes[near]:
         normal, offset = around.normals[first], float(offsets[first])
         frame = _of_plane(own, normal, offset)
         if not len(frame) or _is_met(around, own, normal, offset):
@@ -185,6 +192,11 @@ def _shared_planes(own: _Faces, around: _Faces) -> Iterator[tuple[F64, float]]:
         shared = shapely.intersection(_outline(frame, axes), _outline(walls, axes))
         if float(shapely.area(shared)) > _LEAST_AREA_M2:
             yield normal, offset
+
+
+def _scaled(normals: F64, offsets: F64) -> F64:
+    """(N, 4) planes so that those less than 1 apart along each axis may be one."""
+    return np.column_stack([normals / _TURN, offsets / (2 * _COINCIDE_M)])
 
 
 def _of_plane(faces: _Faces, normal: F64, offset: float) -> F64:
