@@ -27,6 +27,7 @@ OWN_TARGET: Final = {
     "house": "house",
     "dress": "dress.dress",
     "made": "homes.made",
+    "variety": "homes.variety",
     "light": "light.equal_time",
     "light_pictures": "light.light_pictures",
     "light_tables": "light.light_tables",

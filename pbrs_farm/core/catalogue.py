@@ -42,6 +42,7 @@ class Piece:
     library: str = ""
     creator: str = ""
     licence: str = ""  # "CC0", "CC-BY 3.0"
+    of_set: str = ""  # pieces of one set are sold together; "" = it goes with any
 
 
 @dataclass(frozen=True, slots=True, eq=False)

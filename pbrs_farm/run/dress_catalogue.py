@@ -74,6 +74,12 @@ def _stamp(path: Path) -> int:
 
 @lru_cache(maxsize=4)
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+    from pbrs_farm.dress.things.families import with_families
+
+    return with_families(_of_libraries(given, has_package))
+
+
+def _of_libraries(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
     # None: no package is wanted.

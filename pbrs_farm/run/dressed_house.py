@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
 
 
-VERSION: Final = 12
+VERSION: Final = 13
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 

@@ -10,7 +10,9 @@ A step that is a table has one solid (its arguments, as of a function), or `do` 
 `of` is its material, or that of all steps in it; `turn` is a rotation and `at` a place to move to;
 `named` the surface's name. `for` (names) and `in`, `while`, or `when` (and `else`, steps) before
 them repeat or choose. An entry without a group is a part that others use like a solid: `takes`
-names its arguments. docs/dress.md lists the words that expressions know; they are Python's
+names its arguments. `variants` (how many) and `size` (width, depth, height, an expression) make it a
+family of the generated catalogue, its steps then know `size`; `set` names an entry whose values are
+drawn first, the same for all families of a set that have one number. docs/dress.md lists the words that expressions know; they are Python's
 arithmetic, comparisons, `a if b else c`, tuples, lists and calls, and nothing else.
 """
 
@@ -47,9 +49,12 @@ _ALLOWED: Final = (
     ast.Compare, ast.IfExp, ast.Call, ast.keyword, ast.Subscript, ast.operator, ast.unaryop,
     ast.boolop, ast.cmpop,
 )  # fmt: skip
-_HEADER: Final = ("about", "group", "class", "place", "family", "takes", "make")
+_HEADER: Final = (
+    "about", "group", "class", "place", "family", "takes", "make", "variants", "size", "set",
+)  # fmt: skip
 _STEP: Final = ("for", "in", "while", "when", "else", "do", "of", "turn", "at", "named")
 _LET: Final = re.compile(r"\s*(\w+(?:\s*,\s*\w+)*)\s*(\+?)=(?!=)(.*)", re.DOTALL)
+_OWN: Final = ("__builtins__", "family")
 _WRONG: Final = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
@@ -65,6 +70,9 @@ class Description:
     group: str = ""  # "" for a part
     nyu40: int = 0
     place: Place = Place.SURFACE
+    variants: int = 0  # of the generated catalogue
+    size: Callable[[Scope], Any] | None = None  # width, depth, height of one of them
+    set_name: str = ""
 
 
 class Things:
@@ -89,8 +97,9 @@ class Things:
                         if name in known:
                             raise BadInput(file, name, "is the name of a word already")
                         known[name] = _signature(entry.get("takes", ()))
+            tables_by_name = {name: entry for _f, table in tables for name, entry in table.items()}
             found = {
-                name: _DescriptionReader(file, name, known).entry(entry)
+                name: _DescriptionReader(file, name, known).entry(entry, tables_by_name)
                 for file, table in tables
                 for name, entry in table.items()
             }
@@ -100,13 +109,38 @@ class Things:
     @property
     def names(self) -> tuple[str, ...]:
         """Those that are things of themselves: a style and a generator make them."""
-        return tuple(e.name for e in self.entries.values() if e.group and not e.takes)
+        return tuple(
+            e.name for e in self.entries.values() if e.group and not e.takes and not e.variants
+        )
+
+    def size(
+        self, name: str, rng: np.random.Generator, style: Style, known: Mapping[str, object]
+    ) -> tuple[float, float, float]:
+        """Width, depth and height of a variation, metres, without making it; known: as of make."""
+        entry = self.entries[name]
+        if entry.size is None:
+            raise BadInput(entry.file, name, "has no size")
+        scope = {"__builtins__": {}, **self._constants, **self._words(rng, style), **known}
+        width, depth, height = (round(float(v), 4) for v in entry.size(scope))
+        return width, depth, height
+
+    def values(self, name: str, rng: np.random.Generator, style: Style) -> Scope:
+        """What the steps of an entry without solids name: the common taste of a set."""
+        entry = self.entries[name]
+        base = {**self._constants, **self._words(rng, style)}
+        scope = _scope(entry, base, ())
+        for step in entry.steps:
+            step(scope, Loose())
+        return {key: v for key, v in scope.items() if key not in base and key not in _OWN}
 
     def make(
         self, name: str, rng: np.random.Generator, style: Style, *given: object,
-        textures: Iterable[Texture] = (),
+        textures: Iterable[Texture] = (), known: Mapping[str, object] | None = None,
     ) -> Made:  # fmt: skip
-        """The thing of that name in a style; given: what its entry takes, in that order."""
+        """The thing of that name in a style; given: what its entry takes, in that order.
+
+        known: further values by name, those of its set.
+        """
         entry = self.entries[name]
         base = {**self._constants, **self._words(rng, style)}
         base.update(
@@ -114,7 +148,7 @@ class Things:
             for part in self.entries.values()
             if not part.group
         )
-        scope, loose = _scope(entry, base, given), Loose()
+        scope, loose = {**_scope(entry, base, given), **(known or {})}, Loose()
         for step in entry.steps:
             step(scope, loose)
         parts = [(surface, material) for surface, material in loose if material is not None]
@@ -160,15 +194,21 @@ class _DescriptionReader:
         self._file, self._name, self._known = file, name, known
         self._names = {*known, "family"}
 
-    def entry(self, table: object) -> Description:
-        """The entry of that table."""
+    def entry(self, table: object, tables: Mapping[str, object]) -> Description:
+        """The entry of that table; tables: all of them, for the set that it may name."""
         if not isinstance(table, dict):
             raise self._bad("is no table")
         self._only(table, _HEADER)
         text = {key: table.get(key, "") for key in ("about", "group", "class", "place", "family")}
+        text |= {key: table.get(key, "") for key in ("size", "set")}
         for key, value in text.items():
             if not isinstance(value, str):
                 raise self._bad(f"{key} is no text")
+        variants = table.get("variants", 0)
+        if not isinstance(variants, int) or (variants > 0) != bool(text["size"]):
+            raise self._bad("a family says how many variants it has, and their size")
+        self._names |= self._named_by(text["set"], tables)
+        size = self._expression(text["size"]) if variants else None
         takes, steps = table.get("takes", []), table.get("make")
         if not isinstance(takes, list) or not all(str(name).isidentifier() for name in takes):
             raise self._bad("takes is no list of names")
@@ -177,11 +217,25 @@ class _DescriptionReader:
             raise self._bad(f"class {label!r} is none of NYU40", did_you_mean(label, NYU40_NAMES))
         if place not in list(Place):
             raise self._bad(f"place {place!r} is none", did_you_mean(place, list(Place)))
+        if variants:
+            takes = ["size", *takes]
         self._names |= set(takes)
         return Description(
             self._file, self._name, self._steps(steps), tuple(takes),
             text["family"] or self._name, text["group"], NYU40_NAMES.index(label), Place(place),
+            variants, size, text["set"],
         )  # fmt: skip
+
+    def _named_by(self, name: str, tables: Mapping[str, object]) -> set[str]:
+        """The names of the values that a set's entry draws."""
+        if not name:
+            return set()
+        told = tables.get(name)
+        steps = told.get("make", []) if isinstance(told, dict) else None
+        if not isinstance(steps, list):
+            raise self._bad(f"{name} is no set")
+        found = (_LET.fullmatch(step) for step in steps if isinstance(step, str))
+        return {n.strip() for let in found if let for n in let[1].split(",")}
 
     def _steps(self, steps: object) -> tuple[Step, ...]:
         if not isinstance(steps, list):

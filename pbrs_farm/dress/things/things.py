@@ -13,8 +13,9 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
-from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.dress.style import Rgb, Style, mix, shade
+from pbrs_farm.core.house import Material, MaterialKind, Surface
+from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, mix, shade
+from pbrs_farm.dress.things import bodies
 from pbrs_farm.dress.things.assembly import (
     Part,
     any_colour,
@@ -46,8 +47,18 @@ def words(rng: np.random.Generator, style: Style) -> dict[str, Any]:
         r, g, b = (float(v) for v in rng.uniform(low, high, 3))
         return (r, g, b)
 
+    def paint() -> Rgb:
+        # What furniture is painted with: whites and greys more often than colours.
+        names = ("whites", "greys", "paints", "darks", "boards")
+        known = COLOURS[names[int(rng.choice(5, p=(0.42, 0.18, 0.2, 0.1, 0.1)))]]
+        return known[int(rng.integers(len(known)))]
+
     return {
         "rng": rng,
+        "paint": paint,
+        "timber": plain(f"{style.wood.name} wood", style.wood.mean, 0.45),
+        "dark_timber": plain(f"dark {style.wood.name} wood", style.wood.dark, 0.45),
+        "cloth": lambda: plain("fabric", textile(), 0.95),
         "uniform": lambda low, high: float(rng.uniform(low, high)),
         "normal": lambda middle, spread: float(rng.normal(middle, spread)),
         "integers": lambda low, high: int(rng.integers(low, high)),
@@ -181,11 +192,41 @@ SOLIDS: Final = {
     "solid": lambda surface: surface,
 }  # fmt: skip
 
+
+def glossy(name: str, colour: Rgb, roughness: float = 0.35) -> Material:
+    """A lacquer, enamel or glaze of one colour, which the part `parts` leaves as it is."""
+    r, g, b = (round(float(min(max(c, 0.02), 0.95)), 3) for c in colour)
+    return Material(
+        f"coated {name}", diffuse=(r, g, b), specular=(0.4, 0.4, 0.4),
+        shininess=round(2.0 / max(roughness, 0.1) ** 4 - 2.0, 1), roughness=roughness,
+    )  # fmt: skip
+
+
+def _metal(name: str) -> Material:
+    of = METALS[name]
+    return Material(
+        name, diffuse=(0.03, 0.03, 0.03), specular=of.colour, shininess=40.0, roughness=of.roughness
+    )
+
+
+STUFFS: Final = {
+    "chrome": _metal("chrome"), "steel": _metal("brushed steel"), "black_steel": _metal("black steel"),
+    "brass": _metal("brass"), "white_steel": glossy("white steel", (0.9, 0.9, 0.89), 0.4),
+    "ceramic": glossy("ceramic", (0.93, 0.93, 0.92), 0.12), "enamel": glossy("enamel", (0.92, 0.92, 0.91), 0.2),
+    "black_glass": glossy("black glass", (0.02, 0.02, 0.022), 0.08), "rubber": plain("black rubber", (0.06, 0.06, 0.06), 0.7),
+    "cast_iron": plain("cast black", (0.05, 0.05, 0.052), 0.6), "white": glossy("white lacquer", (0.92, 0.92, 0.9), 0.35),
+    "opal": Material("opal glass", MaterialKind.BULB), "silvered": Material("mirror", MaterialKind.MIRROR, (0.9, 0.9, 0.9)),
+    "clear": glass(), "frosted": glass((0.93, 0.96, 0.96), 0.35), "earth": plain("earth", (0.16, 0.11, 0.08), 0.95),
+    "wicker": plain("wicker", (0.66, 0.52, 0.36), 0.9), "light_oak": plain("oak wood", WOODS["pale oak"].mean, 0.5),
+    "linen": plain("fabric linen", (0.9, 0.89, 0.86), 0.95),
+}  # fmt: skip
+"""Materials that families share."""
+
 ARITHMETIC: Final = {
     "pi": np.pi, "sin": np.sin, "cos": np.cos, "min": min, "max": max, "round": round, "int": int,
     "abs": abs, "sorted": sorted, "range": range, "linspace": _linspace, "pairwise": pairwise,
     "product": product, "enumerate": enumerate, "len": len, "single": lambda v: float(np.float32(v)),
-    "mix": mix, "shade": shade, "plain": plain, "glass": glass, "rotation_x": rotation_x,
+    "mix": mix, "shade": shade, "plain": plain, "glossy": glossy, "glass": glass, "rotation_x": rotation_x,
     "rotation_y": rotation_y, "rotation_z": rotation_z, "lying_along_x": LYING_ALONG_X,
     "lying_along_z": LYING_ALONG_Z, "half_turn": np.diag([-1.0, 1.0, -1.0]),
 }  # fmt: skip
@@ -197,7 +238,11 @@ def things_of(*names: str, **solids: object) -> Things:
     return Things(files, words, {**ARITHMETIC, **SOLIDS, **solids})
 
 
-THINGS: Final = things_of("tableware", "household", "desk", "bath", "floor_things", "soft")
+THINGS: Final = things_of(
+    "decor", "tableware", "household", "desk", "bath", "floor_things", "soft",
+    **{name: bodies.SOLIDS[name] for name in ("bevelled", "rounded", "loft", "hoop", "tube")},
+    **{name: bodies.OUTLINES[name] for name in ("oval", "rect", "fluted", "bent", "ring_path")},
+)  # fmt: skip
 
 CASE_GOODS: Final = things_of(
     "case_goods",

@@ -133,6 +133,7 @@ def _along(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | Non
 
 
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
+_BUILT_IN: Final = 0.6  # of kitchens
 _FRONT_M: Final = 0.8  # free before the run
 _GAP: Final = 0.005  # behind the units
 _HUNG_GAP: Final = 0.001  # and behind what touches the wall that it hangs on
@@ -171,27 +172,35 @@ class _Module:
 
 
 def units_of(shelf: Shelf) -> Units | None:
-    """The units of one library that fit together; None where it lacks one."""
+    """The units of one set, or of one library, that fit together; None where it lacks one."""
     fridges = shelf.of("fridge", width=(0.5, 0.95), height=(1.1, 2.2))
     fridges.sort(key=lambda p: p.size[0] > 0.7)
-    cookers = shelf.of("cooker", width=(0.45, 0.75))
     for sink in shelf.of("sink", width=(0.5, 1.3)):
-        bases = [
-            p
-            for p in shelf.of("base_cabinet", width=(0.5, 0.7), depth=(0.5, 0.72))
-            if p.library == sink.library
-        ]
+        bases = _sold_with(
+            sink, shelf.of("base_cabinet", width=(0.5, 0.7), depth=(0.5, 0.72)), alone=True
+        )
+        cookers = _sold_with(sink, shelf.of("cooker", width=(0.45, 0.75)))
         if not (bases and fridges and cookers):
             continue
         uppers = shelf.of("upper_cabinet", width=(0.5, 0.7), depth=(0.2, 0.5), height=(0.4, 0.9))
-        own = [p for p in uppers if p.library == sink.library]
+        own = _sold_with(sink, uppers, alone=True)
         hoods = shelf.of("hood", width=(0.5, 0.7), height=(0.1, 0.95))
-        washers = shelf.of("dishwasher", width=(0.55, 0.65))
+        washers = _sold_with(sink, shelf.of("dishwasher", width=(0.55, 0.65)))
+        # Most who buy a set build the oven into it.
+        built_in = [p for p in cookers if p.of_set and shelf.likes(p, _BUILT_IN)]
         return Units(
-            fridges[0], sink, cookers[0], tuple(bases), bases[0].size[2],
+            fridges[0], sink, (built_in or [p for p in cookers if not p.of_set] or cookers)[0], tuple(bases[:3]), bases[0].size[2],
             hoods[0] if hoods else None, tuple(own or uppers)[:2], washers[0] if washers else None,
         )  # fmt: skip
     return None
+
+
+def _sold_with(sink: Piece, pieces: list[Piece], *, alone: bool = False) -> list[Piece]:
+    """Those of the sink's set, and those of none; alone: of its set alone, or of its library."""
+    mine = sink.of_set or sink.library
+    if alone:
+        return [p for p in pieces if (p.of_set or p.library) == mine]
+    return [p for p in pieces if p.of_set in ("", sink.of_set)]
 
 
 def kitchen_places(

@@ -17,10 +17,10 @@ from pbrs_farm.generate.furnish.template import PieceSlot
 
 STYLES: Final = {
     "mixed": "",
-    "nordic": "simple clear white wooden wood oak beige mid century junior",
-    "modern": "modern glass metal black led flat office design table4 bed3",
-    "classic": "winchester antique iron oak cushion tablecloth grand chandelier captains armchair3",
-    "vintage": "mid century thonet iron leather burlap osaka wood",
+    "nordic": "simple clear white wooden wood oak beige mid century junior nordic pastel",
+    "modern": "modern glass metal black led flat office design table4 bed3 grey loft",
+    "classic": "winchester antique iron oak cushion tablecloth grand chandelier captains armchair3 classic country elegant",
+    "vintage": "mid century thonet iron leather burlap osaka wood bohemian mediterranean",
 }
 """Style -> words of pieces that such a home likes."""
 
@@ -80,6 +80,10 @@ class Shelf:
             and not aside & set(re.findall(r"[a-z0-9]+", f"{p.id} {p.name}".lower()))
         ]
         return sorted(found, key=lambda p: (self._order[p.id], p.id))
+
+    def likes(self, piece: Piece, share: float) -> bool:
+        """Whether the home is of the share that likes a piece."""
+        return self._order[piece.id] < share
 
     def top(self, piece: Piece) -> float:
         """Height above its base at which something can stand in a piece's middle, metres."""

@@ -1,0 +1,167 @@
+"""The generated catalogue: families of furniture that TOML files describe, many variations each; no effects but reading.
+
+A variation is known by its family, its number and its taste (`generated#cooker-07-nordic`); its size
+is told without making it, its shape is made when it is used. Variations of a set (a kitchen) that
+have one number share what the set draws.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.classes import LAMP
+from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
+from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.things.assembly import GENERATED
+from pbrs_farm.dress.things.bodies import OUTLINES, SOLIDS
+from pbrs_farm.dress.things.things import STUFFS, things_of
+
+VERSION: Final = 1
+"""Of the words and solids of families: part of the catalogue's digest. Raised when a shape changes."""
+
+FILES: Final = ("joints", "kitchen")
+
+FAMILIES: Final = things_of(*FILES, **SOLIDS, **OUTLINES, **STUFFS)
+
+_WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
+_FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
+
+
+def with_families(catalogue: Catalogue) -> Catalogue:
+    """The catalogue and every variation of every family, behind its own pieces."""
+    return replace(
+        catalogue,
+        pieces=(*catalogue.pieces, *family_pieces()),
+        load=lambda piece: family_shape(piece) if is_of_family(piece) else catalogue.load(piece),
+        digest=keys.digest(catalogue.digest, _digest()),
+    )
+
+
+def is_of_family(piece: Piece) -> bool:
+    """Whether a piece is a variation of a family."""
+    return piece.id in _numbers()
+
+
+@cache
+def family_pieces() -> tuple[Piece, ...]:
+    """Every variation, in the order of the files."""
+    return tuple(
+        _piece(name, number)
+        for name, entry in FAMILIES.entries.items()
+        for number in range(1, entry.variants + 1)
+    )
+
+
+@cache
+def _numbers() -> dict[str, tuple[str, int]]:
+    # Of each piece's id: its family, its number.
+    rows = (
+        (name, number)
+        for name, entry in FAMILIES.entries.items()
+        for number in range(1, entry.variants + 1)
+    )
+    return {piece.id: row for piece, row in zip(family_pieces(), rows, strict=True)}
+
+
+def family_shape(piece: Piece) -> Shape:
+    """The shape of a variation, as large as it says."""
+    return _lit(_sized(_drawn(piece), piece), piece)
+
+
+def drawn_size(piece: Piece) -> tuple[float, float, float]:
+    """Width, depth and height of a variation as its steps draw it, metres."""
+    low, high = _drawn(piece).bounds
+    width, height, depth = (float(v) for v in high - low)
+    return width, depth, height
+
+
+def _drawn(piece: Piece) -> Shape:
+    name, number = _numbers()[piece.id]
+    entry = FAMILIES.entries[name]
+    known = {}
+    if entry.set_name:
+        set_rng, set_style = _stream(entry.set_name, number)
+        known = FAMILIES.values(entry.set_name, set_rng, set_style)
+    _, style = _stream(entry.set_name or name, number)
+    rng = np.random.default_rng(keys.seed("family", "shape", name, number))
+    _, shape = FAMILIES.make(name, rng, style, piece.size, known=known)
+    return shape
+
+
+def _stream(name: str, number: int) -> tuple[np.random.Generator, Style]:
+    rng = np.random.default_rng(keys.seed("family", name, number))
+    return rng, style_for(rng)
+
+
+def _piece(name: str, number: int) -> Piece:
+    entry = FAMILIES.entries[name]
+    rng, style = _stream(entry.set_name or name, number)
+    known = FAMILIES.values(entry.set_name, rng, style) if entry.set_name else {}
+    own = np.random.default_rng(keys.seed("family", "size", name, number))
+    taste = style.name.replace(" ", "-")
+    return Piece(
+        f"{GENERATED}{name}-{number:02d}-{taste}", entry.family.replace("_", " ").capitalize(),
+        entry.group, entry.place, entry.nyu40, FAMILIES.size(name, own, style, known),
+        ItemKind.LAMP if entry.nyu40 == LAMP else ItemKind.OBJECT,
+        of_set=f"{entry.set_name} {number}" if entry.set_name else "",
+    )  # fmt: skip
+
+
+def _sized(shape: Shape, piece: Piece) -> Shape:
+    """The shape as wide, deep and high as the piece says, with what hangs on a wall before z = 0."""
+    low, high = shape.bounds
+    wanted = np.array([piece.size[0], piece.size[2], piece.size[1]])
+    scale = wanted / np.maximum(high - low, 1e-6)
+    base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    if piece.place is Place.WALL:
+        base[2] = low[2]
+    return replace(shape, surfaces=tuple(_scaled(s, scale, base) for s in shape.surfaces))
+
+
+def _scaled(surface: Surface, scale: F64, base: F64) -> Surface:
+    points = (surface.positions.astype(np.float64) - base) * scale
+    normals = surface.normals
+    if normals is not None:
+        turned = normals.astype(np.float64) / scale
+        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+        normals = turned.astype(np.float32)
+    return replace(surface, positions=points.astype(np.float32), normals=normals)
+
+
+def _lit(shape: Shape, piece: Piece) -> Shape:
+    """The shape with a light for each surface of opal glass that it has."""
+    if piece.kind is not ItemKind.LAMP:
+        return shape
+    bulbs = [
+        k
+        for k, surface in enumerate(shape.surfaces)
+        if shape.materials[surface.material].kind is MaterialKind.BULB
+    ]
+    lights = []
+    for k in bulbs:
+        points = shape.surfaces[k].positions.astype(np.float64)
+        low, high = points.min(0), points.max(0)
+        x, y, z = (float(v) for v in (low + high) / 2)
+        lights.append(
+            LightPart(
+                (x, y, z), float((high - low).min()) / 2, _FLUX_LM, PowerUnit.LUMEN,
+                rgb_linear=_WARM, share=1 / len(bulbs), emitting=(k,),
+            )
+        )  # fmt: skip
+    return replace(shape, lights=tuple(lights))
+
+
+@cache
+def _digest() -> str:
+    texts = [Path(__file__).with_name(f"{name}.toml").read_bytes() for name in FILES]
+    return keys.digest(VERSION, *(hashlib.sha256(text).hexdigest() for text in texts))
