@@ -1,23 +1,29 @@
-"""Against Blender's Cycles: the same home, cameras, light and depth; who is cleaner per CPU second?
+"""Against Blender's Cycles: the same homes, cameras, light and depth; who is cleaner per CPU second?
 
 `make bench-cycles` installs `bpy` into out/cycles-venv (it wants numpy below 2: no extra of ours
-can hold it) and runs this. The scene is written to out/bench/cycles as the tables that our own
+can hold it) and runs this. Scenes are written to out/bench/cycles as the tables that our own
 kernels gather from; benchmarks/renderers/cycles_scene.py, a process of its own, renders them with Cycles.
 
 Coats are taken off for both (diffuse, textured; metals diffuse; mirrors, glass and shades as they
 are): then the two agree on every block of the picture, while Blender's Principled coat lets more
 light through to its base than Ashikhmin and Shirley's.
 
-Method. Both engines render the sum of all light, box filter, no denoiser, no clamping, paths of at
-most the recipe's segments, all cores. For each: one long picture as its own reference, and some
-short ones of other seeds; relMSE = mean over pixels of (y - ref)^2 / (ref^2 + 1e-3 mean(ref)^2) of
-luminance. Variance falls with 1 / samples, so that the reference's own adds spp / reference_spp to
-each error, which is taken off; CPU to a noise is relMSE x CPU time, and the figure is Cycles'
-product over ours. CPU time is that of all threads and of the samples alone: the time of
-a picture of one sample (loading, BVH, compiling, pilot) is taken off both; it is reported beside.
-Metropolis is measured beside, all of its CPU time (bootstrap, direct light) counted.
-relMSE hangs on fireflies (one pixel in a hundred makes nine tenths of it), so the same ratio of the
-median pixel's squared error stands beside it: how grainy the picture looks.
+Cycles renders every view in the ways of WAYS: as it comes, with portals in the openings that daylight
+enters by, with its path guiding, with both; always with its light tree. The way that is cheapest to an
+error counts, view by view and error by error. Guiding learns during a picture's first 128 samples, so
+pictures with it have four times as many samples as the others, and fewer of them are made. Ours are
+guided, too, and have as many.
+
+Method. Both engines render the sum of all light, box filter, no denoiser, no clamping, no adaptive
+sampling, paths of at most the recipe's segments, all cores. relMSE = mean over pixels of the variance
+of luminance between an engine's pictures of other seeds, over ref^2 + 1e-3 mean(ref)^2; ref is a long
+picture of that engine, of Cycles by its cheapest way. CPU to a noise is relMSE x CPU time, since
+variance falls with 1 / samples, and the figure is Cycles' product over ours. CPU time is that of all
+threads: of Cycles that of the samples alone, a picture of one sample (loading, BVH) taken off; of ours
+that of the whole picture, pilot and guiding included. Metropolis is measured beside, all of its CPU
+time (bootstrap, direct light) counted. relMSE hangs on fireflies (one pixel in a hundred makes nine
+tenths of it), so the same ratio of the median pixel's squared error against ref stands beside it: how
+grainy the picture looks. The figures without a home in their name are medians over all views.
 """
 
 from __future__ import annotations
@@ -38,7 +44,7 @@ from numpy.typing import NDArray
 
 from benchmarks.figures import FOLDER, write_report
 from benchmarks.renderers.exchange import home_without_coats, write_scene
-from benchmarks.renderers.picture_noise import blocks, relative_square
+from benchmarks.renderers.picture_noise import blocks
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import House
@@ -49,11 +55,12 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky
 
-HOME = "2BedroomApartment"
-N_CAMERAS = 2
+HOMES = ("2BedroomApartment", "Studio", "3BedroomApartment")
+N_CAMERAS = 2  # the first stored ones of a home
 CHAINS = {"integrator": "metropolis", "mutations_per_pixel": 64, "direct_spp": 64}
 N_CHAINS_PICTURES = 4
-N_ONES = 4  # pictures of one sample
+GUIDED_TIMES = 4  # as many samples in pictures of guided rays
+N_ONES = 3  # pictures of one sample
 PYTHON = Path("out/cycles-venv/bin/python")
 SCRIPT = Path(__file__).with_name("cycles_scene.py")
 FILES = FOLDER / "cycles"
@@ -70,65 +77,91 @@ class Effort:
     n_short: int
 
 
-EFFORT = Effort(112, 84, 32, 1024, 8)
+EFFORT = Effort(64, 48, 32, 512, 4)
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """How Cycles samples; its pictures have `longer` times the samples of others, and three are made."""
+
+    portals: bool
+    guiding: bool
+    longer: int = 1
+
+    def effort(self, e: Effort) -> tuple[int, int]:
+        """(samples of a picture, pictures)."""
+        return e.spp * self.longer, e.n_short if self.longer == 1 else 3
+
+
+WAYS = {
+    "plain": Way(portals=False, guiding=False),
+    "portals": Way(portals=True, guiding=False),
+    "guided": Way(portals=False, guiding=True, longer=GUIDED_TIMES),
+    "guided_portals": Way(portals=True, guiding=True, longer=GUIDED_TIMES),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """Pictures of one engine: (H, W, 3) radiance; cpu_s of the samples of a short one."""
+    """Pictures of one engine, (N, H, W) luminance of other seeds; the CPU seconds that count for one of them."""
 
-    reference: NDArray[np.float32]
-    short: list[NDArray[np.float32]]
+    short: NDArray[np.float64]
+    spp: int
     cpu_s: float
-    setup_s: float
+    setup_s: float  # of a picture of one sample
+
+    def errors(self, reference: NDArray[np.float64], reference_spp: int) -> tuple[float, float]:
+        """(relMSE, the median pixel's squared relative error) of a picture."""
+        scale = reference**2 + 1e-3 * reference.mean() ** 2
+        relmse = float((self.short.var(0, ddof=1) / scale).mean())
+        # The reference's own variance adds to the median's.
+        median = float(np.median((self.short - reference) ** 2 / scale))
+        return relmse, median / (1 + self.spp / reference_spp)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What was rendered of a stored camera: ours, Cycles' ways, long pictures (H, W, 3) of both."""
+
+    key: str
+    ours: Run
+    chains: Run
+    theirs: dict[str, Run]
+    our_reference: NDArray[np.float32]
+    their_reference: NDArray[np.float32]
+    shown: tuple[NDArray[np.float32], NDArray[np.float32]]  # a short picture of either
 
 
 def main() -> None:
     """Measure, print, write out/bench/cycles.json and cycles.png."""
     e = effort_from_environment()
-    house, scene, textures = home_without_coats(HOME)
-    cameras = [
-        Camera.look(Intrinsics.from_hfov(e.width, e.height, c.hfov_rad), c.eye, c.towards)
-        for c in house.cameras[:N_CAMERAS]
-    ]
-    fields = LightFields(filter="box", denoise=False)
-    export(scene.tables, scene.sky, house, textures)
-    ours = [_our_run(scene, camera, fields, e) for camera in cameras]
-    chains = [
-        _our_chains(scene, camera, fields, run.reference)
-        for camera, run in zip(cameras, ours, strict=True)
-    ]
-    figures: dict[str, Any] = {}
-    units: dict[str, str] = {}
-    theirs = _their_runs(cameras, fields, e)
-    for k, (a, b) in enumerate(zip(ours, theirs, strict=True), 1):
-        for name, value, unit in _compared(a, b, e):
-            figures[f"light.cycles_{k}_{name}"] = value
-            units[f"light.cycles_{k}_{name}"] = unit
-        relmse, cpu_s = chains[k - 1]
-        theirs_cost = figures[f"light.cycles_{k}_relmse_cycles"] * b.cpu_s
-        figures |= {
-            f"light.cycles_{k}_relmse_metropolis": relmse,
-            f"light.cycles_{k}_cpu_s_metropolis": cpu_s,
-            f"light.cycles_{k}_ratio_metropolis": theirs_cost / (relmse * cpu_s),
-        }
-        units |= {
-            f"light.cycles_{k}_relmse_metropolis": "-",
-            f"light.cycles_{k}_cpu_s_metropolis": "s CPU, bootstrap and direct light included",
-            f"light.cycles_{k}_ratio_metropolis": "x less CPU time at equal relMSE",
-        }
-    ratios = [figures[f"light.cycles_{k + 1}_ratio"] for k in range(N_CAMERAS)]
-    medians = [figures[f"light.cycles_{k + 1}_ratio_median"] for k in range(N_CAMERAS)]
-    figures["light.vs_cycles"] = min(ratios)
-    figures["light.vs_cycles_metropolis"] = min(
-        figures[f"light.cycles_{k + 1}_ratio_metropolis"] for k in range(N_CAMERAS)
+    homes = os.environ.get("CYCLES_HOMES", "").split() or HOMES
+    views = [view for home in homes for view in _views_of(home, e)]
+    figures = figures_of(views, e)
+    _write_pictures(views)
+    write_report(
+        "cycles",
+        {k: v for k, (v, _unit) in figures.items()},
+        {k: u for k, (_v, u) in figures.items()},
     )
-    figures["light.vs_cycles_median"] = min(medians)
-    units["light.vs_cycles"] = "x less CPU time than Cycles at equal relMSE, the worse camera"
-    units["light.vs_cycles_metropolis"] = "Metropolis: x less CPU time than Cycles at equal relMSE"
-    units["light.vs_cycles_median"] = "the same at equal squared error of the median pixel"
-    _write_pictures(ours, theirs)
-    write_report("cycles", figures, units)
+
+
+def figures_of(views: Sequence[View], e: Effort) -> dict[str, tuple[float, str]]:
+    """Name -> (value, unit): every view's, and the medians over views."""
+    of_views = {view.key: _compared(view, e) for view in views}
+    found: dict[str, tuple[float, str]] = {
+        f"light.cycles_{key}_{name}": value
+        for key, one in of_views.items()
+        for name, value in one.items()
+    }
+    for end in ("ratio", "ratio_metropolis", "ratio_median"):
+        values = [one[end] for one in of_views.values()]
+        name = f"light.vs_cycles{end.removeprefix('ratio')}"
+        found[name] = (
+            float(np.median([v for v, _unit in values])),
+            f"{values[0][1]}, median over {len(views)} views of {len(HOMES)} homes",
+        )
+    return found
 
 
 def effort_from_environment() -> Effort:
@@ -137,80 +170,143 @@ def effort_from_environment() -> Effort:
     return Effort(*(int(w) for w in words)) if words else EFFORT
 
 
-def _our_run(scene: LightScene, camera: Camera, fields: LightFields, e: Effort) -> Run:
-    def rendered(spp: int, seed: int) -> tuple[NDArray[np.float32], float]:
-        some = fields.model_copy(update={"spp": spp})
-        began = time.process_time()
-        result = scene.render(camera, "-", some, seed)
-        return result.outdoor + result.indoor, time.process_time() - began
+def _views_of(home: str, e: Effort) -> list[View]:
+    """The stored cameras of a home, rendered by both."""
+    house, scene, textures = home_without_coats(home)
+    cameras = [
+        Camera.look(Intrinsics.from_hfov(e.width, e.height, c.hfov_rad), c.eye, c.towards)
+        for c in house.cameras[:N_CAMERAS]
+    ]
+    fields = LightFields(filter="box", denoise=False)
+    export(scene.tables, scene.sky, house, textures)
+    views = []
+    for k, (camera, theirs) in enumerate(
+        zip(cameras, _their_runs(cameras, fields, e), strict=True)
+    ):
+        ours, our_reference = _our_run(scene, camera, fields, e)
+        runs, their_reference, their_picture = theirs
+        views.append(
+            View(
+                f"{home.lower()}_{k}",
+                ours,
+                _our_chains(scene, camera, fields),
+                runs,
+                our_reference,
+                their_reference,
+                (_rendered(scene, camera, fields, e.spp, 10)[0], their_picture),
+            )
+        )
+        print(f"{views[-1].key}: rendered", flush=True)
+    return views
 
-    setup_s = _setup_s([rendered(1, k)[1] for k in range(N_ONES)])
-    short = [rendered(e.spp, 10 + k) for k in range(e.n_short)]
-    reference, _s = rendered(e.reference_spp, 999)
-    return _run(reference, short, setup_s, e)
+
+def _rendered(
+    scene: LightScene, camera: Camera, fields: LightFields, spp: int, seed: int
+) -> tuple[NDArray[np.float32], float]:
+    """(picture, CPU seconds of all that it takes)."""
+    some = fields.model_copy(update={"spp": spp})
+    began = time.process_time()
+    result = scene.render(camera, "-", some, seed)
+    return result.outdoor + result.indoor, time.process_time() - began
 
 
-def _our_chains(
-    scene: LightScene, camera: Camera, fields: LightFields, reference: NDArray[np.float32]
-) -> tuple[float, float]:
-    """(relMSE, CPU seconds) of a Metropolis picture.
+def _our_run(
+    scene: LightScene, camera: Camera, fields: LightFields, e: Effort
+) -> tuple[Run, NDArray[np.float32]]:
+    """(our pictures, the long one)."""
+    setup_s = _setup_s([_rendered(scene, camera, fields, 1, k)[1] for k in range(N_ONES)])
+    spp = GUIDED_TIMES * e.spp
+    short = [_rendered(scene, camera, fields, spp, 10 + k) for k in range(e.n_short)]
+    reference, _s = _rendered(scene, camera, fields, e.reference_spp, 999)
+    cpu_s = float(np.mean([s for _p, s in short]))
+    return Run(_luminance([p for p, _s in short]), spp, cpu_s, setup_s), reference
 
-    The squared error is the variance between pictures of other seeds: at this error the noise of
-    a path-traced reference would be most of a difference to it. That the mean is the same is what
-    tests/transport and `verify --light` prove; how far the pictures' mean lies off is printed.
-    """
+
+def _our_chains(scene: LightScene, camera: Camera, fields: LightFields) -> Run:
+    """Metropolis' pictures. That their mean is the same is what tests/transport and `verify --light` prove."""
     some = fields.model_copy(update=CHAINS)
     scene.render(camera, "-", some.model_copy(update={"mutations_per_pixel": 1}), 0)
     pictures = []
     began = time.process_time()
     for seed in range(N_CHAINS_PICTURES):
         result = scene.render(camera, "-", some, 40 + seed)
-        pictures.append((result.outdoor + result.indoor).astype(np.float64) @ LUMINANCE)
+        pictures.append(result.outdoor + result.indoor)
     cpu_s = (time.process_time() - began) / N_CHAINS_PICTURES
-    truth = reference.astype(np.float64) @ LUMINANCE
-    shift = float(np.mean(pictures) / truth.mean()) - 1
-    print(f"Metropolis: mean {shift:+.2%} of the long path's", flush=True)
-    error = np.var(pictures, 0, ddof=1) / (truth**2 + 1e-3 * truth.mean() ** 2)
-    return float(error.mean()), cpu_s
+    return Run(_luminance(pictures), fields.spp, cpu_s, 0.0)
 
 
 def _their_runs(
-    cameras: Sequence[Camera], fields: LightFields, e: Effort, *, guiding: bool = False
-) -> list[Run]:
-    ones = [(1, k) for k in range(N_ONES)]
-    plans = [*ones, *((e.spp, 10 + k) for k in range(e.n_short)), (e.reference_spp, 999)]
-    jobs = [
-        {
-            "camera": {
-                "hfov_rad": 2 * math.atan(0.5 * e.width / camera.intrinsics.fx),
-                "world_from_camera": camera.world_from_camera.tolist(),
-            },
-            "size": [e.width, e.height],
-            "samples": spp,
-            "seed": seed,
-            "max_depth": fields.max_depth,
-            "light_tree": True,
-            "guiding": guiding,
-            "file": f"cycles_{k}_{spp}_{seed}.exr",
-        }
-        for k, camera in enumerate(cameras)
-        for spp, seed in plans
-    ]
-    (FILES / "jobs.json").write_text(json.dumps(jobs))
-    spent = _spent_by_cycles()
-    runs = []
-    for k in range(len(cameras)):
-        rows = [
-            (_exr(FILES / j["file"]), spent[j["file"]])
-            for j in jobs[k * len(plans) : (k + 1) * len(plans)]
+    cameras: Sequence[Camera], fields: LightFields, e: Effort
+) -> list[tuple[dict[str, Run], NDArray[np.float32], NDArray[np.float32]]]:
+    """For each camera: (Cycles' pictures by way, a long one by the cheapest way, a short plain one)."""
+    plans = {
+        name: [
+            *((1, k) for k in range(N_ONES)),
+            *((way.effort(e)[0], 10 + k) for k in range(way.effort(e)[1])),
         ]
-        setup_s = _setup_s([s for _picture, s in rows[:N_ONES]])
-        runs.append(_run(rows[-1][0], rows[N_ONES:-1], setup_s, e))
-    return runs
+        for name, way in WAYS.items()
+    }
+    jobs = {
+        (k, name): [_job(k, camera, name, spp, seed, fields, e) for spp, seed in plan]
+        for k, camera in enumerate(cameras)
+        for name, plan in plans.items()
+    }
+    spent = _spent_by_cycles([job for some in jobs.values() for job in some])
+    runs: list[dict[str, Run]] = [{} for _camera in cameras]
+    for (k, name), some in jobs.items():
+        setup_s = _setup_s([spent[job["file"]] for job in some[:N_ONES]])
+        spp = some[-1]["samples"]
+        mean_s = float(np.mean([spent[job["file"]] for job in some[N_ONES:]]))
+        cpu_s = (mean_s - setup_s) * spp / (spp - 1)
+        pictures = _luminance([_exr(FILES / job["file"]) for job in some[N_ONES:]])
+        runs[k][name] = Run(pictures, spp, cpu_s, setup_s)
+    longs = [
+        _job(k, camera, _cheapest(runs[k]), e.reference_spp, 999, fields, e)
+        for k, camera in enumerate(cameras)
+    ]
+    _spent_by_cycles(longs)
+    return [
+        (runs[k], _exr(FILES / long["file"]), _exr(FILES / jobs[k, "plain"][-1]["file"]))
+        for k, long in enumerate(longs)
+    ]
 
 
-def _spent_by_cycles() -> dict[str, float]:
-    """File -> CPU seconds of every job of jobs.json."""
+def _cheapest(runs: dict[str, Run]) -> str:
+    """The way whose variance falls fastest, judged by its own mean picture."""
+
+    def cost(run: Run) -> float:
+        return run.errors(run.short.mean(0), run.spp)[0] * run.cpu_s
+
+    return min(runs, key=lambda name: cost(runs[name]))
+
+
+def _job(
+    number: int, camera: Camera, way: str, spp: int, seed: int, fields: LightFields, e: Effort
+) -> dict[str, Any]:
+    """A picture that Cycles is asked for."""
+    return {
+        "camera": {
+            "hfov_rad": 2 * math.atan(0.5 * e.width / camera.intrinsics.fx),
+            "world_from_camera": camera.world_from_camera.tolist(),
+        },
+        "size": [e.width, e.height],
+        "samples": spp,
+        "seed": seed,
+        "max_depth": fields.max_depth,
+        "light_tree": True,
+        "guiding": WAYS[way].guiding,
+        "portals": WAYS[way].portals,
+        "file": f"cycles_{number}_{way}_{spp}_{seed}.exr",
+    }
+
+
+def _luminance(pictures: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
+    return np.stack(pictures).astype(np.float64) @ LUMINANCE
+
+
+def _spent_by_cycles(jobs: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Render jobs with Cycles; file -> CPU seconds of each."""
+    (FILES / "jobs.json").write_text(json.dumps(jobs))
     python = os.environ.get("CYCLES_PYTHON", str(PYTHON))
     # -P: this folder holds a cycles.py, and Blender's own module of that name must be found.
     command = [python, "-P", str(SCRIPT), str(FILES)]
@@ -229,41 +325,46 @@ def _setup_s(ones: Sequence[float]) -> float:
     return float(np.mean(ones[1:]))
 
 
-def _run(
-    reference: NDArray[np.float32],
-    short: Sequence[tuple[NDArray[np.float32], float]],
-    setup_s: float,
-    e: Effort,
-) -> Run:
-    cpu_s = float(np.mean([s for _picture, s in short]))
-    return Run(reference, [p for p, _s in short], (cpu_s - setup_s) * e.spp / (e.spp - 1), setup_s)
-
-
-def _compared(ours: Run, theirs: Run, e: Effort) -> list[tuple[str, float, str]]:
-    of_reference = 1 + e.spp / e.reference_spp
-    a, b = (
-        np.stack([relative_square(p, run.reference) for p in run.short]) / of_reference
-        for run in (ours, theirs)
-    )
-    mean = float((ours.reference @ LUMINANCE).mean()), float((theirs.reference @ LUMINANCE).mean())
-    parts = [blocks(run.reference @ LUMINANCE) for run in (ours, theirs)]
-    cost = theirs.cpu_s / ours.cpu_s
-    median = float(np.median(a)), float(np.median(b))
-    return [
-        ("mean_luminance", mean[0], "W m-2 sr-1"),
-        ("mean_luminance_cycles", mean[1], "W m-2 sr-1"),
-        ("block_ratio_median", float(np.median(parts[1] / parts[0])), "Cycles / ours, 8x6 blocks"),
-        ("relmse", float(a.mean()), "-"),
-        ("relmse_cycles", float(b.mean()), "-"),
-        ("median", median[0], "squared relative error of the median pixel"),
-        ("median_cycles", median[1], "squared relative error of the median pixel"),
-        ("cpu_s", ours.cpu_s, "s CPU of the samples"),
-        ("cpu_s_cycles", theirs.cpu_s, "s CPU of the samples"),
-        ("setup_s", ours.setup_s, "s CPU of a picture of one sample"),
-        ("setup_s_cycles", theirs.setup_s, "s CPU of a picture of one sample"),
-        ("ratio", float(b.mean() / a.mean()) * cost, "x less CPU time at equal relMSE"),
-        ("ratio_median", median[1] / median[0] * cost, "the same by the median pixel"),
+def _compared(view: View, e: Effort) -> dict[str, tuple[float, str]]:
+    """Name -> (value, unit) of a view."""
+    ours, theirs = view.our_reference @ LUMINANCE, view.their_reference @ LUMINANCE
+    parts = [blocks(reference) for reference in (ours, theirs)]
+    relmse, median = view.ours.errors(ours, e.reference_spp)
+    chains = view.chains.errors(ours, e.reference_spp)[0]
+    of_ways = {n: run.errors(theirs, e.reference_spp) for n, run in view.theirs.items()}
+    cheapest = [
+        min(errors[k] * view.theirs[name].cpu_s for name, errors in of_ways.items()) for k in (0, 1)
     ]
+    found: dict[str, tuple[float, str]] = {
+        "mean_luminance": (float(ours.mean()), "W m-2 sr-1"),
+        "mean_luminance_cycles": (float(theirs.mean()), "W m-2 sr-1"),
+        "block_ratio_median": (float(np.median(parts[1] / parts[0])), "Cycles / ours, 8x6 blocks"),
+        "relmse": (relmse, "-"),
+        "median": (median, "squared relative error of the median pixel"),
+        "spp": (view.ours.spp, "samples"),
+        "cpu_s": (view.ours.cpu_s, "s CPU of a picture, pilot included"),
+        "setup_s": (view.ours.setup_s, "s CPU of a picture of one sample"),
+        "relmse_metropolis": (chains, "-"),
+        "cpu_s_metropolis": (view.chains.cpu_s, "s CPU, bootstrap and direct light included"),
+        "ratio": (
+            cheapest[0] / (relmse * view.ours.cpu_s),
+            "x less CPU time than Cycles at equal relMSE",
+        ),
+        "ratio_median": (cheapest[1] / (median * view.ours.cpu_s), "the same by the median pixel"),
+        "ratio_metropolis": (
+            cheapest[0] / (chains * view.chains.cpu_s),
+            "Metropolis: x less CPU time than Cycles at equal relMSE",
+        ),
+    }
+    for name, run in view.theirs.items():
+        found |= {
+            f"relmse_{name}": (of_ways[name][0], "-"),
+            f"median_{name}": (of_ways[name][1], "squared relative error of the median pixel"),
+            f"spp_{name}": (run.spp, "samples"),
+            f"cpu_s_{name}": (run.cpu_s, "s CPU of the samples"),
+            f"setup_s_{name}": (run.setup_s, "s CPU of a picture of one sample"),
+        }
+    return found
 
 
 def export(
@@ -284,13 +385,13 @@ def _exr(path: Path) -> NDArray[np.float32]:
     return np.stack([layers[c] for c in "RGB"], -1)
 
 
-def _write_pictures(ours: Sequence[Run], theirs: Sequence[Run]) -> None:
-    """A row a camera: ours and Cycles short, ours and Cycles long, one exposure."""
+def _write_pictures(views: Sequence[View]) -> None:
+    """A row a view: ours and Cycles short, ours and Cycles long, one exposure."""
     fields = Recipe().tone
     rows = []
-    for a, b in zip(ours, theirs, strict=True):
-        exposure = exposure_of(a.reference, fields)
-        pictures = (a.short[0], b.short[0], a.reference, b.reference)
+    for view in views:
+        exposure = exposure_of(view.our_reference, fields)
+        pictures = (*view.shown, view.our_reference, view.their_reference)
         rows.append(np.concatenate([tone(p, fields, exposure=exposure) for p in pictures], 1))
     sheet = np.concatenate(rows).repeat(2, 0).repeat(2, 1)
     (FOLDER / "cycles.png").write_bytes(png_from_array(sheet))

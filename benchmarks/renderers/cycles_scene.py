@@ -18,6 +18,7 @@ import numpy as np
 from mathutils import Matrix, Vector  # type: ignore[import-not-found]
 
 SURFACE, MIRROR, GLASS, NULL = 0, 1, 2, 3
+DIFFUSE = "ShaderNodeBsdfDiffuse"
 
 BLENDER_FROM_WORLD = Matrix(((1, 0, 0, 0), (0, 0, -1, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 """The exported world has +y up, Blender's +z."""
@@ -29,9 +30,12 @@ def main(folder: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     add_mesh(folder, described)
     add_sky(folder, described["sun"])
+    portals = [add_portal(portal) for portal in described["portals"]]
     scene = bpy.context.scene
     for job in json.loads((folder / "jobs.json").read_text()):
         set_up(scene, job)
+        for portal in portals:
+            portal.hide_render = not job["portals"]
         scene.camera = camera_of(job["camera"])
         scene.render.filepath = str(folder / job["file"])
         began, began_wall = time.process_time(), time.perf_counter()
@@ -52,6 +56,7 @@ def set_up(scene, job):  # type: ignore[no-untyped-def]
     scene.render.image_settings.color_depth = "32"
     scene.render.image_settings.exr_codec = "ZIP"
     scene.render.film_transparent = False
+    scene.render.use_persistent_data = True  # the next picture finds the scene loaded
     c = scene.cycles
     c.device = "CPU"
     c.samples, c.seed = job["samples"], job["seed"]
@@ -66,7 +71,7 @@ def set_up(scene, job):  # type: ignore[no-untyped-def]
     c.transparent_max_bounces = 64
     c.pixel_filter_type = "BOX"
     c.use_light_tree = job["light_tree"]
-    c.use_guiding = job["guiding"]
+    c.use_guiding = job["guiding"]  # of surfaces, direct light counted; trained by 128 samples
 
 
 def camera_of(job):  # type: ignore[no-untyped-def]
@@ -127,6 +132,23 @@ def add_sky(folder: Path, sun) -> None:  # type: ignore[no-untyped-def]
         bpy.context.scene.collection.objects.link(held)
 
 
+def add_portal(portal):  # type: ignore[no-untyped-def]
+    """An opening that the dome is sampled through, seen from the room that it looks into."""
+    light = bpy.data.lights.new("portal", "AREA")
+    light.cycles.is_portal = True
+    corners = [BLENDER_FROM_WORLD.to_3x3() @ Vector(c) for c in portal["corners"]]
+    along, up = corners[1] - corners[0], corners[3] - corners[0]
+    light.shape, light.size, light.size_y = "RECTANGLE", along.length, up.length
+    # An area lamp looks along its own -z.
+    x, z = along.normalized(), -(BLENDER_FROM_WORLD.to_3x3() @ Vector(portal["inwards"]))
+    axes = Matrix((x, z.cross(x), z)).transposed().to_4x4()
+    axes.translation = (corners[0] + corners[2]) / 2
+    held = bpy.data.objects.new("portal", light)
+    held.matrix_world = axes
+    bpy.context.scene.collection.objects.link(held)
+    return held
+
+
 def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
     """One exported material row in Cycles' nodes."""
     material = bpy.data.materials.new(part["name"])
@@ -150,7 +172,11 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
         product.operation = "MULTIPLY"
         links.new(picture.outputs["Color"], product.inputs[0])
         product.inputs[1].default_value = rgb
-        links.new(product.outputs[0], node.inputs["Color"])
+        held = nodes.new("ShaderNodeVectorMath")
+        held.operation = "MINIMUM"
+        held.inputs[1].default_value = 3 * [part["max_kd"] if node.bl_idname == DIFFUSE else 1.0]
+        links.new(product.outputs[0], held.inputs[0])
+        links.new(held.outputs[0], node.inputs["Color"])
         return node
 
     def both(a, b):  # type: ignore[no-untyped-def]
@@ -167,7 +193,7 @@ def material_of(folder: Path, part):  # type: ignore[no-untyped-def]
     elif part["kind"] == NULL:
         shader = nodes.new("ShaderNodeBsdfTransparent")
     else:
-        shader = colour(nodes.new("ShaderNodeBsdfDiffuse"), part["kd"])
+        shader = colour(nodes.new(DIFFUSE), part["kd"])
     if part["kind"] == SURFACE and max(part["tau"]) > 0:
         shader = both(shader, colour(nodes.new("ShaderNodeBsdfTranslucent"), part["tau"]))
     if max(part["radiance"]) > 0:

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely.geometry import Point, Polygon
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.raycast.variant import choose_variant
@@ -39,6 +41,8 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
     tables_from_house,
 )
 from pbrs_farm.transport.scene_tables.sky import Sky, sky_for_house
+
+BESIDE_M = 0.4  # from an opening's middle plane to a point that surely lies in the room beside it
 
 
 def home_without_coats(name: str) -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:
@@ -74,7 +78,8 @@ def write_scene(
 ) -> None:
     """Write scene.npz (geometry) and scene.json (materials, lamps, sun) into folder.
 
-    A part is what shares a material and a lamp; "texture" is the id of one of textures.
+    A part is what shares a material and a lamp; "texture" is the id of one of textures, by which its
+    "kd" is multiplied and then held to "max_kd".
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = tables.face_rows
@@ -90,6 +95,9 @@ def write_scene(
     )
     described = {
         "parts": [_part(int(tag), tables, house, set(textures)) for tag in tags],
+        "portals": [
+            {"corners": q.tolist(), "inwards": n.tolist()} for q, n in portals_inwards(house)
+        ],
         "sun": {
             "direction": sky.sun_direction.tolist(),
             "irradiance": sky.sun_irradiance.tolist(),
@@ -97,6 +105,26 @@ def write_scene(
         },
     }
     (folder / "scene.json").write_text(json.dumps(described, indent=1))
+
+
+def portals_inwards(house: House) -> list[tuple[F64, F64]]:
+    """((4, 3) corners, (3,) unit normal into the room) of every opening that daylight enters by."""
+    rooms = [(room, Polygon(room.polygon)) for room in house.rooms]
+
+    def is_indoors(point: F64) -> bool:
+        return any(
+            room.floor_y <= point[1] <= room.ceiling_y
+            and outline.contains(Point(point[0], point[2]))
+            for room, outline in rooms
+        )
+
+    found = []
+    for quad in portals_of_house(house):
+        across = np.cross(quad[1] - quad[0], quad[3] - quad[0])
+        normal, middle = across / np.linalg.norm(across), quad.mean(0)
+        sides = [n for n in (normal, -normal) if is_indoors(middle + BESIDE_M * n)]
+        found += [(quad, n) for n in sides]
+    return found
 
 
 def _part(tag: int, tables: SceneTables, house: House, textures: set[str]) -> dict[str, Any]:
@@ -107,6 +135,7 @@ def _part(tag: int, tables: SceneTables, house: House, textures: set[str]) -> di
         "name": f"{index} {material.name}"[:60],
         "kind": int(row[KIND]),
         "kd": row[KD].tolist(),
+        "max_kd": tables.max_albedo,
         "f0": row[F0].tolist(),
         "tau": row[TAU].tolist(),
         "texture": texture if int(row[KIND]) != MIRROR else None,
