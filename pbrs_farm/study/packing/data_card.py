@@ -174,10 +174,12 @@ def _loading(form: str, split: str) -> str:
             "webdataset reads the same files; normals, depth and instances are `.npz` of uint16."
         )
     return (
-        "```python\nimport io\n\nimport numpy as np\nfrom datasets import load_dataset\n\n"
-        f"row = load_dataset('.', split='{split}')[0]\n"
-        "normal = np.load(io.BytesIO(row['normal']))['normal'] * (2 / 65535) - 1\n```\n\n"
-        "Labels of 16 bits are `.npz` bytes: an `Image` column would make 8 bits of them."
+        "```python\nimport torch\nfrom datasets import load_dataset\n\n"
+        f"views = load_dataset('.', split='{split}')\n"
+        "depth = views.with_format('torch', columns=['depth'], dtype=torch.uint16)[0]['depth']  # (H, W)\n"
+        "normal = views.with_format('numpy')[0]['normal'] * (2 / 65535) - 1  # (H, W, 3)\n```\n\n"
+        "Pictures are `Image` columns, labels `Array2D` and `Array3D` of the types above; without `dtype` "
+        "the formats torch and numpy of `datasets` make int64 of them, with the same values."
     )
 
 
@@ -288,10 +290,10 @@ _CONTEXT: Final[dict[str, Any]] = {
 _PARQUET: Final = "application/x-parquet"
 
 
-def croissant_json(files: Sequence[Path], columns: Mapping[str, bool], facts: RootFacts) -> bytes:
+def croissant_json(files: Sequence[Path], columns: Mapping[str, str], facts: RootFacts) -> bytes:
     """Croissant 1.0: the Parquet files with their digests, and a record set for each split.
 
-    columns: name -> whether it holds pictures. Columns of labels of 16 bits are .npz bytes.
+    columns: name -> data type. Labels are nested lists of integers.
     """
     splits = dict.fromkeys(file.name.partition("-")[0] for file in files)
     licences = sorted({home.licence for home in facts.homes if home.licence})
@@ -335,13 +337,13 @@ def _file_set(split: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _field(split: str, name: str, is_picture: bool) -> dict[str, Any]:
+def _field(split: str, name: str, kind: str) -> dict[str, Any]:
     source: dict[str, Any] = {
         "fileSet": {"@id": f"{split}-files"}, "extract": {"column": name},
     }  # fmt: skip
-    if is_picture:
+    if kind == "sc:ImageObject":
         source["transform"] = {"jsonPath": "bytes"}
     return {
         "@type": "cr:Field", "@id": f"{split}/{name}", "name": name, "source": source,
-        "dataType": "sc:ImageObject" if is_picture else "sc:Text",
+        "dataType": kind, **({"repeated": True} if kind == "sc:Integer" else {}),
     }  # fmt: skip

@@ -12,8 +12,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
@@ -24,7 +26,7 @@ from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shar
 from pbrs_farm.study.reading.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
 from pbrs_farm.study.reading.png_rows import png_of_rows
 from pbrs_farm.study.reading.shard_set import label_parts, tar_end, tar_member
-from pbrs_farm.study.reading.stored_layers import ViewFacts, resized_stored
+from pbrs_farm.study.reading.stored_layers import Stored, ViewFacts, resized_stored
 from pbrs_farm.study.reading.stored_root import StoredRoot
 from pbrs_farm.study.reading.view_sample import Size
 from pbrs_farm.study.reading.views import ViewRef, Views
@@ -37,15 +39,23 @@ def packed_view(root: StoredRoot, ref: ViewRef, packing: Packing) -> dict[str, b
     """Part name -> bytes of a view, json first; BadInput where a file is missing or damaged."""
     facts = root.facts(ref)
     size = packing.size or facts.size
-    parts = {"json": _facts_json(facts, size)}
-    labels, *pictures = packing.requests()
-    for request in pictures:
+    labels, pictures = _stored_parts(root, ref, packing, size)
+    return {"json": _facts_json(facts, size)} | pictures | label_parts(labels)
+
+
+def _stored_parts(
+    root: StoredRoot, ref: ViewRef, packing: Packing, size: Size
+) -> tuple[Stored, dict[str, bytes]]:
+    """(arrays of the labels, part name -> bytes of colour in each mode) of a view."""
+    pictures = {}
+    wanted, *of_colour = packing.requests()
+    for request in of_colour:
         colour = resized_stored(root.arrays(ref, request), size)["colour"]
         if packing.colour == "jpeg":
-            parts[f"{request.mode}.jpg"] = jpeg_from_array(colour, packing.quality)
+            pictures[f"{request.mode}.jpg"] = jpeg_from_array(colour, packing.quality)
         else:
-            parts[f"{request.mode}.png"] = png_of_rows(colour)
-    return parts | label_parts(resized_stored(root.arrays(ref, labels), size))
+            pictures[f"{request.mode}.png"] = png_of_rows(colour)
+    return resized_stored(root.arrays(ref, wanted), size), pictures
 
 
 def _facts_json(facts: ViewFacts, size: Size) -> bytes:
@@ -65,50 +75,91 @@ def _facts_json(facts: ViewFacts, size: Size) -> bytes:
 # file.
 
 
-_TEXTS: Final = ("id", "house", "room", "camera")
 _PICTURE: Final = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+_ROWS_A_GROUP: Final = 20  # 50 MB of labels at 640x480
 
 
 def write_parquet(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Path) -> Path:
     """data/<split>-<number>-of-<number>.parquet: a row a view.
 
-    Pictures and labels of 8 bits are columns of type Image; labels of 16 bits are .npz bytes, since
-    an Image would make 8 bits of them. camera is JSON: size, K and pose as in docs/formats.md.
+    Pictures are columns of type Image, labels of type Array2D (normals Array3D) in the type they are
+    stored in. camera is JSON: size, K and pose as in docs/formats.md. Raises BadInput where the views
+    of a file are not of one size: an array column has one shape.
     """
-    rows = []
-    for ref in plan.refs:
-        parts = packed_view(source, ref, packing)
-        facts = json.loads(parts.pop("json"))
-        camera = {k: v for k, v in facts.items() if k not in ("house", "view", "room")}
-        row: dict[str, Any] = {
-            "id": ref.id, "house": ref.house, "room": facts["room"], "camera": json.dumps(camera),
-        }  # fmt: skip
-        for part, data in parts.items():
-            name, _, ending = part.partition(".")
-            row[name] = data if ending == "npz" else {"bytes": data, "path": None}
-        rows.append(row)
     file = out / "data" / f"{plan.split}-{plan.number:05d}-of-{plan.n_shards:05d}.parquet"
     file.parent.mkdir(exist_ok=True)
-    pq.write_table(pa.Table.from_pylist(rows, _schema(rows[0])), file, row_group_size=50)
+    writer: pq.ParquetWriter | None = None
+    size: Size | None = None
+    try:
+        for start in range(0, len(plan.refs), _ROWS_A_GROUP):
+            rows = []
+            for ref in plan.refs[start : start + _ROWS_A_GROUP]:
+                facts = source.facts(ref)
+                size = size or packing.size or facts.size
+                if (packing.size or facts.size) != size:
+                    raise _two_sizes(ref, size, facts.size)
+                rows.append(_parquet_row(source, ref, facts, packing))
+            table = _table(rows)
+            if writer is None:
+                writer = pq.ParquetWriter(file, table.schema, compression="zstd")
+            writer.write_table(table, row_group_size=_ROWS_A_GROUP)
+    finally:
+        if writer is not None:
+            writer.close()
     return file
 
 
-def _schema(row: dict[str, Any]) -> pa.Schema:
-    # Say which columns are pictures where `datasets` looks for it.
-    types = {
-        name: pa.string()
-        if name in _TEXTS
-        else pa.binary()
-        if isinstance(value, bytes)
-        else _PICTURE
-        for name, value in row.items()
-    }
-    features = {
-        name: {"_type": "Image"} if kind == _PICTURE else {"dtype": str(kind), "_type": "Value"}
-        for name, kind in types.items()
-    }
-    said = json.dumps({"info": {"features": features}})
-    return pa.schema(list(types.items()), metadata={"huggingface": said})
+def _two_sizes(ref: ViewRef, one: Size, other: Size) -> BadInput:
+    sizes = " and ".join(f"{w}x{h}" for w, h in (one, other))
+    hint = "--size WIDTHxHEIGHT makes them one size"
+    return BadInput(ref.id, "", f"views of {sizes} cannot be rows of one table", hint=hint)
+
+
+def _parquet_row(
+    source: StoredRoot, ref: ViewRef, facts: ViewFacts, packing: Packing
+) -> dict[str, Any]:
+    """Column -> text, {"bytes", "path"} of a picture, or a label's array."""
+    size = packing.size or facts.size
+    camera = json.loads(_facts_json(facts, size))
+    room = camera["room"]
+    for name in ("house", "view", "room"):
+        del camera[name]
+    row = {"id": ref.id, "house": ref.house, "room": room, "camera": json.dumps(camera)}
+    labels, pictures = _stored_parts(source, ref, packing, size)
+    for part, data in pictures.items():
+        row[part.partition(".")[0]] = {"bytes": data, "path": None}
+    return row | labels
+
+
+def _table(rows: list[dict[str, Any]]) -> pa.Table:
+    """A table whose metadata says which columns are pictures and arrays, where `datasets` looks for it."""
+    columns: dict[str, pa.Array] = {}
+    features: dict[str, dict[str, Any]] = {}
+    for name, first in rows[0].items():
+        values = [row[name] for row in rows]
+        if isinstance(first, str):
+            columns[name], features[name] = pa.array(values), {"dtype": "string", "_type": "Value"}
+        elif isinstance(first, dict):
+            columns[name], features[name] = pa.array(values, _PICTURE), {"_type": "Image"}
+        else:
+            columns[name] = _array_column(np.stack(values))
+            shape, dtype = list(first.shape), str(first.dtype)
+            kind = f"Array{len(shape)}D"
+            features[name] = {"shape": shape, "dtype": dtype, "_type": kind}
+    table = pa.table(columns)
+    return table.replace_schema_metadata(
+        {"huggingface": json.dumps({"info": {"features": features}})}
+    )
+
+
+def _array_column(stack: NDArray[Any]) -> pa.Array:
+    """(N, ...) values as N nested lists."""
+    column = pa.array(stack.reshape(-1))
+    for axis in range(stack.ndim - 1, 0, -1):
+        n_lists = int(np.prod(stack.shape[:axis]))
+        offsets = np.arange(n_lists + 1, dtype=np.int32) * stack.shape[axis]
+        column = pa.ListArray.from_arrays(pa.array(offsets), column)
+    return column
 
 
 # `pbrs-farm pack`.
@@ -200,6 +251,13 @@ def _write_parquet_files(
         files.append(file)
     facts = root_facts(views, source)
     (out / "README.md").write_text(card(views, packing, facts, form="parquet"), encoding="utf-8")
-    columns = {field.name: field.type == _PICTURE for field in pq.read_schema(files[0])}
+    columns = {field.name: _kind(field.type) for field in pq.read_schema(files[0])}
     (out / "croissant.json").write_bytes(croissant_json(files, columns, facts))
     return len(files) + 2
+
+
+def _kind(column: pa.DataType) -> str:
+    """What a column holds, in Croissant's words."""
+    if column == _PICTURE:
+        return "sc:ImageObject"
+    return "sc:Integer" if pa.types.is_list(column) else "sc:Text"

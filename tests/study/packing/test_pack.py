@@ -8,6 +8,7 @@ import tarfile
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from PIL import Image
@@ -131,13 +132,28 @@ def test_parquet_has_image_columns_and_every_bit_of_labels(root, tmp_path):
     features = json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]
     assert features["mlt_il_ol"] == {"_type": "Image"}
     assert features["house"] == {"dtype": "string", "_type": "Value"}
+    assert features["depth"] == {"shape": [12, 16], "dtype": "uint16", "_type": "Array2D"}
+    assert features["normal"] == {"shape": [12, 16, 3], "dtype": "uint16", "_type": "Array3D"}
+    assert table.schema.field("depth").type == pa.list_(pa.list_(pa.uint16()))
     row = table.to_pylist()[0]
     number, view = int(row["house"].split("-")[1]), int(row["id"].rpartition("_")[2])
     stored = arrays_of_view(1000 * number + view)
-    assert (np.load(io.BytesIO(row["normal"]))["normal"] == stored["normal.png"]).all()
+    for name in ("normal", "depth", "instance"):
+        assert np.array_equal(row[name], stored[f"{name}.png"])
     assert (decode_photo(row["mlt_il_ol"]["bytes"], "x") == stored["mlt_il_ol.png"]).all()
     assert json.loads(row["camera"])["width_px"] == 16
     assert "data/train-*.parquet" in (tmp_path / "x/README.md").read_text()
+
+
+def test_views_of_two_sizes_are_no_table_of_arrays(tmp_path):
+    store = FolderStore(tmp_path / "root")
+    fill(store, {"home-0-00000000": 1})
+    fill(store, {"home-1-00000000": 1}, size=(8, 6))
+    views = pbrs_farm.open(tmp_path / "root")
+    with pytest.raises(BadInput, match="views of (16x12 and 8x6|8x6 and 16x12) cannot be rows"):
+        pack(views, tmp_path / "x", Packing(modes=MODES), form="parquet")
+    assert not (tmp_path / "x").exists()
+    pack(views, tmp_path / "x", Packing((8, 6), modes=MODES), form="parquet")
 
 
 def test_parquet_that_is_not_split_is_a_split_that_datasets_takes(root, tmp_path):
