@@ -1,6 +1,6 @@
 """Progress of a run: bars on a terminal, plain lines otherwise, JSON lines for machines.
 
-Effects: writes to standard output; plain lines of failures to standard error.
+Effects: writes bars to standard error, lines to standard output; plain lines of failures to standard error.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class ProgressReporter(ABC):
 
 
 def progress_reporter(n_homes: int, *, as_json: bool) -> ProgressReporter:
-    """The reporter that fits standard output."""
+    """The reporter that fits standard error: bars where that is a terminal."""
     if as_json:
         return _JsonLines()
-    return _Bars(n_homes) if sys.stdout.isatty() else _PlainLines(n_homes)
+    return _Bars(n_homes) if sys.stderr.isatty() else _PlainLines(n_homes)
 
 
 def _name(event: Event) -> str:
@@ -204,7 +204,7 @@ class _Bars(ProgressReporter):
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             TextColumn("{task.fields[note]}"),
-            console=Console(),
+            console=Console(stderr=True),
         )
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
@@ -218,6 +218,8 @@ class _Bars(ProgressReporter):
         return self
 
     def __exit__(self, *_error: object) -> None:
+        self._progress.refresh()
+        self._progress.update(self._views, note="")
         self._progress.stop()
 
     def __call__(self, event: Event) -> None:

@@ -6,6 +6,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 VENV=.venv
 STAMP=$VENV/.setup.stamp
+LOG=$VENV/setup.log
 EXTRAS=gl,transport,s3,workers,selection,board,video,physics,usd,ifc,gltf,dev
 
 has_lib() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q "$1"; }
@@ -122,11 +123,32 @@ install_packages() {
       return 0
     fi
   fi
-  echo "setup: installing $* with apt"
+  echo "setup: installing $* with apt (a minute or two)"
   # policy-rc.d keeps apt from starting a Redis service: the tests start their own.
   $sudo env DEBIAN_FRONTEND=noninteractive apt-get update -qq || echo "setup: apt-get update failed; trying with the lists as they are" >&2
   $sudo env DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install -y -qq --no-install-recommends "$@" >/dev/null ||
     echo "setup: apt could not install: $*" >&2
+}
+
+# What pip is at, of its lines: on a terminal one line that is rewritten, elsewhere a line for each 20 packages.
+told_of_pip() {
+  local line at='' n=0 told=0
+  while IFS= read -r line; do
+    case $line in
+      Collecting\ *) n=$((n + 1)) at="looking up ${line#Collecting }" ;;
+      *Downloading\ *whl\ * | *Downloading\ *gz\ *) at="downloading ${line#*Downloading }" ;;
+      Building\ * | *Building\ wheel*) at="building" ;;
+      Installing\ collected\ *) at="unpacking all of them" told=-20 ;;
+      *) continue ;;
+    esac
+    if [ -t 2 ]; then
+      printf '\r\033[Ksetup: %s packages, %s s: %.60s' $n $SECONDS "$at"
+    elif [ $((n - told)) -ge 20 ]; then
+      echo "setup: $n packages, $SECONDS s: $at"
+      told=$n
+    fi
+  done
+  [ ! -t 2 ] || printf '\r\033[K'
 }
 
 main() {
@@ -147,14 +169,17 @@ main() {
     echo "setup: Python 3.11 or later is needed: $(command_for python3 python3-venv)" >&2
     exit 1
   fi
-  echo "setup: virtual environment $VENV with $($python --version) (some minutes the first time)"
+  echo "setup: virtual environment $VENV with $($python --version): some minutes and a gigabyte the first time"
   [ -x $VENV/bin/python ] || "$python" -m venv $VENV || {
     echo "setup: no venv module: $(command_for python3-venv)" >&2
     exit 1
   }
-  $VENV/bin/python -m pip install -q --disable-pip-version-check -e ".[$EXTRAS]" 2>&1 |
-    { grep -vE '^\s|^$|WARNING' || true; } >&2
-  [ "${PIPESTATUS[0]}" = 0 ] || exit 1
+  if ! PYTHONUNBUFFERED=1 $VENV/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
+    -e ".[$EXTRAS]" 2>&1 | tee $LOG | told_of_pip >&2; then
+    tail -n 20 $LOG >&2
+    echo "setup: pip failed; all that it said: $LOG" >&2
+    exit 1
+  fi
   echo "$want" >$STAMP
   echo "setup: done"
 }

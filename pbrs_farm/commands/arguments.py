@@ -25,7 +25,7 @@ Handler = Callable[[argparse.Namespace], int]
 Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
 
 # Help of arguments that name a home, and a view.
-HOME: Final = "file, SUNCG house folder, example home's name, or `builtin`"
+HOME: Final = "file, SUNCG house folder, example home's name, `builtin`, or `made:SEED`"
 _MAX_LINE: Final = 1500  # characters of a warning: a command that reproduces a fault fits
 VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
 

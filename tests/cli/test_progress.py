@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import pytest
 
 from pbrs_farm.progress import TimeLeft, progress_reporter, seconds_text
@@ -102,3 +104,34 @@ def test_plain_lines_tell_it(capsys: pytest.CaptureFixture[str]) -> None:
 )
 def test_seconds_are_told_in_words(seconds: float, text: str) -> None:
     assert seconds_text(seconds) == text
+
+
+class Terminal(io.StringIO):
+    """A standard error that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_bars_with_count_rate_and_time_left_and_no_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("TERM", "xterm")
+    clock = iter(range(0, 10_000, 10))
+    monkeypatch.setattr("pbrs_farm.progress.time.monotonic", lambda: float(next(clock)))
+    with progress_reporter(1, as_json=False) as report:
+        report(planned("a", 4))
+        for k in range(3):
+            report(Event("begin", "a", str(k), "light"))
+            report(Event("done", "a", str(k), "light"))
+            report(Event("end", "a", str(k), ""))
+        report(Event("begin", "a", "3", "light"))
+    shown = terminal.getvalue()
+    assert "3/4" in shown
+    assert "a/3 light" in shown
+    assert "/min" in shown
+    assert " left" in shown
+    assert capsys.readouterr().out == ""

@@ -150,7 +150,7 @@ def test_views_of_two_sizes_are_no_table_of_arrays(tmp_path):
     fill(store, {"home-0-00000000": 1})
     fill(store, {"home-1-00000000": 1}, size=(8, 6))
     views = pbrs_farm.open(tmp_path / "root")
-    with pytest.raises(BadInput, match="views of (16x12 and 8x6|8x6 and 16x12) cannot be rows"):
+    with pytest.raises(BadInput, match=r"views of (16x12 and 8x6|8x6 and 16x12) cannot be rows"):
         pack(views, tmp_path / "x", Packing(modes=MODES), form="parquet")
     assert not (tmp_path / "x").exists()
     pack(views, tmp_path / "x", Packing((8, 6), modes=MODES), form="parquet")
