@@ -11,7 +11,10 @@ import httpx
 import numpy as np
 import pytest
 
-from pbrs_farm.board.pages.relighting import lamp_rows, packet, scale_of
+from pbrs_farm.board.pages.relighting import lamp_rows, light_packet, packet, scale_of
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.transport.develop.tone_mapping import with_glare
 from tests.board.roots import HEIGHT, WIDTH, light_images, write_root
 from tests.board.served import served
 
@@ -47,6 +50,19 @@ def test_the_packet_holds_each_layer_of_light_to_a_half_floats_precision(
     np.testing.assert_allclose(planes["albedo"], stored["albedo"], rtol=1e-3)
     for name in ("outdoor", "lamp1", "lamp2"):
         np.testing.assert_allclose(planes[name] / facts["scale"], stored[name], rtol=1e-3)
+
+
+def test_a_lens_that_glares_glares_in_the_sum_that_a_browser_makes(tmp_path: Path) -> None:
+    recipe = recipe_from_name("preview", {"tone.glare": "0.3"})
+    write_root(tmp_path, {"a-1": ("0_0_1",)})
+    view = tmp_path / "houses" / "a-1" / "views" / "0_0_1"
+    files = [(view / name).read_bytes() for name in ("radiance.exr", "view.json")]
+    facts, planes = unpacked(light_packet(*files, json_bytes(recipe), denoise=False))
+    stored = light_images(2)
+    for factor in (1.0, 0.25):
+        total = sum(planes[n] for n in ("lamp1", "lamp2")) * factor + planes["outdoor"]
+        wanted = with_glare(stored["indoor"] * np.float32(factor) + stored["outdoor"], 0.3)
+        np.testing.assert_allclose(total / facts["scale"], wanted, rtol=2e-3)
 
 
 def test_a_page_says_the_command_that_makes_the_same_file(root: Path, client: httpx.Client) -> None:
