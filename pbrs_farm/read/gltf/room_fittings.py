@@ -101,7 +101,7 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     if chosen.all() or not chosen.any():
         return item, ()
     thing_of_part = _things(bounds, fitted)
-    found = []
+    found: list[Item] = []
     for thing in range(int(thing_of_part.max()) + 1):
         faces = chosen & (thing_of_part[part_of_face] == thing)
         if faces.any():
