@@ -47,7 +47,8 @@ def write_view(folder: Path, *, lamps: int = 2, **facts: Any) -> None:
         noise = rng.integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
         (folder / f"{mode}.png").write_bytes(layer_bytes(mode, noise))
     (folder / "radiance.exr").write_bytes(radiance_exr(light_images(lamps)))
-    (folder / "view.json").write_text(json.dumps(view_facts(folder.name, lamps) | facts))
+    place = {"house": folder.parents[1].name, "view": folder.name}
+    (folder / "view.json").write_text(json.dumps(view_facts(folder.name, lamps) | place | facts))
 
 
 def label_arrays() -> dict[str, np.ndarray]:

@@ -43,8 +43,12 @@ def test_the_packet_holds_each_layer_of_light_to_a_half_floats_precision(
     assert list(planes) == ["albedo", "outdoor", "lamp1", "lamp2"]
     assert (facts["width"], facts["height"], facts["denoised"]) == (WIDTH, HEIGHT, False)
     knee = facts["tone"].pop("knee")
-    assert abs(0.6 + knee * np.log1p(63.4 / knee) - 1) < 1e-9
-    assert facts["tone"] == {"preset": "photo", "key": 0.18, "white_balance": 0.7}
+    tone = recipe_from_name("preview").tone_of("a-1", "0_0_1")
+    assert abs(0.6 + knee * np.log1p((tone.white - 0.6) / knee) - 1) < 1e-9
+    assert facts["tone"] == {name: getattr(tone, name) for name in facts["tone"]}
+    assert {"preset", "key", "white_balance", "exposure_ev", "contrast", "black"} <= set(
+        facts["tone"]
+    )
     assert [lamp["name"] for lamp in facts["lamps"]] == ["lamp 0", "lamp 1"]
     stored = light_images(2)
     np.testing.assert_allclose(planes["albedo"], stored["albedo"], rtol=1e-3)

@@ -72,8 +72,7 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
     from pbrs_farm.run.relight import relight_layers
     from pbrs_farm.transport.develop.tone_mapping import exposure_of, with_glare
 
-    place = json.loads(view_json)
-    tone = recipe_from_json(recipe, "recipe.json").tone_of(place["house"], place["view"])
+    tone = _tone_of(view_json, recipe)
     rows = lamp_rows(view_json)
     layers = relight_layers(radiance_from_exr(radiance, "radiance.exr"), rows, denoise=denoise)
     light = {"outdoor": layers.aovs.outdoor}
@@ -128,6 +127,16 @@ def lamp_rows(view_json: bytes) -> list[dict[str, Any]]:
         ]
     except (ValueError, KeyError, TypeError, RecursionError):
         return []
+
+
+def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
+    """The tone that the recipe draws for the view."""
+    try:
+        row = json.loads(view_json)
+        house, view = str(row["house"]), str(row["view"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise BadInput("view.json", "", "names no house and view") from None
+    return recipe_from_json(recipe, "recipe.json").tone_of(house, view)
 
 
 def _tone_facts(tone: ToneFields) -> dict[str, Any]:
