@@ -9,8 +9,10 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Item, ItemKind, Opening, Room
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.dress.space.footprints import plan_area
 
 WallsAt = Callable[[float], BaseGeometry]
 
@@ -19,6 +21,14 @@ _REACH_M = (0.1, 0.25, 0.4, 0.6, 0.8)  # from the wall's middle, where a room is
 _MOST_HALF_WALL_M = 0.6
 _HALF_WALL_M = 0.05  # where no wall is found
 _LEAST_DOOR_M = 1.6  # a lower hole is a hatch
+_STEP_M = 0.004  # at which walls are looked for: half of one without thickness
+_CELL_M = 0.01  # along a wall
+_BESIDE_M = 0.4  # of a leaf: where the jambs of its doorway are looked for
+_DOORWAY_M = (0.5, 2.6)  # least and greatest width
+_OFF_M = 0.01  # a quad nearer to the middle of its wall stays there
+_SAME_WALL_M = 0.1  # walls this near to one another have one hole
+_COVERED = 0.8  # of the most that a line along the hole lies in walls
+_LEAST_COVERED = 0.3  # of the hole's width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +86,8 @@ def passages_of(
 ) -> tuple[Passage, ...]:
     """Every door, archway and window, in the house's order; walls_at: plan area of walls at a height.
 
-    Doors and windows that cut no hole count by their own boxes.
+    A doorway lies where the walls have their hole, however far a leaf that is drawn open stands out
+    of it. Windows that cut no hole, and doors at no wall, count by their own boxes.
     """
     by_id = {item.id: item for item in items}
     found = [_from_opening(o, rooms, walls_at) for o in openings]
@@ -97,16 +108,65 @@ def _from_opening(
     normal = np.asarray(opening.normal, np.float64)
     if not np.isfinite(quad).all() or np.linalg.norm(normal[[0, 2]]) < 0.5:
         return None  # a hole in a roof has no wall
+    normal = normal * [1, 0, 1] / np.linalg.norm(normal[[0, 2]])
+    # The quad's plane may be off the wall: halfway of all that the door's box touches.
+    middle = (quad.min(0) + quad.max(0)) / 2
+    cutter = opening.cutter
+    walls = walls_at(float(middle[1]))
+    span = None
+    if not opening.is_cut:
+        corners = triangle_corners(cutter.positions, cutter.faces).astype(np.float64)
+        span = _depth_of_walls(plan_area(corners, upright=False), walls, normal)
+    if span is not None:
+        off = sum(span) / 2 - float(middle @ normal)
+        quad = quad + normal * (off if abs(off) > _OFF_M else 0.0)
     return _passage(
-        opening.id,
-        opening.item_id,
-        opening.level_id,
-        opening.is_window,
-        quad,
-        normal,
-        rooms,
-        walls_at,
+        opening.id, opening.item_id, opening.level_id, opening.is_window, quad, normal, rooms, walls_at
+    )  # fmt: skip
+
+
+def _depth_of_walls(
+    area: BaseGeometry, walls: BaseGeometry, normal: F64
+) -> tuple[float, float] | None:
+    """Where the wall that a plan area goes through begins and ends along a normal; None = no wall.
+
+    Of several walls that which fills most of the area's width counts: a leaf that is drawn open
+    touches the wall beside it, too.
+    """
+    if area.is_empty:
+        return None
+    across, along = normal[[0, 2]], np.array([normal[2], -normal[0]])
+    plan = shapely.get_coordinates(area)
+    (s0, s1), (t0, t1) = ((float(v.min()), float(v.max())) for v in (plan @ along, plan @ across))
+    offsets = np.arange(t0 + _STEP_M / 2, t1, _STEP_M)
+    if not len(offsets) or s1 - s0 < _STEP_M:
+        return None
+    lines = shapely.linestrings(
+        np.stack([offsets[:, None] * across + s * along for s in (s0, s1)], axis=1)
     )
+    near = shapely.intersection(walls, area)
+    lengths = np.asarray(shapely.length(shapely.intersection(lines, near)))
+    most = float(lengths.max())
+    if most < _LEAST_COVERED * (s1 - s0):
+        return None
+    runs = _runs(lengths >= _COVERED * most, round(_SAME_WALL_M / _STEP_M))
+    first, last = max(runs, key=lambda r: float(lengths[r[0] : r[1]].sum()))
+    # The wall's faces themselves, not the lines that met it.
+    low, high = float(offsets[first]) - _STEP_M, float(offsets[last - 1]) + _STEP_M
+    corners = [s * along + t * across for s, t in ((s0, low), (s1, low), (s1, high), (s0, high))]
+    depths = shapely.get_coordinates(shapely.intersection(shapely.Polygon(corners), near)) @ across
+    return float(depths.min()), float(depths.max())
+
+
+def _runs(found: Bools, gap: int) -> list[tuple[int, int]]:
+    """(first, end) of each stretch of True, those with at most so many False between joined."""
+    runs: list[tuple[int, int]] = []
+    for k in np.flatnonzero(found).tolist():
+        if runs and k - runs[-1][1] <= gap:
+            runs[-1] = (runs[-1][0], k + 1)
+        else:
+            runs.append((k, k + 1))
+    return runs
 
 
 def _from_item(
@@ -118,9 +178,70 @@ def _from_item(
     level = [k for k in range(3) if abs(box.axes[1, k]) < 0.5]
     if not np.isfinite(corners).all() or len(level) != 2:
         return None
-    normal = box.axes[:, min(level, key=lambda k: float(box.half[k]))]
     is_window = item.kind is ItemKind.WINDOW
+    level.sort(key=lambda k: float(box.half[k]))
+    normal = box.axes[:, level[0]]
+    if not is_window:
+        walls = walls_at(float(box.centre[1]))
+        for k in level:
+            found = _doorway(corners, box.axes[:, k] * [1, 0, 1], walls)
+            if found is not None:
+                corners, normal = found, box.axes[:, k]
+                break
     return _passage(item.id, item.id, item.level_id, is_window, corners, normal, rooms, walls_at)
+
+
+def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
+    """(4, 3) the hole of a wall across a normal in which a door stands, by its box's corners (8, 3).
+
+    A wall that has no hole has it where the box goes through. None where neither is found.
+    """
+    across = normal[[0, 2]] / np.linalg.norm(normal[[0, 2]])
+    along = np.array([across[1], -across[0]])
+    plan = corners[:, [0, 2]]
+    (s0, s1), (t0, t1) = ((float(v.min()), float(v.max())) for v in (plan @ along, plan @ across))
+    box = shapely.Polygon(
+        [s * along + t * across for s, t in ((s0, t0), (s1, t0), (s1, t1), (s0, t1))]
+    )
+    low, high = float(corners[:, 1].min()), float(corners[:, 1].max())
+    hole = None
+    if s1 - s0 >= _DOORWAY_M[0]:
+        span = _depth_of_walls(box, walls, np.array([across[0], 0.0, across[1]]))
+        hole = (s0, s1, *span) if span is not None else None
+    hole = hole or _gap((s0, s1), (t0, t1), along, across, walls)
+    if hole is None:
+        return None
+    s0, s1, t0, t1 = hole
+    t = (t0 + t1) / 2
+    return np.array([
+        [*(s * along + t * across), y] for s, y in ((s0, low), (s1, low), (s1, high), (s0, high))
+    ])[:, [0, 2, 1]]  # fmt: skip
+
+
+def _gap(
+    s: tuple[float, float], t: tuple[float, float], along: F64, across: F64, walls: BaseGeometry
+) -> tuple[float, float, float, float] | None:
+    """(s0, s1, t0, t1) of the narrowest gap of a wall at a box s, t along and across it; None = none."""
+    reach = _BESIDE_M + max(s[1] - s[0], t[1] - t[0])
+    ss = np.arange(s[0] - reach, s[1] + reach, _CELL_M)
+    tt = np.arange(t[0] - _BESIDE_M / 2, t[1] + _BESIDE_M / 2, _STEP_M)
+    places = ss[None, :, None] * along + tt[:, None, None] * across
+    solid = shapely.contains_xy(walls, places[..., 0], places[..., 1])
+    gaps: dict[tuple[int, int], list[int]] = {}
+    for row in range(len(tt)):
+        for first, end in _runs(~solid[row], 0):
+            # It lies between two jambs, and the box reaches into it.
+            is_closed = first > 0 and end < len(ss)
+            is_met = ss[first] < s[1] and ss[end - 1] > s[0]
+            if is_closed and is_met and _DOORWAY_M[0] <= (end - first) * _CELL_M <= _DOORWAY_M[1]:
+                gaps.setdefault((first, end), []).append(row)
+    if not gaps:
+        return None
+    # A corridor's walls stand farther apart than its door's jambs.
+    first, end = min(gaps, key=lambda g: (g[1] - g[0], -len(gaps[g])))
+    rows = gaps[first, end]
+    s_half, t_half = _CELL_M / 2, _STEP_M / 2
+    return ss[first] - s_half, ss[end - 1] + s_half, tt[rows[0]] - t_half, tt[rows[-1]] + t_half
 
 
 def _passage(

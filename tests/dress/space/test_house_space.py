@@ -107,6 +107,49 @@ def test_a_door_knows_its_rooms_and_the_space_before_it(space: HouseSpace) -> No
     assert None in front.room_ids
 
 
+def test_an_openings_middle_lies_in_its_wall_however_deep_the_box_of_its_door_is(
+    home: House,
+) -> None:
+    inner = next(o for o in home.openings if o.item_id == "door_inner")
+    normal = np.asarray(inner.normal)
+    # The leaf is drawn open: the quad's plane lies halfway of 95 cm, not of the wall.
+    far = inner.cutter.positions @ normal > float(inner.quad.mean(0) @ normal)
+    cutter = inner.cutter.positions + np.where(far[:, None], 0.8 * normal, 0.0)
+    drawn = replace(
+        inner, quad=inner.quad + 0.38 * normal,
+        cutter=replace(inner.cutter, positions=cutter.astype(np.float32)),
+    )  # fmt: skip
+    openings = tuple(drawn if o is inner else o for o in home.openings)
+    moved = house_space(Draft(replace(home, openings=openings), 1))
+    (door,) = (p for p in moved.passages if p.item_id == "door_inner")
+    assert abs(float((door.centre - inner.quad.mean(0)) @ normal)) < 0.01
+    assert set(door.room_ids) == {"0_0", "0_1"}
+
+
+@pytest.mark.parametrize("has_hole", [True, False])
+def test_a_door_without_an_opening_stands_in_the_hole_of_its_wall(has_hole: bool) -> None:
+    # The wall x = 2 parts two rooms; its door, drawn open, stands 0.9 m into the left one.
+    pieces = [(0.0, 1.0), (1.9, 4.0)] if has_hole else [(0.0, 4.0)]
+    walls = [
+        replace(_block(f"w{k}", (1.95, 0, z0), (2.05, 2.5, z1)), kind=ItemKind.WALL)
+        for k, (z0, z1) in enumerate(pieces)
+    ]
+    leaf = _block("leaf", (1.05, 0, 1.86), (1.99, 2, 1.9))
+    frame = _block("frame", (1.95, 0, 1.0), (2.05, 2, 1.02))
+    door = replace(leaf, kind=ItemKind.DOOR, surfaces=(*leaf.surfaces, *frame.surfaces))
+    rooms = tuple(
+        Room(f"0_{k}", "", "0", np.array([[x0, 0], [x0, 4], [x1, 4], [x1, 0.0]]), 0.0, 2.5)
+        for k, (x0, x1) in enumerate(((0.0, 1.95), (2.05, 4.0)))
+    )
+    base = builtin_home()
+    house = replace(base, rooms=rooms, items=(*walls, door), openings=())
+    (passage,) = house_space(Draft(house, 1)).passages
+    assert passage.centre[[0, 2]] == pytest.approx([2.0, 1.45], abs=0.02)
+    assert abs(passage.normal[0]) == pytest.approx(1.0)
+    assert passage.width == pytest.approx(0.9, abs=0.03)
+    assert set(passage.room_ids) == {"0_0", "0_1"}
+
+
 def test_a_window_knows_its_sill(space: HouseSpace) -> None:
     (window,) = space.room("0_1").windows
     assert (window.bottom_y, window.top_y) == (pytest.approx(0.9), pytest.approx(2.1))
