@@ -43,6 +43,13 @@ class Piece:
     creator: str = ""
     licence: str = ""  # "CC0", "CC-BY 3.0"
     of_set: str = ""  # pieces of one set are sold together; "" = it goes with any
+    low_m: float = 0.0  # of its base above the floor, where its library hangs it; 0 = it stands
+
+    @property
+    def held_by(self) -> Place:
+        """What holds it: the place where it belongs, or a wall where its library hangs it there."""
+        hangs = self.low_m > 0 and self.place in (Place.FLOOR, Place.SURFACE)
+        return Place.WALL if hangs else self.place
 
 
 @dataclass(frozen=True, slots=True, eq=False)

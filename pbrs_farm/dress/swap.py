@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
+from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR, TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
-from pbrs_farm.core.mesh import triangle_bounds
+from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
@@ -362,6 +362,46 @@ def _stands_on(item: Item, corners: F64, top_y: float) -> bool:
     return bool(np.isfinite(height).any() and abs(float(gap.min())) <= _CONTACT_M)
 
 
+# What holds a thing: a fact of it that another model keeps, with its height.
+
+
+_STANDS_M: Final = 0.03  # above the floor, at most
+ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
+    Place.FLOOR: frozenset({Place.FLOOR, Place.KITCHEN, Place.SURFACE}),
+    Place.SURFACE: frozenset({Place.FLOOR, Place.SURFACE}),
+    Place.WALL: frozenset({Place.WALL}),
+    Place.CEILING: frozenset({Place.CEILING}),
+}
+"""By what holds a thing, the places of the models that may be held so."""
+
+
+def held_by(draft: Draft, around: PieceSurroundings, index: int, group: str) -> Place:
+    """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling."""
+    if HELD.get(group) is HeldBy.TOP:
+        return Place.CEILING
+    item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
+    if _above_floor(draft, item, low_y) <= _STANDS_M:
+        return Place.FLOOR
+    # What stands on a piece, a step or a platform does not hang.
+    (low, high), all_bounds = around.bounds()[index], around.bounds()
+    below = boxes_meeting(all_bounds[:, 0], all_bounds[:, 1], low - _CONTACT_M, high)
+    others = [around.items[int(k)] for k in np.flatnonzero(below) if k != index]
+    stands = any(
+        other.kind is not ItemKind.WALL
+        and other.n_faces
+        and _stands_on(item, around.triangles(other), low_y + _CONTACT_M)
+        for other in others
+    )
+    return Place.SURFACE if stands else Place.WALL
+
+
+def _above_floor(draft: Draft, item: Item, low_y: float) -> float:
+    """How far a height lies above the floor of the item's room, or of its storey."""
+    floors = [room.floor_y for room in draft.source.rooms if room.id == item.room_id]
+    floors += [lv.elevation for lv in draft.source.levels if lv.id == item.level_id]
+    return low_y - floors[0] if floors else 0.0
+
+
 def lowest_points(item: Item) -> F64:
     """(N, 3) vertices within 5 cm of the item's bottom; every few of them where they are many."""
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
@@ -410,6 +450,7 @@ class _Member:
     item: Item
     place: OldPlace
     on: tuple[int, ...]  # what stands on it
+    held_by: Place
 
 
 def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
@@ -463,7 +504,10 @@ def _members(
             place = before_boards(place, _boards_near(draft, item))
         if group in _ON_WALLS:
             place = at_wall(place, _walls_near(draft, item))
-        found.append(_Member(index, item, place, tuple(on)))
+        by = held_by(draft, around, index, group)
+        found.append(
+            _Member(index, item, place, tuple(on), Place.WALL if group in _ON_WALLS else by)
+        )
     return found
 
 
@@ -507,6 +551,15 @@ def _swap_set(
     if not candidates:
         draft.refused[f"{PART}: no other model fits"] += 1
         return
+    # What hangs stays hung, what stands keeps standing.
+    candidates = [
+        (piece, scale)
+        for piece, scale in candidates
+        if all(piece.held_by in ALIKE_HELD[m.held_by] for m in members)
+    ]
+    if not candidates:
+        draft.refused[f"{PART}: no other model is held as the old one is"] += 1
+        return
     why = "no other model can be used"
     for k in rng.permutation(len(candidates))[:_TRIES]:
         piece, scale = candidates[int(k)]
@@ -530,6 +583,7 @@ def _placed(
 ) -> Item:
     """The piece as the member's item: same id, room, kind and tags of its source."""
     held, place, item = HELD[group], member.place, member.item
+    held = HeldBy.BACK if member.held_by is Place.WALL else held
     low, high = shape.bounds * np.array(scale)
     # Bring the point that is held to where the old one's was.
     own = np.array([
@@ -550,8 +604,7 @@ def _placed(
 
 def _above_floor_m(draft: Draft, item: Item, low_y: float) -> float:
     """How much a piece stands above its room's floor where that is a few millimetres; else 0."""
-    floors = (room.floor_y for room in draft.source.rooms if room.id == item.room_id)
-    above = low_y - next(floors, low_y)
+    above = _above_floor(draft, item, low_y)
     return above if 0 < above <= _ON_FLOOR_M else 0.0
 
 

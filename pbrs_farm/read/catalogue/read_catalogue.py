@@ -169,6 +169,7 @@ def _piece(
         library=library.name,
         creator=entry.creator,
         licence=library.licence,
+        low_m=entry.piece.elevation,
     )
     load = partial(library_shape, entry, rule.place, seen.turn_deg, library.contents, notes)
     return piece, load

@@ -81,7 +81,7 @@ DRESSER: Size = (1.2, 0.5, 0.8)
 
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0, 180.0, 33.0])
 def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg: float) -> None:
-    old = _item("d", DRESSER, [2.0, 0.1, 1.5], 17, turn_deg=turn_deg)
+    old = _item("d", DRESSER, [2.0, 0.02, 1.5], 17, turn_deg=turn_deg)
     draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
     turn = rotation_y(np.radians(turn_deg))
     own, was = (_corners(i) @ turn for i in (draft.items[0], old))
@@ -98,6 +98,35 @@ def test_a_thing_drawn_two_millimetres_above_the_floor_gives_way_to_one_that_sta
     draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
     assert draft.items[0].source_class == "T#new"
     assert_allclose(_corners(draft.items[0])[:, 1].min(), 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("above_m", "place", "low_m", "is_swapped"),
+    [
+        (0.16, Place.FLOOR, 0.0, False),  # a standing model would float
+        (0.16, Place.WALL, 0.0, True),
+        (0.16, Place.FLOOR, 0.2, True),  # its library hangs it
+        (0.0, Place.FLOOR, 0.2, False),  # a hung model would lie on the floor
+        (0.0, Place.FLOOR, 0.0, True),
+    ],
+)
+def test_what_hangs_stays_hung_and_what_stands_keeps_standing(
+    above_m: float, place: Place, low_m: float, is_swapped: bool
+) -> None:
+    catalogue = _catalogue(("dresser", "new", DRESSER))
+    (piece,) = catalogue.pieces
+    catalogue = replace(catalogue, pieces=(replace(piece, place=place, low_m=low_m),))
+    draft = _swapped(catalogue, _item("d", DRESSER, [2.0, above_m, 1.5], 17))
+    assert (draft.items[0].source_class == "T#new") is is_swapped
+    assert draft.items[0].bounds[0, 1] == pytest.approx(above_m, abs=1e-5)
+    assert ("swap: no other model is held as the old one is" in draft.refused) is not is_swapped
+
+
+def test_a_thing_on_a_platform_stands_and_does_not_hang() -> None:
+    platform = solid("platform", [1.0, 0.0, 1.0], [3.0, 0.3, 2.0])
+    catalogue = _catalogue(("dresser", "new", DRESSER))
+    draft = _swapped(catalogue, _item("d", DRESSER, [2.0, 0.3, 1.5], 17), platform)
+    assert draft.items[0].source_class == "T#new"
 
 
 def test_it_keeps_its_id_and_says_what_it_was_made_from() -> None:
@@ -171,9 +200,9 @@ def test_a_lamp_keeps_its_power_and_its_colour() -> None:
     size = (0.3, 0.3, 0.5)
     lamp = _item("l", size, [2, 0.7, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
     new = replace(_light(0.5), rgb_linear=(1.0, 1.0, 1.0), share=1.0)
-    draft = _swapped(
-        _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size), lights=(new,)), lamp
-    )
+    table = solid("table", [1.5, 0.0, 0.5], [2.5, 0.7, 1.5])
+    catalogue = _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size), lights=(new,))
+    draft = _swapped(catalogue, lamp, table)
     (light,) = draft.items[0].lights
     assert draft.items[0].source_class == "T#new"
     assert (light.power, light.rgb_linear) == (0.8, (1.0, 0.5, 0.2))
@@ -182,7 +211,7 @@ def test_a_lamp_keeps_its_power_and_its_colour() -> None:
 
 def test_a_lamp_that_is_lit_gets_no_model_without_a_light_source() -> None:
     size = (0.3, 0.3, 0.5)
-    lamp = _item("l", size, [2, 0.7, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
+    lamp = _item("l", size, [2, 0, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
     catalogue = _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size))
     draft = _swapped(catalogue, lamp)
     assert draft.items[0] is lamp
