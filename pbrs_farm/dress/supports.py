@@ -237,6 +237,8 @@ _NEAR_M = 0.003  # a face of another thing this near to the support's height lie
 _LEVEL_M = 0.0002  # its own face this near belongs to it; a higher one is a board beside it
 _OPEN_SHARE = 0.5  # of a side's length
 _OUT_OF_REACH_M = 2.35  # above the floor
+_RIM_M = 0.03  # that a bowl's rim rises above its bottom
+_RIM_WITHIN_M = 0.16  # beyond the edge of the bottom
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -381,6 +383,8 @@ def _supports_at(
         # Leave out the inside of closed bodies: nothing leads there but from above.
         if not any(sides) and np.median(air[part]) < room.ceiling_y - height - 0.01:
             continue
+        if not any(sides) and _is_in_a_bowl(around, parts == k, height):
+            continue
         found.append(
             turned_to_front(
                 Support(
@@ -410,6 +414,26 @@ def _open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
         edge = ahead[lines, at] if axis == 1 else ahead[at, lines]
         sides.append(bool(np.mean(~edge) > _OPEN_SHARE))
     return (sides[0], sides[1], sides[2], sides[3])
+
+
+def _is_in_a_bowl(around: Surroundings, part: Bools, height: float) -> bool:
+    """Whether a rim rises around a part of the grid on each of its four sides, as of a sink."""
+    hits = around.hits
+    # A rim begins at the bottom's height or below, unlike what hangs above it.
+    rises = (hits.high > height + _RIM_M) & (hits.low < height + _RIM_M)
+    rim = np.zeros(part.shape, np.bool_)
+    rim[hits.row[rises], hits.column[rises]] = True
+    n = round(_RIM_WITHIN_M / around.grid.cell_m)
+    for axis in (0, 1):
+        lines = np.flatnonzero(part.any(1 - axis))
+        own, rims = (np.moveaxis(m, axis, 0)[lines] for m in (part, rim))
+        for step in (1, -1):
+            own_, rims_ = own[:, ::step], rims[:, ::step]
+            last = own_.shape[1] - np.argmax(own_[:, ::-1], 1)
+            met = [bool(r[e : e + n].any()) for r, e in zip(rims_, last, strict=True)]
+            if np.mean(met) <= _OPEN_SHARE:
+                return False
+    return True
 
 
 def _shifted(mask: Bools, axis: int, by: int) -> Bools:

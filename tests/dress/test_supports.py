@@ -101,3 +101,30 @@ def test_groups_of_faces_cover_what_each_covers_alone() -> None:
     groups = list(np.random.default_rng(4).uniform(0, 2, (3, 5, 3, 3)))
     alone = [covered(grid, group) for group in groups]
     np.testing.assert_array_equal(covered_by_each(grid, groups), alone)
+
+
+def _basin(depth_m: float) -> Item:
+    """A worktop 1 x 0.6 m at 0.9 m with a bowl in its middle, 40 cm square, of boards of 1 cm."""
+    x0, x1, z0, z1, top = 1.3, 1.7, 1.1, 1.5, 0.9
+    low = top - depth_m
+    plates = [([1.0, 0.88, 1.0], [x0, top, 1.6]), ([x1, 0.88, 1.0], [2.0, top, 1.6])]
+    plates += [([x0, 0.88, 1.0], [x1, top, z0]), ([x0, 0.88, z1], [x1, top, 1.6])]
+    sides = [([x0, low, z0], [x0 + 0.01, top, z1]), ([x1 - 0.01, low, z0], [x1, top, z1])]
+    sides += [([x0, low, z0], [x1, top, z0 + 0.01]), ([x0, low, z1 - 0.01], [x1, top, z1])]
+    return boards("sink", [*plates, *sides, ([x0, low - 0.01, z0], [x1, low, z1])], 34)
+
+
+def test_the_bottom_of_a_bowl_is_no_support_and_the_worktop_around_it_is() -> None:
+    (support,) = _supports(_basin(0.2))
+    assert support.height == pytest.approx(0.9)
+    x, z = np.moveaxis(support.grid.centres(), -1, 0)
+    assert not support.mask[(x > 1.32) & (x < 1.68) & (z > 1.12) & (z < 1.48)].any()
+
+
+def test_a_tray_with_a_low_rim_is_a_support() -> None:
+    assert len(_supports(_basin(0.02))) == 2
+
+
+def test_a_worktop_seen_in_the_bowl_of_a_sink_is_no_support() -> None:
+    worktop = solid("worktop", [1.0, 0.0, 1.0], [2.0, 0.8, 1.6])
+    assert not _supports(worktop, _basin(0.15))
