@@ -237,6 +237,28 @@ def _placed_box(shape: Shape, turn: F64, factor: F64, at: F64) -> Box | None:
     return Box(turn @ ((low + high) / 2) + at, (high - low) / 2, turn)
 
 
+def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None = None) -> Item:
+    """The item turned by (3, 3) about a point (3,) of the world, then moved by step (3,) metres."""
+    turn = np.eye(3) if turn is None else turn
+    pivot = np.zeros(3) if about is None else about
+
+    def moved(points: F64) -> F64:
+        return np.asarray((points - pivot) @ turn.T + pivot + step)
+
+    def surface(s: Surface) -> Surface:
+        normals = s.normals
+        if normals is not None:
+            normals = (normals @ turn.T).astype(np.float32)
+        points = moved(s.positions.astype(np.float64))
+        return replace(s, positions=points.astype(np.float32), normals=normals)
+
+    box = item.box and Box(moved(item.box.centre), item.box.half, turn @ item.box.axes)
+    return replace(
+        item, surfaces=tuple(surface(s) for s in item.surfaces), box=box,
+        lights=tuple(_moved_light(light, moved, turn) for light in item.lights),
+    )  # fmt: skip
+
+
 def _moved_light(light: LightPart, moved: Callable[[F64], F64], turn: F64) -> LightPart:
     def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
         x, y, z = (float(c) for c in moved(np.asarray(p, np.float64)))

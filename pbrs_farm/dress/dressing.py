@@ -7,14 +7,14 @@ large textiles, what hangs on walls, and last what lies about. The gates take ou
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece
-from pbrs_farm.core.house import House, Source
+from pbrs_farm.core.house import House, Item, Source
 from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.built_in import joinery
@@ -22,7 +22,7 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
 from pbrs_farm.dress.finishes import parts
 from pbrs_farm.dress.furniture import furniture
-from pbrs_farm.dress.gates import group_of, keep_gates, part_of, piece_id
+from pbrs_farm.dress.gates import group_of, keep_gates, kept_as_rendered, part_of, piece_id
 from pbrs_farm.dress.lamps import lamps
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
@@ -60,8 +60,38 @@ def dress(
     house: as read, not repaired. Equal arguments give equal bits. Raises BadRecipe for an unknown
     style.
     """
+    made = dressed_house(house, catalogue, fields, seed)
+    return made.house, made.report
+
+
+class Dressed(NamedTuple):
+    """A dressed house, and what its gates ask again when it is repaired."""
+
+    house: House
+    report: DressReport
+    pieces: Mapping[str, Piece]  # that were put into it, by id
+    n_source: int  # of its items were there before
+
+
+def dressed_house(house: House, catalogue: Catalogue, fields: DressFields, seed: int) -> Dressed:
+    """As dress, with what kept_in needs."""
     with closing(Draft(house, seed)) as draft:
-        return _dressed(draft, catalogue, fields)
+        return Dressed(*_dressed(draft, catalogue, fields), draft.used, len(house.items))
+
+
+def kept_in(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
+    """The dressed house with what repair parted from its wall hung anew or taken out.
+
+    The same object where everything that was added is held in the repaired house as well.
+    """
+    house, report = kept_as_rendered(
+        dressed.house, dressed.n_source, repaired, dressed.report, dressed.pieces
+    )
+    if house is dressed.house:
+        return dressed
+    added = _added(house.items[dressed.n_source :], dressed.pieces)
+    update = {"added": added, "credits": _credits(house, catalogue)}
+    return dressed._replace(house=house, report=report.model_copy(update=update))
 
 
 def _dressed(draft: Draft, catalogue: Catalogue, fields: DressFields) -> tuple[House, DressReport]:
@@ -107,22 +137,23 @@ def _report(
         for tag in item.tags
         if tag.startswith(CHANGED_TAG)
     )
-    # Count what stands there now, whatever was tried.
-    added = Counter(
-        f"{part_of(item)}: {group_of(item, draft.used)}"
-        for item in house.items[len(draft.source.items) :]
-    )
     return DressReport(
         house_id=house.id,
         seed=draft.seed,
         style=style.name,
-        added=dict(sorted(added.items())),
+        added=_added(house.items[len(draft.source.items) :], draft.used),
         changed=dict(sorted(changed.items())),
         refused=dict(sorted(draft.refused.items())),
         gates=gates,
         credits=credits,
         notes=tuple(f"{n.kind}: {n.place}: {n.text}" for n in draft.notes),
     )
+
+
+def _added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
+    """What was added and stands there now, whatever was tried, by part and group."""
+    found = Counter(f"{part_of(item)}: {group_of(item, pieces)}" for item in items)
+    return dict(sorted(found.items()))
 
 
 def _credits(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:

@@ -46,6 +46,7 @@ class DressReport(Record):
         default_factory=dict
     )  # `<part>: <reason>` -> tries that were given up
     gates: tuple[Gate, ...] = ()
+    moved_after_repair: int = 0  # things hung on the wall that repair left
     credits: tuple[Credit, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -92,6 +93,8 @@ def _lines(report: DressReport) -> Iterator[str]:
         else:
             out = f"; {gate.n_taken_out} taken out or put back for it" if gate.n_taken_out else ""
             yield f"{text}: holds ({gate.n_checked} measured{out})."
+    if report.moved_after_repair:
+        yield f"{report.moved_after_repair} things hang on the wall that repair left of two."
     owed = [c for c in report.credits if is_owed(c)]
     if report.credits:
         yield f"{len(report.credits)} models and pictures of libraries used, {len(owed)} of them CC-BY."

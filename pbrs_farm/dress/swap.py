@@ -19,9 +19,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR, TABLE
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Surface
+from pbrs_farm.core.house import Item, ItemKind, LightPart
 from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.draft import Draft, moved_item
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
 from pbrs_farm.geometry.heights import highest_below
@@ -657,26 +657,6 @@ def _put(
         draft.change(member.index, item, PART)
         draft.done[f"{PART}: {group}"] += 1
     for index, up in lifts.items():
-        draft.change(index, _moved(draft.items[index], up), PART)
+        step = np.array([0.0, up, 0.0])
+        draft.change(index, moved_item(draft.items[index], step), PART)
     draft.used[piece.id] = piece
-
-
-def _moved(item: Item, up: float) -> Item:
-    step = np.array([0.0, up, 0.0])
-
-    def surface(s: Surface) -> Surface:
-        return replace(s, positions=(s.positions + step).astype(np.float32))
-
-    def light(part: LightPart) -> LightPart:
-        x, y, z = part.position
-        end = part.position_end
-        return replace(
-            part, position=(x, y + up, z),
-            position_end=(end[0], end[1] + up, end[2]) if end is not None else None,
-        )  # fmt: skip
-
-    box = item.box and Box(item.box.centre + step, item.box.half, item.box.axes)
-    return replace(
-        item, surfaces=tuple(surface(s) for s in item.surfaces),
-        lights=tuple(light(part) for part in item.lights), box=box,
-    )  # fmt: skip

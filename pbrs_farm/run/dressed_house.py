@@ -5,6 +5,7 @@ Effects: reads the furniture package from the cache (or through apt) and the use
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core import keys
@@ -19,10 +20,15 @@ from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
+    from pbrs_farm.repair import RepairReport
 
+    Repaired = tuple[House, RepairReport]
 
 VERSION: Final = 13
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
+
+
+_ROUNDS: Final = 3  # of repair and gates
 
 
 TELLS_BOXES: Final = frozenset({"plan", "scenestate", "front3d", "habitat"})
@@ -59,23 +65,38 @@ def furnished(house: House, source: SourceRef, recipe: Recipe) -> House:
     return with_rooms_furnished(house, catalogue_of(recipe.dress), seed_of(source, recipe))
 
 
-def dressed(house: House, source: SourceRef, recipe: Recipe) -> tuple[House, DressReport | None]:
-    """A house as read, dressed by its source's seed, and what was done; None where it is not.
+def dressed_and_repaired(
+    house: House, source: SourceRef, recipe: Recipe, repaired: Callable[[House], Repaired]
+) -> tuple[House, RepairReport, DressReport | None]:
+    """A house as read, dressed by its source's seed and repaired; and what was done, None: not dressed.
 
-    Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed
+    Gates hold for the house as it is rendered: what loses its wall to repair is hung on the wall
+    that is left or taken out, and the house is repaired without it. Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed
     where the furniture package cannot be had.
     """
     seed = seed_of(source, recipe)
     if not seed:
-        return house, None
-    from pbrs_farm.dress.dressing import dress
+        doing(source.location, "repair")
+        return *repaired(house), None
+    from pbrs_farm.dress.dressing import dressed_house, kept_in
     from pbrs_farm.repair.repair_house import with_rooms_closed, without_persons_and_plants
 
     doing(source.location, "dress")
     # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.
     bare, _removed = without_persons_and_plants(house, recipe.repair)
     bare = with_rooms_closed(bare, recipe.repair)
-    return dress(bare, catalogue_of(recipe.dress), recipe.dress, seed)
+    catalogue = catalogue_of(recipe.dress)
+    made = dressed_house(bare, catalogue, recipe.dress, seed)
+    for _ in range(_ROUNDS):
+        doing(source.location, "repair")
+        finished, report = repaired(made.house)
+        kept = kept_in(finished, made, catalogue)
+        if kept is made:
+            break
+        made = kept
+    else:
+        finished, report = repaired(made.house)
+    return finished, report, made.report
 
 
 def with_told_furnished(house: House, source: SourceRef, recipe: Recipe) -> House:

@@ -37,7 +37,7 @@ from pbrs_farm.read.source import SourceRef, check_unchanged
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.dress_catalogue import house_of_source
-from pbrs_farm.run.dressed_house import dressed, furnished, with_told_furnished
+from pbrs_farm.run.dressed_house import dressed_and_repaired, furnished, with_told_furnished
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
@@ -133,9 +133,9 @@ def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
         return Caster(geometry_from_house(some))
 
     house = with_told_furnished(house, source, recipe)
-    house, dressing = dressed(furnished(house, source, recipe), source, recipe)
-    doing(source.location, "repair")
-    return *repair(house, recipe.repair, occluder_from=occluder_from), dressing
+    house = furnished(house, source, recipe)
+    repaired = partial(repair, fields=recipe.repair, occluder_from=occluder_from)
+    return dressed_and_repaired(house, source, recipe, repaired)
 
 
 def _house_of_plugin(source: SourceRef, recipe: Recipe) -> MadeHouse:

@@ -1,6 +1,7 @@
 """What a dressed house must keep, measured on its meshes; what breaks it is taken out again."""
 
+from pbrs_farm.dress.gates.as_rendered import kept_as_rendered
 from pbrs_farm.dress.gates.bodies import piece_id
 from pbrs_farm.dress.gates.keep_gates import group_of, keep_gates, part_of
 
-__all__ = ["group_of", "keep_gates", "part_of", "piece_id"]
+__all__ = ["group_of", "keep_gates", "kept_as_rendered", "part_of", "piece_id"]

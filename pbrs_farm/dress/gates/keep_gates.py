@@ -6,7 +6,7 @@ What was added is taken out; what replaced a thing of the source goes, and that 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Final
@@ -29,6 +29,8 @@ _LARGE_M: Final = 0.35  # of the longest side
 _ON_FLOOR_M: Final = 0.1
 _WAYS: Final = {"doors": blocked_doors, "windows": covered_windows, "path": closed_ways}
 _NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path")
+CONTACT: Final = ("penetration", "support")
+"""The gates of what touches what: doors, windows and ways are where they were."""
 _REASONS: Final = {
     "must_haves": "is no longer what the room had",
     "penetration": "stood in another thing",
@@ -50,8 +52,10 @@ class _Memory:
     free: dict[str, int] = field(default_factory=dict)  # ways that nothing closes, how many
 
 
-def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
-    """Take out of the draft what breaks a gate, until nothing does. pieces: by id.
+def keep_gates(
+    draft: Draft, pieces: Mapping[str, Piece], names: Sequence[str] = _NAMES
+) -> tuple[Gate, ...]:
+    """Take out of the draft what breaks a gate, until nothing does. pieces: by id; names: of gates.
 
     What an earlier call measured of items that are still the same is not measured again.
     """
@@ -61,9 +65,9 @@ def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
     memory.free.clear()
     taken: Counter[str] = Counter()
     for _round in range(_ROUNDS):
-        checked, broken = _measured(draft, pieces, memory)
+        checked, broken = _measured(draft, pieces, memory, names)
         out: dict[int, str] = {}
-        for name in _NAMES:
+        for name in names:
             for index in broken[name]:
                 out.setdefault(index, name)
         if not out:
@@ -71,15 +75,15 @@ def keep_gates(draft: Draft, pieces: Mapping[str, Piece]) -> tuple[Gate, ...]:
         taken.update(out.values())
         _take_out(draft, out)
     else:
-        checked, broken = _measured(draft, pieces, memory)
+        checked, broken = _measured(draft, pieces, memory, names)
     return tuple(
         Gate(name=n, n_checked=checked[n], n_taken_out=taken[n], n_left=len(broken[n]))
-        for n in _NAMES
+        for n in names
     )
 
 
 def _measured(
-    draft: Draft, pieces: Mapping[str, Piece], memory: _Memory
+    draft: Draft, pieces: Mapping[str, Piece], memory: _Memory, names: Sequence[str]
 ) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Gate -> how much was measured, and gate -> indices of the items that break it."""
     bodies = _bodies(draft, pieces, memory)
@@ -94,9 +98,10 @@ def _measured(
             broken["penetration"].append(bodies[j if bodies[j].is_new else i].index)
     checked["support"], broken["support"] = _unsupported(bodies, memory)
     # What is free stays free when things are taken out.
-    if any(name not in memory.free for name in _WAYS):
+    ways = {name: gate for name, gate in _WAYS.items() if name in names}
+    if any(name not in memory.free for name in ways):
         space, large = _space(draft, bodies)
-        for name, gate in _WAYS.items():
+        for name, gate in ways.items():
             n, found = gate(space, large)
             checked[name], broken[name] = n, sorted({b.index for b in found})
             if not found:

@@ -1,0 +1,138 @@
+"""Gates on the house as it is rendered: what lost its wall in repair hangs on the next one, or goes.
+
+No effects. Repair drops and moves walls: where rooms overlap, where a wall is drawn twice. What was
+hung on such a wall floats before the one that is left, or lies inside of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Piece, Place
+from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.mesh import boxes_meeting
+from pbrs_farm.dress.draft import Draft, moved_item
+from pbrs_farm.dress.gates.bodies import Body, bodies_of, boxes_of
+from pbrs_farm.dress.gates.keep_gates import CONTACT, keep_gates
+from pbrs_farm.dress.gates.penetration import MOST_M, Solids, near_pairs, penetration_m
+from pbrs_farm.dress.gates.support import Plumb, held
+from pbrs_farm.dress.report import DressReport
+from pbrs_farm.dress.walls.hanging import GAP_M
+from pbrs_farm.geometry.heights import highest_below
+
+_REACH_M: Final = 0.12  # that a thing is moved to another wall, at most
+_BACK_M: Final = 0.003  # of a thing: what touches a wall
+_MOST_POINTS: Final = 200
+_FLAT_M: Final = 0.0015  # that a back's distances to a wall may differ
+_SEES_WALL: Final = 0.95  # of the back
+
+
+def kept_as_rendered(
+    dressed: House, n_source: int, repaired: House, report: DressReport, pieces: Mapping[str, Piece]
+) -> tuple[House, DressReport]:
+    """The dressed house without what nothing holds in the repaired one, and its report.
+
+    The same objects where everything is held. What hung on a wall that repair moved hangs on the
+    wall that is left, where that is within 12 cm. n_source: items of the house as it was read,
+    before what was added. pieces: of what was added, by id.
+    """
+    own = {i.id for i in dressed.items[n_source:] if not i.kind.is_structure}
+    added = [item for item in repaired.items if item.id in own]
+    base = repaired.with_items(item for item in repaired.items if item.id not in own)
+    with closing(Draft(base, report.seed)) as draft:
+        draft.items += added
+        bodies = bodies_of(draft, pieces)
+        if _is_held(bodies):
+            return dressed, report
+        moved = _hung_anew(draft, bodies)
+        gates = {gate.name: gate for gate in keep_gates(draft, pieces, CONTACT)}
+        left = {item.id for item in draft.items[len(base.items) :]}
+        out, why = {item.id for item in added} - left, draft.refused
+    if not out and not moved:
+        return dressed, report
+    items = [
+        moved_item(item, moved[item.id]) if item.id in moved else item
+        for item in dressed.items
+        if item.id not in out
+    ]
+    taken = {name: gate.n_taken_out for name, gate in gates.items()}
+    refused = dict(report.refused)
+    for reason, n in why.items():
+        refused[f"{reason} after repair"] = refused.get(f"{reason} after repair", 0) + n
+    told = report.model_copy(
+        update={
+            "refused": dict(sorted(refused.items())),
+            "moved_after_repair": report.moved_after_repair + len(moved),
+            "gates": tuple(
+                g.model_copy(update={"n_taken_out": g.n_taken_out + taken.get(g.name, 0)})
+                for g in report.gates
+            ),
+        }
+    )
+    return replace(dressed, items=tuple(items)), told
+
+
+def _is_held(bodies: Sequence[Body]) -> bool:
+    """Whether what hangs touches what it hangs on, and no wall stands in anything that was added.
+
+    What else things stand on, they themselves, repair leaves where it was.
+    """
+    asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
+    plumb = Plumb(bodies, asked)
+    if not all(by.is_good for by in held(bodies, asked, plumb).values()):
+        return False
+    solids = Solids()
+    return not any(
+        penetration_m(bodies[i], bodies[j], solids) > MOST_M
+        for i, j in near_pairs(bodies)
+        if ItemKind.WALL in (bodies[i].item.kind, bodies[j].item.kind)
+    )
+
+
+def _hangs(body: Body) -> bool:
+    return body.piece is not None and body.piece.place in (Place.WALL, Place.CEILING)
+
+
+def _hung_anew(draft: Draft, bodies: Sequence[Body]) -> dict[str, F64]:
+    """By id, how things that hang and are not held were moved to a wall; they are moved in the draft."""
+    walls = [b for b in bodies if b.item.kind is ItemKind.WALL]
+    asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
+    moved: dict[str, F64] = {}
+    for k, by in held(bodies, asked, Plumb(bodies, asked)).items():
+        item, piece = bodies[k].item, bodies[k].piece
+        if by.is_good or item.box is None or piece is None or piece.place is not Place.WALL:
+            continue
+        step = _to_wall(item, walls)
+        if step is not None:
+            moved[item.id] = step
+            draft.items[bodies[k].index] = moved_item(item, step)
+    return moved
+
+
+def _to_wall(item: Item, walls: Sequence[Body]) -> F64 | None:
+    """(3,) metres that bring an item's back to the wall behind it; None where there is none."""
+    assert item.box is not None
+    right, front = item.box.axes[:, 0], item.box.axes[:, 2]
+    # Lay the item on its back: what is below it then is the wall.
+    turn = np.stack([right, front, np.cross(right, front)])
+    low, high = item.bounds
+    lows, highs = boxes_of(walls)
+    near = np.flatnonzero(boxes_meeting(lows, highs, low - _REACH_M, high + _REACH_M))
+    if not len(near):
+        return None
+    corners = np.concatenate([walls[k].corners for k in near.tolist()]) @ turn.T
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64) @ turn.T
+    back = points[points[:, 1] < points[:, 1].min() + _BACK_M]
+    back = back[:: max(1, len(back) // _MOST_POINTS)]
+    wall = highest_below(back[:, [0, 2]], corners, back[:, 1] + _REACH_M)
+    gaps = back[:, 1] - wall
+    gaps = gaps[gaps < _REACH_M]
+    if len(gaps) < _SEES_WALL * len(back) or float(np.ptp(gaps)) > _FLAT_M + _BACK_M:
+        return None
+    return np.asarray(-(float(gaps.min()) - GAP_M) * front)

@@ -1,0 +1,134 @@
+"""Gates hold for the house as it is rendered: repair drops walls, and nothing floats before the gap."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import EMPTY, Place
+from pbrs_farm.core.classes import OTHERPROP
+from pbrs_farm.core.house import House, Item, ItemKind, Material, Surface
+from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
+from pbrs_farm.core.recipe import RepairFields, recipe_from_name
+from pbrs_farm.dress import dressing
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.dressing import Dressed, kept_in
+from pbrs_farm.dress.report import DressReport
+from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.things.assembly import hung
+from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.geometry.solids import box
+from pbrs_farm.geometry.surface_points import item_triangles
+from pbrs_farm.read.source import resolve
+from pbrs_farm.repair import repair
+from pbrs_farm.run.dressed_house import dressed_and_repaired
+from tests.repair.wall_rooms import Rect, covers, house, room, walls_around
+
+LEFT: Rect = (0.0, 0.0, 4.0, 3.0)
+RIGHT: Rect = (4.07, 0.0, 8.0, 3.0)
+
+
+def _overlapping_walls() -> House:
+    """Two rooms 7 cm apart, each with walls of 10 cm: either's wall reaches into the other room."""
+    a, b = room("0_0", LEFT), room("0_1", RIGHT)
+    a, b = replace(a, name="Living room"), replace(b, name="Bedroom")
+    walls = [replace(w, room_id="0_0") for w in walls_around(LEFT, "a", thickness=0.1)]
+    walls += [replace(w, room_id="0_1") for w in walls_around(RIGHT, "b", thickness=0.1)]
+    return house([*walls, *covers(a), *covers(b)], [a, b])
+
+
+def _repaired(some: House) -> House:
+    return repair(some, RepairFields(fallback_light=False))[0]
+
+
+def _gaps(dressed: Dressed, repaired: House) -> dict[str, float]:
+    """By id, how far each thing that was hung is from the nearest wall, at most 10 cm."""
+    walls = np.concatenate([item_triangles(i) for i in repaired.items if i.kind is ItemKind.WALL])
+    found = {}
+    for item in dressed.house.items[dressed.n_source :]:
+        if dressed.pieces[item.source_class].place is Place.WALL:
+            found[item.id] = _distance(item_triangles(item).reshape(-1, 3), walls)
+    return found
+
+
+def _distance(points: F64, corners: F64) -> float:
+    low, high = triangle_bounds(corners)
+    corners = corners[((low <= points.max(0) + 0.1) & (high >= points.min(0) - 0.1)).all(1)]
+    pairs = np.repeat(points, len(corners), 0), np.tile(corners, (len(points), 1, 1))
+    return min(0.1, float(distances_to_triangles(*pairs).min(initial=0.1)))
+
+
+def _with_sockets(source: House) -> Dressed:
+    """A socket on each wall that a room sees, hung as the dressing hangs."""
+    with closing(Draft(source, 1)) as draft:
+        lower = hung("socket", "socket", OTHERPROP, [(box_at([0, 0.04, 0.01]), Material("white"))])
+        for space in house_space(draft).rooms:
+            hanging = Hanging(draft, space, "walls")
+            for k, face in enumerate(hanging.faces):
+                hanging.hang(*lower, k, face.length / 2, 0.3)
+        report = DressReport(house_id=source.id, seed=1)
+        return Dressed(draft.house(), report, draft.used, len(source.items))
+
+
+def box_at(middle: list[float]) -> Surface:
+    return box("box", np.array(middle), np.array([0.04, 0.04, 0.01]), 0)
+
+
+def test_what_hung_on_a_wall_that_repair_drops_hangs_on_the_one_that_is_left() -> None:
+    dressed = _with_sockets(_overlapping_walls())
+    repaired = _repaired(dressed.house)
+    assert max(_gaps(dressed, repaired).values()) > 0.006
+    kept = kept_in(repaired, dressed, EMPTY)
+    after = _repaired(kept.house)
+    assert len(_gaps(kept, after)) == 8
+    assert max(_gaps(kept, after).values()) <= 0.002
+    assert kept.report.moved_after_repair == 2
+    assert kept_in(after, kept, EMPTY) is kept
+
+
+def test_what_finds_no_wall_any_more_goes_with_what_stood_on_it() -> None:
+    dressed = _with_sockets(_overlapping_walls())
+    first = dressed.house.items[dressed.n_source]
+    repaired = _repaired(dressed.house)
+    # Nothing is left of the wall that it hangs on, nor of any near it.
+    far = repaired.with_items(
+        i for i in repaired.items if i.kind is not ItemKind.WALL or _is_far(i, first)
+    )
+    kept = kept_in(far, dressed, EMPTY)
+    assert first.id not in {i.id for i in kept.house.items}
+    assert kept.report.refused["walls: floated or sank after repair"] >= 1
+    assert sum(kept.report.added.values()) == len(kept.house.items) - kept.n_source
+
+
+def _is_far(wall: Item, thing: Item) -> bool:
+    return bool((wall.bounds[0] > thing.bounds[1] + 0.1).any() or (wall.bounds[1] < thing.bounds[0] - 0.1).any())  # fmt: skip
+
+
+def test_a_house_whose_walls_stay_is_the_one_that_was_dressed() -> None:
+    a = replace(room("0_0", LEFT), name="Living room")
+    dressed = _with_sockets(house([*walls_around(LEFT), *covers(a)], [a]))
+    assert kept_in(_repaired(dressed.house), dressed, EMPTY) is dressed
+
+
+def test_a_run_measures_the_gates_on_the_repaired_house(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = _with_sockets(_overlapping_walls())
+    monkeypatch.setattr(dressing, "dressed_house", lambda *_: made)
+    source = resolve("builtin").model_copy(update={"dress_seed": 1})
+    recipe = recipe_from_name("fast", {"dress.catalogue": "generated"})
+    finished, _repairs, report = dressed_and_repaired(
+        made.house, source, recipe, lambda some: repair(some, RepairFields(fallback_light=False))
+    )
+    assert report is not None
+    assert report.moved_after_repair == 2
+    assert (
+        max(_gaps(made._replace(house=finished, n_source=_n_source(finished)), finished).values())
+        <= 0.002
+    )
+
+
+def _n_source(finished: House) -> int:
+    return next(k for k, item in enumerate(finished.items) if item.id.startswith("dress-"))
