@@ -18,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.house import Material
 from pbrs_farm.core.record import Nyu40, Record, read_toml
 from pbrs_farm.core.walkable import CELL_M, FloorGrid
@@ -36,7 +37,7 @@ from pbrs_farm.dress.textures.families import pattern_material, photographed
 from pbrs_farm.dress.things.assembly import Made, plain
 from pbrs_farm.dress.things.things import CASE_GOODS
 from pbrs_farm.dress.walls.hanging import Hanging, next_id
-from pbrs_farm.home.room_use import RoomKind
+from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 # What added furniture is made of: wood of the home, white or painted boards but on the draft.
 
@@ -261,6 +262,7 @@ _TRIES = 8  # places of one thing
 _MOST_FACES = 12_000  # of a model of the catalogue
 _FROM_CATALOGUE = 0.35  # of what both have
 _ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
+_FROM_KITCHEN_M = 1.0  # that bookcases keep from worktops, cookers, fridges
 _BESIDE_M = 0.15  # from a bed to its nightstand
 _END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
 _FILLED = ("full", "filled")  # in names of models that hold things of their own
@@ -369,6 +371,8 @@ def _spot(
     weights = np.array([liked for _, _, liked in places])
     if kind.beside is not None:
         weights *= [_is_beside(draft, floor, kind.beside, k, s, w) for k, s, _ in places]
+    if BOOKSHELF in kind.alike:
+        weights *= [not _is_cooked_at(draft, floor, k, s, w) for k, s, _ in places]
     if not weights.any():
         return None
     n = min(_TRIES, int(np.count_nonzero(weights)))
@@ -403,6 +407,26 @@ def _is_beside(
         out, along = face.out_of(corners), face.s_of(corners)
         gap = max(float(along.min()) - (s + width / 2), s - width / 2 - float(along.max()))
         if -0.1 < out.min() < 0.4 and abs(gap) < _BESIDE_M:
+            return True
+    return False
+
+
+def _is_cooked_at(draft: Draft, floor: RoomFloor, face_number: int, s: float, width: float) -> bool:
+    """Whether a place at a wall is among what a kitchen is made of: nobody keeps books there."""
+    face = floor.faces[face_number]
+    ends = [face.point(x, 0.0, 0.0) for x in (s - width / 2, s + width / 2)]
+    low, high = np.min(ends, 0) - _FROM_KITCHEN_M, np.max(ends, 0) + _FROM_KITCHEN_M
+    if floor.room.kind is RoomKind.KITCHEN:
+        return True
+    plan = [0, 2]
+    for number in floor.room.items:
+        item, bounds = draft.items[number], floor.space.bounds[number]
+        is_kitchen = item.nyu40 in (COUNTER, SINK) or is_cooked_in([item])
+        if (
+            is_kitchen
+            and (bounds[0, plan] < high[plan]).all()
+            and (bounds[1, plan] > low[plan]).all()
+        ):
             return True
     return False
 

@@ -69,6 +69,11 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
         return RoomKind.LIVING
     if named is not None:
         return named
+    # One sits on sofas where one lives, whatever else an outline takes in.
+    if SOFA in has and (is_cooked_in(items) or has & {TOILET, BATHTUB}):
+        return RoomKind.LIVING
+    if BED in has and area_m2 >= _LARGE_M2:
+        return RoomKind.BEDROOM
     if not has & {TOILET, BATHTUB, BED} and is_cooked_in(items):
         return RoomKind.KITCHEN
     for kind, classes in (

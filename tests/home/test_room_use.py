@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.home.room_use import RoomKind, is_lived_in, room_kind
 from tests.builders import builtin_home
 
@@ -39,6 +40,18 @@ def test_a_garage_stores_and_is_not_lived_in(name: str) -> None:
     room = replace(builtin_home().rooms[0], name=name, types=())
     assert room_kind(room, [], 12.0) is RoomKind.STORE
     assert not is_lived_in(room, 12.0)
+
+
+@pytest.mark.parametrize("others", [("fridge",), ("toilet",), ("fridge", "bathtub")])
+def test_a_room_without_a_name_where_one_sits_on_a_sofa_is_lived_in(
+    others: tuple[str, ...],
+) -> None:
+    classes = {"sofa": 6, "fridge": 24, "toilet": 33, "bathtub": 36}
+    items = [
+        Item(name, name, ItemKind.OBJECT, "0", (), classes[name]) for name in ("sofa", *others)
+    ]
+    room = replace(builtin_home().rooms[0], name="", types=())
+    assert room_kind(room, items, 30.0) is RoomKind.LIVING
 
 
 def test_a_family_room_is_no_garden() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -43,12 +43,14 @@ from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, supports_of_item, surroundings
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import book_covers, leaning_book, run_of_books, stack_of_books
+from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
 # What stands on tables, desks, counters, chests: by the table of shares, greatest first.
 
 
-_MOST_OF_A_KIND = 3
+_MOST_OF_A_KIND = 3  # on one surface
+_MOST_IN_ROOM = 4
 _ANOTHER = 0.35  # chance of one more of the kind
 _FULL = 0.45  # no more is put where less than this share of the surface is free
 _MOST_FACTOR = 1.6
@@ -60,6 +62,9 @@ _Kinds = tuple[tuple[str, float], ...]
 class _Clutter(Record):
     # The file clutter.toml.
     in_front: tuple[str, ...]
+    at_walls: tuple[str, ...]
+    most_on_one: dict[str, int]
+    most_in_room: dict[str, int]
     usual_m2: dict[str, float]
     floors: dict[RoomKind, _Kinds]
     shelves: dict[str, _Kinds]
@@ -69,17 +74,21 @@ _FILE: Final = read_toml(Path(__file__).with_name("clutter.toml"), _Clutter)
 _USUAL_M2 = 0.4  # of receptacles that the file does not name
 
 
-def fill_top(placing: Placing, top: Worktop, receptacle: str) -> int:
-    """Put things on the worktop as the table says; how many were put there."""
+def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[str] = ()) -> int:
+    """Put things on the worktop as the table says; how many were put there.
+
+    there: kinds that the home has there already.
+    """
     rng = placing.rng
     factor = min(top.support.area / _FILE.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
     wanted: list[str] = []
+    most = _FILE.most_on_one | dict.fromkeys(there, 0)
     for row in shares().get(receptacle, ()):
         chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
-        n = 0
-        while n < _MOST_OF_A_KIND and rng.random() < chance * placing.share:
-            n, chance = n + 1, _ANOTHER * chance
-        wanted += [row.kind] * n
+        left = most.get(row.kind, _MOST_OF_A_KIND) - wanted.count(row.kind)
+        while left > 0 and rng.random() < chance * placing.share:
+            wanted.append(row.kind)
+            left, chance = left - 1, _ANOTHER * chance
     return put_all(placing, top, wanted)
 
 
@@ -110,10 +119,8 @@ def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
     """Put a thing of each of the kinds on the worktop, the largest first."""
     things: list[tuple[str, Made]] = []
     for kind in kinds:
-        made = placing.stock.take(placing.rng, kind, placing.style)
-        if made is None:
-            placing.refuse(f"no {kind} in the catalogue")
-        else:
+        made = _taken(placing, kind)
+        if made is not None:
             things.append((kind, made))
     things.sort(key=lambda thing: -thing[1][0].size[0] * thing[1][0].size[1])
     n = 0
@@ -126,11 +133,24 @@ def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
     return n
 
 
+def _taken(placing: Placing, kind: str) -> Made | None:
+    """A thing of that kind; None, with its reason counted, where the room has enough of them."""
+    if placing.taken[kind] >= _FILE.most_in_room.get(kind, _MOST_IN_ROOM):
+        placing.refuse(f"enough of {kind} in the room")
+        return None
+    made = placing.stock.take(placing.rng, kind, placing.style)
+    if made is None:
+        placing.refuse(f"no {kind} in the catalogue")
+    placing.taken[kind] += made is not None
+    return made
+
+
 # Things on the floor: bins, bags, shoes, baskets, boxes near walls, never in anybody's way.
 
 
 _WALK_M = 0.65  # the width of a way, with something to spare
 _REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
+_AT_WALL_M = 0.12  # beyond its own radius, of what stands at walls
 _KEPT_M = 0.04  # between things
 _DOOR_M = 1.0  # kept free before doors
 _HEAD_M = 1.9
@@ -145,6 +165,7 @@ class _Floor:
     grid: PlanGrid  # of the same cells
     free: Bools  # nothing stands there, no door needs it
     walkable: Bools  # nothing stands there
+    inside: Bools  # in the room and in no wall
     has_ways: bool  # one way joins the room's doors
 
 
@@ -168,7 +189,7 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     for kind in wanted:
         made = placing.stock.take(rng, kind, placing.style)
         if made is not None:
-            n += _put(placing, floor, made)
+            n += _put(placing, floor, made, at_wall=kind in _FILE.at_walls)
     return n
 
 
@@ -197,17 +218,22 @@ def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor 
         zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
         kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
     joined = doors_are_joined(bitmap, room)
-    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
+    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, inside, joined)
 
 
-def _put(placing: Placing, floor: _Floor, made: Made) -> bool:
+def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
     low, high = made[1].bounds
     reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     # Its middle keeps from everything by its own radius, but not much more.
     distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * CELL_M
     to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * CELL_M
     least = reach + _KEPT_M + CELL_M
-    rows, columns = np.nonzero((distance >= least) & (to_wall <= least + _REACH_M))
+    near = to_wall <= least + _REACH_M
+    if at_wall:
+        # Boxes and bins stand at walls; beside a chair they would stand in the middle of a room.
+        wall = ndimage.distance_transform_edt(np.pad(floor.inside, 1))[1:-1, 1:-1] * CELL_M
+        near = wall <= least + _AT_WALL_M
+    rows, columns = np.nonzero((distance >= least) & near)
     for k in placing.rng.permutation(len(rows))[:12]:
         disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + CELL_M)
         # One way still joins all doors, where one did.
@@ -267,7 +293,7 @@ def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
     rng = placing.rng
     others, books = "decor", float(rng.uniform(0.08, 0.26))
     if kind is RoomKind.KITCHEN or (kind is RoomKind.DINING and rng.random() < 0.4):
-        others, books = "kitchen", 0.15
+        others, books = "kitchen", 0.05
     elif kind is RoomKind.OFFICE:
         others, books = "office", float(rng.uniform(0.15, 0.35))
     elif kind is RoomKind.BEDROOM and rng.random() < 0.35:
@@ -338,7 +364,7 @@ def _put_other(
     rng = placing.rng
     share = np.array([p for _, p in plan.others])
     kind = plan.others[int(rng.choice(len(share), p=share / share.sum()))][0]
-    made = placing.stock.take(rng, kind, placing.style)
+    made = _taken(placing, kind)
     if made is None or made[0].size[2] > free - _HEADROOM_M or made[0].size[1] > top.depth:
         return None
     return _leftmost(placing, top, column + 1, [made], plan.inset_m + float(rng.uniform(0, 0.04)))
@@ -384,6 +410,9 @@ def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Made], siz
 _LEAST_SHELF_DEPTH_M = 0.12
 _DOOR_MARGIN_M = 0.02  # around where doors swing
 _LAID = 0.3  # of the dining tables
+_ON_TOP_M = 0.1
+_SCREENS = ("laptop", "monitor")
+_SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook", "pc", "imac"})
 
 
 def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
@@ -444,6 +473,7 @@ def _fill_item(
     placing: Placing, scene: SceneTriangles, room: RoomSpace, index: int, zone: BaseGeometry
 ) -> None:
     plan, item = None, scene.items[index]
+    there = _SCREENS if _has_screen(scene, room, index) else ()
     for support in supports_of_item(scene, index, room.room):
         receptacle = receptacle_of(item, support, room.kind)
         if not receptacle:
@@ -457,7 +487,19 @@ def _fill_item(
         else:
             if receptacle == "dining_table" and placing.rng.random() < _LAID * placing.share:
                 set_table(placing, top, _chairs(scene, room))
-            fill_top(placing, top, receptacle)
+            fill_top(placing, top, receptacle, there)
+
+
+def _has_screen(scene: SceneTriangles, room: RoomSpace, index: int) -> bool:
+    """Whether a laptop or a monitor of the home stands on items[index]."""
+    low, high = scene.bounds[index]
+    for k in room.items:
+        middle, foot = scene.bounds[k].mean(0), scene.bounds[k][0, 1]
+        is_over = (low < middle)[[0, 2]].all() and (middle < high)[[0, 2]].all()
+        is_on = low[1] < foot < high[1] + _ON_TOP_M
+        if k != index and is_over and is_on and words_of_item(scene.items[k]) & _SCREEN_WORDS:
+            return True
+    return False
 
 
 def _chairs(scene: SceneTriangles, room: RoomSpace) -> list[F64]:

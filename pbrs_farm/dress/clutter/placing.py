@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -280,6 +280,7 @@ class Placing:
     rng: np.random.Generator
     share: float
     bias: float = 0.0  # of the home: how much more or less than usual lies about
+    taken: Counter[str] = field(default_factory=Counter)  # in this room, by kind
 
     def put(self, made: Made, at: F64, turn_rad: float) -> None:
         """Add the thing with the middle of its base at (3,), turned about +y."""

@@ -19,6 +19,7 @@ from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import hung, metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
 from pbrs_farm.geometry.solids import box, lathe, sphere
+from pbrs_farm.home.names import RADIATORS, words_of_item
 
 # Hanging cloth as closed thin bodies: pleated panels, blinds, towels over a bar.
 # Shapes have their back towards the wall, z = 0, and grow to +z; y is up from their lower edge.
@@ -144,6 +145,7 @@ _UNDER_CEILING_M = 0.05
 _HIGH_SILL_M = 1.25
 _BESIDE_M = 0.48  # how far a panel covers the wall beside a window, at most
 _MOST_OUT_M = 0.2  # of the rod from the wall
+_OVER_THINGS_M = 0.4  # that a short panel ends above what stands below it
 _ROD_M = 0.012  # its radius
 _FLAT_M = 0.0015  # how far the wall may be from its face at the window where a bracket ends
 
@@ -213,7 +215,7 @@ def hang_curtains(
     draft: Draft, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
     rng: np.random.Generator,
 ) -> bool:  # fmt: skip
-    """A rod and one or two panels; False, with its reason counted, where they do not fit."""
+    """A rod and two panels; False, with its reason counted, where they do not fit."""
     window = seen.window
     rod_y = min(window.top_y + _OVER_WINDOW_M, seen.ceiling_y - _UNDER_CEILING_M)
     depth = float(rng.uniform(0.026, 0.038))
@@ -228,8 +230,9 @@ def hang_curtains(
         found = _panel_place(space, room, seen, sign, cover, rod_y, out, draft)
         if found is not None:
             panels.append(found)
-    if not panels:
-        draft.refused[f"{PART}: no room beside a window"] += 1
+    # One panel alone looks as if the other had been stolen.
+    if len(panels) < 2:
+        draft.refused[f"{PART}: no room on both sides of a window"] += 1
         return False
     # Both panels end at one height.
     bottom = max(p[2] for p in panels)
@@ -246,6 +249,7 @@ def _panel_place(
     half = seen.window.width / 2
     sill = seen.window.bottom_y
     without = [n for n, i in enumerate(draft.items) if i.kind is ItemKind.WINDOW]
+    heaters = [n for n, i in enumerate(draft.items) if words_of_item(i) & RADIATORS]
     free = shapely.difference(room.area, room.walls)
     for beyond in (_BESIDE_M, 0.34, 0.25, 0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)
@@ -262,8 +266,13 @@ def _panel_place(
         for bottom in (*full, sill - 0.15, sill - 0.05):
             if bottom > sill or bottom < seen.floor_y:
                 continue
+            # It hangs down to the floor, or over a radiator or nothing: not onto a worktop.
             low, high = seen.bounds(x0, x1, bottom, rod_y + 0.02, out)
-            if space.is_free(low, high, without=without):
+            least = low.copy()
+            least[1] = max(seen.floor_y + _FROM_FLOOR_M, bottom - _OVER_THINGS_M)
+            if space.is_free(low, high, without=without) and space.is_free(
+                least, high, without=[*without, *heaters]
+            ):
                 return x0, x1, bottom
     return None
 

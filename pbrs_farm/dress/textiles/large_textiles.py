@@ -138,7 +138,8 @@ def _dress_windows(
             continue
         own = np.random.default_rng(look)
         done = cloth is not None and hang_curtains(draft, space, room, seen, cloth, own)
-        if not done and blinds:
+        # Where no cloth fits beside it, people still want to close it.
+        if not done and (blinds or cloth is not None):
             hang_blind(draft, space, room, seen, style, own)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
+from pbrs_farm.core.classes import BED, CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space import HouseSpace, house_space
+from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, mix
 from pbrs_farm.dress.things.assembly import plain
 from pbrs_farm.dress.walls.fittings import (
@@ -138,9 +140,10 @@ def _hang_rail(
 
 _HOOKS_M: Final = 1.68  # of the board's lower edge above the floor
 _RACK_BEFORE_M: Final = 0.55
+_FROM_BED_M: Final = 0.6  # nobody sleeps below coats or against them
 
 
-def hang_coats(hanging: Hanging, style: Style, share: float) -> None:
+def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
     """Hooks with what the room's people take off there, on a free stretch of wall."""
     kind = hanging.room.kind
     rng = hanging.draft.rng("coats", hanging.room.room.id)
@@ -150,6 +153,7 @@ def hang_coats(hanging: Hanging, style: Style, share: float) -> None:
     items = hanging.draft.items
     if is_cooked_in(items[k] for k in hanging.room.items if k < len(items)):
         return
+    beds = [space.bounds[k] for k in hanging.room.items if items[k].nyu40 == BED]
     for n in range(WANTS[kind].most_coats, 0, -1):
         piece, shape = HUNG_THINGS.make("coat_rack", rng, style, n, kind is RoomKind.BATHROOM)
         low, high = shape.bounds
@@ -158,12 +162,23 @@ def hang_coats(hanging: Hanging, style: Style, share: float) -> None:
             (k, float(s))
             for k, face in enumerate(hanging.faces)
             for s in face.starts(width + 0.1, bottom + float(low[1]), bottom + 0.12, _RACK_BEFORE_M)
+            if not _is_at_a_bed(face, float(s), width + 0.1, beds)
         ]
         if places:
             k, s = places[int(rng.integers(len(places)))]
             hanging.hang(piece, shape, k, s + 0.05 + width / 2, bottom)
             return
     hanging.draft.refused["walls: no free wall for a coat rack"] += 1
+
+
+def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) -> bool:
+    """Whether what hangs at s on a face hangs over or beside one of the beds, by their bounds."""
+    ends = [face.point(x, 0.0, out) for x in (s, s + width) for out in (0.0, _RACK_BEFORE_M)]
+    low, high = np.min(ends, 0) - _FROM_BED_M, np.max(ends, 0) + _FROM_BED_M
+    plan = [0, 2]
+    return any(
+        bool((bed[0, plan] < high[plan]).all() and (bed[1, plan] > low[plan]).all()) for bed in beds
+    )
 
 
 # The part `walls` of dressing.
@@ -190,7 +205,7 @@ def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
             hang_radiators(hanging, style, share)
         fit_switches(hanging, catalogue, style, share)
         hang_kitchen(hanging, space, style, share)
-        hang_coats(hanging, style, share)
+        hang_coats(hanging, space, style, share)
         hang_pin_board(hanging, space, style, share)
         hang_shelves(hanging, style, share)
         hang_pictures(hanging, space, gallery, style, share)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from itertools import combinations
 
@@ -9,15 +10,16 @@ import numpy as np
 import pytest
 from manifold3d import Manifold, Mesh
 
-from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import OTHERFURNITURE
-from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.placing import is_known, receptacle_of, shares
+from pbrs_farm.dress.clutter.placing import Row, is_known, receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 from tests.dress.furniture import bookcase, house, room, solid
 
@@ -111,6 +113,34 @@ def test_a_smaller_share_puts_less() -> None:
         return sum(len(_added(_dressed(_room(), seed, share))) for seed in range(4))
 
     assert count(0.25) < 0.7 * count(1.0)
+
+
+def test_a_desk_has_one_laptop_and_none_beside_a_drawn_one() -> None:
+    desk = solid("Desk", [1.0, 0, 0], [2.8, 0.74, 0.8], 14)
+    drawn = replace(solid("Laptop", [1.1, 0.74, 0.2], [1.45, 0.98, 0.45], 40), name="Laptop")
+    counts = []
+    for home, most in ((house(desk), 1), (house(desk, drawn), 0)):
+        for seed in range(4):
+            added = _added(_dressed(home, seed))
+            n = sum("laptop" in i.source_class or "monitor" in i.source_class for i in added)
+            counts.append(n)
+            assert n <= most + (most > 0)
+            assert sum("laptop" in i.source_class for i in added) <= most
+    assert max(counts) > 0
+
+
+def test_a_room_has_no_more_of_a_kind_than_people_keep(monkeypatch: pytest.MonkeyPatch) -> None:
+    piece = Piece("T#card_game", "Card game", "box", Place.SURFACE, 29, (0.1, 0.1, 0.05))
+    surface = box("box", np.array([0, 0.025, 0]), np.array([0.05, 0.025, 0.05]), 0)
+    catalogue = Catalogue((piece,), lambda _p: Shape((surface,), (Material("m"),)), "test")
+    tables = [solid(f"Table {k}", [k, 0, 0], [k + 0.9, 0.45, 0.9], 7) for k in range(4)]
+    rows = {"coffee_table": (Row(receptacle="coffee_table", kind="box", share=1.0, source="own"),)}
+    monkeypatch.setattr(sys.modules[clutter.__module__], "shares", lambda: rows)
+    draft = Draft(house(*tables), 1)
+    clutter(draft, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    on_tables = [i for i in _added(draft) if i.bounds[0, 1] > 0.4]
+    assert len(on_tables) == 2
+    assert draft.refused["clutter: enough of box in the room"] > 0
 
 
 def test_a_table_full_of_things_gets_no_more() -> None:

@@ -14,7 +14,7 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from tests.builders import builtin_home
-from tests.dress.furniture import house, solid
+from tests.dress.furniture import DEPTH, WIDTH, house, solid
 
 
 def _dressed(seed: int) -> Draft:
@@ -53,6 +53,19 @@ def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
             was = before.room(room.room.id)
             if doors_are_joined(floor_bitmap(before, was), was):
                 assert doors_are_joined(floor_bitmap(space, room), room)
+
+
+def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() -> None:
+    table = solid("Table", [1.5, 0, 1.0], [2.5, 0.75, 2.0], 7)
+    n = 0
+    for seed in range(3):
+        draft = Draft(house(table, name="Garage"), seed)
+        clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        for item in _on_floor(draft):
+            (x0, z0), (x1, z1) = item.bounds[:, [0, 2]]
+            assert min(x0, z0, WIDTH - x1, DEPTH - z1) < 0.3, item.name
+            n += 1
+    assert n > 3
 
 
 def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:

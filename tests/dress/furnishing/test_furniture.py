@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
@@ -17,6 +20,7 @@ from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
 from pbrs_farm.dress.things.assembly import Made, plain
 from pbrs_farm.dress.things.things import CASE_GOODS
 from tests.builders import builtin_home
+from tests.dress.furniture import solid
 
 STYLE = style_for(np.random.default_rng(1))
 _WOOD = plain("wood", (0.6, 0.5, 0.4), 0.4)
@@ -116,6 +120,25 @@ def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
         bitmap = floor_bitmap(space, room)
         assert doors_are_joined(bitmap, room)
         assert (bitmap.occupied & bitmap.inside).sum() < 0.6 * bitmap.inside.sum()
+
+
+def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:
+    # A worktop along a wall of the living room; the rest of that wall is free.
+    worktop = replace(solid("Worktop", [0.0, 0, 1.2], [0.6, 0.9, 2.6]), nyu40=COUNTER)
+    home = builtin_home()
+    bare = [i for i in home.items if not i.id.startswith("piece_")]
+    n = 0
+    for seed in range(3):
+        draft = Draft(replace(home, items=(*bare, worktop)), seed)
+        furniture(draft, EMPTY, STYLE, 1.0)
+        for item in _added(draft):
+            if item.nyu40 == BOOKSHELF and item.room_id == "0_0":
+                apart = np.maximum(
+                    item.bounds[0] - worktop.bounds[1], worktop.bounds[0] - item.bounds[1]
+                )
+                assert apart[[0, 2]].max() > 0.9
+                n += 1
+    assert n > 0
 
 
 def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:

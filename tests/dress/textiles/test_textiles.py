@@ -32,6 +32,13 @@ def _bare() -> House:
     return replace(home, items=tuple(i for i in home.items if i.nyu40 != RUG))
 
 
+def _empty(*more: Item) -> House:
+    """The built-in home without its furniture, and with these things."""
+    home = builtin_home()
+    bare = [i for i in home.items if not i.id.startswith("piece_")]
+    return replace(home, items=(*bare, *more))
+
+
 def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> Draft:
     draft = Draft(house or _bare(), seed)
     textiles_large(draft, EMPTY, STYLE, share)
@@ -105,14 +112,34 @@ def test_a_bracket_finds_no_hold_where_a_round_wall_bends_away() -> None:
 def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window() -> None:
     seen = 0
     for seed in range(1, 9):
-        for item in _added(_dressed(seed), CURTAIN):
+        for item in _added(_dressed(seed, _empty()), CURTAIN):
             x0, x1 = (1.6, 3.4) if item.room_id == "0_0" else (6.7, 7.9)
-            for sheet in (s for s in item.surfaces if s.name == "curtain"):
+            sheets = [s for s in item.surfaces if s.name == "curtain"]
+            assert len(sheets) == 2
+            for sheet in sheets:
                 a, b = float(sheet.positions[:, 0].min()), float(sheet.positions[:, 0].max())
                 cover = (min(b, x1) - max(a, x0)) / (x1 - x0)
                 assert 0.14 < cover < 0.26
                 seen += 1
     assert seen > 4
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        ([3.45, 0.0, 0.02], [4.2, 2.0, 0.4]),  # a cupboard on one side of the window
+        ([1.0, 0.0, 0.02], [4.0, 0.88, 0.6]),  # a worktop before it
+    ],
+)
+def test_a_window_that_cloth_fits_at_one_side_of_or_over_a_worktop_gets_a_blind(
+    low: list[float], high: list[float]
+) -> None:
+    a, b = np.array(low), np.array(high)
+    thing = Item("t", "t", ItemKind.OBJECT, "0", (box("t", (a + b) / 2, (b - a) / 2, 0),), 3)
+    found = [_added(_dressed(seed, _empty(thing)), k) for seed in range(1, 3) for k in (CURTAIN, BLINDS)]  # fmt: skip
+    rooms = [(i.nyu40, i.room_id) for items in found for i in items]
+    assert (CURTAIN, "0_0") not in rooms
+    assert (BLINDS, "0_0") in rooms
 
 
 def test_a_window_that_has_curtains_keeps_them() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import BED
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.built_in import coat_material, joinery_scheme
@@ -16,10 +17,14 @@ from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.walls import walls
 from pbrs_farm.dress.walls.fittings import hang_radiators, wants_radiators
+from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
 from pbrs_farm.home.room_use import RoomKind
 from tests.builders import builtin_home
+from tests.dress.furniture import solid
+from tests.repair import wall_rooms
+from tests.repair.wall_rooms import covers, walls_around
 
 
 def _style() -> Style:
@@ -103,6 +108,23 @@ def test_coats_hang_free_of_the_floor() -> None:
     assert coats
     for item in coats:
         assert item.bounds[0, 1] > 0.3
+
+
+def test_no_coats_hang_over_a_bed_or_beside_it() -> None:
+    rect = (0.0, 0.0, 3.4, 3.4)
+    own = replace(wall_rooms.room("0_0", rect), name="Bedroom")
+    bed = replace(solid("Bed", [0.7, 0.0, 0.02], [2.3, 0.5, 2.0]), nyu40=BED)
+    home = wall_rooms.house([*walls_around(rect), *covers(own), bed], [own])
+    n = 0
+    for seed in range(12):
+        draft = Draft(home, seed)
+        space = house_space(draft)
+        hang_coats(Hanging(draft, space.rooms[0], "walls"), space, _style(), 1.0)
+        for item in draft.items[len(draft.source.items) :]:
+            apart = np.maximum(item.bounds[0] - bed.bounds[1], bed.bounds[0] - item.bounds[1])
+            assert apart[[0, 2]].max() >= 0.5
+            n += 1
+    assert n > 2
 
 
 def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
