@@ -71,8 +71,8 @@ def dressed_and_repaired(
     """A house as read, dressed by its source's seed and repaired; and what was done, None: not dressed.
 
     Gates hold for the house as it is rendered: what loses its wall to repair is hung on the wall
-    that is left or taken out, and the house is repaired without it. Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed
-    where the furniture package cannot be had.
+    that is left or taken out, and the house is repaired without it. Raises BadRecipe for an unknown
+    style, BadInput for a library that is none, MachineFailed where the furniture package cannot be had.
     """
     seed = seed_of(source, recipe)
     if not seed:
