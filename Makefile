@@ -71,7 +71,7 @@ bench: setup ## measure everything but house, dress, made, light and its tables,
 bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
-bench-light-tables: setup ## every bench of docs/light_costs.md, one after another, then its tables: 31 quiet minutes
+bench-light-tables: setup ## every bench of docs/lab/light.md, one after another, then its tables: 31 quiet minutes
 	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
 	@failed=; for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
 	for name in cycles luxcore; do $(MAKE) --no-print-directory bench-$$name || failed="$$failed $$name"; done; \

@@ -49,6 +49,7 @@ OWN_TARGET: Final = {
     "python": "python_api",
     "truth": "truth",
     "inputs": "inputs",
+    "docs": "docs_figures",
 }
 
 

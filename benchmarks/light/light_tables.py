@@ -1,7 +1,7 @@
 """Write the measured tables into the docs: `python -m benchmarks light_tables`.
 
 A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME one of table_rows.TABLES. Below it
-stands the command that measures it, and of out/bench/*.json the commit, the machine and its load. A table whose JSON is
+stands the command that measures it; in the lab book, docs/lab, also the commit, the machine and its load. A table whose JSON is
 missing, or lacks a figure, stays as it is and is named; so are tables of different commits. Effects: writes docs/*.md.
 """
 
@@ -39,7 +39,7 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
             name = block[1]
             if name not in TABLES:
                 raise ValueError(f"{page}: no table {name!r}; of {', '.join(TABLES)}")
-            lines, problem = table_lines(TABLES[name], reports)
+            lines, problem = table_lines(TABLES[name], reports, in_lab=page.parent.name == "lab")
             if problem:
                 said.append(f"{page}: {name} stays as it is: {problem} ({TABLES[name].command})")
                 return block[0]
@@ -58,7 +58,7 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
     return said
 
 
-def table_lines(table: Table, reports: Path) -> tuple[list[str], str]:
+def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str], str]:
     """(lines of a table and the line of its making, ""), or ([], what is missing)."""
     figures: dict[str, Any] = {}
     makings: dict[str, list[str]] = {}
@@ -74,6 +74,9 @@ def table_lines(table: Table, reports: Path) -> tuple[list[str], str]:
         lines = table.lines(figures)
     except KeyError as error:
         return [], f"{', '.join(table.benches)}: no figure {error.args[0]}"
+    if not in_lab:
+        where = "commit and machine: the [lab book](lab/light.md)"
+        return [*lines, "", f"*`{table.command}`; {where}.*"], ""
     made = "; ".join(f"{where}, load {', '.join(loads)}" for where, loads in makings.items())
     return [*lines, "", f"*`{table.command}` ({made}, the bench's own included).*"], ""
 

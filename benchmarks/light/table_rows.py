@@ -1,4 +1,4 @@
-"""Figures of out/bench/*.json -> rows of the tables of docs/light_costs.md; no effects.
+"""Figures of out/bench/*.json -> rows of the tables of docs/lab/light.md; no effects.
 
 Each function of TABLES takes the figures of its benches, name -> value, and gives lines of Markdown. A table that
 lacks a figure raises KeyError with its name.
@@ -208,14 +208,14 @@ def compare_lines(f: Figures) -> list[str]:
              "relative squared error at 32 samples, first and second camera of an example home",
              f"{one['relmse']:.2g}, {two['relmse']:.2g}",
              f"{one['relmse_cycles']:.2g}, {two['relmse_cycles']:.2g}",
-             "`make bench-cycles`, [how](light_costs.md#against-cycles)"]),
+             "`make bench-cycles`, [how](lab/light.md#against-cycles)"]),
         row(["", "CPU seconds of those 32 samples", f"{one['cpu_s']:.2f}, {two['cpu_s']:.2f}",
              f"{one['cpu_s_cycles']:.2f}, {two['cpu_s_cycles']:.2f}", ""]),
         row(["", "CPU to equal squared error", "1", f"{one['ratio']:.0f}, {two['ratio']:.0f}", ""]),
         row(["", "mean luminance of the long pictures", f"agrees to {shift:.1%}", "", ""]),
         row(["LuxCore 2.11.2, path, equal CPU",
              "relative squared error, ratio over five scenes (below 1 favours ours)", paths, "1",
-             "`make bench-luxcore`, [how](light_costs.md#against-luxcore)"]),
+             "`make bench-luxcore`, [how](lab/light.md#against-luxcore)"]),
         row(["LuxCore 2.11.2, bidirectional Metropolis, equal CPU", "the same, against our Metropolis",
              chains, "1", ""]),
     ]  # fmt: skip

@@ -8,7 +8,7 @@ with its Sobol and with its Metropolis sampler. LUXCORE_SCENES="door home" names
 Scenes: the rooms of benchmarks/light/shots.py and the first stored camera of an example home, its coats
 taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
-no sky shines (docs/light_costs.md).
+no sky shines (docs/lab/light.md).
 
 Method. Our Metropolis with its usual settings and MUTATIONS a pixel says how much CPU time a picture
 has; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had

@@ -219,7 +219,7 @@ class LightFields(FieldGroup):
         12, ge=1, le=1024, description="path segments; Russian roulette from rr_depth"
     )
     rr_depth: int = Field(
-        1, ge=1, le=1024, description="docs/light.md: measured the best of 1 to 6"
+        1, ge=1, le=1024, description="first vertex; docs/lab/light.md: measured the best of 1 to 6"
     )
     filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
     pilot_spp: int = Field(

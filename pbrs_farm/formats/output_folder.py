@@ -1,6 +1,6 @@
 """What lies in a finished output folder: its houses and views, as plain values. Effects: reads files.
 
-The layout is the README's ("stored layout"); pictures themselves are not opened here.
+The layout is that of docs/formats.md; pictures themselves are not opened here.
 """
 
 from __future__ import annotations

@@ -104,8 +104,8 @@ def write_report_of(
 
 def page_of(tmp_path: Path, *names: str) -> Path:
     """The only page of a docs folder, with an old table of each name."""
-    page = tmp_path / "docs" / "costs.md"
-    page.parent.mkdir()
+    page = tmp_path / "docs/lab/costs.md"
+    page.parent.mkdir(parents=True)
     blocks = [f"before {n}\n<!-- bench:{n} -->\nold {n}\n<!-- /bench -->\nafter" for n in names]
     page.write_text("\n".join(blocks), encoding="utf-8")
     return page
@@ -116,7 +116,7 @@ def test_a_table_is_written_whole_with_its_commit_command_and_load(
     tmp_path: Path, reports: Path, name: str
 ) -> None:
     page = page_of(tmp_path, name)
-    assert written_tables(page.parent, reports) == [f"{page}: {name} written"]
+    assert written_tables(tmp_path / "docs", reports) == [f"{page}: {name} written"]
     text = page.read_text(encoding="utf-8")
     assert text.startswith(f"before {name}\n<!-- bench:{name} -->\n\n|")
     assert text.endswith("<!-- /bench -->\nafter")
@@ -127,14 +127,26 @@ def test_a_table_is_written_whole_with_its_commit_command_and_load(
         assert len({line.count("|") for line in rows.splitlines()}) == 1
     assert f"`{TABLES[name].command}` (c687b25: 2 cores of AMD EPYC, load 1.9" in text
     # Once more, and nothing changes.
-    written_tables(page.parent, reports)
+    written_tables(tmp_path / "docs", reports)
     assert page.read_text(encoding="utf-8") == text
+
+
+def test_a_table_outside_the_lab_book_names_no_commit(tmp_path: Path, reports: Path) -> None:
+    page = page_of(tmp_path, "compare")
+    page = page.rename(tmp_path / "docs/compare.md")
+    written_tables(tmp_path / "docs", reports)
+    text = page.read_text(encoding="utf-8")
+    assert (
+        f"*`{TABLES['compare'].command}`; commit and machine: the [lab book](lab/light.md).*"
+        in text
+    )
+    assert "c687b25" not in text
 
 
 def test_a_table_whose_report_is_missing_stays_and_is_named(tmp_path: Path, reports: Path) -> None:
     (reports / "demo.json").unlink()
     page = page_of(tmp_path, "view", "lux")
-    said = written_tables(page.parent, reports)
+    said = written_tables(tmp_path / "docs", reports)
     assert said[0].startswith(f"{page}: view stays as it is: there is no {reports}/demo.json")
     assert said[1:] == [f"{page}: lux written"]
     assert "old view" in page.read_text(encoding="utf-8")
@@ -147,7 +159,7 @@ def test_a_table_whose_report_lacks_a_figure_stays_and_names_it(
     del figures["light.mutation_cost"]
     write_report_of(reports, "light", figures)
     page = page_of(tmp_path, "light")
-    (said,) = written_tables(page.parent, reports)
+    (said,) = written_tables(tmp_path / "docs", reports)
     assert "light stays as it is: light: no figure light.mutation_cost" in said
     assert "old light" in page.read_text(encoding="utf-8")
 
@@ -155,15 +167,15 @@ def test_a_table_whose_report_lacks_a_figure_stays_and_names_it(
 def test_tables_of_two_commits_are_told(tmp_path: Path, reports: Path) -> None:
     write_report_of(reports, "lux", all_figures()["lux"], "0a53a10d86d1+")
     page = page_of(tmp_path, "lux", "light")
-    said = written_tables(page.parent, reports)
+    said = written_tables(tmp_path / "docs", reports)
     assert said[-1] == "tables are of 2 commits: 0a53a10d86d1+: lux; c687b25cbdd5: light"
     assert "(0a53a10+: 2 cores" in page.read_text(encoding="utf-8")
 
 
 def test_a_marker_of_no_table_is_rejected_by_name(tmp_path: Path, reports: Path) -> None:
-    page = page_of(tmp_path, "nothing")
+    page_of(tmp_path, "nothing")
     with pytest.raises(ValueError, match="no table 'nothing'; of light, view"):
-        written_tables(page.parent, reports)
+        written_tables(tmp_path / "docs", reports)
 
 
 def test_every_table_has_its_place_in_the_docs() -> None:
