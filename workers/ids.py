@@ -9,7 +9,7 @@ views. House "-" is the job: `-/s3/shard` merges shard 3, `-/-/job` ends the job
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -27,6 +27,7 @@ LIGHT_GPU: Final = "light.gpu"  # the queue of light on a GPU, and its leases
 QUEUES: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU, REDUCE)
 LEASES: Final = (*STAGES, LIGHT_GPU)
 WHOLE: Final = "-"
+MOST_IN_GROUP: Final = 64  # tasks of one house that a message names
 
 _JOB_ID: Final = re.compile(r"[0-9a-f]{12}")
 _TASK: Final = re.compile(r"([A-Za-z0-9_.\-]{1,120})/(-|[0-9]{1,4}|s[0-9]{1,5})/([a-z]+)")
@@ -50,6 +51,19 @@ def task_from_text(text: str) -> TaskId:
     if match is None or match[3] not in STAGES:
         raise BadInput(repr(text[:120]), "", "not a task", hint="HOUSE/UNIT/STAGE")
     return TaskId(match[1], match[2], match[3])
+
+
+def group_text(tasks: Sequence[TaskId]) -> str:
+    """Tasks of one house and stage as a message names them: HOUSE/UNIT,UNIT/STAGE."""
+    return f"{tasks[0].house}/{','.join(t.unit for t in tasks)}/{tasks[0].stage}"
+
+
+def tasks_from_group(text: str) -> tuple[TaskId, ...]:
+    """The tasks a message names; raises BadInput when it names none, or too many."""
+    house, _, rest = text.partition("/")
+    units, _, stage = rest.partition("/")
+    names = units.split(",", MOST_IN_GROUP)
+    return tuple(task_from_text(f"{house}/{unit}/{stage}") for unit in names)
 
 
 def check_job_id(text: str) -> str:

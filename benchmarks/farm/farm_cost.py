@@ -48,6 +48,7 @@ SLOTS = int(os.environ.get("SLOTS", "2"))
 UNITS = {
     "farm.task_overhead_ms": "ms of CPU a task, all processes",
     "farm.tasks_per_s": "1/s",
+    "farm.redis_commands": "a task, those within scripts and of looking at it too",
     "farm.redis_mb": "MB, largest",
     "farm.redis_growth_mb": "MB over the last half",
     "farm.coordinator_mb": "MB, largest",
@@ -187,12 +188,13 @@ class Watch:
         self._commands: list[float] = []
         self._seconds = 0.0
         self._cpu_s = 0.0
+        self._n_redis = 0
         self._n = 0
 
     def until(self, n_tasks: int) -> None:
         while self._done() < 1:
             time.sleep(0.05)
-        began, first, cpu = time.monotonic(), self._done(), self._cpu()
+        began, first, cpu, asked = time.monotonic(), self._done(), self._cpu(), self._redis()
         while (done := self._done()) < n_tasks and (FULL or time.monotonic() - began < MOST_S):
             self._sample(done)
             if len(self._samples) % 15 == 1:
@@ -201,7 +203,7 @@ class Watch:
             time.sleep(2.0)
         self._seconds = time.monotonic() - began
         self._n = self._done() - first
-        self._cpu_s = self._cpu() - cpu
+        self._cpu_s, self._n_redis = self._cpu() - cpu, self._redis() - asked
 
     def figures(self) -> dict[str, Any]:
         half = [s for s in self._samples if s[0] >= self._samples[-1][0] / 2]
@@ -210,6 +212,7 @@ class Watch:
             "farm.tasks": self._n,
             "farm.tasks_per_s": round(self._n / self._seconds, 1),
             "farm.task_overhead_ms": round(1e3 * self._cpu_s / self._n, 2),
+            "farm.redis_commands": round(self._n_redis / self._n, 1),
             "farm.redis_mb": round(max(redis), 1),
             "farm.redis_growth_mb": round(half[-1][1] - half[0][1], 2),
             "farm.coordinator_mb": round(max(coordinator), 1),
@@ -239,6 +242,11 @@ class Watch:
         env = {**os.environ, **self._bench.env}
         subprocess.run(words, env=env, check=True, stdout=subprocess.DEVNULL)
         return time.perf_counter() - began
+
+    def _redis(self) -> int:
+        """Commands that Redis has run so far, those within scripts too."""
+        stats = self._farm.ledger.client.info("commandstats")
+        return sum(int(row["calls"]) for row in stats.values())
 
     def _cpu(self) -> float:
         pids = [p.pid for p in self._bench.processes.values()]

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from pbrs_farm.core.errors import StoreFailed
 from pbrs_farm.core.record import Record
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.object_store import Store, get_or_none
 
 
 class StoredFile(Record):
@@ -46,9 +46,8 @@ class Marker(Record):
 
 def read_marker(store: Store, key: str) -> Marker | None:
     """The marker at key, None if there is none. Raises StoreFailed when it is damaged."""
-    if store.head(key) is None:
-        return None
+    data = get_or_none(store, key)
     try:
-        return Marker.model_validate_json(store.get(key))
+        return None if data is None else Marker.model_validate_json(data)
     except ValidationError:
         raise StoreFailed(key, "not a marker", hint="remove it to do the step again") from None

@@ -14,7 +14,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.dress.report import Credit, DressReport, is_owed
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.object_store import Store, get_or_none
 
 _ROUNDS = 5  # of looking again; more houses than that do not come in while a text is written
 
@@ -24,7 +24,7 @@ def write_attribution(store: Store) -> None:
     # Look again after writing: a house may have come in meanwhile.
     seen: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
-        rows = dressing_rows(_manifest(store))
+        rows = dressing_rows(get_or_none(store, keys.MANIFEST) or b"")
         if rows == seen:
             return
         seen = rows
@@ -38,7 +38,7 @@ def write_attribution_of(store: Store, rows: Sequence[dict[str, str]]) -> None:
     if not text:
         return
     data = text.encode("utf-8", "replace")
-    if store.head(keys.ATTRIBUTION) is None or store.get(keys.ATTRIBUTION) != data:
+    if get_or_none(store, keys.ATTRIBUTION) != data:
         store.put(keys.ATTRIBUTION, data)
 
 
@@ -73,13 +73,6 @@ def dressing_rows(manifest: bytes) -> list[dict[str, str]]:
     """The rows of every dress.json in a manifest."""
     found = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
     return [json.loads(match[0]) for match in found]
-
-
-def _manifest(store: Store) -> bytes:
-    try:
-        return store.get(keys.MANIFEST)
-    except ObjectMissing:
-        return b""
 
 
 def _credits(store: Store, dressed: Iterable[str]) -> list[Credit]:

@@ -12,16 +12,17 @@ from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.run.attributions import write_attribution
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.object_store import Store, get_or_none
 
 
 def attribution(store: Store, house_id: str) -> str:
     """The line every product of the house must carry, "" if its source asks for none."""
     key = keys.house_key(house_id, "house.json")
-    if store.head(key) is None:
+    data = get_or_none(store, key)
+    if data is None:
         return ""
     try:
-        return str(json.loads(store.get(key))["source"]["attribution"])
+        return str(json.loads(data)["source"]["attribution"])
     except (ValueError, KeyError, TypeError):
         return ""
 
@@ -34,7 +35,7 @@ def finish_house(store: Store, house_id: str) -> int:
     data = manifest_from_markers(markers, attribution(store, house_id))
     key = keys.house_key(house_id, keys.MANIFEST)
     # Leave an equal file alone: its date tells when the house last changed.
-    if store.head(key) is None or store.get(key) != data:
+    if get_or_none(store, key) != data:
         store.put(key, data)
     # A step that was killed between its marker and the removal of what it kept left that behind.
     done = {keys.unfinished_key(house_id, m.step, m.view_id) for m in markers if m.view_id}
@@ -47,12 +48,8 @@ def finish_house(store: Store, house_id: str) -> int:
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
     """Write the root's manifest.jsonl from those of the houses that have one."""
     # A house that failed before its first marker has none.
-    parts = []
-    for house_id in sorted(house_ids):
-        key = keys.house_key(house_id, keys.MANIFEST)
-        if store.head(key) is not None:
-            parts.append(store.get(key))
-    store.put(keys.MANIFEST, b"".join(parts))
+    found = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
+    store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in found))
 
 
 def finish_root(store: Store, houses: Iterable[str]) -> None:

@@ -29,7 +29,7 @@ from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.object_store import Store, get_or_none
 from pbrs_farm.transport.light_result import Arrays
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
@@ -281,9 +281,8 @@ class LightCheckpoint:
             self._write(self.spent_s + now - self._began_s)
 
     def _found(self) -> KeptParts | None:
-        if self._store.head(self._key) is None:
-            return None
-        found = checkpoint_from_npz(self._store.get(self._key))
+        data = get_or_none(self._store, self._key)
+        found = None if data is None else checkpoint_from_npz(data)
         return found if found and found.digest == self._digest else None
 
     def _write(self, spent_s: float) -> None:

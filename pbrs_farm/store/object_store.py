@@ -76,6 +76,14 @@ class Store(Protocol):
         ...
 
 
+def get_or_none(store: Store, key: str) -> bytes | None:
+    """The object's bytes, None if there is none: one question, not two. Raises as get otherwise."""
+    try:
+        return store.get(key)
+    except ObjectMissing:
+        return None
+
+
 def check_key(key: str) -> str:
     """key itself; raises StoreFailed when it could name anything outside the store."""
     segments = key.split("/")

@@ -51,7 +51,7 @@ class Drive:
     ) -> None:
         stage = task.rpartition("/")[2]
         end = Finished(1.0, batches if stage == "geometry" else (), 1)
-        self.ledger.finish(self.job.job_id, task, claim.token, end, sticky=False)
+        self.ledger.finish_many(self.job.job_id, {task: end}, claim.token)
 
     def fail(self, task: str, claim: Claim, kind: FaultClass = "crash", worker: str = "w1") -> str:
         fault = Fault(fault=kind, fingerprint=kind, message=kind, worker=worker)

@@ -11,6 +11,7 @@ from workers.ledger.task_ledger import (
     Claim,
     Fault,
     Finished,
+    GoOn,
     HouseState,
     JobView,
     LedgerUnavailable,
@@ -32,6 +33,8 @@ class MemoryLedger:
     refusal: Claim | None = None  # what every claim is answered with
     heartbeats: list[str] = field(default_factory=list)  # answers to come; then "ok"
     n_heartbeats: int = 0
+    beaten: list[list[str]] = field(default_factory=list)  # whose leases a heartbeat kept
+    reports: list[list[str]] = field(default_factory=list)  # what was finished together
     n_away: int = 0  # calls that fail before Redis answers again
     leader: str = ""
     reaped: int = 0
@@ -64,8 +67,13 @@ class MemoryLedger:
     def retry(self, job: str, task: str) -> bool:
         raise NotImplementedError
 
-    def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
+    def claim_many(
+        self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
+    ) -> list[Claim]:
         self._answer()
+        return [self._claim(task, token) for task in tasks]
+
+    def _claim(self, task: str, token: str) -> Claim:
         if self.refusal is not None:
             return self.refusal
         if task in self.finished:
@@ -76,16 +84,22 @@ class MemoryLedger:
         self.attempts[task] += 1
         return Claim("run", str(self.attempts[task]), self.inputs.get(task, ""), token)
 
-    def heartbeat(self, job: str, task: str, token: str) -> str:
+    def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str:
         self._answer()
+        self.beaten.append(list(tasks))
         self.n_heartbeats += 1
         return self.heartbeats.pop(0) if self.heartbeats else "ok"
 
-    def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str:
+    def finish_many(
+        self, job: str, ends: Mapping[str, Finished], token: str, go_on: GoOn | None = None
+    ) -> dict[str, Claim]:
         self._answer()
-        assert self.leases.pop(task) == token
-        self.finished[task] = end
-        return self.affine.get(task, "") if sticky else ""
+        self.reports.append(list(ends))
+        for task, end in ends.items():
+            assert self.leases.pop(task) == token
+            self.finished[task] = end
+        more = [self.affine[t] for t in ends if t in self.affine]
+        return {t: self._claim(t, token) for t in more} if go_on and go_on.is_long else {}
 
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
         self._answer()

@@ -5,14 +5,17 @@ import pytest
 from pbrs_farm.core.errors import BadInput
 from tests.workers.conftest import spec
 from workers.ids import (
+    TaskId,
     attempts_from_log_keys,
     check_job_id,
     failed_key,
+    group_text,
     log_key,
     queue_of,
     stages_of_queue,
     task_from_failed_key,
     task_from_text,
+    tasks_from_group,
 )
 from workers.node.house_runner import steps_of_stage
 
@@ -54,3 +57,13 @@ def test_keys_of_logs_and_failures_name_their_task_back() -> None:
         logs = [log_key(job, task, k) for k in (1, 12)]
         others = [log_key(job, "h1/1/light", 1), log_key(job, "h1/0/gl", 1)]
         assert attempts_from_log_keys(job, task, [*others, *logs]) == {1: logs[0], 12: logs[1]}
+
+
+def test_a_group_names_its_tasks_and_no_more_than_allowed() -> None:
+    tasks = [TaskId("h", str(k), "gl") for k in (0, 1, 12)]
+    assert group_text(tasks) == "h/0,1,12/gl"
+    assert list(tasks_from_group("h/0,1,12/gl")) == tasks
+    assert tasks_from_group("h/-/reduce") == (TaskId("h", "-", "reduce"),)
+    for text in ("h/0,/gl", "h/0,1", "h//gl", "h/" + ",".join(["0"] * 70) + "/gl", "h/0,1/x"):
+        with pytest.raises(BadInput):
+            tasks_from_group(text)

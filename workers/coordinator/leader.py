@@ -18,7 +18,8 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import groupby
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -28,9 +29,11 @@ from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.progress_rates import Rates, mean_s
 from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
-from workers.ids import LEASES, STAGES, lane_of, queue_of, task_from_text
+from workers.ids import LEASES, STAGES, TaskId, group_text, lane_of, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import (
+    MOST_TOGETHER,
+    TOGETHER_S,
     WITH_FAILURES,
     JobView,
     Ledger,
@@ -225,12 +228,22 @@ class Coordinator:
         return n_sent
 
     def _publish(self, view: JobView, tasks: list[str]) -> None:
-        gpu = view.uses_gpu
-        recipe = view.fields["recipe"]
-        self._send(
-            (queue_of(task_from_text(task).stage, gpu=gpu), view.job_id, task, recipe)
-            for task in tasks
-        )
+        """Send messages; short tasks of one house go together, as long as each slot gets some."""
+        gpu, recipe = view.uses_gpu, view.fields["recipe"]
+        # The ledger gives a house's tasks one after another.
+        for stage, of_stage in _by_stage(tasks).items():
+            n_slots = max(1, self._slots.get(stage, 0))
+            n_in_flight = sum(view.counts.get(f"{stage}:{s}", 0) for s in "qr") + len(of_stage)
+            most = min(self._together(view, stage), math.ceil(n_in_flight / n_slots))
+            queue = queue_of(stage, gpu=gpu)
+            self._send(
+                (queue, view.job_id, group_text(group), recipe) for group in _groups(of_stage, most)
+            )
+
+    def _together(self, view: JobView, stage: str) -> int:
+        """How many tasks of a stage one message may name: about TOGETHER_S of work."""
+        seconds = mean_s([view], stage)
+        return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1
 
     def _is_due(self, what: str, every_s: float) -> bool:
         now = self._clock()
@@ -238,6 +251,21 @@ class Coordinator:
             return False
         self._due[what] = now + every_s
         return True
+
+
+def _by_stage(tasks: Iterable[str]) -> dict[str, list[TaskId]]:
+    found: dict[str, list[TaskId]] = {}
+    for task in map(task_from_text, tasks):
+        found.setdefault(task.stage, []).append(task)
+    return found
+
+
+def _groups(tasks: Sequence[TaskId], most: int) -> Iterator[list[TaskId]]:
+    """Neighbours of one house, at most so many together."""
+    for _house, of_house in groupby(tasks, key=lambda task: task.house):
+        rest = list(of_house)
+        for k in range(0, len(rest), most):
+            yield rest[k : k + most]
 
 
 # Nothing to be declared (a message goes to a queue by its name), and no repr of its arguments.

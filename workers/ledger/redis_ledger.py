@@ -22,12 +22,15 @@ from workers.config import FarmConfig, shown_url
 from workers.ids import LEASES, LIGHT_GPU, STAGES
 from workers.ledger.task_ledger import (
     ALIVE_S,
+    MOST_TOGETHER,
     STATES,
     SUSPECT,
+    TOGETHER_S,
     UNCOUNTED,
     Claim,
     Fault,
     Finished,
+    GoOn,
     HouseState,
     JobView,
     LedgerUnavailable,
@@ -83,8 +86,22 @@ def lua_constants() -> str:
     for name, classes in (("UNCOUNTED", UNCOUNTED), ("SUSPECT", SUSPECT)):
         lines += [f"local {name} = {{ {', '.join(f'{c} = true' for c in classes)} }}"]
     return "\n".join(
-        [*lines, f"local ALIVE_S = {ALIVE_S:g}", f"local GPU_LEASE = '{LIGHT_GPU}'", ""]
+        [
+            *lines,
+            f"local ALIVE_S = {ALIVE_S:g}",
+            f"local MOST_TOGETHER = {MOST_TOGETHER}",
+            f"local GPU_LEASE = '{LIGHT_GPU}'",
+            "",
+        ]
     )
+
+
+def script_text(name: str) -> str:
+    """A script with what all share before it; whatever it does is written when it is over."""
+    folder = Path(__file__).with_name("lua")
+    common, body = ((folder / f"{n}.lua").read_text() for n in ("common", name))
+    main = f"local function main()\n{body}end\nlocal answer = main()\nflush()\nreturn answer\n"
+    return lua_constants() + common + main
 
 
 class RedisLedger:
@@ -98,11 +115,8 @@ class RedisLedger:
         self.client = client or redis_client(config)
         self._g = config.prefix
         self._where = shown_url(config.redis_url.reveal())
-        folder = Path(__file__).with_name("lua")
-        common = lua_constants() + (folder / "common.lua").read_text()
         self._scripts: dict[str, Any] = {
-            name: self.client.register_script(common + (folder / f"{name}.lua").read_text())
-            for name in _SCRIPTS
+            name: self.client.register_script(script_text(name)) for name in _SCRIPTS
         }
 
     # The job
@@ -201,27 +215,50 @@ class RedisLedger:
 
     # One task
 
-    def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
-        """May this worker run the task? The attempt is counted before the answer."""
+    def claim_many(
+        self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
+    ) -> list[Claim]:
+        """May this worker run the tasks? The attempts are counted before the answers.
+
+        A task that failed before is claimed alone: it may take others with it.
+        """
         from workers.job import work_version
 
         config = self.config
-        verdict, detail, inputs = self._run(
-            "claim", job, task, token, config.worker, work_version(), recipe, config.lease_s,
-            int(direct), config.store_id,
+        answers = self._run(
+            "claim", job, token, config.worker, work_version(), recipe, config.lease_s,
+            int(direct), config.store_id, *tasks,
         )  # fmt: skip
-        return Claim(verdict, detail, inputs, token)
+        return [Claim(verdict, detail, inputs, token) for verdict, detail, inputs in answers]
 
-    def heartbeat(self, job: str, task: str, token: str) -> str:
-        """Keep the lease: ok, lost (somebody else's by now) or cancelled."""
-        return str(self._run("heartbeat", job, task, token, self.config.lease_s))
+    def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
+        """claim_many of one task."""
+        return self.claim_many(job, [task], token=token, recipe=recipe, direct=direct)[0]
 
-    def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str:
-        """Done: what follows becomes ready. Another task of the house to go on with, or ""."""
-        batches = text_from_batches(end.batches)
-        args = (f"{end.seconds:.3f}", batches, end.n_views, self.config.worker, int(sticky))
-        _verdict, more = self._run("finish", job, task, token, *args)
-        return str(more)
+    def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str:
+        """Keep the leases: ok, or of the first task lost (somebody else's by now) or cancelled."""
+        return str(self._run("heartbeat", job, token, self.config.lease_s, *tasks))
+
+    def finish_many(
+        self, job: str, ends: Mapping[str, Finished], token: str, go_on: GoOn | None = None
+    ) -> dict[str, Claim]:
+        """Done: what follows becomes ready. Tasks of the last one's house that are claimed now.
+
+        A lost lease is of no account: what it made is in the store. go_on: claim more at once, where
+        others have enough to do, or where the house's scene is loaded.
+        """
+        from workers.job import work_version
+
+        config = self.config
+        args: list[object] = [token, config.worker, len(ends)]
+        for task, end in ends.items():
+            args += [task, f"{end.seconds:.3f}", text_from_batches(end.batches), end.n_views]
+        if go_on is not None:
+            args += [work_version(), go_on.recipe, config.lease_s, config.store_id, TOGETHER_S]
+            args += [",".join(go_on.queues), int(go_on.is_long)]
+        _verdicts, flat = self._run("finish", job, *args)
+        rows = (flat[i : i + 4] for i in range(0, len(flat), 4))
+        return {task: Claim(v, detail, inputs, token) for task, v, detail, inputs in rows}
 
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
         """Ended badly: stale, handed back, retry, failed (for good) or cancelled."""

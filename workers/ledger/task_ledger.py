@@ -12,20 +12,24 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from pbrs_farm.core.errors import PbrsError, Transient
-from workers.ids import STAGES
+from workers.ids import MOST_IN_GROUP, STAGES
 
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
 ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
-    "store", "draining", "blocked", "elsewhere", "unknown",
+    "store", "draining", "blocked", "elsewhere", "alone", "unknown",
 ]  # fmt: skip
 FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
     "storage", "preempted", "drained", "version", "cancelled",
 ]  # fmt: skip
 
+TOGETHER_S: Final = (
+    30.0  # of work that a slot claims at once: above a claim's cost, below what is lost
+)
+MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
 # Classes of fault that are nobody's: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
@@ -90,6 +94,15 @@ class Finished:
     seconds: float
     batches: tuple[tuple[str, ...], ...] = ()  # of views, only after geometry
     n_views: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class GoOn:
+    """What a slot would take next without a message."""
+
+    recipe: str  # digest of the job's recipe
+    queues: tuple[str, ...]  # that its worker takes from
+    is_long: bool = False  # the last task loaded a scene that is worth another one of its house
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,11 +179,13 @@ class Ledger(Protocol):
     def forget(self, job: str) -> None: ...
 
     # One task: slots
-    def claim(
-        self, job: str, task: str, *, token: str, recipe: str, direct: bool = False
-    ) -> Claim: ...
-    def heartbeat(self, job: str, task: str, token: str) -> str: ...
-    def finish(self, job: str, task: str, token: str, end: Finished, *, sticky: bool) -> str: ...
+    def claim_many(
+        self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
+    ) -> list[Claim]: ...
+    def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str: ...
+    def finish_many(
+        self, job: str, ends: Mapping[str, Finished], token: str, go_on: GoOn | None = None
+    ) -> dict[str, Claim]: ...
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str: ...
 
     # What the coordinator does; only the leader's token moves anything

@@ -31,6 +31,7 @@ from pbrs_farm.run.run_task import limit_threads
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.object_store import get_or_none
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue, path_of
@@ -109,7 +110,7 @@ def _merged(
     store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
 ) -> Iterator[tuple[str, bytes | None]]:
     """The job's rows and those of other houses of the root, by house, one house at a time."""
-    rows = lines_by_house(_get(store, keys.MANIFEST) or b"")
+    rows = lines_by_house(get_or_none(store, keys.MANIFEST) or b"")
     old = ((house, part) for house, part in rows if house not in own)
     return heapq.merge(old, new, key=lambda row: row[0])
 
@@ -133,14 +134,14 @@ def _new_rows(
         on_step(f"merge shard {first // size}")
         members = houses[first : first + size]
         # A house that was finished after its shard was merged has its own manifest.
-        merged = _get(store, shard_key(spec.job_id, first // size))
+        merged = get_or_none(store, shard_key(spec.job_id, first // size))
         found = dict(lines_by_house(merged)) if merged is not None else {}
         for house in members:
             yield house, found.get(house) or _manifest(store, house)
 
 
 def _manifest(store: Store, house: str) -> bytes | None:
-    return _get(store, keys.house_key(house, keys.MANIFEST))
+    return get_or_none(store, keys.house_key(house, keys.MANIFEST))
 
 
 def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
@@ -148,13 +149,6 @@ def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
         record = json.loads(store.get(key))
         task = task_from_failed_key(job, key)
         yield {"task": task, "fault": record["fault"], "message": record["message"]}
-
-
-def _get(store: Store, key: str) -> bytes | None:
-    try:
-        return store.get(key)
-    except ObjectMissing:
-        return None
 
 
 # The farm's real runner.

@@ -13,7 +13,7 @@ import os
 import random
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, TypeVar
@@ -23,13 +23,14 @@ from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProcess
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig, shown_url
-from workers.ids import GEOMETRY, WHOLE, TaskId, failed_key, log_key, task_from_text
+from workers.ids import GEOMETRY, QUEUES, WHOLE, TaskId, failed_key, log_key, task_from_text
 from workers.ledger.task_ledger import (
     UNCOUNTED,
     Claim,
     Fault,
     FaultClass,
     Finished,
+    GoOn,
     Ledger,
     LedgerUnavailable,
     WorkerRegistry,
@@ -44,7 +45,10 @@ _log = logging.getLogger("pbrs.slot")
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 # Refusals that another worker may not meet: wait, so that it comes first.
 _WAIT_AFTER_REJECTION: Final = {"version", "recipe", "store", "draining", "blocked", "elsewhere"}
+# Ends of a task after which the others that were claimed with it are not begun.
+_ENDS_ALL: Final = {"preempted", "cancelled"}
 _POLL_S: Final = 1.0
+_REPORT_EVERY_S: Final = 5.0
 _LOG_EVERY_S: Final = 60.0  # a long task's log is stored so often
 _RETRY_S: Final = 600.0  # how long Redis may be away
 _TAIL_IN_FAULT: Final = 2000  # bytes of the log that the ledger keeps
@@ -107,50 +111,81 @@ class Slot:
         self._sleep = sleep
         self._store: Store | None = None
         self._numbers = itertools.count()
-        self._heartbeat_at = 0.0  # next heartbeat of the lease
+        self._heartbeat_at = 0.0  # next heartbeat of the leases
+        self._ended: dict[str, Finished] = {}  # done, and the ledger does not know yet
+        self._report_at = 0.0  # when the ledger is told at the latest
         self._upload_at = 0.0  # next upload of the running task's log
 
-    def run_task(self, job: str, task: TaskId, recipe: str) -> None:
-        """Run the task if the ledger allows it, then others of its house while that pays."""
-        direct = False
-        following: TaskId | None = task
-        while following is not None:
-            # A token names this attempt alone: the ledger tells it from a former holder.
-            random_part = secrets.token_hex(4)
-            token = f"{self._config.worker}:{os.getpid()}:{next(self._numbers)}:{random_part}"
-            ask = partial(
-                self._ledger.claim, job, str(following), token=token, recipe=recipe, direct=direct
+    def run_tasks(self, job: str, tasks: Sequence[TaskId], recipe: str) -> None:
+        """Run the tasks that the ledger allows, then others of their house while that pays."""
+        # A token names this hold alone: the ledger tells it from a former holder.
+        number, random_part = next(self._numbers), secrets.token_hex(4)
+        token = f"{self._config.worker}:{os.getpid()}:{number}:{random_part}"
+        names = [str(task) for task in tasks]
+        ask = partial(self._ledger.claim_many, job, names, token=token, recipe=recipe)
+        claims = dict(zip(names, self._retry(ask), strict=True))
+        refused = {name: claim for name, claim in claims.items() if claim.verdict != "run"}
+        for k, (name, claim) in enumerate(refused.items()):
+            self._rejected(
+                job, task_from_text(name), claim, waits=k == 0 and len(refused) == len(claims)
             )
-            claim = self._retry(ask)
-            if claim.verdict != "run":
-                self._rejected(job, following, claim)
-                return
-            following = self._run_claimed(_Claimed(job, following, claim))
-            direct = True
+        while claims := {name: c for name, c in claims.items() if c.verdict == "run"}:
+            held = [_Claimed(job, task_from_text(name), claim) for name, claim in claims.items()]
+            claims = self._run_claimed(held, recipe)
 
-    def _run_claimed(self, held: _Claimed) -> TaskId | None:
-        """Run a task to its end; another task of its house to go on with."""
-        request = _request(held)
-        ended = self._render(held, request)
-        if ended.cause:
-            self._failed(held, ended)
-            return None
-        result = Result.model_validate(ended.body)
-        # A task of seconds gains nothing from the scene another one of its house has loaded.
-        sticky = ended.seconds >= self._config.sticky_s and not self._is_preempted()
-        end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
-        more = self._retry(
-            lambda: self._ledger.finish(
-                held.job, str(held.task), held.claim.token, end, sticky=sticky
+    def _run_claimed(self, held: list[_Claimed], recipe: str) -> dict[str, Claim]:
+        """Run tasks to their ends, one after another; those to go on with."""
+        self._heartbeat_at = self._clock() + self._config.heartbeat_s
+        self._ended, self._report_at = {}, self._clock() + _REPORT_EVERY_S
+        while held:
+            first, *held = held
+            if self._is_preempted() and held:
+                # What has not begun is given back at once, with what runs.
+                self._hand_back(held)
+                held = []
+            request = _request(first)
+            ended = self._render(first, request, held)
+            if ended.cause:
+                self._failed(first, ended)
+                if ended.cause in _ENDS_ALL:
+                    self._hand_back(held)
+                    held = []
+                continue
+            result = Result.model_validate(ended.body)
+            end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
+            self._ended[str(first.task)] = end
+            _log.info("%s of job %s: done in %.1f s", first.task, first.job, ended.seconds)
+            # What follows need not wait for the last of many.
+            if held and self._clock() >= self._report_at:
+                self._report(first, None)
+            if not held:
+                # A task of seconds gains nothing from the scene another one of its house has loaded.
+                is_long = ended.seconds >= self._config.sticky_s
+                go_on = GoOn(recipe, self._config.queues or QUEUES, is_long=is_long)
+                return self._report(first, None if self._is_preempted() else go_on)
+        if self._ended:
+            self._report(first, None)
+        return {}
+
+    def _report(self, held: _Claimed, go_on: GoOn | None) -> dict[str, Claim]:
+        """Tell the ledger what is done; tasks that were claimed with it."""
+        ends, self._report_at = self._ended, self._clock() + _REPORT_EVERY_S
+        self._ended = {}
+        tell = partial(self._ledger.finish_many, held.job, ends, held.claim.token, go_on)
+        return self._retry(tell)
+
+    def _hand_back(self, held: Sequence[_Claimed]) -> None:
+        """Give back what was claimed and not begun; nothing is counted."""
+        for one in held:
+            fault = Fault("preempted", "preempted: not begun", "not begun", self._config.worker)
+            give = partial(
+                self._ledger.fail, one.job, str(one.task), one.claim.token, fault, delay_s=0.0
             )
-        )
-        _log.info("%s of job %s: done in %.1f s", held.task, held.job, ended.seconds)
-        return task_from_text(more) if more else None
+            self._retry(give)
 
-    def _render(self, held: _Claimed, request: Request) -> Ended:
-        """Have the task run, and keep its lease meanwhile."""
-        now = self._clock()
-        self._heartbeat_at, self._upload_at = now + self._config.heartbeat_s, now + _LOG_EVERY_S
+    def _render(self, held: _Claimed, request: Request, waiting: Sequence[_Claimed]) -> Ended:
+        """Have the task run, and keep its lease and those of what waits for it meanwhile."""
+        self._upload_at = self._clock() + _LOG_EVERY_S
         deadline_s = self._config.limits.deadline_s(held.task.stage)
         self._process.begin(request.model_dump_json().encode(), task_s=deadline_s)
         while True:
@@ -160,7 +195,7 @@ class Slot:
             # Keep the others from claiming what would wait as well.
             if heard is not None and heard.kind == "waiting":
                 self._open_breaker(heard.text)
-            stop = self._why_stop(held)
+            stop = self._why_stop(held, waiting)
             if stop is not None:
                 return self._process.kill(stop, f"stopped: {stop}")
             # A long task's log can be read while it runs.
@@ -168,15 +203,16 @@ class Slot:
                 self._upload_at = self._clock() + _LOG_EVERY_S
                 self._put(held.log_key, self._process.log_tail())
 
-    def _why_stop(self, held: _Claimed) -> FaultClass | None:
+    def _why_stop(self, held: _Claimed, waiting: Sequence[_Claimed]) -> FaultClass | None:
         """None, or why the running task must end now; sends the heartbeat when it is due."""
         if self._is_preempted():
             return "preempted"
         if self._clock() < self._heartbeat_at:
             return None
         self._heartbeat_at = self._clock() + self._config.heartbeat_s
+        tasks = [str(held.task), *(str(one.task) for one in waiting), *self._ended]
         try:
-            answer = self._ledger.heartbeat(held.job, str(held.task), held.claim.token)
+            answer = self._ledger.heartbeat(held.job, tasks, held.claim.token)
         except LedgerUnavailable as error:
             # Go on: the token fences us off if the lease has run out meanwhile.
             _log.warning("no heartbeat: %s", error)
@@ -222,9 +258,10 @@ class Slot:
             tail=self._process.log_tail(_TAIL_IN_FAULT),
         )
 
-    def _rejected(self, job: str, task: TaskId, claim: Claim) -> None:
+    def _rejected(self, job: str, task: TaskId, claim: Claim, *, waits: bool) -> None:
+        """Say why a task is not run. waits: so that another worker comes first, where it may."""
         _log.log(
-            logging.DEBUG if claim.verdict in ("done", "early") else logging.INFO,
+            logging.DEBUG if claim.verdict in ("done", "early", "alone") else logging.INFO,
             "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
         )  # fmt: skip
         # A message came twice, or its holder died with the Celery child that took it.
@@ -238,7 +275,7 @@ class Slot:
                 reason = f"job {job} lies in another store than {shown_url(self._config.store_url)}"
             with contextlib.suppress(LedgerUnavailable):
                 self._registry.note_rejection(reason)
-        if claim.verdict in _WAIT_AFTER_REJECTION:
+        if waits and claim.verdict in _WAIT_AFTER_REJECTION:
             self._sleep(1.0)
 
     def _release_dead_sibling(self, job: str, task: TaskId, holder: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from workers.config import config_from_environment
-from workers.ids import check_job_id, task_from_text
+from workers.ids import check_job_id, tasks_from_group
 from workers.node.slot import Slot, make_slot
 from workers.queue.celery_app import app
 
@@ -20,5 +20,8 @@ def _slot() -> Slot:
 
 @app.task(name=RUN)  # type: ignore[untyped-decorator]
 def run(job: str, task: str, recipe: str) -> None:
-    """Claim the task, run it in the render process, report to the ledger."""
-    _slot().run_task(check_job_id(job), task_from_text(task), recipe)
+    """Claim the tasks, run them in the render process, report to the ledger.
+
+    task: HOUSE/UNIT/STAGE, or several units of them: HOUSE/UNIT,UNIT/STAGE.
+    """
+    _slot().run_tasks(check_job_id(job), tasks_from_group(task), recipe)

@@ -120,3 +120,23 @@ def test_redis_away_is_no_end_and_leaving_gives_up_the_lead(
     bench.coordinator.run(stop)
     assert len(bench.sent) == 1
     assert bench.ledger.leader == ""
+
+
+def test_short_tasks_of_one_house_go_in_one_message_as_long_as_each_slot_gets_some(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seconds = {"gl": 0.5, "light": 20.0}
+    monkeypatch.setattr(
+        "workers.coordinator.leader.mean_s", lambda _views, stage: seconds.get(stage)
+    )
+    bench.registry.n_slots = {"gl": 2, "light": 2, "geometry": 2}
+    units = [f"h{house}/{unit}" for house in (0, 1) for unit in range(3)]
+    bench.ledger.ready = [f"{unit}/{stage}" for stage in ("gl", "light") for unit in units]
+    bench.ledger.ready += ["h2/-/geometry", "h3/-/geometry"]
+    while bench.coordinator.turn():
+        pass
+    sent = [task for _queue, _job, task, _recipe in bench.sent]
+    assert next(task for task in sent if task.endswith("gl")).startswith("h0/0,1")
+    # Long ones, and those of which nobody knows yet, go one by one.
+    assert all("," not in task for task in sent if not task.endswith("gl"))
+    assert len([task for task in sent if task.endswith("light")]) > 0

@@ -52,7 +52,7 @@ def test_most_batches_failing_quarantines_the_house_and_cancels_the_rest(
     running = d.claim(tasks[2])
     for task in tasks[:2]:
         assert d.fail(task, d.claim(task), "data") == "failed"
-    assert ledger.heartbeat(d.job.job_id, tasks[2], running.token) == "lost"
+    assert ledger.heartbeat(d.job.job_id, [tasks[2]], running.token) == "lost"
     assert d.claim(tasks[2], "w2").verdict == "cancelled"
     d.run_all()
     assert d.state == "done"

@@ -63,7 +63,7 @@ def test_a_cancelled_job_stops_its_runners(ledger: RedisLedger) -> None:
     first, second = d.dispatch()
     claim = d.claim(first)
     assert ledger.steer(d.job.job_id, "cancel", "by hand") == "cancelled"
-    assert ledger.heartbeat(d.job.job_id, first, claim.token) == "cancelled"
+    assert ledger.heartbeat(d.job.job_id, [first], claim.token) == "cancelled"
     assert d.fail(first, claim, "cancelled") == "cancelled"
     assert d.claim(second).verdict == "cancelled"
     assert d.dispatch() == []

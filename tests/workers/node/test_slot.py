@@ -50,8 +50,8 @@ class Bench:
     def _sleep(self, seconds: float) -> None:
         self.clock.now += seconds
 
-    def run(self, task: str = TASK) -> None:
-        self.slot.run_task(JOB, task_from_text(task), "r")
+    def run(self, *tasks: str) -> None:
+        self.slot.run_tasks(JOB, [task_from_text(task) for task in tasks or (TASK,)], "r")
 
 
 @pytest.fixture
@@ -199,3 +199,57 @@ def test_the_lease_of_a_dead_sibling_is_ended(bench: Bench) -> None:
     bench.ledger.leases["h0/1/gl"] = f"w1:{os.getpid()}:0:abcd"
     bench.run("h0/1/gl")
     assert "h0/1/gl" in bench.ledger.leases
+
+
+SECOND, THIRD = "h0/1/gl", "h0/2/gl"
+
+
+def of_one_house(bench: Bench, *seconds: float) -> None:
+    """The house has as many batches as there are seconds; each takes so long in the process."""
+    at = 0.0
+    for k, took in enumerate(seconds):
+        bench.ledger.inputs[f"h0/{k}/gl"] = ";".join("v" for _ in seconds)
+        at += took
+        bench.next.at(at, "done", batches=[], n_views=1)
+    bench.next.at(0, "ready")
+
+
+def test_short_tasks_are_claimed_and_told_together(bench: Bench) -> None:
+    of_one_house(bench, 0.5, 0.5, 0.5)
+    bench.run(TASK, SECOND, THIRD)
+    assert bench.ledger.reports == [[TASK, SECOND, THIRD]]
+    assert len(bench.started) == 1
+
+
+def test_what_is_done_is_told_every_five_seconds(bench: Bench) -> None:
+    of_one_house(bench, 4.0, 4.0, 4.0)
+    bench.run(TASK, SECOND, THIRD)
+    assert bench.ledger.reports == [[TASK, SECOND], [THIRD]]
+
+
+def test_a_heartbeat_keeps_what_runs_what_waits_and_what_is_not_told_yet(bench: Bench) -> None:
+    of_one_house(bench, 2.0, 40.0, 1.0)
+    bench.run(TASK, SECOND, THIRD)
+    assert bench.ledger.beaten[0] == [SECOND, THIRD, TASK]
+
+
+def test_a_task_of_several_that_fails_leaves_the_others_be(bench: Bench) -> None:
+    for k in range(3):
+        bench.ledger.inputs[f"h0/{k}/gl"] = "v;v;v"
+    bench.next.at(0, "ready")
+    bench.next.at(1, "done", batches=[], n_views=1)
+    bench.next.at(2, "fault", "h0: two walls", fault="data", fingerprint="x")
+    bench.next.at(3, "done", batches=[], n_views=1)
+    bench.run(TASK, SECOND, THIRD)
+    assert [f.fault for f in bench.ledger.faults[SECOND]] == ["data"]
+    assert bench.ledger.reports == [[TASK, THIRD]]
+
+
+def test_preemption_gives_back_what_has_not_begun_and_tells_what_is_done(bench: Bench) -> None:
+    of_one_house(bench, 1.0)
+    bench.ledger.inputs |= {TASK: "v;v;v", SECOND: "v;v;v", THIRD: "v;v;v"}
+    bench.next.at(3, lambda: bench.config.preemption_file.touch())
+    bench.run(TASK, SECOND, THIRD)
+    assert list(bench.ledger.finished) == [TASK]
+    assert [f.fault for t in (SECOND, THIRD) for f in bench.ledger.faults[t]] == ["preempted"] * 2
+    assert bench.ledger.leases == {}

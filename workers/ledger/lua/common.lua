@@ -19,64 +19,245 @@
 -- end of its lease), worker:<name> (hash), workers and workers:<stage> (sorted sets: worker by heartbeat).
 local P, G = KEYS[1], KEYS[2]
 
--- Seconds since 1970 by Redis' clock.
+-- What one call reads and writes. A script is atomic: each hash field is read once and written once, at
+-- the end, whatever happens to it meanwhile; so are counters, sorted sets and lists. Every script's body
+-- is `main`, and `flush` follows it (redis_ledger.py).
+local cache, whole, dirty, counts, zsets, pushes = {}, {}, {}, {}, {}, {}
+local MOST = 2000 -- arguments of one command
+
+local function fields_of(key)
+  if not cache[key] then cache[key] = {} end
+  return cache[key]
+end
+
+-- Read several fields of a hash at once.
+local function hmany(key, fields)
+  if whole[key] or #fields == 0 then return end
+  local missing, known = {}, fields_of(key)
+  for _, field in ipairs(fields) do
+    if known[field] == nil then missing[#missing + 1] = field end
+  end
+  if #missing == 0 then return end
+  local values = redis.call('HMGET', key, unpack(missing))
+  for i, field in ipairs(missing) do known[field] = values[i] end
+end
+
+local function hget(key, field)
+  field = tostring(field)
+  if fields_of(key)[field] == nil then
+    if whole[key] then return nil end
+    hmany(key, { field })
+  end
+  return cache[key][field] or nil
+end
+
+-- Read all of a hash; hget then answers from memory.
+local function load_hash(key)
+  local known = fields_of(key)
+  if whole[key] then return end
+  local found = redis.call('HGETALL', key)
+  for i = 1, #found, 2 do
+    if known[found[i]] == nil then known[found[i]] = found[i + 1] end
+  end
+  whole[key] = true
+end
+
+-- All of a hash: field -> value.
+local function hall(key)
+  load_hash(key)
+  local all = {}
+  for field, value in pairs(cache[key]) do
+    if value then all[field] = value end
+  end
+  return all
+end
+
+local function hset(key, field, value)
+  field = tostring(field)
+  fields_of(key)[field] = tostring(value)
+  dirty[key] = dirty[key] or {}
+  dirty[key][field] = true
+end
+
+local function hdel(key, field)
+  fields_of(key)[field] = false
+  dirty[key] = dirty[key] or {}
+  dirty[key][field] = true
+end
+
+local function hadd(key, field, by)
+  local value = tonumber(hget(key, field) or '0') + by
+  hset(key, field, value)
+  return value
+end
+
+-- A member of a sorted set gets a score; false takes it out.
+local function zset(key, member, score)
+  zsets[key] = zsets[key] or {}
+  zsets[key][member] = score
+end
+
+local function push(command, key, value) pushes[#pushes + 1] = { command, key, value } end
+
+-- command, key, then all values, in as many calls as they need.
+local function in_parts(command, key, values)
+  for i = 1, #values, MOST do
+    redis.call(command, key, unpack(values, i, math.min(i + MOST - 1, #values)))
+  end
+end
+
+local function flush()
+  -- Counters of a key: one read, one write, however many changed.
+  for key, fields in pairs(counts) do
+    local changed = {}
+    for field, by in pairs(fields) do
+      if by ~= 0 then changed[#changed + 1] = field end
+    end
+    hmany(key, changed)
+    for _, field in ipairs(changed) do
+      local value = tonumber(hget(key, field) or '0') + fields[field]
+      hset(key, field, value % 1 == 0 and string.format('%d', value) or string.format('%.3f', value))
+    end
+  end
+  for key, fields in pairs(dirty) do
+    local set, gone = {}, {}
+    for field in pairs(fields) do
+      local value = cache[key][field]
+      if value then
+        set[#set + 1] = field
+        set[#set + 1] = value
+      else
+        gone[#gone + 1] = field
+      end
+    end
+    in_parts('HSET', key, set)
+    in_parts('HDEL', key, gone)
+  end
+  for key, members in pairs(zsets) do
+    local added, gone = {}, {}
+    for member, score in pairs(members) do
+      if score then
+        added[#added + 1] = score
+        added[#added + 1] = member
+      else
+        gone[#gone + 1] = member
+      end
+    end
+    in_parts('ZADD', key, added)
+    in_parts('ZREM', key, gone)
+  end
+  -- Neighbours of one list go in one command, in their order.
+  local values, last = {}, nil
+  local function send()
+    if last then in_parts(last[1], last[2], values) end
+    values = {}
+  end
+  for _, one in ipairs(pushes) do
+    if one[3] then
+      if not last or last[1] ~= one[1] or last[2] ~= one[2] then
+        send()
+        last = one
+      end
+      values[#values + 1] = one[3]
+    end
+  end
+  send()
+  -- The coordinator may be waiting for something to be ready.
+  if last and redis.call('LLEN', G .. 'notify') == 0 then redis.call('LPUSH', G .. 'notify', '1') end
+  dirty, counts, zsets, pushes = {}, {}, {}, {}
+end
+
+
+-- Seconds since 1970 by Redis' clock, asked once a call.
+local clock
 local function now()
-  local t = redis.call('TIME')
-  return tonumber(t[1]) + tonumber(t[2]) / 1000000
+  if not clock then
+    local t = redis.call('TIME')
+    clock = tonumber(t[1]) + tonumber(t[2]) / 1000000
+  end
+  return clock
+end
+
+-- Storage is unhealthy: nothing is claimed.
+local held
+local function is_held()
+  if held == nil then held = redis.call('EXISTS', G .. 'breaker') == 1 end
+  return held
 end
 
 -- A task is "<house>/<unit>/<stage>".
 local function split(task) return string.match(task, '^([^/]+)/([^/]+)/([^/]+)$') end
 local function task_of(house, unit, stage) return house .. '/' .. unit .. '/' .. stage end
 local function house_key(house) return P .. 'h:' .. house end
-local function bump(field, by) return redis.call('HINCRBY', P .. 'n', field, by) end
+local function job_field(field)
+  load_hash(P .. 'job')
+  return hget(P .. 'job', field)
+end
+
+-- Counters: changed at the end of the call, read with what the call has changed so far.
+local function bump(field, by)
+  local key = P .. 'n'
+  counts[key] = counts[key] or {}
+  counts[key][field] = (counts[key][field] or 0) + by
+end
+local function count(field)
+  local key = P .. 'n'
+  return tonumber(hget(key, field) or '0') + ((counts[key] or {})[field] or 0)
+end
 local function job_of(prefix) return string.match(prefix, '{(.-)}:$') end
 
 -- Leases are kept by queue, so that each class of workers can be scaled by its own.
 local function lease_key(stage)
-  if stage == LIGHT_STAGE and redis.call('HGET', P .. 'job', 'gpu') == '1' then stage = GPU_LEASE end
+  if stage == LIGHT_STAGE and job_field('gpu') == '1' then stage = GPU_LEASE end
   return G .. 'lease:' .. stage
 end
 
 -- Stage and letter of a unit, nil when there is no such unit.
 local function unit_at(house, unit)
-  local at = redis.call('HGET', house_key(house), unit)
+  load_hash(house_key(house))
+  local at = hget(house_key(house), unit)
   if not at then return nil end
   return string.match(at, '^(.-):(.)$')
 end
 
 -- Move a unit to a state, and the counters of its old and new state with it.
 local function set_unit(house, unit, stage, letter)
-  local old = redis.call('HGET', house_key(house), unit)
+  local old = hget(house_key(house), unit)
   if old then bump(old, -1) end
-  redis.call('HSET', house_key(house), unit, stage .. ':' .. letter)
+  hset(house_key(house), unit, stage .. ':' .. letter)
   bump(stage .. ':' .. letter, 1)
 end
 
 -- The transactional outbox: whoever finishes a step puts what follows here, in the same script, and
 -- notifies the coordinator if it waits.
-local function ready(house, unit, stage, push)
+local function ready(house, unit, stage, command)
   set_unit(house, unit, stage, READY)
-  redis.call(push, P .. 'out:' .. stage, task_of(house, unit, stage))
-  if redis.call('LLEN', G .. 'notify') == 0 then redis.call('LPUSH', G .. 'notify', '1') end
+  push(command, P .. 'out:' .. stage, task_of(house, unit, stage))
+end
+
+-- Take a task that became ready in this very call out of what will be pushed.
+local function take_back(task)
+  for _, one in ipairs(pushes) do
+    if one[3] == task then one[3] = false end
+  end
 end
 
 -- Ready, but not before a point in time: a retry after a delay.
 local function ready_later(house, unit, stage, at)
   set_unit(house, unit, stage, READY)
-  redis.call('ZADD', P .. 'later', at, task_of(house, unit, stage))
+  zset(P .. 'later', task_of(house, unit, stage), at)
 end
 
 -- End the lease of a task.
 local function release(task, stage)
-  redis.call('ZREM', lease_key(stage), job_of(P) .. '|' .. task)
-  redis.call('HDEL', P .. 'claims', task)
+  zset(lease_key(stage), job_of(P) .. '|' .. task, false)
+  hdel(P .. 'claims', task)
 end
 
 -- The stages a batch of views goes through, in order.
 local function batch_stages()
   local names = {}
-  for name in string.gmatch(redis.call('HGET', P .. 'job', 'stages') or '', '[^,]+') do
+  for name in string.gmatch(job_field('stages') or '', '[^,]+') do
     names[#names + 1] = name
   end
   return names
@@ -92,33 +273,35 @@ local function next_stage(stage)
 end
 
 local function pause_job(reason)
-  if redis.call('HGET', P .. 'job', 'state') == 'running' then
-    redis.call('HSET', P .. 'job', 'state', 'paused', 'reason', reason)
+  if job_field('state') == 'running' then
+    hset(P .. 'job', 'state', 'paused')
+    hset(P .. 'job', 'reason', reason)
   end
 end
 
 -- Every shard is merged and the job's manifest is written.
 local function end_job()
-  redis.call('HSET', P .. 'job', 'state', 'done', 'reason', '', 'ended', now())
-  redis.call('ZREM', G .. 'jobs', job_of(P))
+  hset(P .. 'job', 'state', 'done')
+  hset(P .. 'job', 'reason', '')
+  hset(P .. 'job', 'ended', now())
+  zset(G .. 'jobs', job_of(P), false)
 end
 
 -- A house needs no more work (how: done, quarantined); the last of a shard has it merged.
 local function close_house(house, how)
   local key = house_key(house)
-  local shard = math.floor(tonumber(redis.call('HGET', key, 'i'))
-    / tonumber(redis.call('HGET', P .. 'job', 'shard_size')))
-  redis.call('HSET', key, 's', how)
+  local shard = math.floor(tonumber(hget(key, 'i')) / tonumber(job_field('shard_size')))
+  hset(key, 's', how)
   bump('houses:open', -1)
   bump('houses:' .. how, 1)
-  if redis.call('HINCRBY', P .. 'shards', shard, -1) == 0 then
+  if hadd(P .. 'shards', shard, -1) == 0 then
     ready('-', 's' .. shard, SHARD_STAGE, 'RPUSH')
   end
 end
 
 -- One batch fewer is to come, done or failed; the last lets the house be reduced.
 local function batch_ended(house)
-  if redis.call('HINCRBY', house_key(house), 'left', -1) == 0 then
+  if hadd(house_key(house), 'left', -1) == 0 then
     ready(house, '-', REDUCE_STAGE, 'LPUSH')
   end
 end
@@ -127,8 +310,8 @@ end
 local function open_batches(house, batches)
   local n, first = 0, batch_stages()[1]
   for _ in string.gmatch(batches, '[^;]+') do n = n + 1 end
-  redis.call('HSET', house_key(house), 'n', n, 'left', n, 'nf', 0)
-  if batches ~= '' then redis.call('HSET', P .. 'views', house, batches) end
+  for field, value in pairs({ n = n, left = n, nf = 0 }) do hset(house_key(house), field, value) end
+  if batches ~= '' then hset(P .. 'views', house, batches) end
   bump('batches', n)
   for i = n - 1, 0, -1 do ready(house, tostring(i), first, 'LPUSH') end
   if n == 0 then ready(house, '-', REDUCE_STAGE, 'LPUSH') end
@@ -139,23 +322,24 @@ local function advance_job(unit, stage)
   local job = P .. 'job'
   set_unit('-', unit, stage, DONE)
   if stage == SHARD_STAGE then
-    if tonumber(redis.call('HGET', P .. 'shards', string.sub(unit, 2))) > 0 then
+    if tonumber(hget(P .. 'shards', string.sub(unit, 2))) > 0 then
       -- A house of it was opened again meanwhile: the shard is merged once more after it.
       bump('done:' .. SHARD_STAGE, -1)
       set_unit('-', unit, stage, CANCELLED)
-    elseif redis.call('HINCRBY', job, 'shards_left', -1) == 0 then
+    elseif hadd(job, 'shards_left', -1) == 0 then
       local _, letter = unit_at('-', '-')
       if letter == RUNNING then
         -- It is being merged without this shard: once more afterwards.
-        redis.call('HSET', job, 'reduce_again', '1')
+        hset(job, 'reduce_again', '1')
       elseif letter ~= READY and letter ~= QUEUED then
         ready('-', '-', JOB_STAGE, 'RPUSH')
       end
     end
-  elseif redis.call('HDEL', job, 'reduce_again') == 1 then
+  elseif hget(job, 'reduce_again') then
+    hdel(job, 'reduce_again')
     bump('done:' .. JOB_STAGE, -1)
     ready('-', '-', JOB_STAGE, 'RPUSH')
-  elseif tonumber(redis.call('HGET', job, 'shards_left')) == 0 then
+  elseif tonumber(hget(job, 'shards_left')) == 0 then
     end_job()
   end
 end
@@ -167,11 +351,11 @@ local function advance(house, unit, stage, batches)
     advance_job(unit, stage)
   elseif stage == GEOMETRY_STAGE then
     set_unit(house, unit, stage, DONE)
-    redis.call('HDEL', P .. 'sources', house)
+    hdel(P .. 'sources', house)
     open_batches(house, batches)
   elseif stage == REDUCE_STAGE then
     set_unit(house, unit, stage, DONE)
-    if tonumber(redis.call('HGET', house_key(house), 'left')) > 0 then
+    if tonumber(hget(house_key(house), 'left')) > 0 then
       bump('done:' .. REDUCE_STAGE, -1) -- a failed batch was tried again meanwhile; reduced after it
     else
       close_house(house, 'done')
@@ -189,22 +373,20 @@ end
 
 -- The rest of the house is cancelled; a running unit learns it at its next heartbeat.
 local function quarantine(house)
-  local fields = redis.call('HGETALL', house_key(house))
-  for i = 1, #fields, 2 do
-    local stage, letter = string.match(fields[i + 1], '^(%l+):(%l)$')
+  for unit, at in pairs(hall(house_key(house))) do
+    local stage, letter = string.match(at, '^(%l+):(%l)$')
     local is_open = letter == LOADED or letter == READY or letter == QUEUED or letter == RUNNING
-    if stage and is_open and fields[i] ~= 's' then
-      release(task_of(house, fields[i], stage), stage)
-      redis.call('ZREM', P .. 'queued', task_of(house, fields[i], stage))
-      set_unit(house, fields[i], stage, CANCELLED)
+    if stage and is_open and unit ~= 's' then
+      release(task_of(house, unit, stage), stage)
+      zset(P .. 'queued', task_of(house, unit, stage), false)
+      set_unit(house, unit, stage, CANCELLED)
     end
   end
   close_house(house, 'quarantined')
   -- Too many bad houses: something is wrong with the job, not with them.
-  local bad = tonumber(redis.call('HGET', P .. 'n', 'houses:quarantined'))
-  local good = tonumber(redis.call('HGET', P .. 'n', 'houses:done') or '0')
-  local rule = redis.call('HMGET', P .. 'job', 'max_quarantined', 'quarantined_share')
-  if bad >= tonumber(rule[1]) and bad > tonumber(rule[2]) * (bad + good) then
+  local bad, good = count('houses:quarantined'), count('houses:done')
+  local most, share = job_field('max_quarantined'), job_field('quarantined_share')
+  if bad >= tonumber(most) and bad > tonumber(share) * (bad + good) then
     pause_job(bad .. ' of ' .. (bad + good) .. ' houses are quarantined')
   end
 end
@@ -213,20 +395,19 @@ end
 local function fail_unit(house, unit, stage, entry, fingerprint)
   local task = task_of(house, unit, stage)
   set_unit(house, unit, stage, FAILED)
-  redis.call('HSET', P .. 'failed', task, entry)
-  redis.call('HDEL', P .. 'attempts', task)
-  redis.call('HDEL', P .. 'tried', task)
-  local same = redis.call('HINCRBY', P .. 'prints', fingerprint, 1)
-  local most = tonumber(redis.call('HGET', P .. 'job', 'max_same_failure'))
+  hset(P .. 'failed', task, entry)
+  hdel(P .. 'attempts', task)
+  hdel(P .. 'tried', task)
+  local same = hadd(P .. 'prints', fingerprint, 1)
+  local most = tonumber(job_field('max_same_failure'))
   if house == '-' then
     pause_job('the reduction ' .. task .. ' failed')
   elseif unit == '-' then
     quarantine(house)
   else
     local key = house_key(house)
-    local n_failed = redis.call('HINCRBY', key, 'nf', 1)
-    local n = tonumber(redis.call('HGET', key, 'n'))
-    if n_failed > n * tonumber(redis.call('HGET', P .. 'job', 'failed_share')) then
+    local n_failed = hadd(key, 'nf', 1)
+    if n_failed > tonumber(hget(key, 'n')) * tonumber(job_field('failed_share')) then
       quarantine(house)
     else
       batch_ended(house)
@@ -238,18 +419,18 @@ end
 -- A claimed task ended badly. f: class, fingerprint, entry (JSON), worker, delay.
 local function ended_badly(task, f)
   local house, unit, stage = split(task)
-  local attempts = tonumber(redis.call('HGET', P .. 'attempts', task) or '0')
+  local attempts = tonumber(hget(P .. 'attempts', task) or '0')
   release(task, stage)
-  if redis.call('HGET', P .. 'job', 'state') == 'cancelled' then
+  if job_field('state') == 'cancelled' then
     set_unit(house, unit, stage, CANCELLED)
     return 'cancelled'
   end
   -- Nobody's fault: the attempt is given back.
   if UNCOUNTED[f.class] then
     if attempts <= 1 then
-      redis.call('HDEL', P .. 'attempts', task)
+      hdel(P .. 'attempts', task)
     else
-      redis.call('HSET', P .. 'attempts', task, attempts - 1)
+      hset(P .. 'attempts', task, attempts - 1)
     end
     bump('handed_back:' .. f.class, 1)
     ready_later(house, unit, stage, now() + f.delay)
@@ -257,17 +438,108 @@ local function ended_badly(task, f)
   end
   -- Counted: no more attempts, or another one later and elsewhere.
   bump('failures:' .. f.class, 1)
-  local most = tonumber(redis.call('HGET', P .. 'job', 'max_attempts'))
+  local most = tonumber(job_field('max_attempts'))
   if f.class == 'data' or attempts >= most then
     bump('failed:' .. f.class, 1)
     fail_unit(house, unit, stage, f.entry, f.fingerprint)
     return 'failed'
   end
-  local tried = redis.call('HGET', P .. 'tried', task)
-  redis.call('HSET', P .. 'tried', task, (tried and (tried .. ',') or '') .. f.worker)
+  local tried = hget(P .. 'tried', task)
+  hset(P .. 'tried', task, (tried and (tried .. ',') or '') .. f.worker)
   ready_later(house, unit, stage, now() + f.delay)
   return 'retry'
 end
 
 -- Only the leading coordinator may move work; a deposed one is told so.
 local function leads(token) return redis.call('GET', G .. 'leader') == token end
+
+-- What a task works on: the house's source before geometry, its batches of views afterwards.
+local function inputs_of(house, stage)
+  if house == '-' then return '' end
+  return hget(P .. (stage == GEOMETRY_STAGE and 'sources' or 'views'), house) or ''
+end
+
+-- May this worker run this task now? The attempt is counted before any work is done.
+-- c: token, worker, version, recipe, lease_s, direct (without a message), store ("" = not known),
+-- alone (nothing else was claimed in this call), shut (nothing more is claimed in it)
+-- -> {verdict, detail, inputs}; verdict "run" carries the attempt as detail
+local function claim(task, c)
+  local house, unit, stage = split(task)
+  if not house then return { 'unknown', '', '' } end
+  -- Answer what needs no claim: nothing there, past its stage, ended.
+  local at_stage, letter = unit_at(house, unit)
+  if not job_field('state') or not at_stage then return { 'unknown', '', '' } end
+  if at_stage ~= stage or letter == DONE then return { 'done', '', '' } end
+  if letter == FAILED then return { 'failed', '', '' } end
+  if letter == CANCELLED then return { 'cancelled', '', '' } end
+  -- Somebody holds it, maybe we ourselves.
+  if letter == RUNNING then
+    local held = hget(P .. 'claims', task) or ''
+    if string.match(held, '^([^|]*)|') == c.token then -- asked again after a lost answer
+      return { 'run', hget(P .. 'attempts', task), inputs_of(house, stage) }
+    end
+    return { 'leased', held, '' }
+  end
+  if letter ~= QUEUED and not (letter == READY and c.direct) then return { 'early', '', '' } end
+  if job_field('state') == 'cancelled' then
+    zset(P .. 'queued', task, false)
+    set_unit(house, unit, stage, CANCELLED)
+    return { 'cancelled', '', '' }
+  end
+
+  local t = now()
+  -- Not now, or not here: the task becomes ready again, after a delay if there is one.
+  local function reject(verdict, detail, delay)
+    if letter == QUEUED then
+      zset(P .. 'queued', task, false)
+      if delay > 0 then
+        ready_later(house, unit, stage, t + delay)
+      else
+        ready(house, unit, stage, 'LPUSH')
+      end
+    end
+    return { verdict, detail, '' }
+  end
+
+  -- Refuse what must wait: the job, storage, or this worker forbids it.
+  if job_field('state') ~= 'running' and stage ~= JOB_STAGE then return reject('paused', '', 0) end
+  if is_held() then return reject('held', 'storage is unhealthy', 0) end
+  if job_field('version') ~= c.version then return reject('version', job_field('version'), 15) end
+  if job_field('recipe') ~= c.recipe then return reject('recipe', job_field('recipe'), 15) end
+  local store = job_field('store_id') or ''
+  if store ~= '' and c.store ~= '' and store ~= c.store then return reject('store', store, 15) end
+  local self = G .. 'worker:' .. c.worker
+  hmany(self, { 'drain', 'blocked_until', 'streak' })
+  if hget(self, 'drain') == '1' then return reject('draining', '', 0) end
+  local blocked = hget(self, 'blocked_until')
+  if blocked and tonumber(blocked) > t then return reject('blocked', blocked, 2) end
+
+  -- What failed once runs by itself: it may take others with it.
+  local n_before = tonumber(hget(P .. 'attempts', task) or '0')
+  if c.shut or (n_before > 0 and not c.alone) then return reject('alone', '', 0) end
+  -- A failed attempt is repeated elsewhere as long as anybody else could do it.
+  local tried = n_before > 0 and hget(P .. 'tried', task)
+  if tried and string.find(',' .. tried .. ',', ',' .. c.worker .. ',', 1, true) then
+    local pool = G .. 'workers:' .. stage
+    local others = redis.call('ZCOUNT', pool, t - ALIVE_S, '+inf')
+    local seen = {}
+    for name in string.gmatch(tried, '[^,]+') do
+      local seen_at = redis.call('ZSCORE', pool, name)
+      if not seen[name] and seen_at and tonumber(seen_at) > t - ALIVE_S then others = others - 1 end
+      seen[name] = true
+    end
+    if others > 0 and hadd(P .. 'rejected', task, 1) <= 20 then
+      return reject('elsewhere', tried, 3)
+    end
+  end
+
+  -- Count the attempt and take the lease.
+  if letter == QUEUED then zset(P .. 'queued', task, false) end
+  if letter == READY then take_back(task) end
+  if n_before > 0 then hdel(P .. 'rejected', task) end
+  hset(P .. 'attempts', task, n_before + 1)
+  set_unit(house, unit, stage, RUNNING)
+  zset(lease_key(stage), job_of(P) .. '|' .. task, t + c.lease_s)
+  hset(P .. 'claims', task, c.token .. '|' .. c.worker .. '|' .. string.format('%.3f', t))
+  return { 'run', tostring(n_before + 1), inputs_of(house, stage) }
+end

@@ -1,6 +1,6 @@
 -- A job appears, unless it is there. ARGV: n_houses, shard size, then name and value of fields
 -- -> state of the job before ("" = created now)
-local state = redis.call('HGET', P .. 'job', 'state')
+local state = job_field('state')
 if state then return state end
 local n, size = tonumber(ARGV[1]), tonumber(ARGV[2])
 local shards = math.max(1, math.ceil(n / size))

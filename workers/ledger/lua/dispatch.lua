@@ -5,42 +5,47 @@ local t = now()
 -- What waited for its time is ready now.
 for _, task in ipairs(redis.call('ZRANGEBYSCORE', P .. 'later', '-inf', t, 'LIMIT', 0, 500)) do
   local house, unit, stage = split(task)
-  redis.call('ZREM', P .. 'later', task)
+  zset(P .. 'later', task, false)
   local at_stage, letter = unit_at(house, unit)
-  if at_stage == stage and letter == READY then redis.call('LPUSH', P .. 'out:' .. stage, task) end
+  if at_stage == stage and letter == READY then push('LPUSH', P .. 'out:' .. stage, task) end
 end
-local running = redis.call('HGET', P .. 'job', 'state') == 'running'
+local running = job_field('state') == 'running'
 
 -- Admit houses, in order, while few are open.
-local open = tonumber(redis.call('HGET', P .. 'n', 'houses:open') or '0')
+local open = count('houses:open')
 local admitted = 0
 while running and open < tonumber(ARGV[2]) and admitted < 200 do
   local entry = redis.call('LPOP', P .. 'order')
   if not entry then break end
   local i, house = string.match(entry, '^(%d+)|(.*)$')
   local key = house_key(house)
-  local known = redis.call('HGET', key, 's')
+  load_hash(key)
+  local known = hget(key, 's')
   if not known then
     -- A fresh house begins with its geometry.
-    redis.call('HSET', key, 'i', i, 's', 'open')
+    hset(key, 'i', i)
+    hset(key, 's', 'open')
     ready(house, '-', GEOMETRY_STAGE, 'RPUSH')
     open = open + 1
     bump('houses:open', 1)
   elseif known == 'loaded' then
     -- A house storage knows goes on where it was.
-    redis.call('HSET', key, 's', 'open')
-    local fields = redis.call('HGETALL', key)
-    for j = 1, #fields, 2 do
-      local stage, letter = string.match(fields[j + 1], '^(%l+):(%l)$')
-      if letter == LOADED then ready(house, fields[j], stage, 'RPUSH') end
+    hset(key, 's', 'open')
+    local units = {}
+    for unit, at in pairs(hall(key)) do
+      local stage, letter = string.match(at, '^(%l+):(%l)$')
+      if letter == LOADED then units[#units + 1] = { unit, stage } end
     end
+    table.sort(units, function(a, b) return (tonumber(a[1]) or -1) < (tonumber(b[1]) or -1) end)
+    for _, at in ipairs(units) do ready(house, at[1], at[2], 'RPUSH') end
     open = open + 1
     bump('houses:open', 1)
   end
   admitted = admitted + 1
 end
 
--- Take from the outbox what there is room for on the queues.
+-- Take from the outbox what there is room for on the queues; what became ready above is in it by then.
+flush()
 local sent = {}
 for i = 3, #ARGV, 2 do
   local stage, room = ARGV[i], tonumber(ARGV[i + 1])
@@ -53,7 +58,7 @@ for i = 3, #ARGV, 2 do
       -- Anything else was cancelled, or taken without a message.
       if at_stage == stage and letter == READY then
         set_unit(house, unit, stage, QUEUED)
-        redis.call('ZADD', P .. 'queued', t, task)
+        zset(P .. 'queued', task, t)
         sent[#sent + 1] = task
         room = room - 1
       end

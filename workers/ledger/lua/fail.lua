@@ -3,16 +3,17 @@
 -- -> stale | handed back | retry | failed | cancelled
 local task, worker = ARGV[1], ARGV[6]
 local house = split(task)
-local claim = redis.call('HGET', P .. 'claims', task)
-if not claim or string.match(claim, '^([^|]*)|') ~= ARGV[2] then return 'stale' end
+local held_by = hget(P .. 'claims', task)
+if not held_by or string.match(held_by, '^([^|]*)|') ~= ARGV[2] then return 'stale' end
 local _, _, stage = split(task)
 if SUSPECT[ARGV[3]] and redis.call('ZCOUNT', G .. 'workers:' .. stage, now() - ALIVE_S, '+inf') > 1 then
   -- Three failures in a row on different houses: the worker itself is unhealthy and cools down.
   local key = G .. 'worker:' .. worker
-  if redis.call('HGET', key, 'streak_house') ~= house then
-    redis.call('HSET', key, 'streak_house', house)
-    if redis.call('HINCRBY', key, 'streak', 1) >= 3 then
-      redis.call('HSET', key, 'blocked_until', now() + tonumber(ARGV[8]), 'streak', 0)
+  if hget(key, 'streak_house') ~= house then
+    hset(key, 'streak_house', house)
+    if hadd(key, 'streak', 1) >= 3 then
+      hset(key, 'blocked_until', now() + tonumber(ARGV[8]))
+      hset(key, 'streak', 0)
     end
   end
 end

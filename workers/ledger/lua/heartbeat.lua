@@ -1,9 +1,17 @@
--- The holder of a lease is alive. ARGV: task, token, lease seconds -> ok | lost | cancelled | paused
-local task = ARGV[1]
-local claim = redis.call('HGET', P .. 'claims', task)
-if not claim or string.match(claim, '^([^|]*)|') ~= ARGV[2] then return 'lost' end
-local state = redis.call('HGET', P .. 'job', 'state')
-if state == 'cancelled' then return 'cancelled' end
-local _, _, stage = split(task)
-redis.call('ZADD', lease_key(stage), 'XX', now() + tonumber(ARGV[3]), job_of(P) .. '|' .. task)
+-- The holder of leases is alive. ARGV: token, lease seconds, the task that runs, tasks it will run or has run
+-- -> of the first: ok | lost | cancelled
+local function is_ours(task)
+  local claim = hget(P .. 'claims', task)
+  return claim and string.match(claim, '^([^|]*)|') == ARGV[1]
+end
+local tasks = { unpack(ARGV, 3) }
+hmany(P .. 'claims', tasks)
+if not is_ours(tasks[1]) then return 'lost' end
+if job_field('state') == 'cancelled' then return 'cancelled' end
+for _, task in ipairs(tasks) do
+  if is_ours(task) then
+    local _, _, stage = split(task)
+    zset(lease_key(stage), job_of(P) .. '|' .. task, now() + tonumber(ARGV[2]))
+  end
+end
 return 'ok'

@@ -2,15 +2,17 @@
 -- what: "done" or "loaded"; letters: l (to be run), d (done)
 local i, house, what, batches = ARGV[1], ARGV[2], ARGV[3], ARGV[4]
 local key = house_key(house)
-if redis.call('EXISTS', key) == 1 then return 0 end
+load_hash(key)
+if hget(key, 's') then return 0 end
 local n, left, views, n_views = 0, 0, 0, {}
 -- Views of each batch, to count those that are done.
 for batch in string.gmatch(batches, '[^;]+') do
   n_views[n] = select(2, string.gsub(batch, '[^,]+', ''))
   n = n + 1
 end
-redis.call('HSET', key, 'i', i, 's', what)
-if batches ~= '' then redis.call('HSET', P .. 'views', house, batches) end
+hset(key, 'i', i)
+hset(key, 's', what)
+if batches ~= '' then hset(P .. 'views', house, batches) end
 local names = batch_stages()
 local opened = false
 -- Enter each unit, and the stages before its own as done.
@@ -32,7 +34,7 @@ end
 if views > 0 then bump('views', views) end
 if opened then
   bump('done:' .. GEOMETRY_STAGE, 1)
-  redis.call('HSET', key, 'n', n, 'left', left, 'nf', 0)
+  for field, value in pairs({ n = n, left = left, nf = 0 }) do hset(key, field, value) end
   bump('batches', n)
 end
 -- A finished house is closed at once, any other waits to be admitted.
@@ -40,6 +42,6 @@ if what == 'done' then
   bump('houses:open', 1)
   close_house(house, 'done')
 else
-  redis.call('RPUSH', P .. 'order', i .. '|' .. house)
+  push('RPUSH', P .. 'order', i .. '|' .. house)
 end
 return 1

@@ -8,20 +8,20 @@ for i = 3, #ARGV do
     local job, task = string.match(member, '^(.-)|(.*)$')
     P = G .. '{' .. job .. '}:'
     -- The script was called without a job: work on the keys of the lease's own.
-    local claim = redis.call('HGET', P .. 'claims', task)
-    if claim then
-      local worker = string.match(claim, '^[^|]*|([^|]*)|')
+    local held_by = hget(P .. 'claims', task)
+    if held_by then
+      local worker = string.match(held_by, '^[^|]*|([^|]*)|')
       bump('expired', 1)
       ended_badly(task, {
         class = 'lost', fingerprint = 'lost: the worker vanished', worker = worker, delay = 0,
         entry = cjson.encode({
           fault = 'lost', fingerprint = 'lost: the worker vanished', worker = worker, log = '',
           message = 'no sign of life until the lease ran out; the worker, its node or its network died',
-          attempt = tonumber(redis.call('HGET', P .. 'attempts', task) or '0'),
+          attempt = tonumber(hget(P .. 'attempts', task) or '0'),
         }),
       })
     else
-      redis.call('ZREM', G .. 'lease:' .. ARGV[i], member)
+      zset(G .. 'lease:' .. ARGV[i], member, false)
     end
     n = n + 1
   end

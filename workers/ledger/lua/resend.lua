@@ -6,9 +6,9 @@ for _, task in ipairs(redis.call('ZRANGEBYSCORE', P .. 'queued', '-inf', t - ton
   local house, unit, stage = split(task)
   local at_stage, letter = unit_at(house, unit)
   if at_stage ~= stage or letter ~= QUEUED then
-    redis.call('ZREM', P .. 'queued', task)
+    zset(P .. 'queued', task, false)
   elseif stage == ARGV[2] then
-    redis.call('ZADD', P .. 'queued', t, task)
+    zset(P .. 'queued', task, t)
     again[#again + 1] = task
   end
 end

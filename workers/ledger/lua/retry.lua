@@ -4,23 +4,22 @@ local house, unit, stage = split(task)
 if not house then return 0 end
 local at_stage, letter = unit_at(house, unit)
 if at_stage ~= stage or letter ~= FAILED then return 0 end
-local entry = redis.call('HGET', P .. 'failed', task)
+local entry = hget(P .. 'failed', task)
 if entry then bump('failed:' .. cjson.decode(entry).fault, -1) end
-redis.call('HDEL', P .. 'failed', task)
+hdel(P .. 'failed', task)
 local key = house_key(house)
 
 -- A closed house opens again, and with it its shard and the job's reduction.
 local function open_again(how)
   bump('houses:' .. how, -1)
   bump('houses:open', 1)
-  redis.call('HSET', key, 's', 'open')
-  local shard = math.floor(tonumber(redis.call('HGET', key, 'i'))
-    / tonumber(redis.call('HGET', P .. 'job', 'shard_size')))
-  if redis.call('HINCRBY', P .. 'shards', shard, 1) == 1 then
+  hset(key, 's', 'open')
+  local shard = math.floor(tonumber(hget(key, 'i')) / tonumber(job_field('shard_size')))
+  if hadd(P .. 'shards', shard, 1) == 1 then
     local _, at = unit_at('-', 's' .. shard)
     if at == DONE then
       bump('done:' .. SHARD_STAGE, -1)
-      redis.call('HINCRBY', P .. 'job', 'shards_left', 1)
+      hadd(P .. 'job', 'shards_left', 1)
       set_unit('-', 's' .. shard, SHARD_STAGE, CANCELLED)
     end
     local _, last = unit_at('-', '-')
@@ -36,12 +35,11 @@ end
 -- Count what is to end again; what a quarantine cancelled is ready once more.
 local function recount()
   local left, n_failed = 0, 0
-  local fields = redis.call('HGETALL', key)
-  for i = 1, #fields, 2 do
-    local s, at = string.match(fields[i + 1], '^(%l+):(%l)$')
-    if s and fields[i] ~= '-' then
+  for number, value in pairs(hall(key)) do
+    local s, at = string.match(value, '^(%l+):(%l)$')
+    if s and number ~= '-' then
       if at == CANCELLED then
-        ready(house, fields[i], s, 'RPUSH') -- what the quarantine took away
+        ready(house, number, s, 'RPUSH') -- what the quarantine took away
         left = left + 1
       elseif at == FAILED then
         n_failed = n_failed + 1
@@ -50,18 +48,20 @@ local function recount()
       end
     end
   end
-  redis.call('HSET', key, 'left', left, 'nf', n_failed)
+  hset(key, 'left', left)
+  hset(key, 'nf', n_failed)
 end
 
 if house ~= '-' then
-  local how = redis.call('HGET', key, 's')
+  local how = hget(key, 's')
   if how ~= 'open' then open_again(how) end
 end
 ready(house, unit, stage, 'LPUSH')
 if house ~= '-' then recount() end
 -- A finished job runs again.
-if redis.call('HGET', P .. 'job', 'state') == 'done' then
-  redis.call('HSET', P .. 'job', 'state', 'running', 'reason', '')
-  redis.call('ZADD', G .. 'jobs', redis.call('HGET', P .. 'job', 'priority'), job_of(P))
+if job_field('state') == 'done' then
+  hset(P .. 'job', 'state', 'running')
+  hset(P .. 'job', 'reason', '')
+  zset(G .. 'jobs', job_of(P), job_field('priority'))
 end
 return 1

@@ -1,22 +1,23 @@
 -- pause, resume, cancel, reduce, priority. ARGV: what, reason (priority: the number)
 -- -> the job's state afterwards, "" if unknown
-local state = redis.call('HGET', P .. 'job', 'state')
+local state = job_field('state')
 if not state then return '' end
 if ARGV[1] == 'pause' then
   pause_job(ARGV[2])
 elseif ARGV[1] == 'resume' and state == 'paused' then
-  redis.call('HSET', P .. 'job', 'state', 'running', 'reason', '')
+  hset(P .. 'job', 'state', 'running')
+  hset(P .. 'job', 'reason', '')
 elseif ARGV[1] == 'cancel' and state ~= 'done' then
   -- What runs learns it at its next heartbeat; what is queued, when it is claimed.
-  redis.call('HSET', P .. 'job', 'state', 'cancelled', 'reason', ARGV[2], 'ended', now())
-  redis.call('ZREM', G .. 'jobs', job_of(P))
+  for field, value in pairs({ state = 'cancelled', reason = ARGV[2], ended = now() }) do hset(P .. 'job', field, value) end
+  zset(G .. 'jobs', job_of(P), false)
   redis.call('DEL', P .. 'order', P .. 'later')
   for _, stage in ipairs(STAGES) do
     redis.call('DEL', P .. 'out:' .. stage)
   end
 elseif ARGV[1] == 'priority' then
   -- The coordinator reads it at its next turn; a job that is over keeps it for a retry.
-  redis.call('HSET', P .. 'job', 'priority', ARGV[2])
+  hset(P .. 'job', 'priority', ARGV[2])
   redis.call('ZADD', G .. 'jobs', 'XX', ARGV[2], job_of(P))
 elseif ARGV[1] == 'reduce' and state ~= 'cancelled' then
   -- Merge what is there now, unless a merge is on its way.
@@ -24,8 +25,8 @@ elseif ARGV[1] == 'reduce' and state ~= 'cancelled' then
   if letter ~= READY and letter ~= QUEUED and letter ~= RUNNING then
     if letter == DONE then bump('done:' .. JOB_STAGE, -1) end
     ready('-', '-', JOB_STAGE, 'LPUSH')
-    if state == 'done' then redis.call('HSET', P .. 'job', 'state', 'running') end
-    redis.call('ZADD', G .. 'jobs', redis.call('HGET', P .. 'job', 'priority'), job_of(P))
+    if state == 'done' then hset(P .. 'job', 'state', 'running') end
+    zset(G .. 'jobs', job_of(P), job_field('priority'))
   end
 end
-return redis.call('HGET', P .. 'job', 'state')
+return job_field('state')
