@@ -33,7 +33,7 @@ MODULES: Final = {
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "pack", "classes", "label-sheet"),
     "selecting": ("reference", "select"),
-    "studying": ("train", "evaluate", "ablation"),
+    "studying": ("train", "evaluate", "predict", "ablation"),
     "showing": ("board",),
     "submitting": ("submit",),
     "steering": (

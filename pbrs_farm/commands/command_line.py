@@ -18,7 +18,7 @@ GROUPS: Final = {
     "look into one home": ("dress", "repair", "cameras"),
     "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
     "choose and hand on": ("reference", "select", "export", "pack"),
-    "train and judge": ("train", "evaluate", "ablation"),
+    "train and judge": ("train", "evaluate", "predict", "ablation"),
     "run on many machines": (
         "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",
         "priority", "reduce", "workers", "drain", "recover", "adopt", "coordinator", "worker",

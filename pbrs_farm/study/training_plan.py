@@ -53,6 +53,8 @@ class TrainingPlan:
     edge_sum: bool = False  # boundaries: the sum over pixels, as released, or their mean
     # Augmentation
     flip: bool = True
+    turn_deg: float = 0.0  # sd of a turn of the camera, in pitch and in roll, held to twice that
+    hfov_deg: float = 60.0  # of the views, horizontal, that are turned
     zoom: float = 1.0  # largest enlargement of a random part of the view, 1 = none
     gain: float = 0.2  # brightness times 1 +- gain
     gamma: float = 0.2  # brightness to the power of 1 +- gamma
@@ -141,7 +143,7 @@ _H200: Final[dict[str, Any]] = {
 }  # fmt: skip
 # The best of sixteen trials, and longer, on homes that never trained (docs/study.md).
 _TINY_NORMALS = TrainingPlan(
-    "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3,
+    "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3, turn_deg=6.0,
     tint=0.1, hue=1.0, judge_every=400,
 )  # fmt: skip
 _TINY_CLASSES = TrainingPlan(

@@ -53,6 +53,10 @@ class StudyTask(Protocol):
         """The batch with the views where flips (B,) turned left to right."""
         ...
 
+    def turned(self, batch: Batch, rotation: Tensor) -> Batch:
+        """The batch where directions are turned by rotation (B, 3, 3); pixels have moved already."""
+        ...
+
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, ...) what the output says of each pixel, as Scorer.add takes it."""
         ...

@@ -109,6 +109,10 @@ class ClassesTask:
         turned = torch.where(flips[:, None, None], labels.flip(2), labels)
         return batch | {"labels": turned}
 
+    def turned(self, batch: Batch, rotation: Tensor) -> Batch:
+        """Labels have no direction."""
+        return batch
+
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) uint8 ids of the highest score."""
         # Channel 0 is class 1: no label has no score.
@@ -212,6 +216,11 @@ class NormalsTask:
         turned["normal"] = _where(flips, batch["normal"].flip(2) * signs, batch["normal"])
         return turned
 
+    def turned(self, batch: Batch, rotation: Tensor) -> Batch:
+        """Normals turn with the camera."""
+        normal = torch.einsum("bij,bhwj->bhwi", rotation, batch["normal"].float())
+        return batch | {"normal": normal.round().to(batch["normal"].dtype)}
+
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W, 3) float32 unit vectors."""
         unit = functional.normalize(output.float(), dim=1, eps=1e-6)
@@ -304,6 +313,10 @@ class EdgesTask:
         """Left and right change places."""
         edges = batch["edges"]
         return batch | {"edges": torch.where(flips[:, None, None], edges.flip(2), edges)}
+
+    def turned(self, batch: Batch, rotation: Tensor) -> Batch:
+        """Labels have no direction."""
+        return batch
 
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) float32 strengths 0..1."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,6 +88,39 @@ def network_output(network: nn.Module, colour: torch.Tensor, plan: TrainingPlan)
         colour, scale_factor=plan.enlarge, mode="bilinear", align_corners=False
     )
     return functional.adaptive_avg_pool2d(network(large), size)
+
+
+class _Whole(nn.Module):  # type: ignore[misc]
+    """What network_output is, as a module: colour (1, 3, H, W) 0..1 -> (1, C, H, W)."""
+
+    def __init__(self, network: nn.Module, plan: TrainingPlan) -> None:
+        super().__init__()
+        self.network, self.plan = network, plan
+
+    def forward(self, colour: torch.Tensor) -> torch.Tensor:
+        """The map at the picture's size."""
+        return network_output(self.network, colour, self.plan)
+
+
+def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
+    """Write the network as ONNX: input colour (1, 3, H, W) float 0..1 at the plan's size, output map.
+
+    The colour's encoding is inside. The map is (1, C, H, W): a normal (x right, y down, z forward, of
+    no particular length), a score a class (channel 0 is class 1), or edges. Raises MachineFailed
+    without the packages that export.
+    """
+    missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
+    if missing:
+        raise MachineFailed(f"ONNX needs {missing[0]}", hint='pip install "pbrs-farm[onnx]"')
+    whole = _Whole(network, plan).cpu().float().eval()
+    colour = torch.zeros(1, 3, plan.height_px, plan.width_px)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what the exporter itself will do otherwise one day
+        program = torch.onnx.export(
+            whole, (colour,), dynamo=True, input_names=["colour"], output_names=["map"],
+            verbose=False,
+        )  # fmt: skip
+    program.save(path, external_data=False)
 
 
 def as_colour(pictures: torch.Tensor) -> torch.Tensor:

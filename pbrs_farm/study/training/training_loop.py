@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import pi, sqrt, tan
 from typing import Any
 
 import torch
@@ -46,6 +46,9 @@ def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gen
         batch = task.mirrored(batch, flips)
         colour = batch["colour"]
         batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
+    if plan.turn_deg > 0:
+        angles = torch.randn((n, 2), generator=dice).to(device).clamp(-2, 2)
+        batch = turned(batch, task, angles * (plan.turn_deg * pi / 180), plan.hfov_deg)
     if plan.zoom > 1:
         batch = _enlarged(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
     if plan.hue > 0:
@@ -82,22 +85,75 @@ def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
 def _enlarged(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
     """A part of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
 
-    Colour is interpolated, labels are the nearest pixel's; directions stay, as if seen by a longer
-    lens.
+    Directions stay, as if seen by a longer lens.
     """
     n, _, height, width = batch["colour"].shape
     theta = torch.zeros((n, 2, 3), device=shares.device)
     theta[:, 0, 0] = theta[:, 1, 1] = shares
     theta[:, :, 2] = shifts * (1 - shares)[:, None]
-    grid = functional.affine_grid(theta, [n, 1, height, width], align_corners=False)
+    return _sampled(
+        batch, functional.affine_grid(theta, [n, 1, height, width], align_corners=False)
+    )
+
+
+def turned(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
+    """The views as cameras would see them that are pitched up and rolled clockwise by angles (B, 2).
+
+    A turned camera's picture is a homography of the old one, whatever the depth; normals turn with
+    the camera. angles: radians. hfov_deg: of the views. What the old picture does not show has the
+    border's colour and no label.
+    """
+    height, width = batch["colour"].shape[2:]
+    rotation = _rotations(angles)
+    # Rays through the new pixels, in units of the old picture's half width.
+    half = tan(hfov_deg * pi / 360)
+    x = ((torch.arange(width, device=angles.device) + 0.5) * 2 / width - 1) * half
+    y = (
+        ((torch.arange(height, device=angles.device) + 0.5) * 2 / height - 1)
+        * half
+        * height
+        / width
+    )
+    rays = torch.stack(
+        [x.expand(height, -1), y[:, None].expand(-1, width), x.new_ones(height, width)], -1
+    )
+    old = torch.einsum("bji,hwj->bhwi", rotation, rays)  # by the inverse of what turns directions
+    plane = old[..., :2] / old[..., 2:].clamp(min=1e-3) / half
+    grid = plane * plane.new_tensor([1.0, width / height])
+    return task.turned(_sampled(batch, grid), rotation)
+
+
+def _rotations(angles: Tensor) -> Tensor:
+    """(B, 3, 3) that take directions of the old camera's axes (x right, y down) to the turned one's."""
+    cos, sin = torch.cos(angles), torch.sin(angles)
+    one, zero = torch.ones_like(cos[:, 0]), torch.zeros_like(cos[:, 0])
+    # A camera that looks up sees what was ahead lower: z goes to y.
+    pitch = [one, zero, zero, zero, cos[:, 0], sin[:, 0], zero, -sin[:, 0], cos[:, 0]]
+    # One that rolls clockwise sees the world turn the other way.
+    roll = [cos[:, 1], sin[:, 1], zero, -sin[:, 1], cos[:, 1], zero, zero, zero, one]
+    pitched, rolled = (torch.stack(rows, 1).view(-1, 3, 3) for rows in (pitch, roll))
+    return rolled @ pitched
+
+
+def _sampled(batch: Batch, grid: Tensor) -> Batch:
+    """The batch at places of its pictures: grid (B, H, W, 2), -1..1 from edge to edge.
+
+    Colour is interpolated, labels are the nearest pixel's, 0 outside.
+    """
+    n, _, height, width = batch["colour"].shape
     colour = functional.grid_sample(
         batch["colour"], grid, mode="bilinear", padding_mode="border", align_corners=False
     )
     # Turn the grid into rows and columns of labels.
     columns = ((grid[..., 0] + 1) * width / 2 - 0.5).round().long().clamp(0, width - 1)
     rows = ((grid[..., 1] + 1) * height / 2 - 0.5).round().long().clamp(0, height - 1)
-    views = torch.arange(n, device=shares.device).view(-1, 1, 1)
+    views = torch.arange(n, device=grid.device).view(-1, 1, 1)
     labels = {name: x[views, rows, columns] for name, x in batch.items() if name != "colour"}
+    # Beyond the picture nothing is known.
+    outside = (grid.abs() > 1).any(-1)
+    if outside.any():
+        for label in labels.values():
+            label[outside] = 0
     return labels | {"colour": colour}
 
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.training_loop import augmented, turned_hue
+from pbrs_farm.study.training.training_loop import augmented, turned, turned_hue
 from tests.study.training.made_views import small_plan
 
 pytestmark = pytest.mark.study
@@ -45,3 +45,44 @@ def test_hue_changes_pictures_and_no_label() -> None:
     changed = augmented({"colour": colour, **labels}, task_of("normals"), plan, dice)
     assert not torch.allclose(changed["colour"], colour, atol=0.01)
     assert all(torch.equal(changed[name], label) for name, label in labels.items())
+
+
+def sphere(height: int = 96, width: int = 128, hfov_deg: float = 60.0) -> dict[str, torch.Tensor]:
+    """What a camera sees amid a sphere painted by direction: normals that no turn changes."""
+    half = np.tan(np.radians(hfov_deg / 2))
+    x = ((np.arange(width) + 0.5) * 2 / width - 1) * half
+    y = ((np.arange(height) + 0.5) * 2 / height - 1) * half * height / width
+    rays = np.stack([*np.broadcast_arrays(x[None, :], y[:, None], 1.0)], -1)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    return {
+        "colour": torch.from_numpy((rays + 1).transpose(2, 0, 1)[None] / 2).float(),
+        "normal": torch.from_numpy(np.rint(-rays * 32767).astype(np.int16))[None],
+        "valid": torch.ones(1, height, width, dtype=torch.bool),
+    }
+
+
+@pytest.mark.parametrize(("pitch", "roll"), [(0.1, 0.0), (0.0, 0.15), (-0.08, 0.2)])
+def test_a_turned_camera_sees_the_same_sphere_from_its_middle(pitch: float, roll: float) -> None:
+    old = sphere()
+    new = turned(old, task_of("normals"), torch.tensor([[pitch, roll]]), 60.0)
+    known = new["valid"][0]
+    assert 0.6 < float(known.float().mean()) < 1
+    # Every normal points at the camera, whichever way it looks: to a pixel, since labels are nearest.
+    difference = (new["normal"] - old["normal"])[0][known].abs().max() / 32767
+    assert float(difference) < 1.2 * 2 * np.tan(np.radians(30)) / 128
+    assert not new["normal"][0][~known].any()
+
+
+def test_a_camera_that_pitches_up_sees_what_is_above_and_rolls_clockwise() -> None:
+    old, task = sphere(), task_of("normals")
+    up = turned(old, task, torch.tensor([[0.2, 0.0]]), 60.0)["colour"][0, :, 48, 64]
+    assert float(up[1]) == pytest.approx((1 - np.sin(0.2)) / 2, abs=0.01)
+    # Rolled clockwise, the camera's right points down: y grows along its rows.
+    row = turned(old, task, torch.tensor([[0.0, 0.2]]), 60.0)["colour"][0, 1, 48]
+    assert float(row[100]) > float(row[64]) > float(row[28])
+
+
+def test_classes_and_edges_have_no_direction_to_turn() -> None:
+    for name in ("segmentation", "boundaries"):
+        batch = {"labels": torch.ones(1, 2, 2)}
+        assert task_of(name).turned(batch, torch.eye(3)[None]) is batch

@@ -1,0 +1,131 @@
+"""Predictions of photographs: their size and orientation, what cannot be read, and the files."""
+
+from __future__ import annotations
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pbrs_farm.cli import main
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.images import array_from_png, png_from_array
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.judging.photo_predictions import (
+    network_size,
+    photograph_files,
+    read_photograph,
+    upright,
+)
+from tests.study.small_roots import fill
+from tests.study.training.made_views import TINY
+
+pytestmark = pytest.mark.study
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root, out = (tmp_path_factory.mktemp("predict") / name for name in ("root", "run"))
+    fill(FolderStore(root), {f"home-{k}-00000000": 2 for k in range(2)}, (40, 32))
+    words = ["train", "normals", str(root), "--out", str(out), "--hold-out", "none", *TINY]
+    assert main(words) == 0
+    return out
+
+
+def jpeg(path: Path, colour: np.ndarray, orientation: int = 1) -> Path:
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(colour).save(path, "JPEG", quality=95, exif=exif)
+    return path
+
+
+def test_each_photograph_gets_a_prediction_of_its_own_size(run: Path, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    sizes = {"wide": (60, 120), "tall": (130, 50), "same": (96, 128)}
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    for name, (height, width) in sizes.items():
+        picture = rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
+        (folder / f"{name}.png").write_bytes(png_from_array(picture))
+    out = tmp_path / "out"
+    assert main(["predict", str(run), str(folder), "--out", str(out)]) == 0
+    for name, size in sizes.items():
+        stored = array_from_png((out / f"{name}_normal.png").read_bytes())
+        assert stored.dtype == np.uint16
+        assert stored.shape[:2] == size
+        length = np.linalg.norm(stored / 65535 * 2 - 1, axis=-1)
+        np.testing.assert_allclose(length, 1, atol=1e-3)
+    rows = json.loads((out / "predictions.json").read_text())
+    assert [row["photograph"] for row in rows] == ["same", "tall", "wide"]
+    assert (out / "index.html").read_text().count("data:image/jpeg") == 6
+
+
+def test_the_same_picture_turned_by_exif_is_predicted_alike(run: Path, tmp_path: Path) -> None:
+    x = np.linspace(0, 255, 64)
+    picture = np.stack(np.broadcast_arrays(x[None, :], x[:48, None], 128), -1).astype(np.uint8)
+    lying = np.ascontiguousarray(np.rot90(picture))  # a camera held on its side
+    files = [jpeg(tmp_path / "upright.jpg", picture), jpeg(tmp_path / "turned.jpg", lying, 6)]
+    a, b = (read_photograph(f).colour.astype(int) for f in files)
+    assert a.shape == b.shape
+    assert np.abs(a - b).mean() < 2
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_exif_orientations_are_undone_as_pillow_undoes_them(orientation: int) -> None:
+    picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    file = io.BytesIO()
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(picture).save(file, "PNG", exif=exif)
+    from PIL import ImageOps
+
+    expected = np.asarray(ImageOps.exif_transpose(Image.open(file)))
+    np.testing.assert_array_equal(upright(picture, orientation), expected)
+
+
+def test_a_file_that_is_no_picture_is_told_and_the_rest_goes_on(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(b"\x89PNG\r\n\x1a\n nothing")
+    good = jpeg(tmp_path / "good.jpg", np.full((40, 60, 3), 128, np.uint8))
+    out = tmp_path / "out"
+    words = ["predict", str(run), str(broken), str(good), str(tmp_path / "none.jpg")]
+    assert main([*words, "--out", str(out)]) == 1
+    assert (out / "good_normal.png").exists()
+    said = capsys.readouterr().out
+    assert "broken.png" in said
+    assert "none.jpg" in said
+
+
+def test_a_folder_without_pictures_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="holds no picture"):
+        photograph_files([tmp_path])
+
+
+def test_a_photograph_keeps_its_proportions_in_the_network() -> None:
+    assert network_size(480, 640, 160 * 120) == (128, 160)
+    assert network_size(4000, 1000, 160 * 120) == (288, 64)
+    assert network_size(10, 10_000, 160 * 120) == (32, 4384)
+    assert network_size(7, 7, 32 * 32) == (32, 64)
+
+
+def test_onnx_says_what_the_run_says(run: Path, tmp_path: Path) -> None:
+    import onnxruntime
+    import torch
+
+    from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.training.prediction import network_output, write_onnx
+
+    trained, path = open_run(run), tmp_path / "model.onnx"
+    write_onnx(trained.network, trained.plan, path)
+    size = trained.plan.height_px, trained.plan.width_px
+    colour = torch.rand(1, 3, *size, generator=torch.Generator().manual_seed(1))
+    with torch.no_grad():
+        expected = network_output(trained.network.eval(), colour, trained.plan).numpy()
+    session = onnxruntime.InferenceSession(path)
+    found = session.run(["map"], {"colour": colour.numpy()})[0]
+    np.testing.assert_allclose(found, expected, atol=1e-4)
