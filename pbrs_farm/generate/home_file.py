@@ -18,6 +18,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Picture, Place, Shape
+from pbrs_farm.core.house import MaterialKind
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     PlacedPiece,
@@ -28,7 +29,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
     Storey,
 )
-from pbrs_farm.generate.model_file import joinery, model_files
+from pbrs_farm.generate.model_file import joinery, material_name, model_files
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
 
@@ -324,6 +325,9 @@ def _add_light_sources(element: ET.Element, shape: Shape) -> None:
             "x": f"{x:.4f}", "y": f"{1 - z:.4f}", "z": f"{y:.4f}", "color": "00FFE8CC",
             "diameter": f"{min(0.065 / size[0], 1.0):.4f}",
         })  # fmt: skip
+    for number, material in enumerate(shape.materials):
+        if material.kind is MaterialKind.BULB:
+            ET.SubElement(element, "lightSourceMaterial", {"name": material_name(shape, number)})
 
 
 def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, str]) -> None:

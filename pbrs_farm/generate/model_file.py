@@ -42,7 +42,7 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
         surface = _seen(given)
         kind = shape.materials[surface.material].kind
         yield f"g {_GROUPS.get(kind, 'part')}_{number}"
-        yield f"usemtl {_material_name(shape, surface.material)}"
+        yield f"usemtl {material_name(shape, surface.material)}"
         yield from (
             f"v {x:.{_DECIMALS}f} {y:.{_DECIMALS}f} {z:.{_DECIMALS}f}"
             for x, y, z in surface.positions.tolist()
@@ -73,7 +73,7 @@ def _seen(surface: Surface) -> Surface:
     )  # fmt: skip
 
 
-def _material_name(shape: Shape, number: int) -> str:
+def material_name(shape: Shape, number: int) -> str:
     """What its readers know a material by: its number, and what it says of itself."""
     words = re.findall(r"[A-Za-z]+", shape.materials[number].name)
     return "_".join((f"m{number}", *words))[:60]
@@ -94,7 +94,7 @@ def _face_lines(surface: Surface, point: int, uv: int, normal: int) -> Iterator[
 
 def _mtl_lines(shape: Shape, pictures: dict[str, str]) -> Iterator[str]:
     for number, material in enumerate(shape.materials):
-        yield f"newmtl {_material_name(shape, number)}"
+        yield f"newmtl {material_name(shape, number)}"
         yield from _material_lines(material)
         if material.texture_id in pictures:
             yield f"map_Kd {pictures[material.texture_id or '']}"

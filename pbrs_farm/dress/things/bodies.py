@@ -364,6 +364,60 @@ def _over_edge(at: F64, half: float) -> tuple[F64, F64]:
     return np.sign(at) * out, np.maximum(over - 0.015, 0.0)
 
 
+def tub(w: float, d: float, y: float, low: float, high: float, t: float, *, n: int = 18) -> Surface:
+    """A padded wall round the back of an oval w by d, from y up: `low` at its ends, `high` at its middle."""
+    # From the right end past the back to the left one; a third of the way round stays open in front.
+    angle = np.linspace(-0.22 * np.pi, 1.22 * np.pi, n + 1)
+    top = low + (high - low) * np.sin(np.pi * np.linspace(0, 1, n + 1)) ** 1.5
+    rings = []
+    for a, tall in zip(angle, top, strict=True):
+        out = np.array([np.cos(a), 0.0, -np.sin(a)])
+        size = np.array([w / 2, 0.0, d / 2])
+        outer, inner = out * size, out * (size - np.array([t, 0.0, t]))
+        mid = (outer + inner) / 2
+        e = min(0.35 * t, 0.2 * (tall - y))
+        lifted = [
+            (outer, y), (outer, tall - e), (outer * 0.75 + mid * 0.25, tall - 0.3 * e), (mid, tall),
+            (inner * 0.75 + mid * 0.25, tall - 0.3 * e), (inner, tall - e), (inner, y),
+        ]  # fmt: skip
+        rings.append(np.array([p + np.array([0.0, h, 0.0]) for p, h in lifted]))
+    places = np.stack(rings)
+    k = places.shape[1]
+    points = np.concatenate([places.reshape(-1, 3), places[[0, -1]].mean(1)])
+    i = np.arange(k)
+    j = (i + 1) % k
+    faces = []
+    for row in range(n):
+        a0, b0 = row * k, (row + 1) * k
+        faces += [np.stack([a0 + i, b0 + j, a0 + j], -1), np.stack([a0 + i, b0 + i, b0 + j], -1)]
+    last = len(places) * k
+    faces += [np.stack([np.full(k, last), i, j], -1)]
+    faces += [np.stack([np.full(k, last + 1), n * k + j, n * k + i], -1)]
+    return creased("tub", points, np.concatenate(faces), np.radians(60))
+
+
+def chair_shell(w: float, d: float, seat: float, high: float, thick: float) -> Surface:
+    """A seat and a back in one bent sheet: the seat's top at `seat`, the back's edge at `high`."""
+    rows, columns = 15, 9
+    u = np.linspace(-1, 1, columns)
+    # Along: from the front edge down over the seat and up the back.
+    z = np.r_[d / 2 - 0.01, np.linspace(d / 2 - 0.04, -d / 2 + 0.16, 6), -d / 2 + 0.1,
+              np.linspace(-d / 2 + 0.065, -d / 2 + thick / 2 + 0.003, 7)]  # fmt: skip
+    top = high - thick / 2 - 0.002
+    low = seat - thick / 2
+    y = np.r_[low - 0.025, np.full(6, low) - 0.012 * np.sin(np.linspace(0, np.pi, 6)), low + 0.03,
+              np.linspace(low + 0.09, top, 7)]  # fmt: skip
+    half = w / 2 - thick / 2 - 0.001
+    taper = np.r_[0.86, 0.93, np.ones(7), np.linspace(0.99, 0.72, 6)]
+    grid = np.empty((rows, columns, 3))
+    curl = np.r_[np.zeros(2), np.full(5, 0.035), 0.05, np.linspace(0.06, 0.03, 7)]
+    is_back = np.r_[np.zeros(7), 0.4, np.ones(7)]
+    grid[..., 0] = half * taper[:, None] * u[None]
+    grid[..., 1] = y[:, None] + (curl * (1 - is_back))[:, None] * u[None] ** 4
+    grid[..., 2] = z[:, None] + (curl * is_back)[:, None] * u[None] ** 2
+    return sheet(grid, thick)
+
+
 def hanging(w: float, h: float, depth: float, thick: float, folds: float) -> Surface:
     """Cloth that hangs in folds along x, its top at y = h: curtains of showers, towels on rails."""
     n = max(int(folds * 6), 8)
@@ -412,7 +466,7 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
 
 SOLIDS: Final = {
     "bevelled": bevelled, "rounded": rounded, "loft": loft, "board": board, "disc": disc,
-    "tube": tube, "square_tube": square_tube, "hoop": hoop, "draped": draped, "hanging": hanging,
+    "tube": tube, "square_tube": square_tube, "hoop": hoop, "tub": tub, "chair_shell": chair_shell, "draped": draped, "hanging": hanging,
 }  # fmt: skip
 
 OUTLINES: Final = {

@@ -29,7 +29,7 @@ from pbrs_farm.dress.things.things import STUFFS, things_of
 VERSION: Final = 1
 """Of the words and solids of families: part of the catalogue's digest. Raised when a shape changes."""
 
-FILES: Final = ("joints", "kitchen")
+FILES: Final = ("joints", "kitchen", "bathroom", "seating", "tables", "storage", "beds_and_lamps")
 
 FAMILIES: Final = things_of(*FILES, **SOLIDS, **OUTLINES, **STUFFS)
 
@@ -139,26 +139,22 @@ def _scaled(surface: Surface, scale: F64, base: F64) -> Surface:
 
 
 def _lit(shape: Shape, piece: Piece) -> Shape:
-    """The shape with a light for each surface of opal glass that it has."""
-    if piece.kind is not ItemKind.LAMP:
-        return shape
-    bulbs = [
+    """The shape with the light that its surfaces of opal glass give together."""
+    bulbs = tuple(
         k
         for k, surface in enumerate(shape.surfaces)
         if shape.materials[surface.material].kind is MaterialKind.BULB
-    ]
-    lights = []
-    for k in bulbs:
-        points = shape.surfaces[k].positions.astype(np.float64)
-        low, high = points.min(0), points.max(0)
-        x, y, z = (float(v) for v in (low + high) / 2)
-        lights.append(
-            LightPart(
-                (x, y, z), float((high - low).min()) / 2, _FLUX_LM, PowerUnit.LUMEN,
-                rgb_linear=_WARM, share=1 / len(bulbs), emitting=(k,),
-            )
-        )  # fmt: skip
-    return replace(shape, lights=tuple(lights))
+    )
+    if piece.kind is not ItemKind.LAMP or not bulbs:
+        return shape
+    points = shape.surfaces[bulbs[0]].positions.astype(np.float64)
+    low, high = points.min(0), points.max(0)
+    x, y, z = (float(v) for v in (low + high) / 2)
+    light = LightPart(
+        (x, y, z), float((high - low).min()) / 2, _FLUX_LM, PowerUnit.LUMEN, rgb_linear=_WARM,
+        emitting=bulbs,
+    )  # fmt: skip
+    return replace(shape, lights=(light,))
 
 
 @cache

@@ -218,7 +218,6 @@ STUFFS: Final = {
     "opal": Material("opal glass", MaterialKind.BULB), "silvered": Material("mirror", MaterialKind.MIRROR, (0.9, 0.9, 0.9)),
     "clear": glass(), "frosted": glass((0.93, 0.96, 0.96), 0.35), "earth": plain("earth", (0.16, 0.11, 0.08), 0.95),
     "wicker": plain("wicker", (0.66, 0.52, 0.36), 0.9), "light_oak": plain("oak wood", WOODS["pale oak"].mean, 0.5),
-    "linen": plain("fabric linen", (0.9, 0.89, 0.86), 0.95),
 }  # fmt: skip
 """Materials that families share."""
 
