@@ -111,7 +111,7 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     """
     missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
     if missing:
-        raise MachineFailed(f"ONNX needs {missing[0]}", hint='pip install "pbrs-farm[onnx]"')
+        raise MachineFailed(f"ONNX needs {missing[0]}", hint='pip install "pbrs-farm[study]"')
     whole = _Whole(network, plan).cpu().float().eval()
     colour = torch.zeros(1, 3, plan.height_px, plan.width_px)
     with warnings.catch_warnings():
