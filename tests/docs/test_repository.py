@@ -1,0 +1,50 @@
+"""What a hosting site and a contributor's machine read: workflow, issue forms, hooks name what exists."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+REPO = Path(__file__).parents[2]
+WORKFLOWS = sorted((REPO / ".github/workflows").glob("*.yml"))
+FORMS = sorted((REPO / ".github/ISSUE_TEMPLATE").glob("*.yml"))
+
+
+def loaded(path: Path) -> Any:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+def test_ci_runs_the_one_script_on_every_python_that_the_project_takes() -> None:
+    job = loaded(REPO / ".github/workflows/ci.yml")["jobs"]["test"]
+    assert job["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13"]
+    assert [step["run"] for step in job["steps"] if "run" in step][-1] == ".ci/run"
+    assert (REPO / ".ci/run").exists()
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.stem)
+def test_a_workflow_makes_targets_that_there_are(path: Path) -> None:
+    made = re.findall(r"run: make ([a-z-]+)", path.read_text(encoding="utf-8"))
+    makefile = (REPO / "Makefile").read_text(encoding="utf-8")
+    for target in made:
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+@pytest.mark.parametrize("path", [f for f in FORMS if f.stem != "config"], ids=lambda p: p.stem)
+def test_an_issue_form_has_what_the_site_asks_for(path: Path) -> None:
+    form = loaded(path)
+    assert {"name", "description", "body"} <= form.keys()
+    names = [field["id"] for field in form["body"]]
+    assert len(names) == len(set(names))
+    assert all(field["attributes"]["label"] for field in form["body"])
+
+
+def test_hooks_run_what_make_check_runs() -> None:
+    (repo,) = loaded(REPO / ".pre-commit-config.yaml")["repos"]
+    hooks = " ".join(hook["entry"] for hook in repo["hooks"])
+    check = (REPO / "Makefile").read_text(encoding="utf-8").partition("\ncheck:")[2]
+    for program in re.findall(r"^\t\$\(BIN\)/([a-z-]+)", check.partition("\n\n")[0], re.MULTILINE):
+        assert f".venv/bin/{program}" in hooks, program
