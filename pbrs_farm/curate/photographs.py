@@ -117,15 +117,21 @@ def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
 def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
     # Gather the halves of each name.
     halves: dict[str, dict[str, Path]] = {}  # name -> "rgb", "depth" -> file
+    plain: dict[str, Path] = {}  # name -> file without a suffix
     for path in sorted(p for p in inner.iterdir() if p.is_file()):
         match = _SUFFIX.fullmatch(path.stem)
         if match is None:
+            # NAME.png goes with NAME_depth.png, where there is no NAME_rgb.
+            if path.suffix.lower() in _RGB_FILES:
+                plain[path.stem] = path
             continue
         kind = "depth" if match[2].lower() == "depth" else "rgb"
         if path.suffix.lower() in (_DEPTH_FILES if kind == "depth" else _RGB_FILES):
             halves.setdefault(match[1], {})[kind] = path
     pairs = []
     for name, found in halves.items():
+        if "rgb" not in found and name in plain:
+            found["rgb"] = plain[name]
         if len(found) != 2:
             (kind, path), *_ = found.items()
             lacks = "rgb" if kind == "depth" else "depth"

@@ -90,7 +90,7 @@ def test_pairs_are_found_by_folder_by_suffix_and_as_sun_rgbd(tmp_path: Path) -> 
     rgb, depth = photo(0)
     for name, pixels in (
         ("a/color/1.png", rgb), ("a/depth/1.png", depth),
-        ("b/7_rgb.png", rgb), ("b/7_depth.png", depth),
+        ("b/7_rgb.png", rgb), ("b/7_depth.png", depth), ("b/8.png", rgb), ("b/8_depth.png", depth),
         ("kv2/s1/image/0000101.jpg", rgb), ("kv2/s1/depth/0000101-x.png", depth),
         ("kv2/s1/depth_bfx/0000101-x.png", depth),
     ):  # fmt: skip
@@ -99,8 +99,8 @@ def test_pairs_are_found_by_folder_by_suffix_and_as_sun_rgbd(tmp_path: Path) -> 
         (tmp_path / name).write_bytes(encode(pixels))
     (tmp_path / "b/notes.txt").write_text("not a picture")
     pairs = pairs_in(tmp_path)
-    assert [p.id for p in pairs] == ["a/1", "b/7", "kv2/s1"]
-    assert pairs[2].depth.parent.name == "depth_bfx"
+    assert [p.id for p in pairs] == ["a/1", "b/7", "b/8", "kv2/s1"]
+    assert pairs[3].depth.parent.name == "depth_bfx"
 
 
 def test_sun_rgbd_bits_are_rotated_back() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Mask
 
-THRESHOLDS_DEG: Final = (11.25, 22.5, 30.0)  # of the shares that every paper reports
+THRESHOLDS_DEG: Final = (11.25, 22.5, 30.0, 5.0, 7.5)  # of the shares that papers report
 _BIN_DEG: Final = 0.01  # of the histogram that medians are read from
 _N_BINS: Final = round(180 / _BIN_DEG) + 1
 
@@ -37,6 +37,9 @@ class NormalScore:
     below_11_25: float
     below_22_5: float
     below_30: float
+    below_5: float
+    below_7_5: float
+    rms_deg: float
     n_pixels: int
 
 
@@ -47,6 +50,7 @@ class AngularErrors:
         self._histogram = np.zeros(_N_BINS, np.int64)
         self._below = np.zeros(len(THRESHOLDS_DEG), np.int64)
         self._sum = 0.0
+        self._sum_of_squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
         """Count the pixels (H, W) where valid; the view's own mean in degrees, NaN without any."""
@@ -56,6 +60,7 @@ class AngularErrors:
         )
         self._below += [int((errors < threshold).sum()) for threshold in THRESHOLDS_DEG]
         self._sum += float(errors.sum())
+        self._sum_of_squares += float((errors**2).sum())
         return float(errors.mean()) if errors.size else float("nan")
 
     def score(self) -> NormalScore:
@@ -63,10 +68,23 @@ class AngularErrors:
         n = int(self._histogram.sum())
         if n == 0:
             nan = float("nan")
-            return NormalScore(nan, nan, nan, nan, nan, n_pixels=0)
+            return NormalScore(nan, nan, nan, nan, nan, nan, nan, nan, 0)
         # Read the two middle pixels off the histogram: they are one where n is odd.
         seen = np.cumsum(self._histogram)
         middle = np.searchsorted(seen, [(n - 1) // 2, n // 2], side="right")
-        small, medium, large = (float(count / n) for count in self._below)
+        below_11_25, below_22_5, below_30, below_5, below_7_5 = (
+            float(count / n) for count in self._below
+        )
         median_deg = float(middle.mean() * _BIN_DEG)
-        return NormalScore(self._sum / n, median_deg, small, medium, large, n_pixels=n)
+        rms_deg = float(np.sqrt(self._sum_of_squares / n))
+        return NormalScore(
+            self._sum / n,
+            median_deg,
+            below_11_25,
+            below_22_5,
+            below_30,
+            below_5,
+            below_7_5,
+            rms_deg,
+            n,
+        )

@@ -187,7 +187,9 @@ class NormalsTask:
 
     name: str = "normals"
     layers: tuple[str, ...] = ("colour", "normal")
-    figures: tuple[str, ...] = ("mean_deg", "median_deg", "below_11_25", "below_22_5", "below_30")
+    figures: tuple[str, ...] = (
+        "mean_deg", "median_deg", "below_11_25", "below_22_5", "below_30", "below_5", "below_7_5", "rms_deg",
+    )  # fmt: skip
     error_name: str = "mean angle, degrees"
     truth: str = "rendered: the surface's own normal, where a pixel sees a surface"
 

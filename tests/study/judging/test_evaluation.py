@@ -13,7 +13,17 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import training_sets
-from pbrs_farm.study.judging.evaluation import PAPER, is_underfit, markdown, paper_row, spread_text
+from pbrs_farm.study.judging.evaluation import (
+    PAPER,
+    evaluate,
+    is_underfit,
+    markdown,
+    mean_interval,
+    notes,
+    open_run,
+    paper_row,
+    spread_text,
+)
 from pbrs_farm.study.judging.judged_places import camera_of, judged_place
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
@@ -108,6 +118,28 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
     page = (run / "e" / "index.html").read_text()
     assert page.count("<figure>") == 4 * 4
     assert "home home-2-00000000: a person" in page
+
+
+def test_the_interval_of_a_mean_is_that_of_its_normal_law() -> None:
+    values = np.random.default_rng(3).normal(30, 4, 200)
+    low, high = mean_interval(values.tolist())
+    half = 1.645 * values.std() / np.sqrt(200)
+    assert low == pytest.approx(values.mean() - half, abs=0.08)
+    assert high == pytest.approx(values.mean() + half, abs=0.08)
+    assert mean_interval([30.0, 30.0, 30.0]) == (30.0, 30.0)
+
+
+def test_photographs_of_rooms_are_told_by_room_with_an_interval(run: Path, pairs: Path) -> None:
+    for room in ("kitchen", "bath", "hall"):
+        (pairs / room).mkdir()
+        for kind in ("rgb", "depth"):
+            data = (pairs / f"wall_{kind}.png").read_bytes()
+            (pairs / room / f"1_{kind}.png").write_bytes(data)
+    trained = open_run(run)
+    evaluation = evaluate(trained, judged_place(str(pairs), trained.plan, mode="mlt_il_ol"))
+    assert set(evaluation.groups) == {"", "bath", "hall", "kitchen"}
+    assert any("over its 4 homes or folders" in line for line in notes(trained, [evaluation]))
+    assert evaluation.as_json()["groups"] == evaluation.groups
 
 
 def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:

@@ -73,3 +73,14 @@ def test_a_prediction_that_is_not_finite_is_refused() -> None:
 
 def test_without_a_pixel_there_is_no_score() -> None:
     assert math.isnan(AngularErrors().score().mean_deg)
+
+
+def test_small_errors_and_their_root_mean_square_are_told() -> None:
+    angles = np.radians([0.0, 4.0, 6.0, 10.0])
+    predicted = np.stack([np.sin(angles), np.zeros(4), np.cos(angles)], -1)[None]
+    truth = np.broadcast_to([0.0, 0.0, 1.0], predicted.shape)
+    errors = AngularErrors()
+    errors.add(predicted, truth, np.ones((1, 4), bool))
+    score = errors.score()
+    assert (score.below_5, score.below_7_5, score.below_11_25) == (0.5, 0.75, 1.0)
+    assert score.rms_deg == pytest.approx(np.sqrt((16 + 36 + 100) / 4))
