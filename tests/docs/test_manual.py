@@ -23,8 +23,6 @@ from pbrs_farm.study.reading.views import Frame
 REPO = Path(__file__).parents[2]
 HOWTO = sorted(p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index")
 MODULE_OF = {verb: module for module, verbs in MODULES.items() for verb in verbs}
-# Their history is not yet in the lab book.
-LATER = {"docs/dress.md", "docs/farm.md", "docs/homes.md"}
 OF_NAME = {"home": Home, "scene": Home, "lit": Home, "frame": Frame, "left": Frame, "right": Frame}
 
 
@@ -47,9 +45,7 @@ def commands(page: Path) -> Iterator[list[str]]:
                 yield words
 
 
-@pytest.mark.parametrize(
-    "page", [p for p in manual_pages(REPO) if name_of(p) not in LATER], ids=name_of
-)
+@pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
 def test_a_page_outside_the_lab_book_names_no_commit_and_no_date(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert commits_named(text) == []

@@ -2,7 +2,7 @@
 
 After each: the stored objects equal those of a single run byte for byte, the ledger counts what
 storage holds, and no more was repeated than the fault explains. PBRS_CHAOS_TABLE names a file that
-takes a line per test (fault, lost, repeated, seconds to recover): the table of docs/farm.md.
+takes a line per test (fault, lost, repeated, seconds to recover): the table of docs/lab/farm.md.
 """
 
 from __future__ import annotations

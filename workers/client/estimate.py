@@ -1,6 +1,6 @@
 """What a job will cost before it runs: tasks, hours, storage; pure.
 
-The constants were measured on the example homes on two cores (docs/farm.md says when); they are
+The constants were measured on the example homes on two cores; they are
 there to distinguish an hour from a month, not to be right to ten per cent.
 """
 
