@@ -29,7 +29,8 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
     Storey,
 )
-from pbrs_farm.generate.model_file import joinery, material_name, model_files
+from pbrs_farm.generate.joinery import JoineryDesign, drawn_design, joinery
+from pbrs_farm.generate.model_file import material_name, model_files
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
 
@@ -45,7 +46,7 @@ class Paints:
     floor: str
     wet_floor: str
     ceiling: str
-    joinery: tuple[float, float, float]  # sRGB
+    joinery: JoineryDesign
 
 
 def drawn_paints(rng: np.random.Generator) -> Paints:
@@ -54,7 +55,8 @@ def drawn_paints(rng: np.random.Generator) -> Paints:
     chosen = [walls[i] for i in rng.permutation(len(walls))[:3]]
     white, oak, grey = (0.93, 0.92, 0.90), (0.66, 0.50, 0.33), (0.45, 0.46, 0.47)
     wood = (white, white, oak, grey)[int(rng.integers(4))]
-    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", wood)
+    design = drawn_design(rng, wood)
+    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", design)
 
 
 # A furnished plan as a Sweet Home 3D file.
@@ -239,7 +241,7 @@ def _add_levels(
 def _add_stairs(
     home: ET.Element, stair: Stair, rise: float, contents: _Contents, paints: Paints
 ) -> ET.Element:
-    shape = staircase(stair, rise, paints.joinery)
+    shape = staircase(stair, rise, paints.joinery.colour)
     (x, z), (low, high) = stair.middle, shape.bounds
     width, height, depth = (high - low).tolist()
     return ET.SubElement(home, "pieceOfFurniture", {

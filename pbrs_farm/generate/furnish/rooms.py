@@ -11,6 +11,7 @@ from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Stand, Templa
 
 _SIDE_M = 0.6  # free beside a bed
 _HEAD_GAP = 0.02
+_CHOICES = 6  # of a kind, the preferred ones: each is tried at every place
 _BED_LIKES = Liking(corner=0.0, door=0.12, window_wall=-0.5)
 
 
@@ -103,7 +104,7 @@ def wardrobes(shelf: Shelf, wanted: float, *, height: float = 2.4) -> tuple[Temp
     pieces = shelf.of("wardrobe", height=(1.4, height - 0.02))
     pieces = pieces or shelf.of("cabinet", height=(1.4, height - 0.02), depth=(0.3, 0.7))
     found = []
-    for piece in pieces:
+    for piece in pieces[:_CHOICES]:
         for n in (1, 2, 3):
             length = n * piece.size[0]
             if length > max(wanted, 1.0) + 0.5:
@@ -188,8 +189,8 @@ _HUNG_GAP: Final = 0.001
 
 def tubs(shelf: Shelf) -> tuple[Template, ...]:
     """Baths and showers in a corner; a bath before a shower where there is room."""
-    baths = shelf.of("bathtub", width=(1.4, 1.85), depth=(0.65, 0.85))
-    showers = shelf.of("shower", width=(0.7, 1.0), depth=(0.7, 1.2))
+    baths = shelf.of("bathtub", width=(1.4, 1.85), depth=(0.65, 0.85))[:_CHOICES]
+    showers = shelf.of("shower", width=(0.7, 1.0), depth=(0.7, 1.2))[:_CHOICES]
     found = [_cornered(p, 0.4) for p in baths] + [_cornered(p, 0.0) for p in showers]
     # A bath can be made a little shorter, as they are sold.
     found += [_cornered(p, 0.1, length=1.5) for p in baths if p.size[0] > 1.55]
@@ -212,7 +213,7 @@ def _cornered(piece: Piece, rank: float, length: float | None = None) -> Templat
 
 def toilets(shelf: Shelf, *, beside: float = _BESIDE_TOILET_M) -> tuple[Template, ...]:
     """Toilets, .60 m free in front."""
-    found = shelf.of("toilet", depth=(0.4, 0.85))
+    found = shelf.of("toilet", depth=(0.4, 0.85))[:_CHOICES]
     found.sort(key=lambda p: p.size[1] > 0.72)
     return tuple(
         single(p, before=0.6, corner=0.0, gap=_GAP, beside=beside, rank=-0.3 * p.size[1])
@@ -248,7 +249,8 @@ def basins(shelf: Shelf, *, small: bool = False, before: float = 0.6) -> tuple[T
 def washers(shelf: Shelf) -> tuple[Template, ...]:
     """Washing machines."""
     return tuple(
-        single(p, before=0.55, corner=0.4, gap=_GAP) for p in shelf.of("washer", width=(0.5, 0.7))
+        single(p, before=0.55, corner=0.4, gap=_GAP)
+        for p in shelf.of("washer", width=(0.5, 0.7))[:_CHOICES]
     )
 
 
@@ -270,24 +272,24 @@ def narrow_shelves(shelf: Shelf) -> tuple[Template, ...]:
 
 def coats(shelf: Shelf) -> tuple[Template, ...]:
     """Coat racks, narrow wardrobes."""
-    racks = shelf.of("clothes_rack", depth=(0.2, 0.6))
+    racks = shelf.of("clothes_rack", depth=(0.2, 0.6))[:_CHOICES]
     found = [single(p, before=0.6, rank=0.3) for p in racks]
     slim = shelf.of("wardrobe", depth=(0.3, 0.56), width=(0.8, 1.1), height=(1.4, 2.3))
-    return tuple(found + [single(p, before=0.65) for p in slim])
+    return tuple(found + [single(p, before=0.65) for p in slim[:_CHOICES]])
 
 
 def consoles(shelf: Shelf) -> tuple[Template, ...]:
     """What keys and shoes lie on: a low chest, narrow shelves, a bench."""
     pieces = shelf.of("dresser", "shelves", depth=(0.2, 0.56), width=(0.4, 1.5), height=(0.4, 1.3))
-    found = [single(p, before=0.6, rank=-0.5 * p.size[1]) for p in pieces]
+    found = [single(p, before=0.6, rank=-0.5 * p.size[1]) for p in pieces[:_CHOICES]]
     benches = shelf.of("stool", width=(0.7, 1.3), height=(0.35, 0.55))
-    return tuple(found + [single(p, before=0.6) for p in benches])
+    return tuple(found + [single(p, before=0.6) for p in benches[:_CHOICES]])
 
 
 def stores(shelf: Shelf) -> tuple[Template, ...]:
     """Shelves of a store room."""
     pieces = shelf.of("shelves", "bookcase", width=(0.4, 1.1), depth=(0.25, 0.45))
-    return tuple(single(p, before=0.5, corner=0.5) for p in pieces)
+    return tuple(single(p, before=0.5, corner=0.5) for p in pieces[:_CHOICES])
 
 
 def boxes(shelf: Shelf) -> tuple[Template, ...]:
@@ -356,8 +358,8 @@ def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
 
 def _stands(shelf: Shelf) -> list[list[PieceSlot]]:
     """A television on what carries it, at the wall."""
-    low = shelf.of("tv_stand", height=(0.2, 0.75), depth=(0.3, 0.7))
-    low += shelf.of("dresser", height=(0.4, 0.7), depth=(0.3, 0.6))
+    low = shelf.of("tv_stand", height=(0.2, 0.75), depth=(0.3, 0.7))[:_CHOICES]
+    low += shelf.of("dresser", height=(0.4, 0.7), depth=(0.3, 0.6))[: _CHOICES - len(low)]
     screens = shelf.of("tv", width=(0.7, 1.3))
     found = []
     for base in low:

@@ -1,0 +1,201 @@
+"""Generated doors and windows, for homes whose catalogue has none of the right size; no effects.
+
+A shape fills the opening: metres, the middle of its base at the origin, x along the wall, its
+front (the room a door swings into) towards +z. A home has one design of doors and one of windows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Shape
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
+from pbrs_farm.geometry.solids import Triple, boxes_surface
+
+_FRAME_M: Final = 0.06  # breadth of a frame's posts
+_LEAF_M: Final = 0.04  # thickness of a door's leaf
+_PANEL_M: Final = 0.006  # how far a panel stands out
+_SASH_M: Final = 0.05  # breadth of a sash's bars
+_BAR_M: Final = 0.022  # of the bars across a pane
+_PANE_M: Final = 0.006
+_WIDEST_SASH_M: Final = 0.95
+_HANDLE_M: Final = 1.05  # above the floor
+
+LEAVES: Final = ("four", "flat", "two", "six", "one", "boards", "three", "five")
+"""Designs of a door's leaf, by its panels."""
+
+HANDLES: Final = ("lever", "knob", "plate", "bar")
+
+SASHES: Final = ("plain", "rail", "grid", "transom", "halves", "slim")
+"""Designs of windows: no bars across a pane, one, a grid, a light on top, two above each other, thin bars."""
+
+_Box = tuple[Triple, Triple]  # low and high corner
+
+
+@dataclass(frozen=True, slots=True)
+class JoineryDesign:
+    """What a home's doors and windows look like."""
+
+    leaf: str = LEAVES[0]  # of doors between rooms
+    entrance: str = LEAVES[0]
+    handle: str = HANDLES[0]
+    sash: str = SASHES[0]
+    colour: Triple = (0.93, 0.92, 0.90)  # sRGB of their wood
+
+
+def drawn_design(rng: np.random.Generator, colour: Triple) -> JoineryDesign:
+    """A home's design; all are equally common."""
+    leaf, entrance, handle, sash = (
+        choices[int(rng.integers(len(choices)))] for choices in (LEAVES, LEAVES, HANDLES, SASHES)
+    )
+    return JoineryDesign(leaf, entrance, handle, sash, colour)
+
+
+def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape:
+    """The door or window of an opening in a wall of that thickness."""
+    paint = Material("joinery", diffuse=design.colour, specular=(0.3, 0.3, 0.3), shininess=40.0)
+    metal = Material("handle", diffuse=(0.2, 0.2, 0.2), specular=(0.7, 0.7, 0.7), shininess=60.0)
+    glass = Material("pane", kind=MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2)
+    # The frame is 2 cm deeper than the wall, so that it shows on both sides.
+    w, h, d = opening.width, opening.height, wall_m + 0.02
+    frame = _frame(w, h, d, has_sill=opening.sill > 0)
+    if opening.kind is OpeningKind.PASSAGE:
+        return Shape((boxes_surface("frame", frame, 0),), (paint,))
+    if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
+        kind = design.leaf if opening.kind is OpeningKind.DOOR else design.entrance
+        leaf = _leaf(w, h, d, kind)
+        handles = _handles(w, d, opening.hinge_at_start, design.handle)
+        surfaces = [boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1)]
+        return Shape(tuple(surfaces), (paint, metal))
+    bars, panes = _sashes(w, h, design.sash)
+    surfaces = [boxes_surface("frame", [*frame, *bars], 0), boxes_surface("pane", panes, 1)]
+    return Shape(tuple(surfaces), (paint, glass))
+
+
+def _frame(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
+    # Two posts, the head between them, a sill below a window.
+    x, z, t = w / 2, d / 2, _FRAME_M
+    boxes: list[_Box] = [
+        ((-x, 0.0, -z), (-x + t, h, z)),
+        ((x - t, 0.0, -z), (x, h, z)),
+        ((-x + t, h - t, -z), (x - t, h, z)),
+    ]
+    if has_sill:
+        boxes.append(((-x + t, 0.0, -z), (x - t, t * 0.7, z)))
+    return boxes
+
+
+def _leaf(w: float, h: float, d: float, kind: str) -> list[_Box]:
+    """A door's leaf, flush with the room it swings into; panels stand out on both sides."""
+    x, front = w / 2 - _FRAME_M - 0.003, d / 2 - 0.005
+    back, top = front - _LEAF_M, h - _FRAME_M - 0.003
+    boxes: list[_Box] = [((-x, 0.006, back), (x, top, front))]
+    for left, low, right, high in _panels(x, top, kind):
+        boxes.append(((left, low, front), (right, high, front + _PANEL_M)))
+        boxes.append(((left, low, back - _PANEL_M), (right, high, back)))
+    return boxes
+
+
+def _panels(x: float, top: float, kind: str) -> list[tuple[float, float, float, float]]:
+    """(left, low, right, high) of the panels on a leaf that is 2 x wide."""
+    inset, gap, middle = 0.11, 0.036, 0.95
+    left, right = -x + inset, x - inset
+    if kind == "flat":
+        return []
+    if kind == "one":
+        return [(left, 0.14, right, top - inset)]
+    if kind == "boards":
+        n = 6
+        edges = np.linspace(-x + 0.02, x - 0.02, n + 1)
+        return [(float(a) + 0.004, 0.03, float(b) - 0.004, top - 0.03) for a, b in pairwise(edges)]
+    if kind in ("three", "five"):
+        levels = np.linspace(0.13, top - 0.07, 4 if kind == "three" else 6)
+        return [(left, float(a), right, float(b) - 0.06) for a, b in pairwise(levels)]
+    rows = [(0.14, middle - 0.06), (middle + 0.06, top - inset)]
+    if kind == "six":
+        rows = [(0.14, 0.78), (0.88, 1.45), (1.53, top - inset)]
+    columns = [(left, right)] if kind == "two" else [(left, -gap), (gap, right)]
+    return [(a, low, b, high) for low, high in rows for a, b in columns]
+
+
+def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
+    # On either side, away from the hinges.
+    side = 1.0 if hinge_at_start else -1.0
+    at, front = side * (w / 2 - _FRAME_M - 0.06), d / 2 - 0.005
+    boxes: list[_Box] = []
+    for face, out in ((front, 1.0), (front - _LEAF_M, -1.0)):
+
+        def box(
+            x: tuple[float, float], y: tuple[float, float], z: tuple[float, float],
+            face: float = face, out: float = out,
+        ) -> _Box:  # fmt: skip
+            (x0, x1), (z0, z1) = sorted(x), sorted((face + out * z[0], face + out * z[1]))
+            return (x0, y[0], z0), (x1, y[1], z1)
+
+        y = _HANDLE_M
+        if kind == "knob":
+            boxes.append(box((at - 0.01, at + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
+            boxes.append(box((at - 0.026, at + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065)))
+            boxes.append(box((at - 0.03, at + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008)))
+        elif kind == "bar":
+            boxes += [
+                box((at - 0.008, at + 0.008), (low, low + 0.02), (0.0, 0.045))
+                for low in (y - 0.14, y + 0.12)
+            ]
+            boxes.append(box((at - 0.01, at + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06)))
+        else:
+            if kind == "plate":
+                boxes.append(box((at - 0.02, at + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006)))
+            boxes.append(box((at - 0.01, at + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
+            boxes.append(box((at, at - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05)))
+    return boxes
+
+
+def _sashes(w: float, h: float, kind: str) -> tuple[list[_Box], list[_Box]]:
+    """(bars, panes): as many sashes side by side as keep each below a metre."""
+    n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
+    inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M
+    bars: list[_Box] = []
+    panes: list[_Box] = []
+    for k in range(n):
+        left, right = -inner / 2 + k * inner / n + 0.002, -inner / 2 + (k + 1) * inner / n - 0.002
+        cuts = [low, high]
+        if kind == "transom":
+            cuts = [low, low + 0.7 * (high - low), high]
+        elif kind == "halves":
+            cuts = [low, (low + high) / 2, high]
+        for a, b in pairwise(cuts):
+            _sash(bars, panes, (left, a, right, b), kind)
+    return bars, panes
+
+
+def _sash(
+    bars: list[_Box], panes: list[_Box], inside: tuple[float, float, float, float], kind: str
+) -> None:
+    left, low, right, high = inside
+    z, t = 0.03, _SASH_M * (0.7 if kind == "slim" else 1.0)
+    bars += [
+        ((left, low, -z), (left + t, high, z)),
+        ((right - t, low, -z), (right, high, z)),
+        ((left + t, low, -z), (right - t, low + t, z)),
+        ((left + t, high - t, -z), (right - t, high, z)),
+    ]
+    # Bars part the pane into a grid of smaller ones.
+    rows, columns = {"rail": (2, 1), "grid": (3, 2)}.get(kind, (1, 1))
+    ys = np.linspace(low + t, high - t, rows + 1).tolist()
+    xs = np.linspace(left + t, right - t, columns + 1).tolist()
+    half, pane, y0, y1 = _BAR_M / 2, _PANE_M / 2, low + t, high - t
+    bars += [((left + t, y - half, -0.02), (right - t, y + half, 0.02)) for y in ys[1:-1]]
+    for a, b in pairwise([y0 - half, *ys[1:-1], y1 + half]):
+        bars += [((x - half, a + half, -0.02), (x + half, b - half, 0.02)) for x in xs[1:-1]]
+    for a, b in pairwise(ys):
+        for c, d in pairwise(xs):
+            panes.append((
+                (c + half * (c > xs[0]), a + half * (a > ys[0]), -pane),
+                (d - half * (d < xs[-1]), b - half * (b < ys[-1]), pane),
+            ))  # fmt: skip
