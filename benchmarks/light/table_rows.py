@@ -17,9 +17,16 @@ from pbrs_farm.core.recipe import recipe_from_name
 
 Figures = Mapping[str, Any]
 
-LUXCORE_SCENES: Final = {
-    **{key: name for key, (name, _make) in ROOMS.items()},
-    "home": "2BedroomApartment, camera 1",
+LUXCORE_ROOMS: Final = {key: name for key, (name, _make) in ROOMS.items()}
+# Key of a home's figures -> its name: those that other renderers are compared in.
+RENDERED_HOMES: Final = {
+    name.lower(): name for name in ("2BedroomApartment", "Studio", "3BedroomApartment")
+}
+CYCLES_WAYS: Final = {
+    "plain": "Cycles",
+    "portals": "with portals",
+    "guided": "guided",
+    "guided_portals": "both",
 }
 LUXCORE_ENGINES: Final = ("lux_path", "lux_path_metropolis", "lux_bidir", "lux_bidir_metropolis")
 _LUXCORE_HEADS: Final = ("LuxCore path", "path, Metropolis", "bidirectional", "bidirectional, Metropolis")  # fmt: skip
@@ -147,9 +154,27 @@ def luxcore_lights_row(name: str, f: Figures) -> str:
 
 
 def luxcore_lines(f: Figures) -> list[str]:
-    """Errors at equal CPU, a column a scene."""
-    scenes = LUXCORE_SCENES.items()
-    rows = [luxcore_costs_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes]
+    """Errors at equal CPU in rooms, a column a scene."""
+    return _luxcore_table(f, LUXCORE_ROOMS)
+
+
+def luxcore_homes_lines(f: Figures) -> list[str]:
+    """Errors at equal CPU in homes, a column a home, the light there, and the medians over them."""
+    return [
+        *_luxcore_table(f, RENDERED_HOMES),
+        "",
+        *_luxcore_lights(f, RENDERED_HOMES),
+        "",
+        f"The median over the homes: our Metropolis takes {f['light.vs_luxcore_metropolis']:.0f} times less CPU to the relMSE of LuxCore's "
+        f"bidirectional Metropolis, {f['light.vs_luxcore_metropolis_median']:.0f} times less to its median pixel; our `path` "
+        f"{f['light.vs_luxcore_path']:.0f} and {f['light.vs_luxcore_path_median']:.0f} times less than LuxCore's.",
+    ]
+
+
+def _luxcore_table(f: Figures, scenes: Mapping[str, str]) -> list[str]:
+    rows = [
+        luxcore_costs_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes.items()
+    ]
     return _turned([*luxcore_costs_head(), *rows])
 
 
@@ -161,63 +186,67 @@ def _turned(lines: list[str]) -> list[str]:
 
 
 def luxcore_lights_lines(f: Figures) -> list[str]:
-    """Mean pictures over those of our path, scene by scene."""
-    scenes = LUXCORE_SCENES.items()
-    rows = [luxcore_lights_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes]
+    """Mean pictures over those of our path, room by room."""
+    return _luxcore_lights(f, LUXCORE_ROOMS)
+
+
+def _luxcore_lights(f: Figures, scenes: Mapping[str, str]) -> list[str]:
+    rows = [
+        luxcore_lights_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes.items()
+    ]
     return [*luxcore_lights_head(), *rows]
 
 
 def cycles_lines(f: Figures) -> list[str]:
-    """Ours and Cycles' errors of 32 samples, and CPU to equal error."""
-    columns = []
-    for k in (1, 2):
-        c = below(f, f"light.cycles_{k}_")
-        columns.append([
-            f"{c['relmse']:.2g} / {c['relmse_cycles']:.2g}",
-            f"{c['median'] ** 0.5:.2g} / {c['median_cycles'] ** 0.5:.2g}",
-            f"{c['cpu_s']:.2f} / {c['cpu_s_cycles']:.2f} s",
-            f"{c['setup_s']:.1f} / {c['setup_s_cycles']:.1f} s",
-            f"**{c['ratio']:.0f} times less**",
-            f"{c['ratio_median']:.1f} times less",
-            f"{c['ratio_metropolis']:.0f} times less",
-            f"{c['mean_luminance_cycles'] / c['mean_luminance']:.3f}, {c['block_ratio_median']:.3f}",
-        ])  # fmt: skip
-    names = (
-        "relMSE, ours / Cycles", "median pixel", "CPU of the samples", "CPU of a picture of one sample",
-        "our CPU to equal relMSE", "to equal median pixel", "of Metropolis, to equal relMSE",
-        "Cycles' light over ours, long pictures: mean, median of 48 blocks",
-    )  # fmt: skip
+    """Ours and Cycles' errors, view by view, CPU to equal error, and the medians over views."""
+    rows = []
+    for home in RENDERED_HOMES.values():
+        for k in (0, 1):
+            c = below(f, f"light.cycles_{home.lower()}_{k}_")
+            theirs = [
+                f"{c[f'relmse_{way}'] * c[f'cpu_s_{way}']:.2g}, {c[f'median_{way}'] * c[f'cpu_s_{way}']:.2g}"
+                for way in CYCLES_WAYS
+            ]
+            rows.append(row([
+                f"{home}, camera {k + 1}",
+                f"{c['relmse'] * c['cpu_s']:.2g}, {c['median'] * c['cpu_s']:.2g}",
+                *theirs,
+                f"{c['ratio']:.1f}, {c['ratio_median']:.1f}",
+                f"{c['ratio_metropolis']:.0f}",
+                f"{c['mean_luminance_cycles'] / c['mean_luminance']:.3f}, {c['block_ratio_median']:.3f}",
+            ]))  # fmt: skip
+    medians = f"**{f['light.vs_cycles']:.1f}, {f['light.vs_cycles_median']:.1f}**"
     return [
-        *head("2BedroomApartment", "first camera", "second camera"),
-        *(row([name, *cells]) for name, *cells in zip(names, *columns, strict=True)),
-    ]
+        *head(
+            "error x CPU: relMSE, median pixel's", "ours", *CYCLES_WAYS.values(),
+            "our CPU, times less than the best of Cycles: to equal relMSE, median pixel",
+            "Metropolis, to equal relMSE", "Cycles' light over ours: mean, median of 48 blocks",
+        ),
+        *rows,
+        row(["**the median**", "", *([""] * len(CYCLES_WAYS)), medians, f"**{f['light.vs_cycles_metropolis']:.0f}**", ""]),
+    ]  # fmt: skip
 
 
 def compare_lines(f: Figures) -> list[str]:
     """The table of docs/compare.md."""
-    one, two = (below(f, f"light.cycles_{k}_") for k in (1, 2))
-    ratios = {
-        end: [f[f"light.luxcore_{key}_{end}"] for key in LUXCORE_SCENES]
-        for end in ("path_relmse_ratio", "relmse_ratio")
-    }
-    shift = max(abs(c["mean_luminance_cycles"] / c["mean_luminance"] - 1) for c in (one, two))
-    paths, chains = (f"{min(v):.2g} to {max(v):.2g}" for v in ratios.values())
+    views = [below(f, f"light.cycles_{home}_{k}_") for home in RENDERED_HOMES for k in (0, 1)]
+    shift = max(abs(c["mean_luminance_cycles"] / c["mean_luminance"] - 1) for c in views)
+    ratios = [c["ratio"] for c in views]
     return [
         *head("against", "measured", "ours", "theirs", "how"),
-        row(["Cycles of Blender 5.0.1, the renderer below BlenderProc, Infinigen and Kubric",
-             "relative squared error at 32 samples, first and second camera of an example home",
-             f"{one['relmse']:.2g}, {two['relmse']:.2g}",
-             f"{one['relmse_cycles']:.2g}, {two['relmse_cycles']:.2g}",
+        row(["Cycles of Blender 5.0.1, the renderer below BlenderProc, Infinigen and Kubric: plain, with portals, guided, or both, whichever is best",
+             "CPU to equal relative squared error, median over two views of three example homes (least, most)",
+             "1", f"{f['light.vs_cycles']:.1f} ({min(ratios):.1f}, {max(ratios):.1f})",
              "`make bench-cycles`, [how](lab/light.md#against-cycles)"]),
-        row(["", "CPU seconds of those 32 samples", f"{one['cpu_s']:.2f}, {two['cpu_s']:.2f}",
-             f"{one['cpu_s_cycles']:.2f}, {two['cpu_s_cycles']:.2f}", ""]),
-        row(["", "CPU to equal squared error", "1", f"{one['ratio']:.0f}, {two['ratio']:.0f}", ""]),
+        row(["", "CPU to equal squared error of the median pixel", "1", f"{f['light.vs_cycles_median']:.1f}", ""]),
+        row(["", "the same, of our Metropolis to equal relative squared error", "1", f"{f['light.vs_cycles_metropolis']:.0f}", ""]),
         row(["", "mean luminance of the long pictures", f"agrees to {shift:.1%}", "", ""]),
-        row(["LuxCore 2.11.2, path, equal CPU",
-             "relative squared error, ratio over five scenes (below 1 favours ours)", paths, "1",
+        row(["LuxCore 2.11.2, path",
+             "CPU to equal relative squared error, and to that of the median pixel: median over three example homes",
+             "1", f"{f['light.vs_luxcore_path']:.0f}, {f['light.vs_luxcore_path_median']:.0f}",
              "`make bench-luxcore`, [how](lab/light.md#against-luxcore)"]),
-        row(["LuxCore 2.11.2, bidirectional Metropolis, equal CPU", "the same, against our Metropolis",
-             chains, "1", ""]),
+        row(["LuxCore 2.11.2, bidirectional Metropolis", "the same, against our Metropolis", "1",
+             f"{f['light.vs_luxcore_metropolis']:.0f}, {f['light.vs_luxcore_metropolis_median']:.0f}", ""]),
     ]  # fmt: skip
 
 
@@ -351,6 +380,7 @@ TABLES: Final = {
     "lux": Table(("lux",), "python -m benchmarks lux", lux_lines),
     "cycles": Table(("cycles",), "make bench-cycles", cycles_lines),
     "luxcore": Table(("luxcore",), "make bench-luxcore", luxcore_lines),
+    "luxcore_homes": Table(("luxcore",), "make bench-luxcore", luxcore_homes_lines),
     "luxcore_light": Table(("luxcore",), "make bench-luxcore", luxcore_lights_lines),
     "compare": Table(("cycles", "luxcore"), "make bench-cycles bench-luxcore", compare_lines),
 }

@@ -43,6 +43,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.figures import FOLDER, write_report
+from benchmarks.light.table_rows import RENDERED_HOMES
 from benchmarks.renderers.exchange import home_without_coats, write_scene
 from benchmarks.renderers.picture_noise import blocks
 from pbrs_farm.core.camera import Camera, Intrinsics
@@ -55,7 +56,6 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky
 
-HOMES = ("2BedroomApartment", "Studio", "3BedroomApartment")
 N_CAMERAS = 2  # the first stored ones of a home
 CHAINS = {"integrator": "metropolis", "mutations_per_pixel": 64, "direct_spp": 64}
 N_CHAINS_PICTURES = 4
@@ -135,7 +135,7 @@ class View:
 def main() -> None:
     """Measure, print, write out/bench/cycles.json and cycles.png."""
     e = effort_from_environment()
-    homes = os.environ.get("CYCLES_HOMES", "").split() or HOMES
+    homes = os.environ.get("CYCLES_HOMES", "").split() or RENDERED_HOMES.values()
     views = [view for home in homes for view in _views_of(home, e)]
     figures = figures_of(views, e)
     _write_pictures(views)
@@ -159,7 +159,7 @@ def figures_of(views: Sequence[View], e: Effort) -> dict[str, tuple[float, str]]
         name = f"light.vs_cycles{end.removeprefix('ratio')}"
         found[name] = (
             float(np.median([v for v, _unit in values])),
-            f"{values[0][1]}, median over {len(views)} views of {len(HOMES)} homes",
+            f"{values[0][1]}, median over {len(views)} views of {len(RENDERED_HOMES)} homes",
         )
     return found
 

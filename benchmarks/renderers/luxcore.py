@@ -5,13 +5,13 @@ are written to out/bench/luxcore as the tables that our own kernels gather from;
 benchmarks/renderers/luxcore_scene.py, a process of its own, renders them: LuxCore's PATHCPU and BIDIRCPU, each
 with its Sobol and with its Metropolis sampler. LUXCORE_SCENES="door home" names some scenes.
 
-Scenes: the rooms of benchmarks/light/shots.py and the first stored camera of an example home, its coats
-taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
+Scenes: the rooms of benchmarks/light/shots.py and the first stored camera of three example homes, their
+coats taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 12 segments, no denoiser, no
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
 no sky shines (docs/lab/light.md).
 
-Method. Our Metropolis with its usual settings and MUTATIONS a pixel says how much CPU time a picture
-has; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
+Method. Our Metropolis with its usual settings and MUTATIONS a pixel (HOME_MUTATIONS in homes, which takes
+about as long) says how much CPU time a picture has, bootstrap, pilot and direct light counted; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
 it (loading, BVH, kernels before the clock). PICTURES of each, other seeds. All errors are relative, as
 in benchmarks/light/equal_time.py, to one reference, the mean of N_REFERENCE more pictures of our Metropolis, here
 the least noisy: squares of luminance are divided by ref^2 + 1e-3 mean(ref)^2. relMSE is the mean over
@@ -19,11 +19,12 @@ pixels of the variance between an engine's pictures: no noise of the reference c
 engines' materials differ by. The median pixel's error is against the reference, whose noise is
 small in the median. Ratios are ours over LuxCore's at equal CPU time, below 1 favours ours. That the
 light is the same is shown beside: every engine's mean picture over that of our `path`, mean
-luminance and the median of 48 blocks.
+luminance and the median of 48 blocks. light.vs_luxcore* are medians over the homes.
 """
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
@@ -39,7 +40,8 @@ from numpy.typing import NDArray
 from benchmarks.figures import FOLDER, write_report
 from benchmarks.light.shots import Shot
 from benchmarks.light.table_rows import (
-    LUXCORE_SCENES,
+    LUXCORE_ROOMS,
+    RENDERED_HOMES,
     luxcore_costs_head,
     luxcore_costs_row,
     luxcore_lights_head,
@@ -58,16 +60,13 @@ from pbrs_farm.transport.scene_tables.scene_tables import tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky
 from tests.transport import hard_rooms
 
-HOME = "2BedroomApartment"
 SIZE = (64, 48)
-MUTATIONS = 128
+MUTATIONS, HOME_MUTATIONS = 128, 48
 CHAINS = 16384
 PICTURES = 4
 N_REFERENCE = 4
 PLAIN = LightFields(filter="box", denoise=False)
-METROPOLIS = PLAIN.model_copy(
-    update={"integrator": "metropolis", "mutations_per_pixel": MUTATIONS, "chains": CHAINS}
-)
+METROPOLIS = PLAIN.model_copy(update={"integrator": "metropolis", "chains": CHAINS})
 THEIRS = {
     "lux_path": ("PATHCPU", "SOBOL"),
     "lux_path_metropolis": ("PATHCPU", "METROPOLIS"),
@@ -77,7 +76,7 @@ THEIRS = {
 PAIRS = {"": ("metropolis", "lux_bidir_metropolis"), "path_": ("path", "lux_path")}
 """Whose errors are compared: figures' prefix -> (ours, LuxCore's)."""
 
-PYTHON = Path("out/luxcore-venv/bin/python")
+PYTHON = Path(os.environ.get("LUXCORE_PYTHON", "out/luxcore-venv/bin/python"))
 SCRIPT = Path(__file__).with_name("luxcore_scene.py")
 FILES = FOLDER / "luxcore"
 
@@ -106,9 +105,33 @@ def main() -> None:
         rows.append([*(runs[n].pictures[0] for n in names), reference])
         figures |= {f"light.luxcore_{shot.key}_{name}": v for name, v in found.items()}
     _write_rows(rows)
-    units = {name: "s CPU of a picture" if name.endswith("_s") else "-" for name in figures}
+    figures |= _medians(figures)
+    units = {name: _unit(name) for name in figures}
     write_report("luxcore", {k: float(f"{v:.4g}") for k, v in figures.items()}, units)
     print("\n" + "\n".join(costs), "\n" + "\n".join(lights), sep="\n")
+
+
+def _unit(name: str) -> str:
+    if name.startswith("light.vs_"):
+        return "x less CPU time than LuxCore to its error, median over homes"
+    return "s CPU of a picture" if name.endswith("_s") else "-"
+
+
+def _medians(figures: dict[str, float]) -> dict[str, float]:
+    """Over the homes that were measured: how many times less CPU ours takes to LuxCore's errors."""
+    found = {}
+    for prefix in PAIRS:
+        for end in ("relmse", "median"):
+            names = [f"light.luxcore_{key}_{prefix}{end}_ratio" for key in RENDERED_HOMES]
+            # An error falls with the root of CPU time, a squared one with CPU time.
+            power = 1 if end == "relmse" else 2
+            values = [figures[name] ** -power for name in names if name in figures]
+            if values:
+                of_median = "_median" if end == "median" else ""
+                found[f"light.vs_luxcore_{prefix or 'metropolis_'}".rstrip("_") + of_median] = (
+                    float(np.median(values))
+                )
+    return found
 
 
 # Scenes.
@@ -121,7 +144,7 @@ def _shot_makers() -> dict[str, Callable[[], Shot]]:
         "globe": lambda: _room("globe", hard_rooms.glass_globe(), dark_sky()),
         "sunlit": lambda: _room("sunlit", hard_rooms.sunlit(), sun),
         "shade": lambda: _room("shade", hard_rooms.open_shade(), dark_sky()),
-        "home": _home,
+        **{key: functools.partial(_home, key) for key in RENDERED_HOMES},
     }
 
 
@@ -130,16 +153,16 @@ def _room(key: str, room: tuple[House, Camera], sky: Sky) -> Shot:
     tables = without_coats(tables_from_house(house, {}, Recipe()))
     scene = LightScene(tables, sky, portals_of_house(house), choose_variant())
     _export(key, scene, house, {})
-    return Shot(key, LUXCORE_SCENES[key], scene, camera.with_size(*SIZE))
+    return Shot(key, LUXCORE_ROOMS[key], scene, camera.with_size(*SIZE))
 
 
-def _home() -> Shot:
-    house, scene, textures = home_without_coats(HOME)
-    _export("home", scene, house, textures)
+def _home(key: str) -> Shot:
+    house, scene, textures = home_without_coats(RENDERED_HOMES[key])
+    _export(key, scene, house, textures)
     stored = house.cameras[0]
     intrinsics = Intrinsics.from_hfov(*SIZE, stored.hfov_rad)
     camera = Camera.look(intrinsics, stored.eye, stored.towards)
-    return Shot("home", LUXCORE_SCENES["home"], scene, camera)
+    return Shot(key, RENDERED_HOMES[key], scene, camera)
 
 
 def _export(
@@ -167,8 +190,10 @@ def _export(
 
 def _runs(shot: Shot) -> tuple[NDArray[np.float64], dict[str, Run]]:
     """(reference, pictures of every engine by name)."""
-    reference = np.mean([_timed(shot, METROPOLIS, 990 + k)[0] for k in range(N_REFERENCE)], 0)
-    chains = _our_run(shot, METROPOLIS)
+    n_mutations = HOME_MUTATIONS if shot.key in RENDERED_HOMES else MUTATIONS
+    fields = METROPOLIS.model_copy(update={"mutations_per_pixel": n_mutations})
+    reference = np.mean([_timed(shot, fields, 990 + k)[0] for k in range(N_REFERENCE)], 0)
+    chains = _our_run(shot, fields)
     _trial, trial_s = _timed(shot, PLAIN.model_copy(update={"spp": 256}), 3)
     equal = PLAIN.model_copy(update={"spp": max(round(256 * chains.cpu_s / trial_s), 1)})
     ours = {"path": _our_run(shot, equal), "metropolis": chains}

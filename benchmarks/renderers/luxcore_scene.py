@@ -126,7 +126,11 @@ def material(name, part):  # type: ignore[no-untyped-def]
         out[f"{picture}.mapping.uvscale"], out[f"{picture}.mapping.uvdelta"] = [1, -1], [0, 1]
         out[f"{product}.type"], out[f"{product}.texture1"] = "scale", f"{name}{key}p"
         out[f"{product}.texture2"] = list(rgb)
-        return f"{name}{key}"
+        # What a surface reflects is held to part["max_kd"], as by our kernels.
+        held = f"scene.textures.{name}{key}h"
+        out[f"{held}.type"], out[f"{held}.texture"] = "clamp", f"{name}{key}"
+        out[f"{held}.min"], out[f"{held}.max"] = 0.0, part["max_kd"] if key == "d" else 1.0
+        return f"{name}{key}h"
 
     if part["kind"] == MIRROR:
         out |= {f"{here}.type": "mirror", f"{here}.kr": part["f0"]}

@@ -7,19 +7,23 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks.light import denoised, guided, lux
 from benchmarks.light.light_tables import written_tables
 from benchmarks.light.measured_views import EIGHT
 from benchmarks.light.table_rows import (
+    CYCLES_WAYS,
     DENOISED_COUNTS,
     DENOISED_WAYS,
     LUXCORE_ENGINES,
-    LUXCORE_SCENES,
+    LUXCORE_ROOMS,
     PRESETS,
+    RENDERED_HOMES,
     TABLES,
 )
+from benchmarks.renderers import cycles
 from pbrs_farm.assets.homes_package import example_homes
 from pbrs_farm.core.recipe import recipe_from_name
 from tests.benchmarks.test_equal_time import MEASURED
@@ -43,14 +47,28 @@ def luxcore_figures() -> dict[str, float]:
     engines = ("path", "metropolis", *LUXCORE_ENGINES)
     names = ["cpu_s", *(f"{e}_{x}" for e in engines for x in errors)]
     names += [f"{p}{x}_ratio" for p in ("", "path_") for x in ("relmse", "median")]
-    return {f"light.luxcore_{key}_{name}": 0.5 for key in LUXCORE_SCENES for name in names}
+    scenes = LUXCORE_ROOMS | RENDERED_HOMES
+    medians = {
+        f"light.vs_luxcore_{name}{end}": 9.0
+        for name in ("path", "metropolis")
+        for end in ("", "_median")
+    }
+    return {f"light.luxcore_{key}_{name}": 0.5 for key in scenes for name in names} | medians
 
 
 def cycles_figures() -> dict[str, float]:
-    both = ("mean_luminance", "relmse", "median", "cpu_s", "setup_s")
-    names = [*both, *(f"{n}_cycles" for n in both), "block_ratio_median", "ratio"]
-    names += ["ratio_median", "ratio_metropolis"]
-    return {f"light.cycles_{k}_{name}": 2.0 for k in (1, 2) for name in names}
+    effort = cycles.Effort(4, 3, 32, 512, 4)
+    pictures = np.random.default_rng(0).gamma(2.0, size=(4, 12, 16))
+    long = np.random.default_rng(1).gamma(2.0, size=(12, 16, 3)).astype(np.float32)
+    run = cycles.Run(pictures, 32, 2.0, 0.5)
+    views = [
+        cycles.View(
+            f"{home}_{k}", run, run, dict.fromkeys(CYCLES_WAYS, run), long, long, (long, long)
+        )
+        for home in RENDERED_HOMES
+        for k in (0, 1)
+    ]
+    return {name: value for name, (value, _unit) in cycles.figures_of(views, effort).items()}
 
 
 def growth_figures() -> dict[str, float]:
