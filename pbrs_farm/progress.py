@@ -9,6 +9,8 @@ import json
 import sys
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 from rich.console import Console
@@ -198,14 +200,7 @@ class _Bars(ProgressReporter):
     """A bar for houses and one for views, with rate and time left."""
 
     def __init__(self, n_homes: int) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description:<7}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[note]}"),
-            console=Console(stderr=True),
-        )
+        self._progress = _bars()
         self._houses = self._progress.add_task("houses", total=n_homes, note="")
         self._views = self._progress.add_task("views", total=None, note="")
         self._left = TimeLeft(n_homes)
@@ -250,3 +245,39 @@ class _Bars(ProgressReporter):
         rate = f"{60 * (self._n_ended - 1) / seconds:.1f}/min" if self._n_ended > 1 else ""
         left_s = self._left.seconds(time.monotonic())
         return rate if left_s is None else f"{rate} {seconds_text(left_s)} left"
+
+
+def _bars() -> Progress:
+    """Bars on standard error: what, bar, n of n, time, a note."""
+    return Progress(
+        TextColumn("{task.description:<7}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
+    )
+
+
+@contextmanager
+def counting_bar(noun: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar on standard error of things of one kind; nothing where that is no terminal.
+
+    What it gives is called with how many are done, of how many.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _n, _of: None
+        return
+    with _bars() as bar:
+        task, began_s = bar.add_task(noun, total=None, note=""), time.monotonic()
+
+        def tell(n: int, of: int) -> None:
+            seconds = time.monotonic() - began_s
+            note = (
+                f"{60 * n / seconds:.1f}/min {seconds_text((of - n) * seconds / n)} left"
+                if n
+                else ""
+            )
+            bar.update(task, completed=n, total=of, note=note if n < of else "")
+
+        yield tell

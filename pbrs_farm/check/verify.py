@@ -6,7 +6,9 @@ house.glb, cameras from view.json, hits from Embree.
 
 from __future__ import annotations
 
+import itertools
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,12 +142,18 @@ class Scenes:
     items: HouseItems
 
 
-def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False) -> Certificate:
+def verify(
+    folder: Path,
+    *,
+    sample: int | None = None,
+    all_pixels: bool = False,
+    tell: Callable[[int, int], None] = lambda _n, _of: None,
+) -> Certificate:
     """Check every house and view below folder (an output root) and say how much was checked.
 
     sample: pixels of each view that are recomputed by rays (SAMPLE when None); all_pixels: every
-    one. Checks on files, tables and whole pictures are always complete. Raises BadInput when
-    folder is no output root.
+    one. Checks on files, tables and whole pictures are always complete. tell: called with how many
+    views were checked, of how many, as each one is. Raises BadInput when folder is no output root.
     """
     found = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
     houses = sorted(found, key=lambda p: p.name)
@@ -154,10 +162,13 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     tally, views = Tally(), list[StoredView]()
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
+    n_views = sum(1 for house in houses for _file in house.glob("views/*/view.json"))
+    checked = itertools.count(1)
+    tell(0, n_views)
     check_root_manifest(folder, houses, tally)
     for house in houses:
         check_files(folder, house, tally)
-        views += _check_house(house, n_pixels, tally)
+        views += _check_house(house, n_pixels, tally, lambda: tell(next(checked), n_views))
     _judge_ties(tally)
     return tally.certificate(
         str(folder), len(houses), len(views), all_pixels=all_pixels,
@@ -165,8 +176,10 @@ def verify(folder: Path, *, sample: int | None = None, all_pixels: bool = False)
     )  # fmt: skip
 
 
-def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> list[StoredView]:
-    """Check the house's views; those that could be read."""
+def _check_house(
+    house: Path, n_pixels: int | None, tally: Tally, tell: Callable[[], None]
+) -> list[StoredView]:
+    """Check the house's views; those that could be read. tell: called as a view is done."""
     views, faults = views_of_house(house)
     for file, fault in faults.items():
         place = f"{house.name}/{file.parent.name}/view.json"
@@ -188,7 +201,8 @@ def _check_house(house: Path, n_pixels: int | None, tally: Tally) -> list[Stored
                 f"{error} is missing" if isinstance(error, KeyError) else f"does not fit: {error}"
             )
             tally.expect("layers", f"{view.place}/view.json", False, what)
-            continue
+            arrays = None
+        tell()
         if arrays is not None:
             seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
     check_reprojection(seen, tally)

@@ -116,10 +116,12 @@ def _verify(args: argparse.Namespace) -> int:
 
 def _verify_folder(args: argparse.Namespace) -> int:
     from pbrs_farm.check import verify
+    from pbrs_farm.progress import counting_bar
 
     if args.sample is not None:
         at_least("--sample", args.sample, 1)
-    certificate = verify(args.folder, sample=args.sample, all_pixels=args.all)
+    with counting_bar("views") as tell:
+        certificate = verify(args.folder, sample=args.sample, all_pixels=args.all, tell=tell)
     if args.json:
         echo_json(certificate.model_dump(mode="json"))
     else:

@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from pbrs_farm.progress import TimeLeft, progress_reporter, seconds_text
+from pbrs_farm.progress import TimeLeft, counting_bar, progress_reporter, seconds_text
 from pbrs_farm.run.processes.render_task import Event
 
 
@@ -135,3 +135,19 @@ def test_a_terminal_gets_bars_with_count_rate_and_time_left_and_no_lines(
     assert "/min" in shown
     assert " left" in shown
     assert capsys.readouterr().out == ""
+
+
+def test_what_is_counted_has_a_bar_on_a_terminal_and_nothing_elsewhere(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with counting_bar("views") as tell:
+        tell(1, 2)
+    assert capsys.readouterr() == ("", "")
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("TERM", "xterm")
+    with counting_bar("views") as tell:
+        for n in range(3):
+            tell(n, 2)
+    assert "2/2" in terminal.getvalue()
