@@ -29,7 +29,7 @@ MODULES: Final = {
     "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
     "scattering": ("scatter",),
-    "explaining": ("dress", "repair", "cameras"),
+    "explaining": ("dress", "catalogue", "repair", "cameras"),
     "using": ("sheet", "verify", "relight"),
     "labelling": ("export", "pack", "classes", "label-sheet"),
     "selecting": ("reference", "select"),

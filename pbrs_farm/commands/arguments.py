@@ -74,8 +74,8 @@ def add_dress(p: argparse.ArgumentParser) -> None:
 def add_catalogue(p: argparse.ArgumentParser) -> None:
     """What to dress with beside the furniture package."""
     text = (
-        "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB;"
-        " `generated` leaves out the furniture package"
+        "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
+        " 3D-FUTURE, hssd-models or objathor; `generated` leaves out the furniture package"
     )
     options(p, "dressing").add_argument(
         "--catalogue", action="append", default=[], metavar="LIBRARY", help=text

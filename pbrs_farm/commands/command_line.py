@@ -15,7 +15,7 @@ from pbrs_farm.core.shown_text import did_you_mean
 GROUPS: Final = {
     "begin": ("demo", "doctor", "homes", "inputs", "skies", "completion"),
     "make pictures and labels": ("run", "scatter", "objects", "step", "recipes", "layers"),
-    "look into one home": ("dress", "repair", "cameras"),
+    "look into one home": ("dress", "catalogue", "repair", "cameras"),
     "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
     "choose and hand on": ("reference", "select", "export", "pack"),
     "train and judge": ("train", "evaluate", "predict", "ablation"),

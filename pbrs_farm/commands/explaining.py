@@ -1,8 +1,11 @@
-"""Verbs that run one stage and explain it: dress, repair, cameras. Effects: read a home, write files."""
+"""Verbs that run one stage and explain it: dress, catalogue, repair, cameras. Effects: read a home, write files."""
 
 from __future__ import annotations
 
 import argparse
+import csv
+import io
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +17,7 @@ from pbrs_farm.commands.arguments import (
     add_home,
     add_recipe,
     at_least,
+    counted,
     dress_seeds,
     echo,
     echo_json,
@@ -33,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add dress, repair and cameras."""
+    """Add dress, catalogue, repair and cameras."""
     text = "make a home look lived in: before and after, the bundle, a report in plain words"
     p = verb("dress", _dress, text)
     add_home(p)
@@ -46,6 +50,14 @@ def add_verbs(verb: Verb) -> None:
     add("--views", type=int, default=1, metavar="N", help=text)
     add_catalogue(p)
     add_fields(p)
+
+    text = "what furniture of your own is used for, and what of it is refused and why"
+    p = verb("catalogue", _catalogue, text)
+    text = "as --catalogue takes it: 3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, .sh3f"
+    p.add_argument("libraries", nargs="+", type=Path, metavar="LIBRARY", help=text)
+    text = "write what was refused: a CSV of kind, model, reason"
+    p.add_argument("--refused", type=Path, metavar="FILE.csv", help=text)
+    p.add_argument("--json", action="store_true", help="for machines")
 
     text = "read and repair a home: bundle, report in plain words, a cut through the walls"
     p = verb("repair", _repair, text)
@@ -65,6 +77,31 @@ def add_verbs(verb: Verb) -> None:
     add_cameras(p)
     add("--json", action="store_true", help="views and report as JSON")
     add_recipe(p)
+
+
+def _catalogue(args: argparse.Namespace) -> int:
+    from pbrs_farm.run.dress_catalogue import own_catalogue
+
+    found = own_catalogue(args.libraries)
+    groups = Counter(piece.group for piece in found.pieces)
+    kinds = Counter(note.kind for note in found.notes)
+    if args.refused is not None:
+        rows = [(note.kind, note.place, note.text) for note in found.notes]
+        text = io.StringIO(newline="")
+        csv.writer(text).writerows([("kind", "model", "reason"), *rows])
+        args.refused.write_text(text.getvalue(), encoding="utf-8")
+    if args.json:
+        echo_json(
+            {"pieces": len(found.pieces), "groups": groups, "notes": kinds, "digest": found.digest}
+        )
+        return 0
+    echo(f"{counted(len(found.pieces), 'piece')}, {counted(len(found.pictures), 'picture')}")
+    for group, n in sorted(groups.items(), key=lambda pair: (-pair[1], pair[0])):
+        echo(f"  {n:6} {group.replace('_', ' ')}")
+    for kind, n in kinds.most_common():
+        first = next(note for note in found.notes if note.kind == kind)
+        echo(f"{n} {kind}: {first.place}: {first.text}{' ...' if n > 1 else ''}")
+    return 0
 
 
 def _dress(args: argparse.Namespace) -> int:

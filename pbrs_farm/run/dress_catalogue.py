@@ -6,6 +6,7 @@ cache; downloads nothing unless asked.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -50,6 +51,13 @@ def catalogue_of_words(words: str) -> Catalogue:
     if GENERATED in given:
         return _catalogue(stamps, None)
     return _catalogue(stamps, furniture_package.PACKAGE in _cached_names())
+
+
+def own_catalogue(paths: Sequence[Path]) -> Catalogue:
+    """What libraries and folders of the user's own give by themselves, indexed once; BadInput as above."""
+    from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
+
+    return catalogue_from((), given=paths, store=_store())
 
 
 def has_furniture() -> bool:

@@ -1,144 +1,312 @@
 """Folders of OBJ and GLB models -> pieces; a table or the folders' names say what they are.
 
-`catalogue.csv` beside the models, if there: columns file, and any of name, group, width, depth,
-height (cm), creator, licence. Effects: reads the models, to measure them.
+Thousands of models are indexed once: what was found lies in a store under the names, sizes and times
+of the folder's files. Effects: reads the models, to measure them; reads and writes the store.
 """
 
 from __future__ import annotations
 
-import csv
 import hashlib
-from collections.abc import Mapping
-from dataclasses import replace
+import json
+import struct
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.assets.debian import write_whole
+from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput, PbrsError
-from pbrs_farm.core.house import House
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import House, ItemKind, Note
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.catalogue.library_files import LibraryNotes
 from pbrs_farm.read.catalogue.library_shapes import MAX_TRIANGLES, fitted_shape
-from pbrs_farm.read.catalogue.piece_groups import GroupRule, Size, group_rule
+from pbrs_farm.read.catalogue.model_tables import ModelTable, Size, Told, model_table
+from pbrs_farm.read.catalogue.piece_groups import GroupRule, group_rule
 from pbrs_farm.read.objects.model_folders import ObjectModel, find_models
 from pbrs_farm.read.objects.single_object import read_object
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, digest_of_regular, fault_of, read_regular
+from pbrs_farm.regular_files import digest_of_regular, open_regular
 
-TABLE: Final = "catalogue.csv"
-MOST_MODELS: Final = 2000  # that one folder may hold: each is read once
+MOST_MODELS: Final = 50_000  # that one folder may hold: each is read once
+INDEX_VERSION: Final = 1  # raised when another piece is made of the same files
 _FIELDS: Final = ReadFields(max_model_triangles=MAX_TRIANGLES)
+_UNITS: Final = {0.01: "centimetres", 0.001: "millimetres", 0.0254: "inches"}
+_MAX_JSON_BYTES: Final = 64_000_000
+_MOST_NODES: Final = 20_000  # of a model whose bounds are asked
+_FAULTS: Final = (
+    PbrsError, OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError,
+)  # fmt: skip
 
 FolderPiece = tuple[Piece, "partial[Shape | None]"]
 
 
-def model_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[FolderPiece, ...]]:
-    """(digest of all its files, the pieces) of a folder; a model without a group becomes a note.
+@dataclass(frozen=True, slots=True)
+class _Indexed:
+    """A model that is a piece: what is stored of it."""
 
-    Raises BadInput for a folder without a model, or with more than MOST_MODELS.
+    file: str  # below the folder
+    name: str
+    group: str
+    place: str
+    nyu40: int
+    kind: str
+    size: Size  # of the piece, turned to its front
+    quarters: int
+    creator: str
+    licence: str
+
+
+def model_folder(
+    path: Path, notes: LibraryNotes, store: Path | None = None
+) -> tuple[str, tuple[FolderPiece, ...]]:
+    """(digest of all its files, the pieces) of a folder; a model that is refused becomes a note.
+
+    store: a folder to keep the index in. Raises BadInput for a folder without a model, or with more
+    than MOST_MODELS.
     """
-    models = [m for m in find_models([path]) if not m.entry]
+    files = {f.relative_to(path).as_posix(): f for f in sorted(path.rglob("*")) if f.is_file()}
+    stored = store / f"index-{_key(path, files)}.json" if store is not None else None
+    found = _read_index(stored) if stored is not None else None
+    if found is None:
+        own = LibraryNotes()
+        pieces = tuple(_index(path, own))
+        found = _digest(files), pieces, tuple(own.found)
+        if stored is not None:
+            _write_index(stored, *found)
+    digest, pieces, said = found
+    for note in said:
+        notes.add(note.kind, note.place, note.text)
+    return digest, tuple(_piece(path, one, notes) for one in pieces)
+
+
+# What a folder holds: every model measured, given a group, or refused with a reason.
+
+
+def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
+    table = model_table(path, notes)
+    found = []
+    for model in _models(path, table):
+        file = model.path.relative_to(model.root).as_posix()
+        one = _indexed(model, file, table.rows.get(file, Told()), notes)
+        if one is not None:
+            found.append(one)
+    return found
+
+
+def _models(path: Path, table: ModelTable) -> list[ObjectModel]:
+    if table.is_whole:
+        files = [path / file for file in table.rows]
+        models = [ObjectModel(f.stem, f.stem, "", 0, f, path) for f in files]
+        if not models:
+            raise BadInput(path, "", "no model found", hint="its table names none that is there")
+    else:
+        models = [m for m in find_models([path]) if not m.entry]
     if len(models) > MOST_MODELS:
         raise BadInput(path, "", f"holds {len(models)} models, at most {MOST_MODELS} are read")
-    table = _table(path, notes)
-    found = []
-    for model in models:
-        file = model.path.relative_to(model.root).as_posix()
-        piece = _piece(model, path.name, file, table.get(file, {}), notes)
-        if piece is not None:
-            found.append(piece)
-    return _digest(path), tuple(found)
+    return models
 
 
-def _piece(
-    model: ObjectModel, library: str, file: str, row: Mapping[str, str], notes: LibraryNotes
-) -> FolderPiece | None:
-    piece_id = f"{library}#{file.rpartition('.')[0]}"
+def _indexed(model: ObjectModel, file: str, told: Told, notes: LibraryNotes) -> _Indexed | None:
+    place = f"{model.root.name}#{file.rpartition('.')[0]}"
+    name = told.name or model.name.replace("_", " ")
     try:
-        size = _size_m(row) or _measured(model)
-    except (PbrsError, ValueError) as error:
-        notes.add("unusable-model", piece_id, f"{error}: left out")
+        size = told.size or _measured(model)
+    except _FAULTS as error:
+        notes.add("unusable-model", place, f"{error}: left out")
         return None
-    name = row.get("name") or model.name.replace("_", " ")
-    rule = _rule(name, row.get("group", ""), model.category, size)
+    rule, size = _fitting(name, told, model.category, _turned(size, told.quarters), place, notes)
     if rule is None:
-        notes.add("unmapped-class", piece_id, f"no group for {name!r}: left out")
         return None
-    piece = Piece(
-        id=piece_id, name=name, group=rule.group, place=rule.place, nyu40=rule.nyu40, size=size,
-        kind=rule.kind, library=library, creator=row.get("creator", ""),
-        licence=row.get("licence", ""),
+    return _Indexed(
+        file, name, rule.group, rule.place.value, rule.nyu40, rule.kind.value, size,
+        told.quarters, told.creator, told.licence,
     )  # fmt: skip
-    return piece, partial(_shape, model, piece, rule.place, notes)
 
 
-def _rule(name: str, group: str, category: str, size: Size) -> GroupRule | None:
-    # The table's word, then the folder's, then the name's.
-    if group:
-        return group_rule(name, "", size, group=group)
+def _fitting(
+    name: str, told: Told, category: str, size: Size, place: str, notes: LibraryNotes
+) -> tuple[GroupRule | None, Size]:
+    """(the rule, the size in metres) of a piece; None, with a note, where none has that size."""
+    if told.group and told.size is not None:
+        rule = group_rule(name, "", size, group=told.group)
+        if rule is None:
+            notes.add("unmapped-class", place, f"no group {told.group!r}: left out")
+        return rule, size
+    rule = _rule(name, told, category, size)
+    if rule is not None and rule.fits("", size):
+        return rule, size
+    # A model of another unit is a thing of a usual size in it.
+    if told.size is None:
+        for unit, words in _UNITS.items():
+            width, depth, height = size
+            smaller = (width * unit, depth * unit, height * unit)
+            other = _rule(name, told, category, smaller)
+            if other is not None and other.fits("", smaller):
+                notes.add("other-unit", place, f"is told in {words}")
+                return other, smaller
+    if rule is None:
+        notes.add("unmapped-class", place, f"no group for {name!r} of {_text(size)}: left out")
+    else:
+        notes.add(
+            "wrong-size", place, f"{_text(size)} is no {rule.group.replace('_', ' ')}: left out"
+        )
+    return None, size
+
+
+def _rule(name: str, told: Told, category: str, size: Size) -> GroupRule | None:
+    """By the table's word, then the folder's, then the name's."""
+    if told.group:
+        return group_rule(name, "", size, group=told.group)
+    if told.label:
+        # A data set's category says more than the class that it stands for.
+        words = group_rule(name, "", size)
+        if words is not None and (told.label not in NYU40_NAMES or _is_of(words, told.label)):
+            return words
+        return group_rule(name, "", size, group=told.label) or words
     return group_rule(name, "", size, group=category) or group_rule(name, "", size)
 
 
-def _size_m(row: Mapping[str, str]) -> Size | None:
-    written = [row.get(key) or "" for key in ("width", "depth", "height")]
-    if not any(written):
-        return None
-    width, depth, height = (float(text) / 100 for text in written)
-    if not (0 < width < 50 and 0 < depth < 50 and 0 < height < 50):
-        raise ValueError("a size is not between 0 and 50 m")
-    return width, depth, height
+def _is_of(rule: GroupRule, label: str) -> bool:
+    return NYU40_NAMES[rule.nyu40] == label
+
+
+def _text(size: Size) -> str:
+    return " x ".join(f"{v:.3g}" for v in size) + " m"
+
+
+def _turned(size: Size, quarters: int) -> Size:
+    width, depth, height = size
+    return (depth, width, height) if quarters % 2 else size
 
 
 def _measured(model: ObjectModel) -> Size:
-    low, high = read_object(model, _FIELDS).items[0].bounds
+    bounds = _bounds_of_glb(model.path) if model.path.suffix.lower() == ".glb" else None
+    low, high = read_object(model, _FIELDS).items[0].bounds if bounds is None else bounds
     width, height, depth = (float(v) for v in np.maximum(high - low, 1e-4))
+    if not all(np.isfinite((width, height, depth))):
+        raise ValueError("a coordinate is not finite")
     return width, depth, height
 
 
-def _shape(model: ObjectModel, piece: Piece, place: Place, notes: LibraryNotes) -> Shape | None:
-    width, depth, height = piece.size
+def _bounds_of_glb(path: Path) -> Any:
+    """(2, 3) the box of a GLB by the bounds that it tells, without its meshes; None where that is not plain.
+
+    A node that is turned by no quarter makes the box of its box, which is larger than its mesh.
+    """
+    with open_regular(path) as stream:
+        head = stream.read(20)
+        if len(head) < 20 or head[:4] != b"glTF" or head[16:20] != b"JSON":
+            return None
+        (length,) = struct.unpack_from("<I", head, 12)
+        if length > _MAX_JSON_BYTES:
+            return None
+        scene = json.loads(stream.read(length))
+    nodes = scene.get("nodes", [])
+    if any({"matrix", "rotation", "skin"} & node.keys() for node in nodes):
+        return None
+    used = scene.get("extensionsRequired", [])
+    if {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"} & set(used):
+        return None
+    roots = scene["scenes"][scene.get("scene", 0)]["nodes"]
+    corners, left = [], [(k, np.zeros(3), np.ones(3)) for k in roots]
+    for _ in range(_MOST_NODES):
+        if not left:
+            break
+        k, at, scale = left.pop()
+        node = nodes[k]
+        at = at + scale * np.array(node.get("translation", (0, 0, 0)), float)
+        scale = scale * np.array(node.get("scale", (1, 1, 1)), float)
+        left += [(child, at, scale) for child in node.get("children", ())]
+        if "mesh" in node:
+            for primitive in scene["meshes"][node["mesh"]]["primitives"]:
+                accessor = scene["accessors"][primitive["attributes"]["POSITION"]]
+                corners += [at + scale * np.array(accessor[end], float) for end in ("min", "max")]
+    is_whole = corners and not left
+    return np.array([np.min(corners, 0), np.max(corners, 0)]) if is_whole else None
+
+
+# The index of a folder, kept.
+
+
+def _key(path: Path, files: dict[str, Path]) -> str:
+    """Of the folder's name and its files' names, sizes and times: what is cheap to ask of thousands."""
+    digest = hashlib.sha256(f"{INDEX_VERSION} {path.name}\n".encode())
+    for name, file in files.items():
+        status = file.stat()
+        line = f"{name} {status.st_size} {status.st_mtime_ns}\n"
+        digest.update(line.encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()[:32]
+
+
+def _digest(files: dict[str, Path]) -> str:
+    digest = hashlib.sha256(f"{INDEX_VERSION}\n".encode())
+    for name, file in files.items():
+        digest.update(f"{name} {digest_of_regular(file)}\n".encode("utf-8", "surrogateescape"))
+    return digest.hexdigest()
+
+
+def _write_index(
+    file: Path, digest: str, pieces: tuple[_Indexed, ...], notes: tuple[Note, ...]
+) -> None:
+    said = [(n.kind, n.place, n.text) for n in notes]
+    row = {"digest": digest, "pieces": [asdict(one) for one in pieces], "notes": said}
+    with suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, json.dumps(row).encode())
+
+
+def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]] | None:
+    """What _write_index wrote; None where there is nothing, or it is damaged."""
+    try:
+        row = json.loads(file.read_bytes())
+        pieces = tuple(_Indexed(**{**one, "size": tuple(one["size"])}) for one in row["pieces"])
+        return str(row["digest"]), pieces, tuple(Note(*said) for said in row["notes"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+# Pieces and their shapes.
+
+
+def _piece(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
+    piece = Piece(
+        id=f"{path.name}#{one.file.rpartition('.')[0]}", name=one.name, group=one.group,
+        place=Place(one.place), nyu40=one.nyu40, size=one.size, kind=ItemKind(one.kind),
+        library=path.name, creator=one.creator, licence=one.licence,
+    )  # fmt: skip
+    file = path / one.file
+    model = ObjectModel(keys.slug(file.stem), one.name, one.group, one.nyu40, file, path)
+    return piece, partial(_shape, model, piece, one.quarters, notes)
+
+
+def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: LibraryNotes) -> Shape | None:
+    width, depth, height = _turned(piece.size, quarters)
     try:
         house = read_object(replace(model, size_m=(width, height, depth)), _FIELDS)
     except PbrsError as error:
         notes.add("unusable-model", piece.id, error.message)
         return None
-    return fitted_shape(_on_base(house, place), place, piece.id, notes)
+    return fitted_shape(_on_base(house, piece.place, quarters), piece.place, piece.id, notes)
 
 
-def _on_base(house: House, place: Place) -> Shape:
-    # A single object stands about the origin: lift it on its base, bring its back forward.
+def _on_base(house: House, place: Place, quarters: int) -> Shape:
+    # A single object stands about the origin: turn it, lift it on its base, bring its back forward.
     item = house.items[0]
-    low, _ = item.bounds
+    turn = np.rint(rotation_y(quarters * np.pi / 2))
+    low = np.min([(s.positions @ turn.T).min(0) for s in item.surfaces], 0)
     shift = np.array([0.0, -low[1], -low[2] if place is Place.WALL else 0.0])
     surfaces = tuple(
-        replace(s, positions=(s.positions + shift).astype(np.float32)) for s in item.surfaces
+        replace(
+            s,
+            positions=(s.positions @ turn.T + shift).astype(np.float32),
+            normals=None if s.normals is None else (s.normals @ turn.T).astype(np.float32),
+        )
+        for s in item.surfaces
     )
     return Shape(surfaces, house.materials, house.textures)
-
-
-def _table(path: Path, notes: LibraryNotes) -> dict[str, dict[str, str]]:
-    file = path / TABLE
-    if not file.exists():
-        return {}
-    try:
-        text = read_regular(file, MAX_TEXT_BYTES).decode("utf-8-sig")
-        rows = list(csv.DictReader(text.splitlines()))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        why = fault_of(error) if isinstance(error, OSError) else str(error)
-        notes.add("damaged-table", TABLE, why)
-        return {}
-    if rows and "file" not in rows[0]:
-        notes.add("damaged-table", TABLE, "has no column `file`")
-        return {}
-    return {row["file"]: {k: (v or "").strip() for k, v in row.items() if k} for row in rows}
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    for file in sorted(path.rglob("*")):
-        if file.is_file():
-            line = f"{file.relative_to(path).as_posix()} {digest_of_regular(file)}\n"
-            digest.update(line.encode())
-    return digest.hexdigest()

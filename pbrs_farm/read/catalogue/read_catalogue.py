@@ -67,7 +67,7 @@ def catalogue_from(
         found.append(_furniture(jar, notes, JAR_FURNITURE))
         found.append(_textures(jar, notes, JAR_TEXTURES))
     found += [_furniture(path, notes, FURNITURE) for path in libraries]
-    found += [_given(path, notes) for path in given]
+    found += [_given(path, notes, store) for path in given]
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
     shapes = ShapeStore(store) if store is not None else None
@@ -93,13 +93,13 @@ def _stored(shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader) 
     return lambda: shapes.shape(key, load)
 
 
-def _given(path: Path, notes: LibraryNotes) -> Found | None:
+def _given(path: Path, notes: LibraryNotes, store: Path | None) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
     found: Found | None
     n_before = len(notes.found)
     if path.is_dir():
-        found = _folder(path, notes)
+        found = _folder(path, notes, store)
     elif path.suffix.lower() == ".sh3t":
         found = _textures(path, notes, TEXTURES)
     elif path.suffix.lower() == ".sh3f":
@@ -113,10 +113,10 @@ def _given(path: Path, notes: LibraryNotes) -> Found | None:
     return found
 
 
-def _folder(path: Path, notes: LibraryNotes) -> Found:
+def _folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
     """Models; pictures for the walls where there are no models."""
     try:
-        sha256, pieces = model_folder(path, notes)
+        sha256, pieces = model_folder(path, notes, store)
     except BadInput:
         sha256, pictures = picture_folder(path, notes)
         if not pictures:

@@ -1,13 +1,18 @@
 from __future__ import annotations
 
+import gzip
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.read.catalogue import model_folder as folders
 from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 from tests.read.catalogue.small_library import WEDGE_MTL, WEDGE_OBJ
+from tests.read.gltf.gltf_scenes import Scene
 
 
 def write(path: Path, data: bytes = WEDGE_OBJ) -> None:
@@ -75,3 +80,149 @@ def test_the_digest_follows_every_file_of_the_folder(tmp_path: Path) -> None:
     first = catalogue_from([], given=[tmp_path]).digest
     (tmp_path / "sofa" / "wedge.mtl").write_bytes(WEDGE_MTL + b"\n")
     assert catalogue_from([], given=[tmp_path]).digest != first
+
+
+def box_glb(width: float, height: float, depth: float) -> bytes:
+    """A box from the origin on."""
+    scene = Scene()
+    scene.materials.append({"name": "wood"})
+    return scene.glb([scene.node("thing", mesh=scene.box([0, 0, 0], [width, height, depth], 0))])
+
+
+def put(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(data)
+
+
+def kinds(folder: Path) -> list[str]:
+    return sorted(note.kind for note in catalogue_from([], given=[folder]).notes)
+
+
+def test_3d_future_is_known_by_its_table_and_by_its_raw_models(tmp_path: Path) -> None:
+    rows = [
+        {"model_id": "a1", "super-category": "Sofa", "category": "Loveseat Sofa"},
+        {"model_id": "b2", "super-category": "Cabinet/Shelf/Desk", "category": "Nightstand"},
+        {"model_id": "c3", "super-category": "Bed", "category": "King-size Bed"},
+    ]
+    (tmp_path / "model_info.json").write_text(json.dumps(rows))
+    for one in ("a1", "b2"):
+        write(tmp_path / one / "raw_model.obj")
+        write(tmp_path / one / "normalized_model.obj")
+    catalogue = catalogue_from([], given=[tmp_path])
+    # A nightstand of 2 m is none, and the bed is not there.
+    assert [(p.id, p.group) for p in catalogue.pieces] == [
+        (f"{tmp_path.name}#a1/raw_model", "sofa")
+    ]
+    assert sorted(n.kind for n in catalogue.notes) == ["missing-models", "wrong-size"]
+    assert "1 of its 3 models are not there" in next(
+        n.text for n in catalogue.notes if n.kind == "missing-models"
+    )
+
+
+def test_hssd_models_are_turned_to_the_front_that_their_configuration_tells(tmp_path: Path) -> None:
+    (tmp_path / "objects.csv").write_text("id,name,main_category\nab12,x,bookcase\n")
+    put(tmp_path / "objects/a/ab12.glb", box_glb(0.3, 1.8, 0.9))
+    put(tmp_path / "objects/a/ab12.collider.glb", box_glb(9, 9, 9))
+    put(tmp_path / "objects/a/ab12.object_config.json", b'{"up": [0, 1, 0], "front": [1, 0, 0]}')
+    catalogue = catalogue_from([], given=[tmp_path])
+    (piece,) = catalogue.pieces
+    assert piece.group == "bookcase"
+    assert piece.size == pytest.approx((0.9, 0.3, 1.8))
+    shape = catalogue.shape(piece)
+    assert shape is not None
+    np.testing.assert_allclose(shape.bounds, [[-0.45, 0, -0.15], [0.45, 1.8, 0.15]], atol=1e-6)
+
+
+def test_a_front_to_the_right_comes_to_the_front_and_the_back_to_the_back(tmp_path: Path) -> None:
+    write(tmp_path / "a.obj")  # 2 x 1, its tall side at -z
+    (tmp_path / "list.csv").write_text("file,class,size,front\na.obj,sofa,100 x 200 x 100,+x\n")
+    catalogue = catalogue_from([], given=[tmp_path])
+    (piece,) = catalogue.pieces
+    assert piece.size == (2.0, 1.0, 1.0)
+    shape = catalogue.shape(piece)
+    assert shape is not None
+    points = np.concatenate([s.positions for s in shape.surfaces])
+    # What looked to -z looks to +x where +x has become the front: the tall side is at +x.
+    assert np.allclose(points[points[:, 1] > 0.5][:, 0], 1.0)
+
+
+def test_objathor_is_read_from_glb_and_its_pickles_are_refused(tmp_path: Path) -> None:
+    rows = {"a1": {"category": "armchair"}, "b2": {"category": "vase"}}
+    (tmp_path / "annotations.json.gz").write_bytes(gzip.compress(json.dumps(rows).encode()))
+    put(tmp_path / "assets/a1/a1.glb", box_glb(0.8, 0.9, 0.8))
+    put(tmp_path / "assets/b2/b2.pkl.gz", b"no")
+    catalogue = catalogue_from([], given=[tmp_path])
+    assert [p.group for p in catalogue.pieces] == ["armchair"]
+    assert sorted(n.kind for n in catalogue.notes) == ["missing-models", "refused-pickles"]
+
+
+@pytest.mark.parametrize(
+    ("size", "found"),
+    [((80, 90, 80), "centimetres"), ((800, 900, 800), "millimetres"), ((7, 9, 7), "wrong-size")],
+)
+def test_a_model_of_another_unit_is_scaled_and_one_of_no_size_is_refused(
+    tmp_path: Path, size: tuple[float, float, float], found: str
+) -> None:
+    put(tmp_path / "armchair" / "a.glb", box_glb(*size))
+    if found == "wrong-size":
+        with pytest.raises(BadInput, match="7 x 7 x 9 m is no armchair"):
+            catalogue_from([], given=[tmp_path])
+        return
+    catalogue = catalogue_from([], given=[tmp_path])
+    (piece,) = catalogue.pieces
+    assert piece.size == pytest.approx((0.8, 0.8, 0.9))
+    shape = catalogue.shape(piece)
+    assert shape is not None
+    np.testing.assert_allclose(shape.bounds, [[-0.4, 0, -0.4], [0.4, 0.9, 0.4]], atol=1e-6)
+    assert [n.text for n in catalogue.notes] == [f"is told in {found}"]
+
+
+def test_a_folder_is_indexed_once_and_anew_where_a_file_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, store = tmp_path / "own", tmp_path / "store"
+    put(own / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
+    put(own / "armchair" / "b.glb", b"junk")
+    first = catalogue_from([], given=[own], store=store)
+    with monkeypatch.context() as patch:
+        patch.setattr(folders, "_index", lambda *_: pytest.fail("indexed again"))
+        patch.setattr(folders, "digest_of_regular", lambda _: pytest.fail("digested again"))
+        again = catalogue_from([], given=[own], store=store)
+    assert (again.pieces, again.digest, again.notes) == (first.pieces, first.digest, first.notes)
+    (index,) = store.glob("index-*.json")
+    index.write_bytes(b"[1")
+    assert catalogue_from([], given=[own], store=store).pieces == first.pieces
+    put(own / "armchair" / "c.glb", box_glb(0.7, 0.9, 0.8))
+    assert len(catalogue_from([], given=[own], store=store).pieces) == 2
+
+
+def test_a_glb_is_measured_by_the_bounds_that_it_tells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put(tmp_path / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.7))
+    monkeypatch.setattr(folders, "read_object", lambda *_: pytest.fail("its meshes were read"))
+    (piece,) = catalogue_from([], given=[tmp_path]).pieces
+    assert piece.size == pytest.approx((0.8, 0.7, 0.9))
+
+
+def test_a_glb_whose_nodes_go_round_is_refused(tmp_path: Path) -> None:
+    scene = Scene()
+    scene.nodes += [{"children": [1]}, {"children": [0]}]
+    put(tmp_path / "armchair" / "round.glb", scene.glb([0]))
+    put(tmp_path / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
+    assert kinds(tmp_path) == ["unusable-model"]
+
+
+def test_the_verb_says_what_is_used_and_writes_what_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pbrs_farm.run.dress_catalogue._store", lambda: tmp_path / "store")
+    put(tmp_path / "own" / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
+    put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
+    refused = tmp_path / "refused.csv"
+    assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 0
+    assert capsys.readouterr().out == (
+        "1 piece, 0 pictures\n       1 armchair\n"
+        "1 wrong-size: own#armchair/huge: 7 x 7 x 9 m is no armchair: left out\n"
+    )
+    assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")

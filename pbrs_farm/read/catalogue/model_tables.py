@@ -1,0 +1,250 @@
+"""What a table beside models says of them: catalogue.csv, 3D-FUTURE, HSSD, objathor. Effects: reads tables.
+
+`catalogue.csv` (or the only CSV of the folder that has a column `file`): file, and any of name,
+class (or group), size or width, depth, height (cm), front, creator, licence. `model_info.json` is
+3D-FUTURE's, `objects.csv` HSSD's, `annotations.json` (`.gz`) objathor's. A table of one of the three
+says which models are pieces; with catalogue.csv all models are.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.read.catalogue.library_files import LibraryNotes
+from pbrs_farm.read.common.bounded_json import bounded_json
+from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+
+Size = tuple[float, float, float]
+
+TABLE: Final = "catalogue.csv"
+_INFO: Final = ("model_info.json", "3D-FUTURE-model/model_info.json")
+_OBJECTS: Final = (
+    "objects.csv", "semantics/objects.csv", "metadata/objects.csv", "semantics/hssd-hab_semantics_objects.csv",
+)  # fmt: skip
+_ANNOTATIONS: Final = ("annotations.json", "annotations.json.gz")
+_MAX_BYTES: Final = 256_000_000  # of a table, unpacked
+_MOST_M: Final = 50.0
+_AXES: Final = {"+z": 0, "z": 0, "+x": 3, "x": 3, "-z": 2, "-x": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What a table says of a model; "" and None where it says nothing.
+
+    quarters: how often the model is turned by 90 degrees about the vertical until its front looks
+    to +z.
+    """
+
+    name: str = ""
+    group: str = ""  # a group or a class, of the user's own table: it is taken at its word
+    label: str = ""  # the class that a data set's vocabulary gives: its size must fit
+    size: Size | None = None
+    quarters: int = 0
+    creator: str = ""
+    licence: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ModelTable:
+    """A folder's table: what it says by file; is_whole: models that it does not name are no pieces."""
+
+    rows: Mapping[str, Told]
+    is_whole: bool = False
+
+
+def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
+    """The table of a folder of models, empty where there is none; what is wrong with it is a note."""
+    for names, read in (
+        ((TABLE,), _own),
+        (_INFO, _future),
+        (_OBJECTS, _hssd),
+        (_ANNOTATIONS, _objathor),
+    ):
+        for name in names:
+            if (path / name).exists():
+                return _table(path, name, read, notes)
+    others = [f for f in sorted(path.glob("*.csv"))[:8] if _names_files(f)]
+    return _table(path, others[0].name, _own, notes) if len(others) == 1 else ModelTable({})
+
+
+def _table(path: Path, name: str, read: Any, notes: LibraryNotes) -> ModelTable:
+    try:
+        table: ModelTable = read(path, name, notes)
+    except (BadHouse, BadInput, OSError, ValueError, KeyError, csv.Error, EOFError) as error:
+        why = fault_of(error) if isinstance(error, OSError) and error.strerror else str(error)
+        notes.add("damaged-table", name, why)
+        return ModelTable({})
+    if table.is_whole:
+        missing = [file for file in table.rows if not (path / file).is_file()]
+        if missing:
+            text = (
+                f"{len(missing)} of its {len(table.rows)} models are not there, {missing[0]} first"
+            )
+            notes.add("missing-models", name, text)
+        return ModelTable({k: v for k, v in table.rows.items() if k not in set(missing)}, True)
+    return table
+
+
+def _names_files(file: Path) -> bool:
+    try:
+        with file.open("rb") as stream:
+            return b"file" in stream.readline(4096).lower().strip().split(b",")
+    except OSError:
+        return False
+
+
+# A table of the user's own.
+
+
+def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+    text = read_regular(path / name, MAX_TEXT_BYTES).decode("utf-8-sig")
+    rows = list(csv.DictReader(text.splitlines()))
+    if rows and "file" not in rows[0]:
+        raise ValueError("has no column `file`")
+    found: dict[str, Told] = {}
+    for row in rows:
+        cells = {
+            k.strip().lower(): (v or "").strip() for k, v in row.items() if k and isinstance(v, str)
+        }
+        try:
+            found[cells["file"]] = Told(
+                name=cells.get("name", ""),
+                group=cells.get("group", "") or cells.get("class", ""),
+                size=_size_cm(cells),
+                quarters=_quarters(cells.get("front", "")),
+                creator=cells.get("creator", ""),
+                licence=cells.get("licence", ""),
+            )
+        except ValueError as error:
+            notes.add(
+                "damaged-row",
+                f"{name}: {cells.get('file', '')}",
+                f"{error}: its other models are read",
+            )
+    return ModelTable(found)
+
+
+def _size_cm(cells: Mapping[str, str]) -> Size | None:
+    words = [cells.get(key, "") for key in ("width", "depth", "height")]
+    if not any(words) and cells.get("size"):
+        words = cells["size"].lower().replace("x", " ").replace(",", " ").split()
+    if not any(words):
+        return None
+    if len(words) != 3:
+        raise ValueError("a size is width, depth and height in cm")
+    width, depth, height = (float(word) / 100 for word in words)
+    if not all(0 < v < _MOST_M for v in (width, depth, height)):
+        raise ValueError("a size is not between 0 and 50 m")
+    return width, depth, height
+
+
+def _quarters(text: str) -> int:
+    """Turns from a front: an axis ("-x"), or a vector of three numbers."""
+    word = text.lower().strip()
+    if not word:
+        return 0
+    if word in _AXES:
+        return _AXES[word]
+    numbers = [float(v) for v in word.replace(",", " ").split()]
+    if len(numbers) != 3 or abs(numbers[1]) > 0.5 * max(abs(numbers[0]), abs(numbers[2])):
+        raise ValueError(f"front {text!r} is no axis: +z, -z, +x or -x")
+    x, _y, z = numbers
+    return (_AXES["+z" if z > 0 else "-z"]) if abs(z) >= abs(x) else _AXES["+x" if x > 0 else "-x"]
+
+
+# Tables of data sets.
+
+
+def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+    """3D-FUTURE: a list of model_id, super-category, category; raw_model.obj in metres, front to +z."""
+    rows = bounded_json(_data(path / name), name)
+    folder = name.rpartition("/")[0]
+    found = {}
+    for row in rows if isinstance(rows, list) else []:
+        if isinstance(row, dict) and _is_plain(str(row.get("model_id", ""))):
+            category = str(row.get("category") or "")
+            above = str(row.get("super-category") or "")
+            seen = given_class("3dfuture", category) or given_class("3dfuture-super", above)
+            file = "/".join(filter(None, (folder, str(row["model_id"]), "raw_model.obj")))
+            label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
+            found[file] = Told(name=category or above, label=label, creator="3D-FUTURE")
+    return ModelTable(found, is_whole=True)
+
+
+def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+    """HSSD: an id a row and its category; models in objects/, by the id's first character."""
+    rows = csv.reader(io.StringIO(_data(path / name).decode("utf-8", "replace")))
+    head = [h.strip().lower() for h in next(rows, [])]
+    at_id = head.index("id") if "id" in head else 0
+    at_class = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
+    found = {}
+    for row in rows:
+        if len(row) <= max(at_id, at_class) or not _is_plain(row[at_id].strip()):
+            continue
+        one, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
+        ways = (f"objects/{one[0]}/{one}.glb", f"objects/{one}.glb", f"{one}.glb")
+        file = next((w for w in ways if (path / w).is_file()), ways[0])
+        quarters = _front_of_config(path / file.replace(".glb", ".object_config.json"))
+        found[file] = Told(name=words, label=words, quarters=quarters, creator="HSSD")
+    return ModelTable(found, is_whole=True)
+
+
+def _front_of_config(file: Path) -> int:
+    """Turns from the front that a model's own configuration tells, in the model's axes; 0 where none does."""
+    try:
+        front = json.loads(read_regular(file, 1_000_000)).get("front")
+        return _quarters(" ".join(map(str, front))) if isinstance(front, list) else 0
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return 0
+
+
+def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+    """objathor: id -> annotation with its category; GLB beside it or in assets/. Pickles are refused."""
+    rows = bounded_json(_data(path / name), name)
+    if not isinstance(rows, dict):
+        raise ValueError("holds no annotations by id")
+    found, pickles = {}, 0
+    for one, row in rows.items():
+        if not (_is_plain(one) and isinstance(row, dict)):
+            continue
+        ways = [
+            f"{folder}{one}{end}" for folder in ("", "assets/") for end in (".glb", f"/{one}.glb")
+        ]
+        file = next((w for w in ways if (path / w).is_file()), "")
+        if not file:
+            packed = [f"{folder}{one}/{one}.pkl.gz" for folder in ("", "assets/")]
+            pickles += any((path / w).is_file() for w in packed)
+        words = str(row.get("category") or row.get("ref_category") or "").replace("_", " ")
+        seen = given_class("ai2thor", words)
+        label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
+        found[file or ways[0]] = Told(name=words, label=label or words, creator="objathor")
+    if pickles:
+        text = f"{pickles} models are pickles, which may hold programs: convert them to GLB"
+        notes.add("refused-pickles", name, text)
+    return ModelTable(found, is_whole=True)
+
+
+def _is_plain(one: str) -> bool:
+    """Whether a model's id is a name and no path."""
+    return bool(one) and one.replace("-", "").replace("_", "").isalnum()
+
+
+def _data(file: Path) -> bytes:
+    data = read_regular(file, _MAX_BYTES)
+    if file.suffix != ".gz":
+        return data
+    with gzip.open(io.BytesIO(data)) as stream:
+        plain = stream.read(_MAX_BYTES + 1)
+    if len(plain) > _MAX_BYTES:
+        raise ValueError("is too large")
+    return plain
