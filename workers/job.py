@@ -67,6 +67,9 @@ class JobSpec(BaseModel):
     n_views: int = 0
     gpu: bool = False
     priority: int = Field(DEFAULT_PRIORITY, ge=0, le=LEAST_URGENT, description="0 goes first")
+    max_slots: int = Field(0, ge=0, description="tasks in flight at once; 0 = as there are slots")
+    budget_h: float = Field(0.0, ge=0, description="slot-hours, then it pauses itself; 0 = none")
+    after: tuple[str, ...] = Field((), description="jobs that must be done before it begins")
     batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
     min_batches: int = Field(
@@ -81,6 +84,9 @@ class JobSpec(BaseModel):
 _NOT_WORK = {
     "job_id",
     "priority",
+    "max_slots",
+    "budget_h",
+    "after",
     "rules",
     "n_houses",
     "min_batches",

@@ -72,6 +72,17 @@ def add_verbs(verb: Verb) -> None:
     p = farm_verb("priority", _priority, "how urgent a job is, while it runs: 0 goes first, 9 last")
     p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER")
     _add_job(p)
+    p = farm_verb(
+        "limit", _limit, "another ceiling of a job: tasks in flight, slot-hours; 0 = none"
+    )
+    p.add_argument("--max-slots", type=int, metavar="N")
+    p.add_argument("--budget", type=float, metavar="HOURS")
+    _add_job(p)
+    p = farm_verb("gc", _gc, "what the store holds and nobody needs: told, and removed with --yes")
+    p.add_argument(
+        "--keep", default="30d", metavar="TIME", help="younger things stay (default 30d)"
+    )
+    p.add_argument("--yes", action="store_true", help="remove it")
     p = farm_verb("drain", _drain, "a worker finishes what it runs and leaves")
     p.add_argument("worker")
     p.add_argument("--undo", action="store_true", help="let it stay")
@@ -202,6 +213,35 @@ def _priority(args: argparse.Namespace) -> int:
     state = farm.set_priority(job, args.number)
     answer = {"job": job, "state": state, "priority": args.number}
     _show(args, answer, lambda: f"{job} {state}, priority {args.number}")
+    return 0
+
+
+def _limit(args: argparse.Namespace) -> int:
+    farm, job = _farm_and_job(args)
+    state = farm.limit(job, max_slots=args.max_slots, budget_h=args.budget)
+    again = f"; `pbrs-farm resume {job}` goes on" if state == "paused" else ""
+    _show(args, {"job": job, "state": state}, lambda: f"{job} {state}{again}")
+    return 0
+
+
+def _gc(args: argparse.Namespace) -> int:
+    from workers.client.garbage import garbage, keep_from_text, remove
+
+    farm, keep_s = farm_of(args), keep_from_text(args.keep)
+    farm.ledger.ping()
+    found = garbage(farm, keep_s, time.time())
+    n = remove(farm, found) if args.yes else 0
+    rows = [{"kind": g.kind, "objects": len(g.found), "bytes": g.n_bytes} for g in found]
+
+    def text() -> str:
+        lines = [
+            f"{g.kind:<22}{len(g.found):>9} objects {g.n_bytes / 1e6:>10.1f} MB" for g in found
+        ]
+        lines += [f"    {key}" for g in found for key in g.found[:3]]
+        told = f"{n} objects removed" if args.yes else "nothing is removed: --yes does it"
+        return "\n".join([*lines, told])
+
+    _show(args, {"found": rows, "removed": n}, text)
     return 0
 
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import math
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.arguments import (
     Verb,
@@ -26,7 +30,10 @@ from pbrs_farm.commands.arguments import (
     views_wanted,
     warn,
 )
-from workers.ids import DEFAULT_PRIORITY, LEAST_URGENT
+from pbrs_farm.commands.job_file import job_file, option_words, submit_words
+from pbrs_farm.core.errors import BadInput
+from workers.ids import DEFAULT_PRIORITY, LEAST_URGENT, check_job_id
+from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:
     from workers.job import JobSpec
@@ -36,7 +43,9 @@ def add_verbs(verb: Verb) -> None:
     """Add submit."""
     p = verb("submit", _submit, "put houses on the farm")
     add_farm(p)
-    p.add_argument("homes", nargs="+", metavar="HOME", help="files, folders, example homes")
+    p.set_defaults(parser=p)
+    text = "files, folders, example homes; or one job.toml that says all (docs/farm.md)"
+    p.add_argument("homes", nargs="+", metavar="HOME", help=text)
     text = "file with a SUNCG house id a line (HOME: root)"
     p.add_argument("--houses", metavar="LIST", help=text)
     add_models(p)
@@ -50,12 +59,27 @@ def add_verbs(verb: Verb) -> None:
         "--priority", type=int, default=DEFAULT_PRIORITY, choices=range(LEAST_URGENT + 1),
         help=f"0 goes first, {LEAST_URGENT} last",
     )  # fmt: skip
+    text = "tasks of it in flight at once, at most (0: as many as there are slots)"
+    p.add_argument("--max-slots", type=int, default=0, metavar="N", help=text)
+    text = "slot-hours after which it pauses itself (0: none)"
+    p.add_argument("--budget", type=float, default=0.0, metavar="HOURS", help=text)
+    text = "begin when this job is done, repeatable"
+    p.add_argument("--after", action="append", default=[], metavar="JOB", help=text)
     p.add_argument("--update", action="store_true", help="give the store this recipe")
     p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
     p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")
 
 
 def _submit(args: argparse.Namespace) -> int:
+    described = job_file(args.homes)
+    if described is not None:
+        return _submit_file(args, described)
+    _submitted(args)
+    return 0
+
+
+def _submitted(args: argparse.Namespace) -> str:
+    """Put the houses on the farm; the job's id, "" after a dry run."""
     from pbrs_farm.run.dressed_house import uses_catalogue
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
@@ -85,11 +109,13 @@ def _submit(args: argparse.Namespace) -> int:
             echo_json(plan)
         else:
             echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
-        return 0
+        return ""
     # Fail before anything is uploaded where Redis does not answer or no worker has the store.
     farm = farm_of(args)
     farm.ledger.ping()
     farm.check_store()
+    for before in spec.after:
+        farm.view(before)
     for line in farm.check_plugins(needed_plugins(refs, spec.recipe, spec.layers)):
         warn(line)
     if any(uses_catalogue(ref, spec.recipe) for ref in refs):
@@ -101,12 +127,34 @@ def _submit(args: argparse.Namespace) -> int:
     job = farm.submit(houses, spec, update=args.update)
     if args.json:
         echo_json({"job": job.job_id, "houses": job.n_houses, "was": job.was})
-        return 0
+        return job.job_id
     # The same homes and recipe are the same job.
     if job.was:
         warn(f"this job is there already, {job.was}")
     echo(job.job_id)
-    return 0
+    return job.job_id
+
+
+def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
+    """Submit what a job.toml says; with a table pack, wait for the job's end and pack its views."""
+    file = args.homes[0]
+    words = submit_words(job, args.parser, file)
+    chosen = args.parser.parse_args(words)
+    chosen.store, chosen.json = args.store or chosen.store, args.json
+    chosen.dry_run = args.dry_run or chosen.dry_run
+    pack = option_words(job.get("pack", {}), file)
+    name = _submitted(chosen)
+    if not pack or not name:
+        return 0
+    farm = farm_of(chosen)
+    warn(f"packing when job {name} is done; this command may be ended and begun again")
+    while (state := farm.view(name).outcome) not in ("done", WITH_FAILURES):
+        if state == "cancelled":
+            raise BadInput(name, "", "was cancelled: nothing is packed")
+        time.sleep(2.0)
+    selected = ["--selection", name] if job.get("select", {}).get("reference") else []
+    command = [sys.executable, "-m", "pbrs_farm.cli", "pack", farm.store.url, *selected, *pack]
+    return subprocess.run(command, check=False).returncode
 
 
 def _warn_of_paths(in_place: Sequence[str]) -> None:
@@ -125,6 +173,9 @@ def _spec(args: argparse.Namespace) -> JobSpec:
     from workers.node.house_runner import batch_stages
 
     at_least("--slots", args.slots, 1)
+    at_least("--max-slots", args.max_slots, 0)
+    if not 0 <= args.budget < math.inf:
+        raise BadInput("--budget", args.budget, "expected slot-hours, 0 or more")
     want = wanted(args.modes, args.layers, views_wanted(args))
     recipe = recipe_of(args)
     return new_spec(
@@ -134,6 +185,9 @@ def _spec(args: argparse.Namespace) -> JobSpec:
         n_views=want.n_views,
         gpu=args.gpu,
         priority=args.priority,
+        max_slots=args.max_slots,
+        budget_h=args.budget,
+        after=tuple(check_job_id(job) for job in args.after),
         batch_stages=batch_stages(want),
         seconds_per_view=seconds_per_view(recipe),
     )

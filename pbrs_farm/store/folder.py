@@ -95,7 +95,10 @@ class FolderStore:
     def head(self, key: str) -> Head | None:
         path = self._path(key)
         try:
-            return Head(n_bytes=path.stat().st_size) if path.is_file() else None
+            if not path.is_file():
+                return None
+            status = path.stat()
+            return Head(n_bytes=status.st_size, modified_s=status.st_mtime)
         except OSError as error:
             raise self._failure(key, error) from error
 

@@ -33,6 +33,7 @@ class Head:
     """What a store knows about an object that it has not read."""
 
     n_bytes: int
+    modified_s: float = 0.0  # since 1970, by the store's clock; 0 where it keeps none
 
 
 class Store(Protocol):

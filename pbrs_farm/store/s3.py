@@ -123,7 +123,7 @@ class S3Store:
             found = self._call(key, lambda _tries: self._obstore.head(self._client, key))
         except ObjectMissing:
             return None
-        return Head(n_bytes=int(found["size"]))
+        return Head(n_bytes=int(found["size"]), modified_s=found["last_modified"].timestamp())
 
     def list(self, prefix: str = "") -> Iterator[str]:
         check_prefix(prefix)

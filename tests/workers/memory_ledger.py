@@ -39,6 +39,8 @@ class MemoryLedger:
     leader: str = ""
     reaped: int = 0
     fields: dict[str, str] = field(default_factory=lambda: {"recipe": "r", "state": "running"})
+    seconds: dict[str, float] = field(default_factory=dict)  # stage -> of tasks that are done
+    others: dict[str, str] = field(default_factory=dict)  # another job -> its state
     lengths: Counter[str] = field(default_factory=Counter)  # of the queues
 
     def _answer(self) -> None:
@@ -62,7 +64,8 @@ class MemoryLedger:
         raise NotImplementedError
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
-        raise NotImplementedError
+        self.fields |= {"state": "paused", "reason": reason} if what == "pause" else {}
+        return self.fields["state"]
 
     def retry(self, job: str, task: str) -> bool:
         raise NotImplementedError
@@ -142,7 +145,12 @@ class MemoryLedger:
         return [t for t in self.queued if t.endswith(f"/{stage}")]
 
     def view(self, job: str) -> JobView | None:
-        counts = Counter(f"{task.rpartition('/')[2]}:q" for task in self.queued)
+        if job != "0" * 12:
+            state = self.others.get(job)
+            return None if state is None else JobView(job, {"state": state}, {}, {}, 0)
+        counts: dict[str, float] = Counter(f"{task.rpartition('/')[2]}:q" for task in self.queued)
+        counts |= Counter(f"{task.rpartition('/')[2]}:w" for task in self.ready)
+        counts |= {f"seconds:{stage}": n for stage, n in self.seconds.items()}
         return JobView(job, self.fields, counts, {}, 0)
 
     def set_told(self, job: str, outcome: str) -> None:

@@ -323,6 +323,7 @@ class Farm:
             "reason": view.fields.get("reason", ""),
             "recipe": view.fields.get("recipe_name", ""),
             "priority": priority_of(view),
+            "waits_for": [j for j in view.after if not self._is_done(j)],
             "houses": {
                 "total": int(view.fields.get("n_houses", 0)),
                 "waiting": view.n_waiting_houses,
@@ -342,6 +343,10 @@ class Farm:
             ],
             "storage": self.registry.breaker() or "ok",
         }
+
+    def _is_done(self, job: str) -> bool:
+        view = self.ledger.view(job)
+        return view is not None and view.state == "done"
 
     def explain(self, job: str, text: str) -> list[dict[str, Any]]:
         """What is known of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
@@ -429,6 +434,21 @@ class Farm:
         # A job that is recovered keeps it; who only steers may do without a store.
         if self.config.store_url:
             spec = self.spec(job).model_copy(update={"priority": priority})
+            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+        return state
+
+    def limit(
+        self, job: str, *, max_slots: int | None = None, budget_h: float | None = None
+    ) -> str:
+        """Give a job another ceiling of tasks in flight or of slot-hours (0 = none); its state."""
+        given = {"max_slots": max_slots, "budget_h": budget_h}
+        chosen = {name: n for name, n in given.items() if n is not None}
+        if not chosen:
+            raise BadInput("limit", "", "nothing to change", hint="--max-slots N, --budget HOURS")
+        for name, number in chosen.items():
+            state = self._steer(job, name, f"{number:g}")
+        if self.config.store_url:
+            spec = self.spec(job).model_copy(update=chosen)
             self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
         return state
 

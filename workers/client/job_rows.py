@@ -27,7 +27,6 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
     is_over = view.state not in ("loading", "running", "paused")
     # Tasks that are left, running ones too, times the mean of those done.
     left_s = sum(s.mean_s * max(0, s.total - s.done - s.failed) for s in stages)
-    seconds = sum(n for name, n in view.counts.items() if name.startswith("seconds:"))
     return {
         "job": view.job_id,
         "state": view.outcome,
@@ -42,7 +41,7 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
         if is_over
         else max((s.eta_s for s in stages if s.eta_s is not None), default=None),
         "failed": view.n_failed,
-        "slot_hours": round(seconds / 3600, 4),
+        "slot_hours": round(view.spent_h, 4),
         "slot_hours_left": 0.0 if is_over else round(left_s / 3600, 4),
         "done": sum(s.done for s in stages),
         "running": sum(s.running for s in stages),

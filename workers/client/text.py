@@ -44,6 +44,8 @@ def status_text(status: Mapping[str, Any]) -> str:
             lines.append(f"{text}: {counts}")
     if status["state"] == WITH_FAILURES:
         lines.append(f"`pbrs-farm failures {status['job']}` says what failed")
+    if status.get("waits_for"):
+        lines.append(f"begins when {', '.join(status['waits_for'])} is done")
     lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
     if status["storage"] != "ok":
         lines.append(f"storage: {status['storage']}")

@@ -53,6 +53,7 @@ _REAP_EVERY_S: Final = 5.0
 _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
 _NOTICE_EVERY_S: Final = 10.0
+_LIMITS_EVERY_S: Final = 1.0
 _AHEAD_S: Final = 20.0  # of work on a queue; a standby leads after 15
 _WITHOUT_SLOTS: Final = 8  # messages of a stage that nobody takes yet
 
@@ -88,6 +89,7 @@ class Coordinator:
         self._slots: dict[str, int] = {}  # stage -> tasks the workers can run at once
         self._rates = Rates()
         self._shares = Shares()
+        self._waiting: set[str] = set()  # jobs that follow others
         self.leading = False
 
     def run(self, stop: threading.Event) -> None:
@@ -134,15 +136,37 @@ class Coordinator:
         # While storage is unhealthy nothing is sent: it could only fail.
         if self._registry.breaker():
             return 0
-        n_sent = self._dispatch(views)
+        if self._is_due("limits", _LIMITS_EVERY_S):
+            self._waiting = {view.job_id for view in views if self._waits(view)}
+            for view in views:
+                self._keep_budget(view)
+        n_sent = self._dispatch([v for v in views if v.job_id not in self._waiting])
         if self._is_due("resend", _RESEND_EVERY_S):
             n_sent += self._resend(views)
         return n_sent
+
+    def _waits(self, view: JobView) -> bool:
+        """Whether a job follows others that are not done; pauses it where they never will be."""
+        for job in view.after:
+            before = self._ledger.view(job)
+            state = before.state if before is not None else "unknown"
+            if state in ("cancelled", "unknown") and view.state == "running":
+                self._ledger.steer(view.job_id, "pause", f"follows job {job}, which is {state}")
+            if state != "done":
+                return True
+        return False
+
+    def _keep_budget(self, view: JobView) -> None:
+        """Pause a job that has spent its slot-hours; what runs, ends."""
+        if view.budget_h and view.spent_h >= view.budget_h and view.state == "running":
+            reason = f"its budget of {view.budget_h:g} slot-hours is spent"
+            self._ledger.steer(view.job_id, "pause", f"{reason}; `pbrs-farm limit` raises it")
 
     def _dispatch(self, views: list[JobView]) -> int:
         """Send what there is room for, by the jobs' priorities; how many messages."""
         room = self._room(views)
         given = self._shares.split(room, views)
+        left = {v.job_id: _left_of(v) for v in views}  # of a job's own ceiling
         spare = {s: n - sum(own[s] for own in given.values()) for s, n in room.items()}
         # Each job its share and what those before it left; then what is still free to whoever has
         # more: a ready task may be waiting for its time, and one may have become ready meanwhile.
@@ -151,11 +175,12 @@ class Coordinator:
             limited = []
             for view in rest:
                 may_send = {s: n + spare[s] for s, n in allowed[view.job_id].items()}
-                n_by_lane = self._send_of(view, may_send)
+                n_by_lane = self._send_of(view, _within(may_send, view, left[view.job_id]))
                 if n_by_lane is None:
                     self.leading = False
                     return n_sent
                 n_sent += n_by_lane.total()
+                left[view.job_id] -= n_by_lane.total()
                 spare = {s: n - n_by_lane[s] for s, n in may_send.items()}
                 if any(n_by_lane[s] == n and n_ready(view, s) > n for s, n in may_send.items()):
                     limited.append(view)
@@ -251,6 +276,26 @@ class Coordinator:
             return False
         self._due[what] = now + every_s
         return True
+
+
+def _left_of(view: JobView) -> float:
+    """How many more tasks of a job may be in flight."""
+    if not view.max_slots:
+        return math.inf
+    return max(
+        0, view.max_slots - sum(n for at, n in view.counts.items() if at[-2:] in (":q", ":r"))
+    )
+
+
+def _within(may_send: dict[str, int], view: JobView, most: float) -> dict[str, int]:
+    """Lane -> tasks that may be sent, together at most so many; the last stages first."""
+    if math.isinf(most):
+        return may_send
+    allowed = dict.fromkeys(may_send, 0)
+    for lane in reversed(LEASES):
+        allowed[lane] = min(may_send[lane], n_ready(view, lane), int(most))
+        most -= allowed[lane]
+    return allowed
 
 
 def _by_stage(tasks: Iterable[str]) -> dict[str, list[TaskId]]:

@@ -136,6 +136,9 @@ class RedisLedger:
             "stages": ",".join(spec.batch_stages),
             "priority": spec.priority,
             "gpu": int(spec.gpu),
+            "max_slots": spec.max_slots,
+            "budget_h": spec.budget_h,
+            "after": ",".join(spec.after),
             "max_attempts": rules.max_attempts,
             "failed_share": rules.failed_share,
             "max_quarantined": rules.max_quarantined,
@@ -203,7 +206,7 @@ class RedisLedger:
                 self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
-        """pause, resume, cancel, reduce, or priority, whose number is the reason.
+        """pause, resume, cancel, reduce, or priority, max_slots, budget_h, whose number is the reason.
 
         The state afterwards, "" for an unknown job.
         """

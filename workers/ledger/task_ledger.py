@@ -143,6 +143,26 @@ class JobView:
         return self.fields.get("gpu") == "1"
 
     @property
+    def max_slots(self) -> int:
+        """Tasks of it that may be in flight at once, 0 for as many as there are slots."""
+        return int(self.fields.get("max_slots") or 0)
+
+    @property
+    def budget_h(self) -> float:
+        """Slot-hours it may spend, 0 for any."""
+        return float(self.fields.get("budget_h") or 0.0)
+
+    @property
+    def spent_h(self) -> float:
+        """Slot-hours of its tasks that are done."""
+        return sum(n for name, n in self.counts.items() if name.startswith("seconds:")) / 3600
+
+    @property
+    def after(self) -> tuple[str, ...]:
+        """Jobs that must be done before it begins."""
+        return tuple(filter(None, self.fields.get("after", "").split(",")))
+
+    @property
     def n_failed(self) -> int:
         """Tasks that failed for good."""
         return int(sum(self.counts.get(f"{s}:{STATES['FAILED']}", 0) for s in STAGES))

@@ -140,3 +140,46 @@ def test_short_tasks_of_one_house_go_in_one_message_as_long_as_each_slot_gets_so
     # Long ones, and those of which nobody knows yet, go one by one.
     assert all("," not in task for task in sent if not task.endswith("gl"))
     assert len([task for task in sent if task.endswith("light")]) > 0
+
+
+def test_a_job_s_ceiling_bounds_what_is_in_flight(bench: Bench) -> None:
+    bench.ledger.fields["max_slots"] = "2"
+    bench.registry.n_slots = {"gl": 50, "light": 50}
+    bench.ledger.ready = [f"h0/{k}/gl" for k in range(5)]
+    assert bench.coordinator.turn() == 2
+    bench.clock.now += 2
+    assert bench.coordinator.turn() == 0
+    bench.ledger.queued.clear()
+    assert bench.coordinator.turn() == 2
+
+
+def test_a_job_that_has_spent_its_budget_pauses_itself(bench: Bench) -> None:
+    bench.ledger.fields["budget_h"] = "0.5"
+    bench.ledger.seconds["light"] = 1799.0
+    bench.coordinator.turn()
+    assert bench.ledger.fields["state"] == "running"
+    bench.ledger.seconds["light"] = 1800.0
+    bench.clock.now += 5
+    bench.coordinator.turn()
+    assert bench.ledger.fields["state"] == "paused"
+    assert "0.5 slot-hours" in bench.ledger.fields["reason"]
+
+
+@pytest.mark.parametrize(
+    ("before", "sent", "state"),
+    [
+        ("done", 1, "running"),
+        ("running", 0, "running"),
+        ("paused", 0, "running"),
+        ("cancelled", 0, "paused"),
+        (None, 0, "paused"),
+    ],
+)
+def test_a_job_follows_another_one(bench: Bench, before: str | None, sent: int, state: str) -> None:
+    bench.ledger.fields["after"] = "b" * 12
+    bench.ledger.ready = ["h0/-/geometry"]
+    bench.ledger.others = {} if before is None else {"b" * 12: before}
+    assert bench.coordinator.turn() == sent
+    assert bench.ledger.fields["state"] == state
+    if state == "paused":
+        assert "b" * 12 in bench.ledger.fields["reason"]

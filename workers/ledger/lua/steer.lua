@@ -1,10 +1,12 @@
--- pause, resume, cancel, reduce, priority. ARGV: what, reason (priority: the number)
+-- pause, resume, cancel, reduce, priority, max_slots, budget_h. ARGV: what, reason (of the last three: the number)
 -- -> the job's state afterwards, "" if unknown
 local state = job_field('state')
 if not state then return '' end
 if ARGV[1] == 'pause' then
   pause_job(ARGV[2])
 elseif ARGV[1] == 'resume' and state == 'paused' then
+  -- Whoever resumes a job that waits for another one does not want it to wait.
+  hdel(P .. 'job', 'after')
   hset(P .. 'job', 'state', 'running')
   hset(P .. 'job', 'reason', '')
 elseif ARGV[1] == 'cancel' and state ~= 'done' then
@@ -15,6 +17,8 @@ elseif ARGV[1] == 'cancel' and state ~= 'done' then
   for _, stage in ipairs(STAGES) do
     redis.call('DEL', P .. 'out:' .. stage)
   end
+elseif ARGV[1] == 'max_slots' or ARGV[1] == 'budget_h' then
+  hset(P .. 'job', ARGV[1], ARGV[2])
 elseif ARGV[1] == 'priority' then
   -- The coordinator reads it at its next turn; a job that is over keeps it for a retry.
   hset(P .. 'job', 'priority', ARGV[2])

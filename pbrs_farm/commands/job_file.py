@@ -1,0 +1,76 @@
+"""A job of the farm as one file: homes, and the options of submit, select and pack. Effect: reads it.
+
+homes = ["made:1..50", "flat.sh3d"]
+[render]              # options of submit
+recipe = "fast"
+views = 6
+max-slots = 40
+[select]              # which views look like photographs, when all are made
+reference = "nyu.npz"
+[pack]                # options of pack, done by this command when the job is done
+out = "shards"
+"""
+
+from __future__ import annotations
+
+import argparse
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.regular_files import text_given
+
+_TABLES = ("render", "select", "pack")
+
+
+def job_file(words: list[str]) -> dict[str, Any] | None:
+    """The job that a command's one word names, None where it names homes. Raises BadInput."""
+    if len(words) != 1 or not words[0].endswith(".toml") or not Path(words[0]).is_file():
+        return None
+    try:
+        job = tomllib.loads(text_given(Path(words[0])))
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        raise BadInput(words[0], "", f"is no TOML: {error}") from None
+    # A programme of a made home is TOML, too; it names no homes.
+    if "homes" not in job:
+        return None
+    homes = job["homes"]
+    if not isinstance(homes, list) or not homes or any(not isinstance(h, str) for h in homes):
+        raise BadInput(words[0], "homes", "expected a list of homes")
+    for name, table in job.items():
+        if name != "homes" and (name not in _TABLES or not isinstance(table, dict)):
+            hint = did_you_mean(name, [*_TABLES, "homes"]) or f"[{'], ['.join(_TABLES)}]"
+            raise BadInput(words[0], name, "is no table of a job", hint=hint)
+    return job
+
+
+def submit_words(job: Mapping[str, Any], parser: argparse.ArgumentParser, file: str) -> list[str]:
+    """The words of submit that the job's homes and tables render and select stand for."""
+    options = option_words({**job.get("render", {}), **job.get("select", {})}, file, parser)
+    return [*options, "--", *job["homes"]]
+
+
+def option_words(
+    table: Mapping[str, Any], file: str, parser: argparse.ArgumentParser | None = None
+) -> list[str]:
+    """A table's entries as options: true is a flag, a list is many words. Raises BadInput."""
+    known = parser._option_string_actions if parser is not None else {}
+    words: list[str] = []
+    for name, value in table.items():
+        option = f"--{name.replace('_', '-')}"
+        action = known.get(option)
+        if parser is not None and action is None:
+            raise BadInput(file, name, "no such option", hint=did_you_mean(option, known))
+        values = [str(v) for v in value] if isinstance(value, list) else [str(value)]
+        if isinstance(value, dict):
+            raise BadInput(file, name, "expected a value, not a table")
+        if isinstance(value, bool):
+            words += [option] if value else []
+        elif isinstance(action, argparse._AppendAction):
+            words += [word for v in values for word in (option, v)]
+        else:
+            words += [option, *values]
+    return words

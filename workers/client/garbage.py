@@ -1,0 +1,140 @@
+"""What a farm's store holds and nobody needs: found first, told, and removed only then.
+
+Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Nothing of a job
+that is loading, running or paused is touched, nor anything younger than the time that is kept.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, Final, Literal
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.store.object_store import Store, get_or_none
+from workers.ids import job_key
+from workers.job import houses_from_lines
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
+
+Kind = Literal["logs", "cancelled jobs", "named by no manifest"]
+_UNITS: Final = {"d": 86_400.0, "h": 3600.0, "w": 7 * 86_400.0}
+_KEEP: Final = re.compile(r"(\d{1,4})([dhw])")
+_LIVE: Final = ("loading", "running", "paused")
+
+
+@dataclass(frozen=True, slots=True)
+class Garbage:
+    """Objects of one kind."""
+
+    kind: Kind
+    found: tuple[str, ...]  # their keys
+    n_bytes: int
+
+
+def keep_from_text(text: str) -> float:
+    """Seconds of "30d", "12h", "2w". Raises BadInput for what is none."""
+    match = _KEEP.fullmatch(text)
+    if match is None:
+        raise BadInput("--keep", text, "no time", hint="30d, 12h or 2w")
+    return int(match[1]) * _UNITS[match[2]]
+
+
+def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
+    """What may go, by kind. now_s: seconds since 1970, by the clock of the store's objects."""
+    store = farm.store
+    states = {job: _state(farm, job) for job in _jobs(store)}
+    is_old = _older_than(store, now_s - keep_s)
+    logs = _logs(store, [job for job, state in states.items() if state not in _LIVE])
+    cancelled = _files_of(store, [job for job, state in states.items() if state == "cancelled"])
+    working = {house for job, s in states.items() if s in _LIVE for house in _houses(store, job)}
+    found: list[tuple[Kind, Iterable[str]]] = [
+        ("cancelled jobs", cancelled),
+        ("logs", logs),
+        ("named by no manifest", _unnamed(store, working)),
+    ]
+    # An object counts once, under the first kind that has it.
+    seen: set[str] = set()
+    kinds = []
+    for kind, candidates in found:
+        old = {k: n for k in candidates if k not in seen and (n := is_old(k)) is not None}
+        seen |= old.keys()
+        kinds.append(Garbage(kind, tuple(sorted(old)), sum(old.values())))
+    return kinds
+
+
+def remove(farm: Farm, found: Iterable[Garbage]) -> int:
+    """Delete what was found, and forget cancelled jobs of which nothing is left; how many objects."""
+    n = 0
+    for kind in found:
+        for key in kind.found:
+            farm.store.delete(key)
+            n += 1
+        if kind.kind == "cancelled jobs":
+            for job in {key.split("/")[1] for key in kind.found}:
+                # Half of it may be younger: then it stays, and so does what is known of it.
+                if next(iter(farm.store.list(f"jobs/{job}/")), None) is None:
+                    farm.ledger.forget(job)
+    return n
+
+
+def _jobs(store: Store) -> list[str]:
+    ends = (key.split("/") for key in store.list("jobs/"))
+    return sorted({parts[1] for parts in ends if len(parts) == 3 and parts[2] == "job.json"})
+
+
+def _state(farm: Farm, job: str) -> str:
+    """The job's state in the ledger; "lost" where the ledger does not know it."""
+    view = farm.ledger.view(job)
+    return "lost" if view is None else view.state
+
+
+def _older_than(store: Store, oldest_s: float) -> Callable[[str], int | None]:
+    """Key -> its bytes where it was last written before that time, else None."""
+
+    def size(key: str) -> int | None:
+        head = store.head(key)
+        return None if head is None or head.modified_s >= oldest_s else head.n_bytes
+
+    return size
+
+
+def _logs(store: Store, jobs: Iterable[str]) -> Iterator[str]:
+    for job in jobs:
+        yield from store.list(job_key(job, "logs/"))
+
+
+def _files_of(store: Store, jobs: Iterable[str]) -> Iterator[str]:
+    for job in jobs:
+        yield from store.list(f"jobs/{job}/")
+
+
+def _houses(store: Store, job: str) -> list[str]:
+    data = get_or_none(store, job_key(job, "houses.jsonl")) or b""
+    return [entry.house_id for entry in houses_from_lines(data)]
+
+
+def _unnamed(store: Store, working: set[str]) -> Iterator[str]:
+    """Objects of houses that no job works on and their own manifest does not name."""
+    for root in keys.FOLDERS:
+        found = (key for key in store.list(f"{root}/") if key.count("/") >= 2)
+        for house, group in groupby(sorted(found), key=lambda key: key.split("/")[1]):
+            if house in working:
+                continue
+            manifest = get_or_none(store, keys.house_key(house, keys.MANIFEST))
+            named = _named(manifest) if manifest is not None else set()
+            named.add(keys.house_key(house, keys.MANIFEST))
+            done = keys.house_key(house, "done/")
+            for key in group:
+                # Markers of a house with a manifest are what the manifest was made from.
+                if key not in named and not (manifest is not None and key.startswith(done)):
+                    yield key
+
+
+def _named(manifest: bytes) -> set[str]:
+    return {str(json.loads(line)["key"]) for line in manifest.splitlines()}
