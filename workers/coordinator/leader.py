@@ -27,6 +27,7 @@ from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.store import store_from_url
 from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, config_from_environment, make_scratch
+from workers.coordinator.farm_alerts import FarmAlerts
 from workers.coordinator.progress_rates import Rates, mean_s
 from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
 from workers.ids import LEASES, STAGES, TaskId, group_text, lane_of, queue_of, task_from_text
@@ -343,7 +344,13 @@ def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
     if not config.webhook.reveal():
         return lambda: None
 
-    return watch_jobs(Webhook(ledger, poster(config.webhook)), ledger)
+    post, registry = poster(config.webhook), Registry(ledger)
+    alerts = FarmAlerts(post)
+
+    def look_at(views: list[JobView]) -> None:
+        alerts.look(views, registry.workers(), registry.breaker())
+
+    return watch_jobs(Webhook(ledger, post), ledger, look_at)
 
 
 def main() -> int:
@@ -467,8 +474,12 @@ def poster(url: Secret) -> Post:
     return post
 
 
-def watch_jobs(webhook: Webhook, ledger: Ledger) -> Callable[[], None]:
+def watch_jobs(
+    webhook: Webhook, ledger: Ledger, look_at: Callable[[list[JobView]], None] = lambda _views: None
+) -> Callable[[], None]:
     """What the leader calls now and then: a look at the newest jobs, in a thread of its own.
+
+    look_at: is shown the same jobs.
 
     A URL that does not answer holds up no task; while one look lasts no other begins.
     """
@@ -478,7 +489,9 @@ def watch_jobs(webhook: Webhook, ledger: Ledger) -> Callable[[], None]:
     def look() -> None:
         try:
             known = ledger.known_jobs()[-_NEWEST:]
-            webhook.look([v for job in known if (v := ledger.view(job)) is not None])
+            views = [v for job in known if (v := ledger.view(job)) is not None]
+            webhook.look(views)
+            look_at(views)
         except LedgerUnavailable as error:
             _webhook_log.warning("no notice: %s", error)
         finally:

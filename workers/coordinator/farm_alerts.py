@@ -1,0 +1,96 @@
+"""What a person on call wants to be told of a farm while its jobs run: found by looking again and again.
+
+Effect: the clock's. Failure rates, workers that died, queues that do not move, a store in trouble. The
+leader looks; a new one begins afresh, so what goes on may be told once more.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from workers.ledger.task_ledger import JobView, WorkerView
+
+_WINDOW_S: Final = 600.0  # over which failures are counted
+_MOST_FAILED: Final = 0.2  # of the attempts that ended in it
+_LEAST_ATTEMPTS: Final = 10  # that ended in it: fewer say nothing
+_STUCK_S: Final = 1800.0  # tasks wait and none ends
+_STORE_S: Final = 60.0  # that the store is in trouble before it is told
+_LOST_S: Final = 3600.0  # a worker that died longer ago is history
+
+
+@dataclass(slots=True)
+class _Seen:
+    """A job as the last looks saw it."""
+
+    ended: deque[tuple[float, float, float]]  # time, attempts failed, tasks done
+    moved_at: float  # when a task ended last, or nothing waited
+
+
+class FarmAlerts:
+    """Tells what begins to be wrong, once each, and when it is over. post: may raise OSError."""
+
+    def __init__(
+        self, post: Callable[[dict[str, Any]], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._post, self._clock = post, clock
+        self._jobs: dict[str, _Seen] = {}
+        self._trouble_at: float | None = None  # since when the store is in trouble
+        self._told: dict[str, str] = {}  # alert -> what was said of it
+
+    def look(self, views: Sequence[JobView], workers: Iterable[WorkerView], breaker: str) -> None:
+        """Compare with what was seen before. breaker: why claims are stopped, or ""."""
+        now = self._clock()
+        found: dict[str, str] = {}
+        for view in views:
+            found |= self._of_job(view, now)
+        for worker in workers:
+            if worker.state == "dead" and worker.age_s < _LOST_S:
+                since = f"silent for {worker.age_s:.0f} s; its tasks go to others"
+                found[f"lost worker {worker.name}"] = since
+        self._trouble_at = None if not breaker else self._trouble_at or now
+        if self._trouble_at is not None and now - self._trouble_at >= _STORE_S:
+            found["store"] = breaker
+        # A job that is gone ends its alerts, too.
+        self._jobs = {v.job_id: self._jobs[v.job_id] for v in views}
+        for name in found.keys() - self._told.keys():
+            self._tell(name, "begins", found[name])
+        for name in self._told.keys() - found.keys():
+            self._tell(name, "over", self._told[name])
+
+    def _of_job(self, view: JobView, now: float) -> dict[str, str]:
+        done = sum(n for name, n in view.counts.items() if name.startswith("done:"))
+        failed = sum(n for name, n in view.counts.items() if name.startswith("failures:"))
+        seen = self._jobs.setdefault(view.job_id, _Seen(deque([(now, failed, done)]), now))
+        found = {}
+        # Attempts that ended within the window.
+        while len(seen.ended) > 1 and seen.ended[0][0] < now - _WINDOW_S:
+            seen.ended.popleft()
+        n_failed, n_done = failed - seen.ended[0][1], done - seen.ended[0][2]
+        n_ended = n_failed + n_done
+        if n_ended >= _LEAST_ATTEMPTS and n_failed > _MOST_FAILED * n_ended:
+            said = f"{n_failed:.0f} of {n_ended:.0f} attempts of the last minutes failed"
+            found[f"failures of job {view.job_id}"] = said
+        # Tasks wait, the job runs, and nothing ends.
+        waiting = sum(n for name, n in view.counts.items() if name[-2:] in (":w", ":q"))
+        if view.state != "running" or not waiting or done + failed != sum(seen.ended[-1][1:]):
+            seen.moved_at = now
+        elif now - seen.moved_at >= _STUCK_S:
+            said = f"{waiting:.0f} tasks wait and none has ended for {(now - seen.moved_at) / 60:.0f} minutes"
+            found[f"stuck job {view.job_id}"] = said
+        seen.ended.append((now, failed, done))
+        return found
+
+    def _tell(self, name: str, state: str, said: str) -> None:
+        text = f"pbrs_farm: {name} {'is over' if state == 'over' else f'- {said}'}"
+        try:
+            self._post({"alert": name, "state": state, "reason": said, "text": text})
+        except (OSError, ValueError):
+            return  # tried again at the next look
+        if state == "over":
+            del self._told[name]
+        else:
+            self._told[name] = said
