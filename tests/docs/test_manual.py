@@ -65,6 +65,13 @@ def test_every_field_that_a_page_names_is_one_of_the_recipe(page: Path) -> None:
     assert [f for f in named if f not in known and not f.endswith(endings)] == []
 
 
+def test_every_page_that_the_code_names_exists() -> None:
+    for folder in ("pbrs_farm", "workers"):
+        for path in (REPO / folder).rglob("*.py"):
+            for page in re.findall(r"\bdocs/[a-z_/]+\.md", path.read_text(encoding="utf-8")):
+                assert (REPO / page).exists(), f"{path}: {page}"
+
+
 def test_readme_has_at_most_110_lines() -> None:
     assert len((REPO / "README.md").read_text(encoding="utf-8").splitlines()) <= 110
 
