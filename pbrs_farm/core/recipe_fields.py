@@ -70,6 +70,9 @@ class DressFields(FieldGroup):
     walls: Share = Field(1.0, description="of pictures, mirrors, clocks, sockets and switches")
     textiles: Share = Field(1.0, description="of curtains, blinds, rugs, pillows, blankets")
     lamps: Share = Field(1.0, description="of rooms without a lamp that get one")
+    mess: Share = Field(
+        0.3, description="how little was tidied up: chairs, beds, tables, clothes, pictures"
+    )
     style: str = Field("", max_length=64, description="every home's; empty = drawn by the seed")
     furnish: Literal["none", "empty"] = Field(
         "none", description="rooms that get furniture first: `empty` = those that have none"

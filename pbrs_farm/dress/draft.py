@@ -125,9 +125,10 @@ CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item
 class Draft:
     """The house being dressed. Items keep their order; what is added comes after them."""
 
-    def __init__(self, house: House, seed: int) -> None:
+    def __init__(self, house: House, seed: int, mess: float = 0.0) -> None:
         self.source = house
         self.seed = seed
+        self.mess = mess  # 0..1: how little people have tidied up
         self.items: list[Item] = list(house.items)
         self.materials = DraftMaterials(house.materials, house.textures)
         self.notes: list[Note] = []

@@ -24,6 +24,7 @@ from pbrs_farm.dress.finishes import parts
 from pbrs_farm.dress.furniture import furniture
 from pbrs_farm.dress.gates import group_of, keep_gates, kept_as_rendered, part_of, piece_id
 from pbrs_farm.dress.lamps import lamps
+from pbrs_farm.dress.mess import chairs, pictures
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import surfaces
@@ -38,6 +39,7 @@ _FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
     ("surfaces", surfaces),
     ("swap", swap),
     ("furniture", furniture),
+    ("mess", chairs),
 )
 """Field of the recipe that holds the part's share, and the part, in the order they are done."""
 
@@ -47,6 +49,7 @@ _THINGS: Final[tuple[tuple[str, Part], ...]] = (
     ("lamps", lamps),
     ("textiles", textiles_large),
     ("walls", walls),
+    ("mess", pictures),
     ("clutter", clutter),
 )
 """The same of what is done when it is known which furniture stays."""
@@ -75,7 +78,7 @@ class Dressed(NamedTuple):
 
 def dressed_house(house: House, catalogue: Catalogue, fields: DressFields, seed: int) -> Dressed:
     """As dress, with what kept_in needs."""
-    with closing(Draft(house, seed)) as draft:
+    with closing(Draft(house, seed, fields.mess)) as draft:
         return Dressed(*_dressed(draft, catalogue, fields), draft.used, len(house.items))
 
 

@@ -18,13 +18,15 @@ from pbrs_farm.core.classes import BED, CHAIR, SOFA
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.walkable import CELL_M
-from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat
+from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_throw
+from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat, find_seat
 from pbrs_farm.dress.clutter.placing import (
     LIFT_M,
     Placing,
     Stock,
     TopSpot,
     Worktop,
+    apart,
     can_hold,
     is_round,
     receptacle_of,
@@ -54,6 +56,7 @@ _MOST_IN_ROOM = 4
 _ANOTHER = 0.35  # chance of one more of the kind
 _FULL = 0.45  # no more is put where less than this share of the surface is free
 _MOST_FACTOR = 1.6
+_LEFT_M, _NAPKINS, _NAPKIN_M = 0.025, 0.6, 0.12  # after a meal: how far aside; napkins
 _CHAIR_M = 0.6  # from a chair's middle to the table it belongs to
 
 _Kinds = tuple[tuple[str, float], ...]
@@ -92,8 +95,12 @@ def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[
     return put_all(placing, top, wanted)
 
 
-def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64]) -> int:
-    """Lay a place before each chair (plan points (2,)): a plate, a glass to its right; how many."""
+def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: SceneTriangles) -> int:
+    """Lay a place before each chair (plan points (2,)): a plate, a glass to its right; how many.
+
+    After a meal things stand where hands left them, and a napkin lies beside a plate.
+    """
+    rng, is_eaten = placing.rng, placing.rng.random() < placing.draft.mess
     plate = placing.stock.take(placing.rng, "one_plate", placing.style)
     glass = placing.stock.take(placing.rng, "glass", placing.style)
     if plate is None or glass is None:
@@ -110,8 +117,15 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64]) -> int:
         inward = inward / np.linalg.norm(inward)
         right = np.array([-inward[1], inward[0]])
         at = edge + inward * (plate[0].size[0] / 2 + 0.03)
-        n += placing.drop_near(top, plate, at)
-        n += placing.drop_near(top, glass, at + inward * 0.1 + right * 0.17)
+        aside = rng.normal(0, _LEFT_M, (2, 2)) if is_eaten else np.zeros((2, 2))
+        turned = float(rng.normal(0, 0.6)) if is_eaten else 0.0
+        n += placing.drop_near(top, plate, at + aside[0], turn_rad=turned)
+        n += placing.drop_near(top, glass, at + inward * 0.1 + right * 0.17 + aside[1])
+        if is_eaten and rng.random() < _NAPKINS:
+            place = at - right * 0.22 + inward * 0.02
+            if top.is_free(place, _NAPKIN_M):
+                drop_clothes(placing, scene, place, top.height, napkin=True)
+                n += 1
     return n
 
 
@@ -150,6 +164,7 @@ def _taken(placing: Placing, kind: str) -> Made | None:
 
 _WALK_M = 0.65  # the width of a way, with something to spare
 _REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
+_NEAR_WALLS_M = 0.5  # of a room: farther ones are not its own
 _AT_WALL_M = 0.12  # beyond its own radius, of what stands at walls
 _KEPT_M = 0.04  # between things
 _DOOR_M = 1.0  # kept free before doors
@@ -165,7 +180,6 @@ class _Floor:
     grid: PlanGrid  # of the same cells
     free: Bools  # nothing stands there, no door needs it
     walkable: Bools  # nothing stands there
-    inside: Bools  # in the room and in no wall
     has_ways: bool  # one way joins the room's doors
 
 
@@ -188,6 +202,8 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     n = 0
     for kind in wanted:
         made = placing.stock.take(rng, kind, placing.style)
+        if made is not None and kind == "shoes":
+            made = apart(made, rng, placing.draft.mess)
         if made is not None:
             n += _put(placing, floor, made, at_wall=kind in _FILE.at_walls)
     return n
@@ -218,7 +234,7 @@ def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor 
         zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
         kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
     joined = doors_are_joined(bitmap, room)
-    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, inside, joined)
+    return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
 
 
 def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
@@ -228,12 +244,13 @@ def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
     distance = ndimage.distance_transform_edt(np.pad(floor.free, 1))[1:-1, 1:-1] * CELL_M
     to_wall = ndimage.distance_transform_edt(np.pad(floor.walkable, 1))[1:-1, 1:-1] * CELL_M
     least = reach + _KEPT_M + CELL_M
-    near = to_wall <= least + _REACH_M
-    if at_wall:
+    near = distance >= least
+    if not at_wall:
+        near &= to_wall <= least + _REACH_M
+    else:
         # Boxes and bins stand at walls; beside a chair they would stand in the middle of a room.
-        wall = ndimage.distance_transform_edt(np.pad(floor.inside, 1))[1:-1, 1:-1] * CELL_M
-        near = wall <= least + _AT_WALL_M
-    rows, columns = np.nonzero((distance >= least) & near)
+        near &= _distance_to_walls(floor, distance >= least) <= least + _AT_WALL_M
+    rows, columns = np.nonzero(near)
     for k in placing.rng.permutation(len(rows))[:12]:
         disc = _disc(floor.grid.shape, int(rows[k]), int(columns[k]), reach + CELL_M)
         # One way still joins all doors, where one did.
@@ -253,6 +270,19 @@ def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
         return True
     placing.refuse("no place on the floor")
     return False
+
+
+def _distance_to_walls(floor: _Floor, asked: Bools) -> F64:
+    """(H, W) metres from the asked cells to real walls: rooms may open into each other.
+
+    Where a home has no walls, to the room's outline.
+    """
+    found = np.full(asked.shape, np.inf)
+    room = floor.room
+    near = shapely.intersection(room.walls, room.area.buffer(_NEAR_WALLS_M))
+    near = room.area.boundary if near.is_empty else near
+    found[asked] = shapely.distance(shapely.points(floor.grid.centres()[asked]), near)
+    return found
 
 
 def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Bools:
@@ -331,10 +361,11 @@ def _put_books(
     if depth < 0.1 or tall < 0.11:
         return None
     # Now and then they lie; a pile may carry nothing.
-    if rng.random() < 0.12:
+    mess = placing.draft.mess
+    if rng.random() < 0.08 + 0.14 * mess:
         return _leftmost(placing, top, column, [_lying(rng, placing, depth, tall)], plan.inset_m)
     most = min(float(rng.uniform(0.14, 0.6)), (top.columns[1] - column) * top.grid.cell_m - 0.012)
-    leans = rng.random() < 0.3 and most > 0.3
+    leans = rng.random() < 0.2 + 0.4 * mess and most > 0.3
     for length in (most, 0.6 * most, 0.35 * most):
         if length < 0.03:
             return None
@@ -409,6 +440,9 @@ def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Made], siz
 
 _LEAST_SHELF_DEPTH_M = 0.12
 _DOOR_MARGIN_M = 0.02  # around where doors swing
+_THROWN = 0.9  # of sofas, where nobody tidies up
+_SEAT_M = 0.72  # wide: a chair, wider ones are armchairs
+_ON_SEAT_M = 0.2  # before its back
 _LAID = 0.3  # of the dining tables
 _ON_TOP_M = 0.1
 _SCREENS = ("laptop", "monitor")
@@ -426,7 +460,7 @@ def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
     for room in space.rooms:
         rng = draft.rng("clutter", room.room.id)
         own = room_style(style, draft.rng("style", room.room.id))
-        placing = Placing(draft, stock, room.room, own, rng, share, bias)
+        placing = Placing(draft, stock, room.room, own, rng, share, bias, room.kind)
         _fill_room(placing, scene, room, owners)
         fill_floor(placing, scene, space, room)
 
@@ -486,7 +520,7 @@ def _fill_item(
                 fill_shelf(placing, top, plan)
         else:
             if receptacle == "dining_table" and placing.rng.random() < _LAID * placing.share:
-                set_table(placing, top, _chairs(scene, room))
+                set_table(placing, top, _chairs(scene, room), scene)
             fill_top(placing, top, receptacle, there)
 
 
@@ -512,7 +546,19 @@ def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item)
     low, high = item.bounds
     width = float(max(high[0] - low[0], high[2] - low[2]))
     # Chairs at tables carry none, armchairs one now and then.
+    mess, kind = placing.draft.mess, placing.kind
     if item.nyu40 == SOFA:
-        dress_seat(placing, scene, index, 4 if width > 1.5 else 2)
+        # A throw first: cushions need its place, and find it taken.
+        if width > 1.2 and placing.rng.random() < _THROWN * mess * placing.share:
+            lay_throw(placing, scene, index)
+        else:
+            dress_seat(placing, scene, index, 4 if width > 1.5 else 2)
+    elif width < _SEAT_M and kind is RoomKind.BEDROOM and placing.rng.random() < mess:
+        seat = find_seat(scene, index, placing.room.floor_y)
+        if seat is not None:
+            rows = seat.back_row[np.isfinite(seat.back_row)]
+            column = float(np.flatnonzero(np.isfinite(seat.back_row)).mean())
+            at = seat.grid.plan_of(column, float(rows.max()) + _ON_SEAT_M / seat.grid.cell_m)
+            drop_clothes(placing, scene, at, seat.level)
     elif width > 0.72 and placing.rng.random() < 0.5:
         dress_seat(placing, scene, index, 1)

@@ -11,6 +11,7 @@ from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
+from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_duvet
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, cells_over, plan_turn, top_heights
 from pbrs_farm.dress.things.assembly import Made, smooth
@@ -21,6 +22,7 @@ from pbrs_farm.geometry.heights import highest_below
 
 
 _CELL_M = 0.02
+_DOUBLE_M = 1.08  # from which a mattress is wide enough for two pillows
 _LEAST_AIR_M = 0.6  # above a mattress
 TOUCH_M = 0.0003  # soft things keep this from what they lie on
 _PILLOW_UP_M = 0.06  # what rises so far above the mattress is a pillow, or a board
@@ -59,14 +61,26 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         # Both pillows of a bed are alike.
         own = int(rng.integers(1 << 30))
         made = THINGS.make("bed_pillow", np.random.default_rng(own), placing.style)
+        is_double = bed.width > _DOUBLE_M
+        most = (bed.width + 0.04) / 2 - 0.02 if is_double else bed.width
+        if made[0].size[0] > most:
+            made = _narrowed(made, most / made[0].size[0])
         apart = max(0.46, (made[0].size[0] + 0.02) / bed.width)
-        fits = bed.width > 1.15 and apart * bed.width + made[0].size[0] < bed.width + 0.06
-        for at in (0.5 - apart / 2, 0.5 + apart / 2) if fits else (0.5,):
+        for at in (0.5 - apart / 2, 0.5 + apart / 2) if is_double else (0.5,):
             n += lay_down(placing, scene, index, made, *_place(bed, at, 0.06, made), bed.level)
+        # Who sleeps there has a duvet, below the pillows.
+        first = bed.rows[0] * bed.grid.cell_m + 0.06 + made[0].size[1] + 0.08
+        sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
+        rows = first, bed.rows[1] * bed.grid.cell_m
+        duvet = lay_duvet(placing, scene, index, bed.grid, sides, rows, bed.level)
+        if rng.random() < placing.draft.mess:
+            _drop_on(placing, scene, duvet)
+        return n + 1
     if rng.random() < 0.45 * placing.share:
+        # A cushion leans where the pillows end, not across the bed's middle.
         made = THINGS.make("cushion", rng, placing.style)
-        at = float(rng.uniform(0.4, 0.6))
-        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.75, made), bed.level)
+        at = float(rng.uniform(0.35, 0.65))
+        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.56, made), bed.level)
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
         made = THINGS.make("folded_blanket", rng, placing.style)
@@ -74,6 +88,27 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)
     return n
+
+
+def _narrowed(made: Made, factor: float) -> Made:
+    """The thing with its width scaled."""
+    piece, shape = made
+    scale = np.array([factor, 1.0, 1.0])
+    surfaces = tuple(
+        smooth(s.name, s.positions.astype(np.float64) * scale, s.faces) for s in shape.surfaces
+    )
+    surfaces = tuple(
+        replace(s, material=old.material) for s, old in zip(surfaces, shape.surfaces, strict=True)
+    )
+    size = (piece.size[0] * factor, *piece.size[1:])
+    return replace(piece, size=size), Shape(surfaces, shape.materials, shape.textures)
+
+
+def _drop_on(placing: Placing, scene: SceneTriangles, corners: F64) -> None:
+    """Drop a garment somewhere on cloth that was laid, given by its triangles."""
+    low, high = corners.min((0, 1)), corners.max((0, 1))
+    at = low + (high - low) * placing.rng.uniform(0.3, 0.7, 3)
+    drop_clothes(placing, scene, at[[0, 2]], float(high[1]))
 
 
 def lying_place(scene: SceneTriangles, index: int, room: Room) -> Lying | None:

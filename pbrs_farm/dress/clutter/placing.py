@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -13,7 +13,10 @@ from typing import Final
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from pydantic import Field
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, I32, Bools
@@ -35,11 +38,11 @@ from pbrs_farm.core.classes import (
     TOILET,
 )
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import Item, ItemKind, Room
+from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.core.record import Nyu40, Record, Several, read_csv
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.supports import Support
+from pbrs_farm.dress.supports import LEAST_FREE_M, Support
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_books
 from pbrs_farm.dress.things.things import THINGS
@@ -122,6 +125,19 @@ class Worktop:
         ahead = slice(spot.row, spot.row + spot.n_rows)
         self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
 
+    def is_free(self, at: F64, side_m: float) -> bool:
+        """Whether a square about a plan place (2,) lies on the support and is free; it is taken then."""
+        column, _y, row = self.grid.local(np.array([at[0], self.support.height, at[1]]))
+        n = round(side_m / self.grid.cell_m)
+        i, j = int(row) - n // 2, int(column) - n // 2
+        if i < 0 or j < 0 or i + n > self.clear.shape[0] or j + n > self.clear.shape[1]:
+            return False
+        part = self.clear[i : i + n, j : j + n]
+        if not (self.support.mask[i : i + n, j : j + n] & (part > LEAST_FREE_M)).all():
+            return False
+        part[:] = 0.0
+        return True
+
     def keep_free(self, zone: BaseGeometry) -> None:
         """Nothing can stand over a plan area."""
         plan = self.grid.centres()
@@ -133,6 +149,40 @@ class Worktop:
         """(3,) world place of the spot's middle, on the support."""
         x, z = self.grid.plan_of(spot.column + spot.n_columns / 2, spot.row + spot.n_rows / 2)
         return np.array([x, self.height, z])
+
+
+def apart(made: Made, rng: np.random.Generator, mess: float) -> Made:
+    """A pair of things that stand side by side, each turned and moved by itself."""
+    piece, shape = made
+    turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
+    quarter = piece.size[0] / 4
+    surfaces = []
+    for surface in shape.surfaces:
+        points = surface.positions.astype(np.float64)
+        # Each connected part goes with the side that its middle is on.
+        of = _parts(surface)
+        middle = np.array([points[of == k, 0].mean() for k in range(int(of.max()) + 1)])[of]
+        for side, sign in enumerate((-1, 1)):
+            own = middle * sign > 0
+            pivot, turn = np.array([sign * quarter, 0.0, 0.0]), rotation_y(float(turns[side]))
+            step = [sign * abs(float(turns[side])) * quarter, 0.0, float(ahead[side])]
+            points[own] = (points[own] - pivot) @ turn.T + pivot + step
+        surfaces.append(replace(surface, positions=points.astype(np.float32), normals=None))
+    moved = Shape(tuple(surfaces), shape.materials, shape.textures)
+    low, high = moved.bounds
+    width, height, depth = (float(v) for v in high - low)
+    return replace(piece, size=(width, depth, height)), moved
+
+
+def _parts(surface: Surface) -> NDArray[np.int64]:
+    """(N,) the number of the connected part of each vertex; vertices of one place are one."""
+    _, place = np.unique(np.round(surface.positions, 5), axis=0, return_inverse=True)
+    place = place.reshape(-1)
+    start = place[surface.faces]
+    ends = np.roll(start, -1, 1)
+    n = int(place.max()) + 1
+    links = coo_array((np.ones(start.size, np.int8), (start.ravel(), ends.ravel())), (n, n))
+    return np.asarray(connected_components(links, directed=False)[1][place], np.int64)
 
 
 def turned_size(size: F64, turn_rad: float) -> tuple[float, float, float]:
@@ -280,7 +330,11 @@ class Placing:
     rng: np.random.Generator
     share: float
     bias: float = 0.0  # of the home: how much more or less than usual lies about
+    kind: RoomKind = RoomKind.OTHER  # what the room is for
     taken: Counter[str] = field(default_factory=Counter)  # in this room, by kind
+    laid: list[F64] = field(
+        default_factory=list
+    )  # triangles of what fell here: cloth lies on cloth
 
     def put(self, made: Made, at: F64, turn_rad: float) -> None:
         """Add the thing with the middle of its base at (3,), turned about +y."""
@@ -295,6 +349,13 @@ class Placing:
         )  # fmt: skip
         self.draft.add(item, PART, piece)
 
+    def laid_near(self, low: F64, high: F64) -> list[F64]:
+        """The triangles of cloth in the room that may meet the box low..high (3,)."""
+        return [
+            c for c in self.laid
+            if (c.min((0, 1)) <= high).all() and (c.max((0, 1)) >= low).all()
+        ]  # fmt: skip
+
     def refuse(self, reason: str) -> None:
         """Count a thing that was not put down."""
         self.draft.refused[f"{PART}: {reason}"] += 1
@@ -307,7 +368,8 @@ class Placing:
         size = np.asarray(made[0].size)[[0, 2, 1]]
         low, high = made[1].bounds
         size = high - low
-        turn = self.rng.uniform(-np.pi, np.pi) if faces_anywhere else self.rng.normal(0, 0.12)
+        sd = 0.06 + 0.3 * self.draft.mess
+        turn = self.rng.uniform(-np.pi, np.pi) if faces_anywhere else self.rng.normal(0, sd)
         for turn_rad, inset in ((turn, 0.02), (0.0, 0.01), (0.0, 0.0)):
             needed = turned_size(size, turn_rad)
             rows, columns, n = top.spots(needed, inset_m=inset)
@@ -324,11 +386,11 @@ class Placing:
         self.put(made, top.middle(spot), top.grid.turn_rad + float(turn_rad))
         return True
 
-    def drop_near(self, top: Worktop, made: Made, at: F64) -> bool:
+    def drop_near(self, top: Worktop, made: Made, at: F64, *, turn_rad: float = 0.0) -> bool:
         """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit."""
         low, high = made[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
-        rows, columns, n = top.spots(turned_size(high - low, 0.0), margin_m=0.01)
+        rows, columns, n = top.spots(turned_size(high - low, turn_rad), margin_m=0.01)
         if not len(rows):
             return False
         places = top.grid.plan_of(columns + n[1] / 2, rows + n[0] / 2)
@@ -338,7 +400,7 @@ class Placing:
             return False
         spot = TopSpot(int(rows[k]), int(columns[k]), *n)
         top.take(spot)
-        self.put(made, top.middle(spot), top.grid.turn_rad)
+        self.put(made, top.middle(spot), top.grid.turn_rad + turn_rad)
         return True
 
 

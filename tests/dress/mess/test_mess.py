@@ -1,0 +1,177 @@
+"""How little was tidied up: chairs, pictures, beds, clothes; never against a gate, and none of it at 0."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.core.catalogue import EMPTY, Piece, Place, Shape
+from pbrs_farm.core.classes import BED, CHAIR, PICTURE, TABLE
+from pbrs_farm.core.house import House, Item, Material
+from pbrs_farm.core.mesh import edges_are_paired, triangle_corners
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
+from pbrs_farm.dress.clutter.placing import apart
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.gates import keep_gates
+from pbrs_farm.dress.mess import chairs, pictures
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.supports import PlanGrid
+from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.solids import box
+from pbrs_farm.geometry.surface_points import item_triangles
+from tests.dress.furniture import boards, house, solid
+
+STYLE = style_for(np.random.default_rng(1), "nordic")
+TABLE_ITEM = replace(solid("table", [1.2, 0.72, 1.0], [2.8, 0.75, 1.8]), nyu40=TABLE)
+
+
+def _chair(name: str, x: float, z: float) -> Item:
+    """A chair 40 cm wide before the table, its back to -z."""
+    parts = [([x, 0.0, z], [x + 0.4, 0.45, z + 0.4]), ([x, 0.45, z], [x + 0.4, 0.9, z + 0.03])]
+    return boards(name, parts, CHAIR)
+
+
+def _dining() -> House:
+    return house(TABLE_ITEM, _chair("a", 1.4, 0.7), _chair("b", 2.0, 0.7))
+
+
+def _moves(seed: int, share: float) -> list[float]:
+    draft = Draft(_dining(), seed, share)
+    chairs(draft, EMPTY, STYLE, share)
+    pairs = zip(draft.items[1:], draft.source.items[1:], strict=True)
+    return [float(np.linalg.norm(a.bounds.mean(0) - b.bounds.mean(0))) for a, b in pairs]
+
+
+def test_chairs_stand_apart_by_a_few_centimetres_and_some_are_pulled_out() -> None:
+    few = [m for seed in range(12) for m in _moves(seed, 0.001)]
+    many = [m for seed in range(12) for m in _moves(seed, 1.0)]
+    assert len({round(m, 3) for m in few}) > 12
+    assert max(few) < 0.2
+    assert np.mean([m > 0.1 for m in many]) > 0.6
+
+
+def test_a_chair_is_not_pulled_into_what_stands_behind_it_or_through_a_wall() -> None:
+    cupboard = solid("cupboard", [1.0, 0.0, 0.35], [3.0, 1.0, 0.66])
+    for seed in range(8):
+        draft = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.7), cupboard), seed, 1.0)
+        chairs(draft, EMPTY, STYLE, 1.0)
+        assert draft.items[1].bounds[0, 2] > 0.64
+        keep_gates(draft, {})
+        assert not draft.refused["swap: stood in another thing"]
+        at_wall = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.02)), seed, 1.0)
+        chairs(at_wall, EMPTY, STYLE, 1.0)
+        assert at_wall.items[1].bounds[0, 2] > -0.001
+
+
+def test_a_picture_hangs_a_degree_askew_in_its_own_plane() -> None:
+    piece = Piece(
+        "generated#picture", "Picture", "picture_frame", Place.WALL, PICTURE, (0.5, 0.02, 0.4)
+    )
+    shape = Shape(
+        (box("p", np.array([0, 0.2, 0.01]), np.array([0.25, 0.2, 0.01]), 0),), (Material("m"),)
+    )
+    angles = []
+    for seed in range(12):
+        draft = Draft(house(), seed, 0.5)
+        at = np.array([2.0, 1.4, 0.001])
+        item = draft.placed(
+            piece, shape, at, 0.0, item_id="dress-walls-0", room_id="0_0", level_id="0"
+        )
+        draft.add(item, "walls", piece)
+        pictures(draft, EMPTY, STYLE, 0.5)
+        moved = draft.items[-1]
+        assert moved.bounds[:, 2] == pytest.approx(item.bounds[:, 2], abs=1e-6)
+        assert moved.box is not None
+        angles.append(float(np.degrees(np.arctan2(moved.box.axes[1, 0], moved.box.axes[0, 0]))))
+    assert 0.3 < np.std(angles) < 3.0
+    assert max(map(abs, angles)) < 6.0
+
+
+def _bedroom(width: float) -> House:
+    parts = [
+        ([0.0, 0.0, 0.5], [0.05, 0.9, 0.5 + width]),
+        ([0.05, 0.0, 0.5], [2.05, 0.5, 0.5 + width]),
+    ]
+    return house(boards("Bed", parts, BED), name="Bedroom")
+
+
+@pytest.mark.parametrize(("width", "n"), [(1.6, 2), (1.12, 2), (0.9, 1)])
+def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: float, n: int) -> None:
+    for seed in range(3):
+        draft = Draft(_bedroom(width), seed, 0.3)
+        clutter(draft, EMPTY, STYLE, 1.0)
+        keep_gates(draft, draft.used)
+        added = draft.items[1:]
+        pillows = [i for i in added if i.source_class == "generated#pillow"]
+        duvets = [i for i in added if i.source_class == "generated#duvet"]
+        assert (len(pillows), len(duvets)) == (n, 1)
+        # The pillows lie at the head, the duvet below them over the rest.
+        assert max(p.bounds[1, 0] for p in pillows) < duvets[0].bounds[0, 0]
+        assert duvets[0].bounds[1, 0] > 1.95
+
+
+def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters_nothing() -> None:
+    block = solid("block", [0.5, 0.0, 0.5], [2.1, 0.5, 2.5])
+    corners, thick = item_triangles(block), 0.02
+    grid = PlanGrid(np.zeros(2), 0.0, CELL_M, (260, 260))
+    ground = Ground.of(grid, corners, 0.0, 1.0, thick)
+    net, threads = flat_net((1.2, 1.0), 0.06, (0.6, 0.6, 1.5), 0.1)
+    made = [
+        folded(
+            fallen(net, threads, ground, thick),
+            ground,
+            thick,
+            Folds(9, 0.03, 0.04, (0.2, 0.6)),
+            np.random.default_rng(2),
+        )
+        for _ in range(2)
+    ]
+    assert np.array_equal(*made)
+    sheet = sheet_of("cloth", made[0], ground, thick)
+    points = sheet.positions.astype(np.float64)
+    places = np.unique(
+        np.round(triangle_corners(sheet.positions, sheet.faces).reshape(-1, 3), 6),
+        axis=0,
+        return_inverse=True,
+    )[1]
+    assert edges_are_paired(places.reshape(-1, 3))
+    over = points[:, 1] - np.maximum(highest_below(points[:, [0, 2]], corners), 0.0)
+    assert 0.0 < over.min() < 0.002
+    assert points[:, 1].min() < 0.3
+    # Threads keep their lengths but for what folds take: cloth neither grows nor shrinks away.
+    spans = np.linalg.norm(np.diff(made[0], axis=1), axis=-1).sum(1)
+    assert float(np.median(spans)) == pytest.approx(1.2, rel=0.1)
+
+
+def test_shoes_stand_apart_and_on_their_soles() -> None:
+    pair = [
+        box("s", np.array([x, 0.04, 0.0]), np.array([0.04, 0.04, 0.13]), 0) for x in (-0.05, 0.05)
+    ]
+    surface = replace(
+        pair[0], positions=np.concatenate([p.positions for p in pair]),
+        faces=np.concatenate([pair[0].faces, pair[1].faces + len(pair[0].positions)]),
+        uvs=None, normals=None,
+    )  # fmt: skip
+    piece = Piece("generated#shoes", "Shoes", "shoes", Place.SURFACE, 40, (0.18, 0.26, 0.08))
+    shape = Shape((surface,), (Material("m"),))
+    _piece, moved = apart((piece, shape), np.random.default_rng(3), 1.0)
+    points = moved.surfaces[0].positions
+    assert points[:, 1].min() == pytest.approx(0.0, abs=1e-6)
+    halves = [
+        shapely.MultiPoint(points[k * 24 : (k + 1) * 24][:, [0, 2]]).convex_hull for k in (0, 1)
+    ]
+    assert halves[0].intersection(halves[1]).area < 1e-6
+    _same, tidy = apart((piece, shape), np.random.default_rng(3), 0.0)
+    assert tidy.surfaces[0].positions == pytest.approx(surface.positions, abs=1e-6)
+
+
+def test_a_recipe_that_does_not_name_the_mess_keeps_its_digest() -> None:
+    told = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.3"})
+    untold = recipe_from_name("fast", {"dress.seed": "3"})
+    other = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.6"})
+    assert told.digest() == untold.digest() != other.digest()
