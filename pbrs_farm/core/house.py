@@ -182,6 +182,14 @@ class ModelPose:
     world_from_model: tuple[Rows4, Rows4, Rows4, Rows4]  # rigid; metres
 
 
+OUTSIDE: Final = "outside"
+"""Tag of an item that lies before the windows (dress/surroundings): seen, and no part of the home.
+
+Light is not scattered by it; labels and pictures have it behind glass.
+"""
+LIT: Final = "lit"
+"""Begins the name of a material of such an item that shines by itself: windows at night."""
+
 TOLD: Final = "told"
 """Tag of an item without surfaces of which the source tells class and box alone.
 
@@ -226,6 +234,11 @@ class Item:
             return self.box
         low, high = self.bounds
         return Box((low + high) / 2, (high - low) / 2, np.eye(3))
+
+    @property
+    def is_outside(self) -> bool:
+        """It is no part of the home: it lies before its windows."""
+        return OUTSIDE in self.tags
 
     @property
     def n_faces(self) -> int:

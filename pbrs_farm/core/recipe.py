@@ -34,6 +34,7 @@ from pbrs_farm.core.recipe_fields import (
     SelectionFields,
     SensorFields,
     SkyFields,
+    SurroundingFields,
     ToneFields,
 )
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
@@ -56,6 +57,7 @@ __all__ = [
     "SelectionFields",
     "SensorFields",
     "SkyFields",
+    "SurroundingFields",
     "ToneFields",
     "changed_recipe",
     "differences",
@@ -74,6 +76,7 @@ class Recipe(FieldGroup):
     read: ReadFields = ReadFields()
     dress: DressFields = DressFields()
     repair: RepairFields = RepairFields()
+    surroundings: SurroundingFields = SurroundingFields()
     cameras: CameraFields = CameraFields()
     lens: LensFields = LensFields()
     blur: BlurFields = BlurFields()
@@ -162,6 +165,7 @@ _CAME_LATER: Mapping[str, tuple[str, ...]] = {
     "lens": tuple(LensFields.model_fields),
     "sensor": tuple(SensorFields.model_fields),
     "repair": ("lamp_in_every_room", "lamp_lx", "add_ceilings"),
+    "surroundings": tuple(SurroundingFields.model_fields),
     "selection": ("min_room_lx", "black_modes"),
     "tone": ("pictures", "white", "glare", "exposure_ev", "contrast", "black", "spread"),
     "sky": (
@@ -198,6 +202,7 @@ _PHOTO: Mapping[str, Any] = {
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
+        "surroundings": {"kind": "drawn"},
         "cameras": _PHOTO,
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 10, "filter": "box"},
@@ -207,6 +212,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     },
     "fast": {
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
+        "surroundings": {"kind": "drawn"},
         "cameras": _PHOTO,
         "light": {"spp": 28, "filter": "box"},
         "sky": {"time": "drawn"},

@@ -115,6 +115,14 @@ class RepairFields(FieldGroup):
     bulb_radius_m: float = Field(BULB_RADIUS_M, gt=0, le=1, description="where none is given")
 
 
+class SurroundingFields(FieldGroup):
+    """What lies before the windows (docs/dress.md); it is seen and lights or darkens nothing."""
+
+    kind: Literal["none", "drawn", "street", "garden", "court", "blocks", "hills"] = Field(
+        "none", description="on all sides; drawn: by the house's seed, storey and kind of home"
+    )
+
+
 class CameraFields(FieldGroup):
     """Camera sampling (paper section 3.1)."""
 

@@ -37,7 +37,7 @@ _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "de
 STEPS: Final = {
     step.name: step
     for step in (
-        Step("house", 10, ("read", "repair"), per_view=False),
+        Step("house", 10, ("read", "repair", "surroundings"), per_view=False),
         Step("cameras", 2, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),

@@ -135,7 +135,17 @@ def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
     house = with_told_furnished(house, source, recipe)
     house = furnished(house, source, recipe)
     repaired = partial(repair, fields=recipe.repair, occluder_from=occluder_from)
-    return dressed_and_repaired(house, source, recipe, repaired)
+    house, report, dressing = dressed_and_repaired(house, source, recipe, repaired)
+    return _before_windows(house, recipe), report, dressing
+
+
+def _before_windows(house: House, recipe: Recipe) -> House:
+    """The repaired house with what lies before its windows, where the recipe asks for it."""
+    if recipe.surroundings.kind == "none":
+        return house
+    from pbrs_farm.dress.surroundings import with_surroundings
+
+    return with_surroundings(house, recipe.surroundings.kind, recipe.seed)
 
 
 def _house_of_plugin(source: SourceRef, recipe: Recipe) -> MadeHouse:
@@ -168,7 +178,7 @@ def remember_house(source: SourceRef, recipe: Recipe, made: MadeHouse) -> None:
 
 
 def _made_with(source: SourceRef, recipe: Recipe) -> str:
-    return keys.digest(source, recipe.digest("read", "dress", "repair"))
+    return keys.digest(source, recipe.digest("read", "dress", "repair", "surroundings"))
 
 
 def _cameras(work: Work) -> StepOutput:

@@ -68,7 +68,7 @@ class Renderer:
 
     def house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         """The house of a source, read, dressed, repaired and edited; those of the last homes are kept."""
-        key = keys.digest(source, recipe.digest("read", "dress", "repair"))
+        key = keys.digest(source, recipe.digest("read", "dress", "repair", "surroundings"))
         with self._lock:
             made = self._made.get(key)
         if made is None:

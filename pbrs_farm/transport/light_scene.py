@@ -59,7 +59,14 @@ class LightScene:
     or left out. device_scene: the same on the device; None for scalar variants.
     """
 
-    def __init__(self, tables: SceneTables, sky: Sky, portals: F64, variant: str) -> None:
+    def __init__(
+        self,
+        tables: SceneTables,
+        sky: Sky,
+        portals: F64,
+        variant: str,
+        outside: tuple[House, SceneTables] | None = None,
+    ) -> None:
         self.tables = tables
         self.sky = sky
         self.variant = variant
@@ -73,6 +80,8 @@ class LightScene:
             from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
             self.device_scene = DeviceScene(tables, one_scene=variant.startswith("cuda"))
+        # OptiX takes one scene in a kernel: there windows show the sky alone.
+        self._outside = outside if variant.startswith("llvm") else None
 
     @staticmethod
     def load(
@@ -90,8 +99,17 @@ class LightScene:
         """
         name = choose_variant() if variant is None else variant
         mitsuba(name)
-        tables = tables_from_house(house, textures, recipe)
-        return LightScene(tables, sky, portals_of_house(house), name)
+        inside = house.with_items(i for i in house.items if not i.is_outside)
+        tables = tables_from_house(inside, textures, recipe)
+        outside = None
+        if len(inside.items) < len(house.items):
+            beyond = house.with_items(i for i in house.items if i.is_outside)
+            shown = {
+                beyond.materials[s.material].texture_id for i in beyond.items for s in i.surfaces
+            }
+            own = {name: texture for name, texture in textures.items() if name in shown}
+            outside = beyond, tables_from_house(beyond, own, recipe)
+        return LightScene(tables, sky, portals_of_house(house), name, outside)
 
     @property
     def n_lamps(self) -> int:
@@ -311,5 +329,10 @@ class LightScene:
             targets = guiding_targets(self.device_scene, self._emitters, self.tables, 0)
             self.device_scene.set_guiding_targets(*pdfs_by_face(targets))
             self._emitters.set_targets(targets)
+            if self._outside is not None:
+                from pbrs_farm.transport.kernels.outside import Outside
+
+                beyond, tables = self._outside
+                self._emitters.outside = Outside(tables, beyond, self.sky)
         self._emitters.set_view(portals, weights)
         return self._emitters

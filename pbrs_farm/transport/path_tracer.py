@@ -136,7 +136,7 @@ class _LaneSums:
     def add_guides(self, result: StepResult, seen: Any, first_rough: Any) -> None:
         """Add albedo and normal of the first rough surface, for the denoiser."""
         self.albedo += dr.select(first_rough, result.albedo, 0)
-        self.albedo += dr.select(result.missed & ~seen, mi.Color3f(1), 0)
+        self.albedo += dr.select(result.missed & ~seen, result.sky_albedo, 0)
         self.normal += dr.select(first_rough, result.si.n, 0)
 
     def add_sample(self, l_out: Any, l_in: Any, sample: Any, done: Any) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -52,6 +52,9 @@ from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
 
 # Points on lamps, where shadow rays end; kernels.
 # Effects: holds buffers on the device.
+
+if TYPE_CHECKING:
+    from pbrs_farm.transport.kernels.outside import Outside
 
 
 class LampPointSampler:
@@ -151,6 +154,7 @@ class Emitters:
     def __init__(
         self, tables: SceneTables, sky: Sky, portals: F64, weights: EmitterWeights
     ) -> None:
+        self.outside: Outside | None = None  # what lies before the windows, set where there is any
         self.nearby = NearbyLampSampler(tables)
         grid = VoxelGrid(tables.positions)
         level = (sky.sky_lx + sky.sun_lx) / LM_PER_W / math.pi

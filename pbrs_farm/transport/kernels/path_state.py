@@ -134,6 +134,7 @@ class StepResult(NamedTuple):
     direct_indoor: Any
     is_rough: Any  # Bool: the vertex is neither mirror nor glass
     missed: Any  # Bool: the ray met no surface
+    sky_albedo: Any  # Color3f of what such a ray shows, white where that is the sky
     albedo: Any
     si: SurfaceInteraction
     scattered_d: Any  # direction drawn at the vertex

@@ -95,7 +95,7 @@ def advance(
         counted, ends = context.emitter_filter.indoor, missed | lobe.reflected
         weight = guided_mis_weight(context.emitters, path, si, counted, ends, vertex.is_rough)
         path = replace(path, beta=path.beta * weight) if may_reconnect is False else path
-    emitted_outdoor, emitted_indoor = _emitted_light(context, path, si, missed)
+    emitted_outdoor, emitted_indoor, sky_albedo = _emitted_light(context, path, si, missed)
 
     # Send shadow rays, and go on.
     goes_on = vertex.is_rough & (vertex.depth < context.fields.max_depth)
@@ -111,6 +111,7 @@ def advance(
         direct_indoor=path.beta * direct.indoor.light,
         is_rough=vertex.is_rough,
         missed=missed,
+        sky_albedo=sky_albedo,
         albedo=dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1),
         si=si,
         scattered_d=scattered.d,
@@ -182,8 +183,11 @@ def _strategy(
 
 def _emitted_light(
     context: PathContext, path: PathState, si: SurfaceInteraction, missed: Any
-) -> tuple[Any, Any]:
-    """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled."""
+) -> tuple[Any, Any, Any]:
+    """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled.
+
+    And the colour of what a ray shows that has left the home: white where that is the sky.
+    """
     emitters, emitter_filter = context.emitters, context.emitter_filter
     by_scatter = path.bsdf_pdf > 0
 
@@ -194,7 +198,7 @@ def _emitted_light(
     counts = mi.Bool(by_scatter)
     for asked in emitter_filter:
         counts |= False if asked is None else asked == ALL_EMITTERS
-    outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
+    outdoor, indoor, sky_albedo = mi.Color3f(0), mi.Color3f(0), mi.Color3f(1)
     if emitter_filter.outdoor is not None:
         here, asked = path.reference.p, emitter_filter.outdoor
         chances = emitters.outdoor_choice.chances(here, missed)
@@ -204,6 +208,12 @@ def _emitted_light(
         is_asked = (asked > NO_EMITTERS) & (asked < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
         sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
+        if emitters.outside is not None:
+            # What lies before the windows stands before the sky, for rays that nothing scattered.
+            beyond = emitters.outside.seen(context.scene, path.o, path.d, missed & ~by_scatter)
+            sky = dr.select(beyond.valid, beyond.radiance, sky)
+            sees_sky |= beyond.valid & counts & is_asked
+            sky_albedo = dr.select(beyond.valid, beyond.albedo, sky_albedo)
         outdoor = dr.select(sees_sky, path.beta * sky, 0)
     if emitter_filter.indoor is not None:
         shines = si.valid & counts & (emitter_filter.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
@@ -212,7 +222,7 @@ def _emitted_light(
             si.emitter, path.reference, distance, cos, emitter_filter.indoor, shines
         )
         indoor = dr.select(shines, path.beta * radiance * balanced(lamp_pdf), 0)
-    return outdoor, indoor
+    return outdoor, indoor, sky_albedo
 
 
 def _scatter(step: _Step, goes_on: Any) -> ScatteredRay:
