@@ -68,12 +68,17 @@ def test_a_field_that_came_later_changes_no_digest_of_paper_and_released(
     assert recipe_from_name(name).digest() == digest
     assert not recipe_from_name(name).repair.lamp_in_every_room
     assert recipe_from_name(name).repair.lamp_lx == 0
+    assert not recipe_from_name(name).repair.add_ceilings
+    assert recipe_from_name(name).surroundings.kind == "none"
     assert recipe_from_name(name).selection.min_room_lx == 0
     for other in ("preview", "fast"):
         recipe = recipe_from_name(other)
         assert recipe.repair.lamp_in_every_room
         assert recipe.repair.lamp_lx == 100
-        off = recipe_from_name(other, {"repair.lamp_in_every_room": "false", "repair.lamp_lx": "0"})
+        assert recipe.repair.add_ceilings
+        assert recipe.surroundings.kind == "drawn"
+        settings = {"lamp_in_every_room": "false", "lamp_lx": "0", "add_ceilings": "false"}
+        off = recipe_from_name(other, {f"repair.{field}": word for field, word in settings.items()})
         assert recipe.digest("repair") != off.digest("repair")
         assert off.digest("repair") == recipe_from_name(name).digest("repair")
 

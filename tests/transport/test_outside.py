@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.house import LIT, OUTSIDE, House, Item, ItemKind, Material
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
@@ -28,7 +29,7 @@ FIELDS: LightFields = RECIPE.light.model_copy(
 SKY = (1.0, 2.0, 3.0)
 
 
-def home(*, outside: str = "") -> tuple[House, rooms.Camera]:
+def home(*, outside: str = "") -> tuple[House, Camera]:
     """A grey wall with a hole, a floor before it; outside: the name of a board's material behind it."""
     wall = [
         rooms.quad([(-4, 0, 0), (-1, 0, 0), (-1, 3, 0), (-4, 3, 0)], 0),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.recipe import Recipe, RepairFields, recipe_from_name
 from pbrs_farm.dress.surroundings import surroundings, with_surroundings
@@ -26,11 +27,11 @@ def outside(house: House) -> list[Item]:
     return [i for i in house.items if i.is_outside]
 
 
-def distances_m(item: Item) -> np.ndarray:  # type: ignore[type-arg]
+def distances_m(item: Item) -> F64:
     """Of the triangles' plan to the room with its walls, 0.2 m thick."""
     walls = shapely.box(*RECT).buffer(0.2, join_style="mitre")
     corners = corners_of_surfaces(item.surfaces)[:, :, [0, 2]]
-    return shapely.distance(walls, shapely.multipoints(corners))
+    return np.asarray(shapely.distance(walls, shapely.multipoints(corners)))
 
 
 @pytest.mark.parametrize("kind", surroundings.KINDS)
