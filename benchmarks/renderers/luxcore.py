@@ -10,8 +10,8 @@ coats taken off. Both engines: the sum of all light, 64x48 pixels, box filter, 1
 clamping, all cores. LuxCore's roulette is on where its pictures stay right with it: in PATHCPU where
 no sky shines (docs/lab/light.md).
 
-Method. Our Metropolis with its usual settings and MUTATIONS a pixel (HOME_MUTATIONS in homes, which takes
-about as long) says how much CPU time a picture has, bootstrap, pilot and direct light counted; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
+Method. Our Metropolis with its usual settings and MUTATIONS a pixel (HOME_MUTATIONS in homes, where one
+costs more) says how much CPU time a picture has, bootstrap, pilot and direct light counted; `path` gets as many samples as fit into it, LuxCore's threads are stopped when they have had
 it (loading, BVH, kernels before the clock). PICTURES of each, other seeds. All errors are relative, as
 in benchmarks/light/equal_time.py, to one reference, the mean of N_REFERENCE more pictures of our Metropolis, here
 the least noisy: squares of luminance are divided by ref^2 + 1e-3 mean(ref)^2. relMSE is the mean over
@@ -61,7 +61,7 @@ from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky
 from tests.transport import hard_rooms
 
 SIZE = (64, 48)
-MUTATIONS, HOME_MUTATIONS = 128, 48
+MUTATIONS, HOME_MUTATIONS = 128, 16
 CHAINS = 16384
 PICTURES = 4
 N_REFERENCE = 4
