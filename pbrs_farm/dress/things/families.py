@@ -26,7 +26,7 @@ from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.dress.things.bodies import OUTLINES, SOLIDS
 from pbrs_farm.dress.things.things import STUFFS, things_of
 
-VERSION: Final = 2
+VERSION: Final = 3
 """Of the words and solids of families: part of the catalogue's digest. Raised when a shape changes."""
 
 FILES: Final = ("joints", "kitchen", "bathroom", "seating", "tables", "storage", "beds_and_lamps")

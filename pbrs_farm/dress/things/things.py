@@ -238,7 +238,7 @@ def things_of(*names: str, **solids: object) -> Things:
 
 
 THINGS: Final = things_of(
-    "decor", "vessels", "tableware", "household", "desk", "bath", "floor_things", "soft",
+    "decor", "vessels", "belongings", "tableware", "household", "desk", "bath", "floor_things", "soft",
     **{name: bodies.SOLIDS[name] for name in ("bevelled", "rounded", "loft", "hoop", "tube")},
     **{name: bodies.OUTLINES[name] for name in ("oval", "rect", "fluted", "bent", "ring_path")},
 )  # fmt: skip
