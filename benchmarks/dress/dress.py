@@ -1,6 +1,6 @@
 """Dressing, measured: time, contacts, what views show, bits, leaks, light, failures -> out/bench/dress.json.
 
-`python -m benchmarks.dress.dress [PART...]`: homes (nine homes, three seeds each), light, failures;
+`python -m benchmarks.dress.dress [PART...]`: homes (nine homes, three seeds each), light, failures, outside;
 all of them if none is named. A part's rows stay in out/bench/dress/, and the report is made of
 those there are, so that parts can be measured one at a time.
 """
@@ -95,6 +95,23 @@ def _failures(names: list[str]) -> Rows:
     return rows
 
 
+def _outside(names: list[str]) -> Rows:
+    rows = []
+    for name in (*names, "made:1", "made:2", "made:3"):
+        rows.append({"home": name, **_row("outside_share", name)})
+        print(rows[-1], flush=True)
+    return rows
+
+
+def _figures_of_outside(rows: Rows) -> dict[str, Any]:
+    left, met = (sum(row[k] for row in rows) for k in ("left", "met"))
+    return {
+        "outside.share": round(met / left, 3),
+        "outside.triangles": max(row["triangles"] for row in rows),
+        "outside.seconds": max(row["seconds"] for row in rows),
+    }
+
+
 def _figures_of_homes(rows: Rows) -> dict[str, Any]:
     shares = np.array([s for row in rows for s in row["shares"]])
     column = {name: k for k, name in enumerate(NYU13_NAMES)}
@@ -148,10 +165,11 @@ def _figures_of_failures(rows: Rows) -> dict[str, Any]:
 
 
 _PARTS: dict[str, Callable[[list[str]], Rows]] = {
-    "homes": _homes, "light": _light, "failures": _failures,
+    "homes": _homes, "light": _light, "failures": _failures, "outside": _outside,
 }  # fmt: skip
 _FIGURES: dict[str, Callable[[Rows], dict[str, Any]]] = {
     "homes": _figures_of_homes, "light": _figures_of_light, "failures": _figures_of_failures,
+    "outside": _figures_of_outside,
 }  # fmt: skip
 
 UNITS = {
@@ -178,6 +196,9 @@ UNITS = {
     "dress.light_cost_worst": "the same of the worst home",
     "dress.failures": "homes that could not be dressed, or break a gate",
     "dress.pairs": "pairs of home and seed that were tried",
+    "dress.outside.share": "of rays through windows, those that meet something outside: nine homes, three made ones",
+    "dress.outside.triangles": "of what lies before the windows, most",
+    "dress.outside.seconds": "CPU-s that this takes of a house, worst",
 }
 
 if __name__ == "__main__":

@@ -348,8 +348,8 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
     trees = Look("far trees", picture=mottled(rng, (0.012, 0.024, 0.010), (0.05, 0.085, 0.032), slope=0.6), size_m=(4.0, 4.0))  # fmt: skip
     hills = Look("far hills", picture=mottled(rng, (0.06, 0.10, 0.085), (0.12, 0.17, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
     for look, away, share, wave_m, grain_m in (
-        (trees, radius, 0.14, 1.2, 1.1),
-        (hills, radius + 8.0, 0.30 if far else 0.21, 5.0 if far else 2.0, 0.0),
+        (trees, radius, 0.17, 1.2, 1.1),
+        (hills, radius + 8.0, 0.32 if far else 0.27, 5.0 if far else 2.0, 0.0),
     ):
         top = place.eye_m + share * away + wave_m * waves + grain_m * grain
         foot = np.stack([np.cos(turn) * away, np.zeros_like(turn), np.sin(turn) * away], 1) + centre
