@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 NAME ?=
 HOME_NAME ?= Studio
 
-.PHONY: help setup demo check test test-farm test-infra test-slow test-web test-sweethome3d test-study test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -25,7 +25,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not study and not notebooks"
+	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -36,6 +36,9 @@ test-farm: setup ## the farm's tests that really kill processes
 
 test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
 	$(BIN)/pytest -m infra -rs
+
+test-kube: setup ## the manifests on the cluster that kubectl reaches: jobs, kills, drains, a roll-out (tests/infra/README.md)
+	$(BIN)/pytest -m kube -s -x tests/workers/test_kube.py
 
 test-web: export PBRS_SETUP_ALSO := chromium redis-server
 test-web: setup ## the board in a real browser: each page, slider and button, a farm with a killed worker

@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
-MARKERS = "not slow and not gpu and not chaos and not infra and not web and not sweethome3d and not notebooks"
+MARKERS = "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not notebooks"
 LINE_KINDS = (
     "lines_of_statements",
     "lines_of_imports",

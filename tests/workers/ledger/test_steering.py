@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from pbrs_farm.store.secret import Secret
-from tests.workers.conftest import spec
+from tests.workers.conftest import JOB_ID, spec
 from tests.workers.drive import BATCHES, ROOM, drive, with_config
 from tests.workers.redis_server import RedisServer
 from workers.config import FarmConfig
@@ -205,3 +205,24 @@ def test_a_service_waits_for_redis_but_not_where_it_is_refused(
     )
     with pytest.raises(LedgerUnavailable, match="refuses these credentials"):
         RedisLedger(stranger).wait_until_there(600.0)
+
+
+def test_a_job_s_ceilings_are_changed_while_it_runs_and_resume_ends_its_waiting(
+    ledger: RedisLedger,
+) -> None:
+    limits = {"max_slots": 2, "budget_h": 1.5, "after": ("b" * 12,)}
+    job = JOB_ID
+    ledger.create(spec(1, job).model_copy(update=limits))
+    ledger.open(job, 5)
+
+    def now() -> tuple[int, float, tuple[str, ...]]:
+        view = ledger.view(job)
+        assert view is not None
+        return view.max_slots, view.budget_h, view.after
+
+    assert now() == (2, 1.5, ("b" * 12,))
+    assert ledger.steer(job, "max_slots", "7") == "running"
+    assert ledger.steer(job, "budget_h", "0") == "running"
+    ledger.steer(job, "pause", "follows another one")
+    ledger.steer(job, "resume")
+    assert now() == (7, 0.0, ())
