@@ -74,19 +74,19 @@ bench: setup ## measure everything but house, dress, made, light and its tables,
 bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
-bench-light-tables: setup ## every bench of docs/lab/light.md, one after another, then its tables: 31 quiet minutes
+bench-light-tables: setup ## every bench of docs/lab/light.md, one after another, then its tables: under an hour
 	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
 	@failed=; for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
 	for name in cycles luxcore; do $(MAKE) --no-print-directory bench-$$name || failed="$$failed $$name"; done; \
 	$(BIN)/python -m benchmarks light_tables; \
 	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
 
-bench-cycles: setup ## against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): 5 quiet minutes
+bench-cycles: setup ## three homes against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): under 20 quiet minutes
 	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv
 	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
 	$(BIN)/python -m benchmarks cycles
 
-bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: 6 quiet minutes
+bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: under 15 quiet minutes
 	@test -x out/luxcore-venv/bin/python || $(BIN)/python -m venv out/luxcore-venv
 	@out/luxcore-venv/bin/pip show -q pyluxcore || out/luxcore-venv/bin/pip install -q "pyluxcore==2.11.2" numpy
 	$(BIN)/python -m benchmarks luxcore
