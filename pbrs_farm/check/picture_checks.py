@@ -6,6 +6,7 @@ only the denoiser is the same program, since nothing else gives its values.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -149,7 +150,7 @@ def _light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | N
     if view.recipe is None or not view.recipe.light.denoise:
         return planes
     try:
-        import pyoidn
+        pyoidn = _pyoidn()
     except ImportError:
         tally.note(f"{view.place}: light was denoised, and pyoidn is not installed to do it again")
         return None
@@ -167,6 +168,19 @@ def _light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | N
             noisy = clean * np.asarray(lit).any(axis=-1, keepdims=True)
         planes[group] = noisy[:, n : noisy.shape[1] - n]
     return planes
+
+
+def _pyoidn() -> Any:
+    """The denoiser's module, imported as if there were no torch: it would load it for nothing, in 6 s."""
+    is_hidden = "torch" not in sys.modules
+    if is_hidden:
+        sys.modules["torch"] = None  # type: ignore[assignment]  # what import takes for "not there"
+    try:
+        import pyoidn
+    finally:
+        if is_hidden:
+            del sys.modules["torch"]
+    return pyoidn
 
 
 def _glared(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:

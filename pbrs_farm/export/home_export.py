@@ -163,7 +163,8 @@ class ExportedHome:
 
 
 def exported_home(house: House) -> ExportedHome:
-    """The home in the frames of its items."""
+    """The home in the frames of its items, without what lies before its windows."""
+    house = replace(house, items=tuple(item for item in house.items if not item.is_outside))
     names = _unique_names(house.items)
     bounds = np.array([item.bounds for item in house.items]).reshape(-1, 2, 3)
     floors = {room.id: room.floor_y for room in house.rooms}

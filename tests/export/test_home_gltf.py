@@ -10,7 +10,7 @@ import pytest
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import Box, House, ItemKind, corners_of_surfaces
+from pbrs_farm.core.house import OUTSIDE, Box, House, ItemKind, corners_of_surfaces
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.export.gltf_home import glb_of_pieces
 from pbrs_farm.export.home_export import export_homes, exported_home, rooms_json
@@ -77,6 +77,13 @@ def test_names_of_pieces_are_unique_and_fit_every_file_system() -> None:
     names = [p.name for p in exported_home(house.with_items(items)).pieces]
     assert len({n.lower() for n in names}) == len(names)
     assert all(n.isascii() and n.replace("_", "").isalnum() and n[0].isalpha() for n in names)
+
+
+def test_what_lies_before_the_windows_is_no_part_of_an_exported_home() -> None:
+    house = repaired_home()
+    street = replace(house.items[0], id="outside_street", kind=ItemKind.GROUND, tags=(OUTSIDE,))
+    with_street = house.with_items([*house.items, street])
+    assert len(exported_home(with_street).pieces) == len(house.items)
 
 
 def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkable() -> None:
