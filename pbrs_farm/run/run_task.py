@@ -37,6 +37,7 @@ _OF_LIGHT = (
     "pbrs_farm.run.steps", "pbrs_farm.formats.house_bundle", "pbrs_farm.transport.light_scene",
     "pbrs_farm.transport.illuminance", "pbrs_farm.transport.lampshade_exitance",
     "pbrs_farm.transport.pilot", "pbrs_farm.transport.sample_passes",
+    "pbrs_farm.transport.kernels.outside",
     "pbrs_farm.run.house_cache", "pbrs_farm.run.chosen_cameras", "pbrs_farm.run.chosen_cameras",
 )  # fmt: skip
 _OF_FINISHING = (

@@ -464,9 +464,10 @@ class Items(Table):
     """A home's items: rows of instance id, item id, name, class, room, size and middle in metres."""
 
     def __init__(self, house: House, items: Sequence[Item] | None = None) -> None:
-        """house: finished. items: some of its items; None: all."""
+        """house: finished. items: some of its items; None: all but what lies before its windows."""
         self._house = house
-        self._items = tuple(house.items if items is None else items)
+        inside = (item for item in house.items if not item.is_outside)
+        self._items = tuple(inside if items is None else items)
         instance = {item.id: k for k, item in enumerate(house.items, 1)}
         room_names = {room.id: room.name for room in house.rooms}
         rows = [_row(item, instance[item.id], room_names) for item in self._items]

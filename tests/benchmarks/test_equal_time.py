@@ -46,6 +46,7 @@ def test_the_table_has_a_cell_for_every_head() -> None:
     assert "| 0.20 ± 0.02 |" in row
 
 
+@pytest.mark.slow
 def test_the_report_has_the_names_that_gates_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

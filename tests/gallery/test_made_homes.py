@@ -42,6 +42,7 @@ def test_a_file_of_another_home_is_not_written_over(tmp_path: Path) -> None:
     assert (tmp_path / "made-1.sh3d").read_bytes() == b"a person's"
 
 
+@pytest.mark.slow
 def test_two_processes_write_what_one_does(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / name).mkdir()

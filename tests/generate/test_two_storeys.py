@@ -129,6 +129,7 @@ def test_two_storeys_without_enough_bedrooms_are_refused_with_the_nearest() -> N
         Wishes(bedrooms=(0, 1), storeys=2)
 
 
+@pytest.mark.slow
 def test_a_small_area_leaves_fewer_bedrooms_rather_than_no_plan() -> None:
     # Seeds that would draw four bedrooms, which need 96 m2.
     for seed in (4, 5, 9):

@@ -97,6 +97,7 @@ def test_a_harmless_note_is_kept_and_passes_reader_and_step(tmp_path: Path) -> N
     assert [n.kind for n in house.notes] == ["unmapped-class"]
 
 
+@pytest.mark.slow
 @pytest.mark.homes
 def test_eight_of_the_nine_example_homes_are_accepted_strictly() -> None:
     example_homes()

@@ -129,7 +129,7 @@ def test_verify_recomputes_pairs_and_finds_a_share_that_is_wrong(
 @pytest.mark.parametrize(
     "lens",
     [
-        {"lens.model": "radtan", "lens.k1": "-0.2"},
+        pytest.param({"lens.model": "radtan", "lens.k1": "-0.2"}, marks=pytest.mark.slow),
         {"lens.preset": "fisheye180", "image.width_px": "64", "image.height_px": "64"},
         {"lens.model": "equirect", "image.width_px": "64", "image.height_px": "32"},
     ],

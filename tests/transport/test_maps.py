@@ -221,6 +221,7 @@ def test_the_metal_lobe_is_mitsubas_roughconductor_but_for_joint_shadowing(alpha
     np.testing.assert_allclose(ours[0].numpy(), theirs[0].numpy() * joint, rtol=2e-3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_metropolis_and_path_have_one_mean_where_coats_are_bumpy() -> None:
     # Significance: 16 blocks of each group, |z| < 5: missed by chance once in 50,000 runs.
     house, camera = mapped_room(roughness=0.8)

@@ -31,8 +31,15 @@ def started(folder: Path, **env: str) -> subprocess.Popen[str]:
         "TMPDIR": str(folder),
     }
     return subprocess.Popen(
-        ["bash", str(SCRIPT)], env=clean | own | env, stdout=subprocess.PIPE, text=True
-    )
+        ["bash", str(SCRIPT)], env=clean | own | env, stdout=subprocess.PIPE, text=True,
+        preexec_fn=_heed_signals,
+    )  # fmt: skip
+
+
+def _heed_signals() -> None:
+    # A signal that a test before made this process ignore cannot be trapped by a shell it starts.
+    for number in (signal.SIGTERM, signal.SIGUSR2):
+        signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_upper_storeys_look_down_and_houses_see_the_ground(home: House) -> None:
             next(
                 i for i in with_surroundings(house, "drawn", seed).items if i.id == "outside_ground"
             )
-            for seed in range(12)
+            for seed in range(6)
         ]
         return {round(float(-i.bounds[0, 1]), 1) for i in grounds}
 

@@ -40,7 +40,9 @@ def unguided(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guide, "_MAX_BOOST", 1.0)
 
 
-@pytest.mark.parametrize("room", [hard_rooms.open_shade, hard_rooms.covered_cup])
+@pytest.mark.parametrize(
+    "room", [hard_rooms.open_shade, pytest.param(hard_rooms.covered_cup, marks=pytest.mark.slow)]
+)
 def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
     room: Callable[[], tuple[House, Camera]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -112,6 +114,7 @@ def test_a_small_view_is_guided_without_a_trial() -> None:
     assert weights.is_guided
 
 
+@pytest.mark.slow
 def test_small_faces_far_from_the_origin_lose_no_light() -> None:
     # Where float32 is coarse a ray starts a millimetre off its surface: it must still meet the
     # face it was aimed at, or that light is lost (2 % of it, once).
