@@ -25,7 +25,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -43,7 +43,7 @@ test-kube: setup ## the manifests on the cluster that kubectl reaches: jobs, kil
 test-web: export PBRS_SETUP_ALSO := chromium redis-server
 test-web: setup ## the board in a real browser: each page, slider and button, a farm with a killed worker
 	@$(BIN)/python -c "import playwright" 2>/dev/null || $(BIN)/pip install -q playwright
-	$(BIN)/pytest -m web tests/board/web
+	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
 
 test-sweethome3d: export PBRS_SETUP_ALSO := sweethome3d Xvfb:xvfb javac:default-jdk-headless
 test-sweethome3d: setup ## the real program opens ten made homes and saves them: out/sweethome3d/*.png
@@ -57,7 +57,7 @@ endef
 
 test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
 	@$(study-packages)
-	$(BIN)/pytest -m "study and not slow and not gpu"
+	$(BIN)/pytest -n 2 --dist loadfile -m "study and not slow and not gpu"
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
 	@$(BIN)/python -c "import nbclient, nbformat, ipykernel" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check -e ".[notebooks]"

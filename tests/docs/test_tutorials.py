@@ -40,6 +40,7 @@ def test_every_line_of_the_researchers_tutorial_runs(
     assert n_run >= 12
 
 
+@pytest.mark.slow
 def test_every_block_of_the_python_page_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

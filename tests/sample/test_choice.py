@@ -32,7 +32,15 @@ def differing(house: House, fields: CameraFields, seeds: range) -> tuple[int, in
     return n_differ, n_sectors
 
 
-@pytest.mark.parametrize("rules", [{}, {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}])
+@pytest.mark.parametrize(
+    "rules",
+    [
+        {},
+        pytest.param(
+            {"max_item_fraction": 0.35, "max_wall_fraction": 0.55}, marks=pytest.mark.slow
+        ),
+    ],
+)
 def test_coarse_first_finds_the_winner_of_full_size_in_99_of_100_sectors(
     rules: dict[str, float],
 ) -> None:

@@ -125,6 +125,7 @@ def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
     assert joinery_scheme(draft, style) == first
 
 
+@pytest.mark.slow
 def test_furniture_parts_leave_coats_as_they_are() -> None:
     home, report = dress(builtin_home(), EMPTY, DressFields(), 2)
     doors = [i for i in home.items if i.kind is ItemKind.DOOR]

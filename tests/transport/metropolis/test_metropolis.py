@@ -54,7 +54,7 @@ SCENES = {
     "open shade": lambda: (*hard_rooms.open_shade(), uniform_sky((1, 1, 1))),
 }  # fmt: skip
 
-SLOW = ("glass globe", "open shade")
+SLOW = ("window", "glass globe", "open shade")
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,12 @@ def shaded_room() -> tuple[House, Camera]:
 
 # The tolerance of the mean is above 4 standard deviations of four pictures of each.
 @pytest.mark.parametrize(
-    ("room", "tolerance"), [(coated_room, 0.02), (slot_room, 0.02), (shaded_room, 0.08)]
+    ("room", "tolerance"),
+    [
+        pytest.param(coated_room, 0.02, marks=pytest.mark.slow),
+        (slot_room, 0.02),
+        (shaded_room, 0.08),
+    ],
 )
 def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
     room: Callable[[], tuple[House, Camera]], tolerance: float
