@@ -61,8 +61,16 @@ class Outside:
         self._street = opaque3(mi.Color3f, street)
         self._glow = dr.opaque(mi.Float, GLOW_CD_M2 / LM_PER_W)
 
+    @dr.syntax
     def seen(self, home: DeviceScene, o: Any, d: Any, active: Any) -> Seen:
         """What rays show that have left the home."""
+        valid, radiance, albedo = mi.Bool(False), mi.Color3f(0), mi.Color3f(0)
+        # Branch: packets of lanes whose rays are all at home pass by.
+        if active:
+            valid, radiance, albedo = self._shown(home, o, d, active)
+        return Seen(valid, radiance, albedo)
+
+    def _shown(self, home: DeviceScene, o: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
         si = self._scene.intersect(o, d, active)
         # The sun, unless the home or the outside stands before it.
         cos = dr.dot(si.n, self._sun)
@@ -79,7 +87,7 @@ class Outside:
         # Glass that a lit room stands behind is dark by day: its colour alone counts at night.
         hue = si.bsdf.kd / dr.maximum(dr.max(si.bsdf.kd), 1e-6)
         radiance += dr.select(si.emitter != NO_LAMP, hue * self._glow, 0)
-        return Seen(si.valid, dr.select(si.valid, radiance, 0), si.bsdf.kd)
+        return si.valid, dr.select(si.valid, radiance, 0), si.bsdf.kd
 
     def _of_sky(self, n: Any) -> Any:
         """Color3f irradiance by the sky of a surface of normal n."""
