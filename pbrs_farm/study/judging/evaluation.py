@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
@@ -251,6 +252,7 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
     check_exact(plan.task, exact=exact)
     task = task_of(plan.task, EXACT_THRESHOLDS if exact else 0)
     network = network_of(plan.network, task.n_out(plan))
+    _check_sha256(folder.weights, str(record.get("weights_sha256", "")))
     position = load_checkpoint(folder.weights, network)
     if position.task != plan.task:
         raise BadInput(folder.weights, "", f"weights of task {position.task}, not {plan.task}")
@@ -259,6 +261,12 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
     except (OSError, ValueError):
         raise BadInput(folder.baseline, "", "missing or damaged: train again") from None
     return Trained(folder, record, plan, task, placed(network, plan), baseline)
+
+
+def _check_sha256(path: Path, told: str) -> None:
+    """Raise BadInput where packed weights are not those their record names."""
+    if told and path.exists() and hashlib.sha256(path.read_bytes()).hexdigest() != told:
+        raise BadInput(path, "", "other bytes than run.json's weights_sha256: damaged or changed")
 
 
 def check_exact(task_name: str, *, exact: bool) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from torch import nn
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
@@ -28,13 +29,18 @@ from pbrs_farm.study.photographs import (
 )
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.prediction import predicted, scored
+from pbrs_farm.study.training.training_loop import Judge
 from pbrs_farm.study.training.view_sources import (
     TrainingSource,
     all_views,
+    credits_of,
     held_out_views,
     is_held_out,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
+
+_CURVE_THRESHOLDS: Final = 9  # of lines, while a run trains
 
 
 def judged_place(
@@ -60,6 +66,23 @@ def judged_place(
         hold_out &= frozenset(home_of(house) for house in open_views(place).homes)
     source = TrainingSource((place,), (own_mode or mode,), hold_out)
     return _of_homes(source, plan, label or path.name, trained_on, most)
+
+
+def judge_of_places(places: Sequence[JudgedViews], plan: TrainingPlan) -> Judge:
+    """What a network errs on each of some places, as `on_<name>`: for the curve, and to choose steps."""
+    task = task_of(plan.task, _CURVE_THRESHOLDS)
+
+    def judge(network: nn.Module) -> dict[str, float]:
+        return {
+            f"on_{on.name}": task.error(
+                scored(
+                    predicted(network, on.colour, task, plan, on.sizes), on.truths, task, plan
+                ).figures
+            )
+            for on in places
+        }
+
+    return judge
 
 
 def homes_that_train(sources: Sequence[TrainingSource]) -> frozenset[str]:
@@ -95,9 +118,7 @@ def _of_homes(
         text = f"home {min(leaked)} has trained, it may not judge"
         raise BadInput(source.name, "", text, hint="the same --hold-out as in training")
     truth = f"{task_of(plan.task).truth}; {source.modes[0]} light, {len(views.homes)} homes"
-    credits_of = getattr(open_views(source.places[0]).source, "credits", None)
-    credits = tuple(credits_of(views.homes)) if credits_of else ()
-    return judged_of_arrays(name, truth, views, credits)
+    return judged_of_arrays(name, truth, views, credits_of(source, views.homes))
 
 
 # NYUv2's .mat as views to judge on: its test pictures, truth at their own size. Effects: reads

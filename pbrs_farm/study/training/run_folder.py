@@ -3,6 +3,7 @@
     run.json                what was trained on what, by which plan, and whether it is finished
     metrics.jsonl           a line each plan.log_every steps
     checkpoint.safetensors  what a killed run goes on from; gone when it is finished
+    best.safetensors        of a run that stops on a judge: the weights it liked best so far
     weights.safetensors     the trained weights
     baseline.npy            the prediction that needs no picture
     figures.json            how good it is, on training and held-out homes, beside the baseline
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +26,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.training_plan import TrainingPlan, plan_as_trained, plan_from_json
 
 RUNNING, FINISHED, FAILED = "running", "finished", "failed"
-_SAME: Final = ("task", "seed", "mode", "init", "views_digest")  # of a run that goes on
+_SAME: Final = ("task", "seed", "mode", "init", "views_digest", "stop_on")  # of a run that goes on
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,11 @@ class RunFolder:
     def checkpoint(self) -> Path:
         """What a killed run goes on from."""
         return self.root / "checkpoint.safetensors"
+
+    @property
+    def best(self) -> Path:
+        """The weights that the judge who chooses liked best."""
+        return self.root / "best.safetensors"
 
     @property
     def weights(self) -> Path:
@@ -118,6 +125,10 @@ class RunFolder:
             except ValueError:
                 break  # cut off by a kill
         return rows
+
+    def least(self, name: str) -> float:
+        """The least value of a name in the metrics; infinity where there is none."""
+        return min((row[name] for row in self.metrics() if name in row), default=math.inf)
 
     def keep_metrics_until(self, step: int) -> None:
         """Drop rows of steps that are done again."""

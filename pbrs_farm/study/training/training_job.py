@@ -116,16 +116,19 @@ class Job:
     mode: str = "mlt_il_ol"  # lighting of the pictures
     source: str = ""  # where the views come from, in words
     init: str = "none"  # none, vgg16.pth, hed, or a run's folder
+    stop_on: str = (
+        ""  # the judge whose least error chooses the weights; "" = those of the last step
+    )
     facts: dict[str, Any] = field(default_factory=dict)  # more of the record
 
 
 def train(
     job: Job, views: TrainingViews, held_out: ViewArrays | None = None,
-    observe: Observer = lambda _row: None,
+    observe: Observer = lambda _row: None, also: Judge = lambda _network: {},
 ) -> dict[str, Any]:  # fmt: skip
     """Train, judge, and say so in the folder; the figures. A finished run is not trained again.
 
-    Raises what the loop raises; the folder then says that the run failed, and why.
+    also: errors by name that are asked for each plan.judge_every steps beside our own. Raises what the loop raises; the folder then says that the run failed, and why.
     """
     folder, plan = RunFolder(job.out), job.plan
     device_of(plan)
@@ -144,7 +147,7 @@ def train(
         network = train_network(
             network, views, task, plan,
             seed=job.seed, folder=folder, observe=observe,
-            judge=_judge_of_curve(views, held_out, plan), share=share,
+            judge=_judge_of_curve(views, held_out, plan, also), share=share, stop_on=job.stop_on,
         )  # fmt: skip
         if not share.is_first:
             return {}
@@ -155,7 +158,8 @@ def train(
         raise
     folder.write("figures.json", figures)
     folder.write_text("curves.svg", _curves(folder, plan))
-    folder.checkpoint.unlink(missing_ok=True)
+    for path in (folder.checkpoint, folder.best):
+        path.unlink(missing_ok=True)
     folder.end(FINISHED)
     return figures
 
@@ -164,7 +168,10 @@ def _record(
     job: Job, views: TrainingViews, held_out: ViewArrays | None, origin: dict[str, str]
 ) -> dict[str, Any]:
     held = held_out.homes if held_out else ()
+    # How often it is asked changes what is chosen.
+    stop = f"{job.stop_on}, each {job.plan.judge_every} steps" if job.stop_on else ""
     return {
+        **({"stop_on": stop} if stop else {}),
         "task": job.plan.task,
         "plan": plan_as_json(job.plan),
         "seed": job.seed,
@@ -185,7 +192,9 @@ def _record(
     }
 
 
-def _judge_of_curve(views: TrainingViews, held_out: ViewArrays | None, plan: TrainingPlan) -> Judge:
+def _judge_of_curve(
+    views: TrainingViews, held_out: ViewArrays | None, plan: TrainingPlan, also: Judge
+) -> Judge:
     """Errors on a few training and held-out views; of lines at fewer thresholds, for speed."""
     task = task_of(plan.task, _CURVE_THRESHOLDS)
     parts: dict[str, ViewArrays] = {}
@@ -195,10 +204,11 @@ def _judge_of_curve(views: TrainingViews, held_out: ViewArrays | None, plan: Tra
             parts["train_error"] = views.decoded(plan.judge_views)
             if held_out:
                 parts["held_out_error"] = held_out.some(plan.judge_views)
-        return {
+        own = {
             name: task.error(judged(network, part, task, plan).figures)
             for name, part in parts.items()
         }
+        return own | also(network)
 
     return judge
 
@@ -235,6 +245,8 @@ def _curves(folder: RunFolder, plan: TrainingPlan) -> str:
 
     title = f"{plan.task}, plan {plan.name}"
     errors = {"training": points("train_error"), "held out": points("held_out_error")}
+    names = dict.fromkeys(name for row in rows for name in row)
+    errors |= {name[3:]: points(name) for name in names if name.startswith("on_")}
     panels = {f"{title}: loss": {"loss": smoothed(points("loss"))}}
     if any(errors.values()):
         panels[f"{title}: {task_of(plan.task).error_name}"] = errors

@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import pi, sqrt, tan
+from math import inf, pi, sqrt, tan
 from typing import Any
 
 import torch
@@ -244,11 +244,12 @@ def share_of_process() -> Share:
 
 def train_network(
     network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan, *, seed: int,
-    folder: RunFolder, observe: Observer, judge: Judge, share: Share,
+    folder: RunFolder, observe: Observer, judge: Judge, share: Share, stop_on: str = "",
 ) -> nn.Module:  # fmt: skip
     """Train from the folder's checkpoint, or from the network's own weights; writes weights last.
 
-    judge: asked each plan.judge_every steps; what it says becomes a row of the metrics. Raises
+    judge: asked each plan.judge_every steps; what it says becomes a row of the metrics. stop_on: the
+    name of one of its errors; the weights are then those of the step where it was least. Raises
     LossFailed, naming the view, when the loss is no number; BadInput when the checkpoint is of
     something else.
     """
@@ -279,16 +280,26 @@ def train_network(
             folder.add_metrics(row)
             observe(row)
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
-        if plan.judge_every and done % plan.judge_every == 0:
+        if _is_judged(plan, done, stop_on):
             judging = time.monotonic()
-            folder.add_metrics({"step": done} | judge(network))
+            errors, least = judge(network), folder.least(stop_on)
+            folder.add_metrics({"step": done} | errors)
+            if stop_on and (errors[stop_on] < least or least == inf):
+                save_weights(folder.best, network, _at(where, done))
             started += time.monotonic() - judging
         # A checkpoint holds no gradients, so it waits until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
             save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done))
     if share.is_first:
-        save_weights(folder.weights, network, _at(where, plan.steps))
+        best = load_checkpoint(folder.best, network) if stop_on else _at(where, plan.steps)
+        save_weights(folder.weights, network, best)
     return network
+
+
+def _is_judged(plan: TrainingPlan, done: int, stop_on: str) -> bool:
+    if not plan.judge_every:
+        return False
+    return done % plan.judge_every == 0 or bool(stop_on and done == plan.steps)
 
 
 def _row_since(

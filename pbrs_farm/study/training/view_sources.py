@@ -216,6 +216,17 @@ def all_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> View
     return _arrays(_in_each_light(_spread(views, most), source, plan), plan)
 
 
+def credits_of(source: TrainingSource, homes: Sequence[str]) -> tuple[str, ...]:
+    """The lines that everything made of these homes must carry, each once."""
+    lines: dict[str, None] = {}
+    for place in () if source.is_nyu else source.places:
+        views = open_views(place)
+        told = getattr(views.source, "credits", None)
+        own = set(views.homes)
+        lines |= dict.fromkeys(told([home for home in homes if home in own]) if told else ())
+    return tuple(lines)
+
+
 def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
     """id -> why, of views that lack what the plan's task needs, or that a run has begun only."""
     if source.is_nyu:

@@ -129,3 +129,35 @@ def test_onnx_says_what_the_run_says(run: Path, tmp_path: Path) -> None:
     session = onnxruntime.InferenceSession(path)
     found = session.run(["map"], {"colour": colour.numpy()})[0]
     np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(
+    run: Path, tmp_path: Path
+) -> None:
+    from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.judging.packed_weights import pack_weights
+    from pbrs_farm.study.training.prediction import predicted
+
+    packed = pack_weights(run, tmp_path / "packed")
+    whole, half = open_run(run), open_run(packed.root)
+    assert packed.weights.stat().st_size < 0.6 * whole.folder.weights.stat().st_size
+    size = whole.plan.height_px, whole.plan.width_px
+    colour = np.random.default_rng(0).integers(0, 256, (1, *size, 3)).astype(np.uint8)
+    a, b = (next(predicted(r.network, colour, r.task, r.plan)) for r in (whole, half))
+    assert (a * b).sum(-1).min() > np.cos(np.radians(1))
+    card = (packed.root / "README.md").read_text()
+    assert half.record["weights_sha256"] in card
+    assert "degrees" in card
+
+    data = bytearray(packed.weights.read_bytes())
+    data[-1] ^= 1
+    packed.weights.write_bytes(data)
+    with pytest.raises(BadInput, match="other bytes than"):
+        open_run(packed.root)
+
+
+def test_predict_without_a_photograph_says_how(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["predict", str(run), "--out", "nowhere"]) == 1
+    assert "no photograph is named" in capsys.readouterr().err

@@ -72,6 +72,24 @@ def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> 
     assert finished_run(folder.root)[1]["state"] == "finished"
 
 
+def test_the_weights_are_those_that_the_judge_who_chooses_liked_best(tmp_path: Path) -> None:
+    plan = small_plan(steps="4", judge_every="1")
+    seen: list[dict[str, torch.Tensor]] = []
+
+    def also(network: torch.nn.Module) -> dict[str, float]:
+        seen.append({name: x.clone() for name, x in network.state_dict().items()})
+        return {"on_rooms": [9.0, 3.0, 5.0, 4.0][len(seen) - 1]}
+
+    train(Job(plan, tmp_path, stop_on="on_rooms"), views(3, plan), also=also)
+    kept, position = read_tensors(RunFolder(tmp_path).weights)
+    assert position.step == 2
+    assert all(torch.equal(kept[f"model.{name}"], x) for name, x in seen[1].items())
+    assert not RunFolder(tmp_path).best.exists()
+    other = small_plan(steps="4", judge_every="2")
+    with pytest.raises(BadInput, match="another stop_on"):
+        train(Job(other, tmp_path, stop_on="on_rooms"), views(3, other), also=also)
+
+
 def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
     plan = small_plan(steps="2", hue="0")
     first = train(Job(plan, tmp_path), views(3, plan))

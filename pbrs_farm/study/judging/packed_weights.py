@@ -1,0 +1,124 @@
+"""A finished run as small as it can be handed on: half floats, their sha256, a model card. Effects: files.
+
+What is packed is a run itself: `predict`, `evaluate` and `--init` take it. The best ones of plan tiny
+ship with the package, below study/weights.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path, PurePosixPath
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.judging.evaluation import Trained, markdown, open_run, shown_figure, title_of
+from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
+from pbrs_farm.study.training.run_folder import RunFolder, made_folder
+from pbrs_farm.study.training_plan import plan_as_json
+
+SHIPPED: Final = Path(__file__).parents[1] / "weights"
+_SAYS: Final = {
+    "normals": "the direction of the surface at each pixel",
+    "segmentation": "which of NYU's 40 classes each pixel is of",
+    "boundaries": "how likely each pixel is an edge of an object",
+}
+_MOST_HOMES: Final = 12  # named on the card; of more, these and how many
+
+
+def shipped_run(task: str) -> Path:
+    """The folder of the weights that come with the package; BadInput for a task without."""
+    folder = SHIPPED / task
+    if not (folder / "run.json").exists():
+        there = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
+        hint = f"weights come for {', '.join(there)}" if there else "pbrs-farm predict RUN PHOTO..."
+        raise BadInput("--task", task, "no weights of this task come with the package", hint=hint)
+    return folder
+
+
+def pack_weights(root: Path, out: Path) -> RunFolder:
+    """Write a finished run's weights as half floats, with what is known of them, into out.
+
+    What `evaluate` left in RUN/evaluation is told on the card. Raises BadInput for any other folder.
+    """
+    run, packed = open_run(root), RunFolder(made_folder(out))
+    tensors, position = read_tensors(run.folder.weights)
+    halves = {name: x.half() if x.is_floating_point() else x for name, x in tensors.items()}
+    write_tensor_file(packed.weights, halves, {"position": json.dumps(asdict(position))})
+    np.save(packed.baseline, run.baseline.astype(np.float16))
+    packed.write("figures.json", run.figures)
+    # Where the views lay on this machine is nobody else's business.
+    names = [PurePosixPath(place).name for place in str(run.record["source"]).split(" + ")]
+    digest = hashlib.sha256(packed.weights.read_bytes()).hexdigest()
+    record = run.record | {"source": " + ".join(names), "weights_sha256": digest}
+    packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
+    card = model_card(run, record | {"step": position.step}, _evaluations(root))
+    packed.write_text("README.md", card)
+    return packed
+
+
+def _evaluations(root: Path) -> list[dict[str, Any]]:
+    path = root / "evaluation" / "evaluation.json"
+    return list(json.loads(path.read_bytes())["evaluations"]) if path.exists() else []
+
+
+def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[str, Any]]) -> str:
+    """What the weights are, were trained on, are worth and are not worth: Markdown."""
+    plan, task = run.plan, run.task
+    size = f"{plan.width_px}x{plan.height_px}"
+    homes = record["homes"]["train"]
+    stop = record.get("stop_on", "")
+    chosen = f"step {record['step']:,} of {plan.steps:,}"
+    chosen += f", chosen by the error {stop.removeprefix('on_')}" if stop else ""
+    said = [
+        f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
+        f"# {task.name}, plan {plan.name}",
+        f"Says {_SAYS[task.name]}, from one colour picture of a room. Network `{plan.network}`,"
+        f" {record['weights']:,} weights in half floats, trained at {size}.",
+        f"```\npbrs-farm predict --task {task.name} PHOTO... --out seen\n```",
+        "## What it was trained on",
+        f"{record['views']['train']} rendered views of {len(homes)} homes in light"
+        f" `{record['mode']}`: {', '.join(homes[:_MOST_HOMES])}"
+        f"{' and others' if len(homes) > _MOST_HOMES else ''}. No photograph was trained on."
+        f" First weights: {record['init']}. Weights of {chosen}; seed {record['seed']};"
+        f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}.",
+        f"Truth: {record['truth']}.",
+        "## Figures",
+        _figures(run, evaluations),
+        *(f"Truth of {one['on']}: {one['truth']}." for one in evaluations),
+        "## Limits",
+        f"A small network of two cores and few homes, at {size}: nothing for measuring or for safety."
+        " It knows rooms of made homes by day and by lamplight; photographs of other places, people,"
+        " animals and close-ups are unlike anything it saw.",
+        "## Whose works it saw",
+        "\n".join(f"- {line.removeprefix('- ')}" for line in record.get("credits", []))
+        or "The run names none.",
+        f"weights.safetensors, sha256 {record['weights_sha256']}",
+    ]  # fmt: skip
+    return "\n\n".join(said) + "\n"
+
+
+def _figures(run: Trained, evaluations: list[dict[str, Any]]) -> str:
+    stored = run.figures
+    still = stored["baseline_name"]
+    parts = {"train": "training homes", "held_out": "held-out homes"}
+    columns = [
+        (f"{title} ({stored['views'][part]})", stored["network"][part], stored["baseline"][part])
+        for part, title in parts.items()
+        if part in stored["network"]
+    ]
+    columns += [
+        (f"{one['on']} ({one['n_views']})", one["figures"]["network"], one["figures"][still])
+        for one in evaluations
+    ]
+    rows = [
+        [title_of(name)]
+        + [f"{shown_figure(name, own[name])} ({shown_figure(name, base[name])})" for _, own, base in columns]
+        for name in run.task.figures
+    ]  # fmt: skip
+    text = markdown(["", *(title for title, _, _ in columns)], rows)
+    return f"{text}\n\nIn brackets: {still}, which looks at no picture."

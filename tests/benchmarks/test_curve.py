@@ -1,0 +1,35 @@
+"""The learning curve tells every point, and what more homes bring at equal views."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree as ET
+
+from benchmarks.study.curve import POINTS, run_words
+from benchmarks.study.curve_pictures import Point, curve_page, curve_picture
+
+JUDGED = [
+    Point(10, 100, {"made": (30.0, 32.0), "training": (9.0, 9.2)}),
+    Point(40, 100, {"made": (28.0, 28.0), "training": (9.1, 9.0)}),
+    Point(20, 200, {"made": (29.0,), "training": (10.0,)}),
+]
+
+
+def test_a_page_has_a_row_a_point_and_the_seeds_spread() -> None:
+    page = curve_page(JUDGED, ["Rendering took 60 CPU-seconds a home."])
+    assert "| 10 | 100 | 2 | 31.0 ± 1.4 | 9.1 ± 0.1 |" in page
+    assert "| 20 | 200 | 1 | 29.0 | 10.0 |" in page
+    assert "Equal views, 100: of 10 homes against 40: made 31.0 to 28.0." in page
+
+
+def test_a_line_joins_the_points_of_fewest_homes_and_others_stand_apart() -> None:
+    picture = ET.fromstring(curve_picture(JUDGED))
+    names = [child.tag.rpartition("}")[2] for child in picture]
+    assert names.count("polyline") == 1
+    assert names.count("circle") == 3
+    lines = [child.get("points") or "" for child in picture if "points" in child.attrib]
+    assert len(lines[0].split()) == 2
+
+
+def test_every_point_has_equally_many_views_a_home_or_fewer_and_its_roots_are_apart() -> None:
+    assert all(views <= 10 * homes for homes, views in POINTS)
+    assert run_words("homes_011")[1] == "made:11..20"
