@@ -96,6 +96,7 @@ def test_a_tutorial_names_only_verbs_that_exist(page: str) -> None:
     assert set(re.findall(r"`pbrs-farm ([a-z][a-z-]*)", text)) <= known
 
 
+@pytest.mark.slow
 def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None:
     source = tmp_path / "source"
     for name in ("pbrs_farm", "workers"):
