@@ -19,7 +19,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.render_task import Event
 
-_SHARE_EVERY_S: Final = 30.0
+_SHARE_EVERY_S: Final = 30.0  # of a view
+_HOME_SHARE_EVERY_S: Final = 10.0
 
 
 class ProgressReporter(ABC):
@@ -54,7 +55,8 @@ def _write_line(line: str) -> None:
 class TimeLeft:
     """How long a run will take yet, by its events. now_s: seconds that only grow.
 
-    Views of homes whose views are not known yet count as many as the known homes have on average.
+    Views of homes whose views are not known yet count as many as the known homes have on average,
+    and making such a home as long as the others took.
     """
 
     def __init__(self, n_homes: int) -> None:
@@ -63,7 +65,9 @@ class TimeLeft:
         self._n_views = 0  # of those
         self._n_ended = 0  # views
         self._n_made = 0  # views of them that were not there already
-        self._began_s: float | None = None  # when the first view that is made was begun
+        self._began_s: float | None = None  # when the first home or view that is made was begun
+        self._view_s = 0.0  # of steps of views that were made
+        self._home_s: dict[str, float] = {}  # home that was made -> seconds of its own steps
         self._making: set[str] = set()
         self._shares: dict[str, float] = {}  # view under way -> share of its long step, light
 
@@ -73,12 +77,12 @@ class TimeLeft:
             self._n_planned += 1
             self._n_views += len(event.facts["views"])
         elif event.view_id is None:
-            # A home that failed before its views were known has none.
-            self._n_homes -= event.kind == "failed" and event.step in ("house", "cameras")
+            self._hear_of_home(event, now_s)
         elif event.kind in ("begin", "done"):
             self._began_s = now_s if self._began_s is None else self._began_s
             if event.kind == "done":
                 self._making.add(_name(event))
+                self._view_s += event.seconds
         elif event.kind == "end":
             self._n_ended += 1
             self._n_made += _name(event) in self._making
@@ -86,6 +90,15 @@ class TimeLeft:
             self._shares.pop(_name(event), None)
         elif event.kind == "under_way":
             self._shares[_name(event)] = event.facts["share"]
+
+    def _hear_of_home(self, event: Event, now_s: float) -> None:
+        # A home that failed before its views were known has none.
+        self._n_homes -= event.kind == "failed" and event.step in ("house", "cameras")
+        if event.kind == "begin" and self._began_s is None:
+            self._began_s = now_s
+        if event.kind == "done":
+            before = self._home_s.get(event.house_id, 0.0)
+            self._home_s[event.house_id] = before + event.seconds
 
     @property
     def views_text(self) -> str:
@@ -96,16 +109,26 @@ class TimeLeft:
     def seconds(self, now_s: float) -> float | None:
         """Seconds to the end; None while no view was made, not even a part of one."""
         part = sum(self._shares.values())
-        if self._began_s is None or not self._n_made + part > 0:
+        n_made = self._n_made + part
+        if self._began_s is None or not n_made > 0:
             return None
-        return self._n_left(part) * (now_s - self._began_s) / (self._n_made + part)
+        # A home counts as the views that are made while it is.
+        home_s, n_homes = sum(self._home_s.values()), max(1, len(self._home_s))
+        views_a_home = home_s / n_homes / (self._view_s / n_made) if self._view_s else 0.0
+        done = n_made + views_a_home * len(self._home_s)
+        left = self._n_left(part) + views_a_home * self._n_unknown()
+        return left * (now_s - self._began_s) / done
 
     def _n_left(self, part: float) -> float:
         return max(0.0, self._expected_views() - self._n_ended - part)
 
     def _expected_views(self) -> int:
-        unknown = max(0, self._n_homes - self._n_planned)
-        return round(self._n_views + unknown * self._n_views / max(1, self._n_planned))
+        a_home = self._n_views / max(1, self._n_planned)
+        return round(self._n_views + self._n_unknown() * a_home)
+
+    def _n_unknown(self) -> int:
+        """Homes whose views are not known yet."""
+        return max(0, self._n_homes - self._n_planned)
 
 
 def seconds_text(seconds: float) -> str:
@@ -170,9 +193,10 @@ class _PlainLines(ProgressReporter):
             _write_line(f"{clock} {name}: {how}; {self._left.views_text}{self._time_left()}")
 
     def _tell_share(self, name: str, clock: str, event: Event) -> None:
-        """A line for a view that takes minutes, twice a minute."""
+        """A line for a view that takes minutes, twice a minute; for a home each ten seconds."""
         now_s = time.monotonic()
-        if now_s - self._told_s.get(name, self._started) < _SHARE_EVERY_S:
+        every_s = _SHARE_EVERY_S if event.view_id else _HOME_SHARE_EVERY_S
+        if now_s - self._told_s.get(name, self._started) < every_s:
             return
         self._told_s[name] = now_s
         share = f"{100 * event.facts['share']:.0f} %"

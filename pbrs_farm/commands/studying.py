@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -281,6 +282,7 @@ def _ablation(args: argparse.Namespace) -> int:
         TrainingSet,
         ablation_table,
         compare,
+        hold_out_notes,
         training_sets,
     )
     from pbrs_farm.study.judging.evaluation import check_exact
@@ -293,7 +295,9 @@ def _ablation(args: argparse.Namespace) -> int:
     plan, common = _plan(args, args.task), TrainingSource((), (), _hold_out(args), most=args.views)
     made_folder(args.out)
     # A set of training views a row; all rows share plan, seeds and held-out homes.
-    sets = training_sets(args.root, args.modes, common)
+    sets = training_sets(args.root, args.modes, replace(common, all_there=False))
+    for note in hold_out_notes(sets):
+        echo(note)
     if args.objects:
         objects = TrainingSource((args.objects,), ("mlt_il_ol",), frozenset(), True, args.views)
         sets = (*sets, TrainingSet("objects", objects))

@@ -76,10 +76,13 @@ class Dressed(NamedTuple):
     n_source: int  # of its items were there before
 
 
-def dressed_house(house: House, catalogue: Catalogue, fields: DressFields, seed: int) -> Dressed:
-    """As dress, with what kept_in needs."""
+def dressed_house(
+    house: House, catalogue: Catalogue, fields: DressFields, seed: int,
+    tell: Callable[[float], None] = lambda _share: None,
+) -> Dressed:  # fmt: skip
+    """As dress, with what kept_in needs. tell: called with the share of the parts that are done."""
     with closing(Draft(house, seed, fields.mess)) as draft:
-        return Dressed(*_dressed(draft, catalogue, fields), draft.used, len(house.items))
+        return Dressed(*_dressed(draft, catalogue, fields, tell), draft.used, len(house.items))
 
 
 def kept_in(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
@@ -97,16 +100,21 @@ def kept_in(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
     return dressed._replace(house=house, report=report.model_copy(update=update))
 
 
-def _dressed(draft: Draft, catalogue: Catalogue, fields: DressFields) -> tuple[House, DressReport]:
+def _dressed(
+    draft: Draft, catalogue: Catalogue, fields: DressFields, tell: Callable[[float], None]
+) -> tuple[House, DressReport]:
     style = style_for(draft.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
     # Put back what stands wrong before things are laid on it, then look at everything.
+    n_done = 0
     for several in (_FURNITURE, _THINGS):
         for field, part in several:
             share = float(getattr(fields, field))
             if share > 0:
                 part(draft, catalogue, style, share)
+            n_done += 1
+            tell(n_done / len(_FURNITURE + _THINGS))
         gates = _joined(gates, keep_gates(draft, pieces | draft.used))
     if fields.passes:
         for name in fields.passes.split(":"):

@@ -34,8 +34,8 @@ from pbrs_farm.transport.light_result import Arrays
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 
-def _unheard(_share: float) -> None:
-    return None
+def unheard(_share: float) -> None:
+    """Nobody hears how far a step is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Work:
     layers: tuple[str, ...] = ()  # optional layers to write beside those that are there
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
     digest: str = ""  # of the step under way
-    tell_share: Callable[[float], None] = _unheard  # called with the share done of a long step
+    tell_share: Callable[[float], None] = unheard  # called with the share done of a long step
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,6 +47,7 @@ from pbrs_farm.run.step_cache import (
     Work,
     required_source,
     run_unless_done,
+    unheard,
 )
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
@@ -83,7 +84,7 @@ def _house(work: Work) -> StepOutput:
 
     # The submitted id has the source's digest: another one means another file at that place.
     source = required_source(work)
-    repaired, report, dressing = made_house(source, work.recipe)
+    repaired, report, dressing = made_house(source, work.recipe, work.tell_share)
     if repaired.id != work.house_id:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
@@ -107,8 +108,13 @@ def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairRepo
     return house, report
 
 
-def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
-    """As repaired_house, with what dressing did; None where the source is not dressed."""
+def made_house(
+    source: SourceRef, recipe: Recipe, tell: Callable[[float], None] = unheard
+) -> MadeHouse:
+    """As repaired_house, with what dressing did; None where the source is not dressed.
+
+    tell: called with the share that is done while it is dressed.
+    """
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import RepairReport, repair
 
@@ -135,7 +141,7 @@ def made_house(source: SourceRef, recipe: Recipe) -> MadeHouse:
     house = with_told_furnished(house, source, recipe)
     house = furnished(house, source, recipe)
     repaired = partial(repair, fields=recipe.repair, occluder_from=occluder_from)
-    house, report, dressing = dressed_and_repaired(house, source, recipe, repaired)
+    house, report, dressing = dressed_and_repaired(house, source, recipe, repaired, tell)
     return _before_windows(house, recipe), report, dressing
 
 

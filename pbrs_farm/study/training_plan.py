@@ -64,7 +64,7 @@ class TrainingPlan:
     # Machine
     device: str = "auto"  # auto, cpu, cuda
     threads: int = 0  # of torch, 0 = its own choice
-    bf16: bool = False  # the forward pass in bfloat16
+    bf16: bool = False  # the forward pass in bfloat16, where a processor's step is not slower so
     channels_last: bool = True
     memory_gb: float = 4.0  # training views that take more are read anew for each step
     workers: int = 0  # processes that read them then

@@ -45,6 +45,30 @@ def test_homes_not_read_yet_count_with_the_mean_of_the_others() -> None:
     assert left.seconds(10.0) == pytest.approx(110.0)
 
 
+def test_homes_still_to_be_made_count_with_what_the_others_took() -> None:
+    left = TimeLeft(3)
+    left.hear(Event("begin", "a", None, "house"), 0.0)
+    left.hear(Event("done", "a", None, "house", seconds=60.0), 60.0)
+    left.hear(planned("a", 2), 60.0)
+    for k in range(2):
+        left.hear(Event("begin", "a", str(k), "truth"), 60.0 + 5 * k)
+        left.hear(Event("done", "a", str(k), "truth", seconds=5.0), 65.0 + 5 * k)
+        left.hear(Event("end", "a", str(k), ""), 65.0 + 5 * k)
+    assert left.seconds(70.0) == pytest.approx(140.0)
+
+
+def test_a_home_under_way_tells_its_share(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr("pbrs_farm.progress.time.monotonic", lambda: now[0])
+    with progress_reporter(1, as_json=False) as report:
+        for now[0], share in ((4.0, 0.1), (12.0, 0.4), (13.0, 0.5)):
+            report(Event("under_way", "a", None, "house", facts={"share": share}))
+    lines = [line.split("] ")[1] for line in capsys.readouterr().out.splitlines()]
+    assert lines == ["a house: 40 %"]
+
+
 def test_a_home_that_cannot_be_read_has_no_views() -> None:
     left = TimeLeft(2)
     left.hear(Event("failed", "b", None, "house"), 0.0)

@@ -25,7 +25,12 @@ from pbrs_farm.study.judging.evaluation import (
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays
-from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
+from pbrs_farm.study.training.view_sources import (
+    TrainingSource,
+    held_out_views,
+    missing_of,
+    training_views,
+)
 from pbrs_farm.study.training_plan import TrainingPlan
 
 Tell = Callable[[str], None]
@@ -163,6 +168,20 @@ def _n_seeds(result: dict[str, Any]) -> int:
 def _is_underfit(task_name: str, run: dict[str, Any]) -> bool:
     error = task_of(task_name).error
     return is_underfit(error(run["network"]["train"]), error(run["baseline"]["train"]))
+
+
+def hold_out_notes(sets: Sequence[TrainingSet]) -> list[str]:
+    """What is said of homes to hold out that some rows lack; BadInput for one that all rows lack."""
+    missing = {each.name: missing_of(each.source) for each in sets}
+    everywhere = set.intersection(*(set(names) for names in missing.values()))
+    if everywhere:
+        places = ", ".join(dict.fromkeys(each.source.name for each in sets))
+        raise BadInput("--hold-out", min(everywhere), f"no such home in {places}")
+    return [
+        f"{row} has no home {', '.join(names)} to hold out"
+        for row, names in missing.items()
+        if names
+    ]
 
 
 def training_sets(

@@ -348,6 +348,10 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
             f"underfit: the error on its own training views, {train:.3g}, is above 80 % of the"
             f" baseline's, {still:.3g}; rank nothing by it"
         )
+    if seconds := run.record.get("seconds_a_step"):
+        taken = min(seconds, key=lambda name: float(seconds[name]))
+        timed = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+        said.append(f"a step takes {timed} here: trained in {taken}")
     said.append(f"truth of training and held-out homes: {run.record['truth']}")
     if isinstance(run.task, EdgesTask):
         text = f"thresholds: {N_THRESHOLDS} of training and held-out homes"

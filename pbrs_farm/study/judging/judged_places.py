@@ -63,8 +63,7 @@ def judged_place(
         return pair_views(path, plan, label or path.name)
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)
-        hold_out &= frozenset(home_of(house) for house in open_views(place).homes)
-    source = TrainingSource((place,), (own_mode or mode,), hold_out)
+    source = TrainingSource((place,), (own_mode or mode,), hold_out, all_there=False)
     return _of_homes(source, plan, label or path.name, trained_on, most)
 
 

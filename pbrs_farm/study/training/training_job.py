@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,14 @@ from pbrs_farm.study.networks.network_choice import n_weights, network_of
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.prediction import baseline_judged, device_of, judged
 from pbrs_farm.study.training.run_folder import FAILED, FINISHED, RunFolder
-from pbrs_farm.study.training.training_loop import Judge, Observer, share_of_process, train_network
+from pbrs_farm.study.training.training_loop import (
+    Judge,
+    Observer,
+    Share,
+    seconds_a_step,
+    share_of_process,
+    train_network,
+)
 from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan, plan_as_json
 
@@ -116,9 +123,7 @@ class Job:
     mode: str = "mlt_il_ol"  # lighting of the pictures
     source: str = ""  # where the views come from, in words
     init: str = "none"  # none, vgg16.pth, hed, or a run's folder
-    stop_on: str = (
-        ""  # the judge whose least error chooses the weights; "" = those of the last step
-    )
+    stop_on: str = ""  # the judge that chooses the weights; "" = those of the last step
     facts: dict[str, Any] = field(default_factory=dict)  # more of the record
 
 
@@ -128,7 +133,8 @@ def train(
 ) -> dict[str, Any]:  # fmt: skip
     """Train, judge, and say so in the folder; the figures. A finished run is not trained again.
 
-    also: errors by name that are asked for each plan.judge_every steps beside our own. Raises what the loop raises; the folder then says that the run failed, and why.
+    also: errors by name that are asked for each plan.judge_every steps beside our own. Raises what
+    the loop raises; the folder then says that the run failed, and why.
     """
     folder, plan = RunFolder(job.out), job.plan
     device_of(plan)
@@ -140,6 +146,8 @@ def train(
     torch.manual_seed(job.seed)
     network = network_of(plan.network, task.n_out(plan))
     origin = start_from(network, job.init)
+    plan, timed = _faster(folder, network, views, plan, share)
+    job = replace(job, plan=plan, facts=job.facts | timed)
     row = _record(job, views, held_out, origin) | {"weights": n_weights(network)}
     if not (folder.begin(row) if share.is_first else not folder.is_finished()):
         return folder.figures() if share.is_first else {}
@@ -162,6 +170,26 @@ def train(
         path.unlink(missing_ok=True)
     folder.end(FINISHED)
     return figures
+
+
+def _faster(
+    folder: RunFolder, network: torch.nn.Module, views: TrainingViews, plan: TrainingPlan, share: Share
+) -> tuple[TrainingPlan, dict[str, Any]]:  # fmt: skip
+    """The plan with bfloat16 where that was asked for and is the faster, and what was measured.
+
+    A run that goes on keeps what it began with. GPUs and several processes do as they are told.
+    """
+    if not plan.bf16 or share.of > 1 or device_of(plan).type != "cpu":
+        return plan, {}
+    older = folder.record() if (folder.root / "run.json").exists() else {}
+    seconds = (
+        older.get("seconds_a_step")
+        if older
+        else seconds_a_step(network, views, task_of(plan.task), plan)
+    )
+    if seconds is None:
+        return plan, {}
+    return replace(plan, bf16=seconds["bfloat16"] < seconds["float32"]), {"seconds_a_step": seconds}
 
 
 def _record(

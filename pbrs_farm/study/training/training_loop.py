@@ -6,12 +6,13 @@ same weights. Under torchrun each process takes its share of every batch (DDP).
 
 from __future__ import annotations
 
+import copy
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi, sqrt, tan
-from typing import Any
+from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
@@ -209,6 +210,8 @@ def _released_groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, A
 # The training loop.
 
 
+_TIMED_STEPS: Final = 2  # of each arithmetic; the first makes what others find made
+
 Observer = Callable[[dict[str, float]], None]
 Judge = Callable[[nn.Module], dict[str, float]]  # errors of the network as it is, by name
 
@@ -300,6 +303,25 @@ def _is_judged(plan: TrainingPlan, done: int, stop_on: str) -> bool:
     if not plan.judge_every:
         return False
     return done % plan.judge_every == 0 or bool(stop_on and done == plan.steps)
+
+
+def seconds_a_step(
+    network: nn.Module, views: TrainingViews, task: StudyTask, plan: TrainingPlan
+) -> dict[str, float]:
+    """Wall seconds of a step forth and back in each arithmetic, the network itself left as it is."""
+    read = next(iter(views.batches(range(1), plan, 0, slice(None))))
+    seconds = {}
+    for name, bf16 in (("float32", False), ("bfloat16", True)):
+        model = placed(copy.deepcopy(network), plan)
+        each = replace(plan, bf16=bf16)
+        loop = _Loop(model, optimiser_of(model, each), task, each, 0, Share())
+        times = []
+        for _ in range(_TIMED_STEPS):
+            began = time.perf_counter()
+            loop.step(0, read)
+            times.append(time.perf_counter() - began)
+        seconds[name] = round(min(times), 4)
+    return seconds
 
 
 def _row_since(

@@ -155,7 +155,8 @@ class TrainingSource:
 
     places: roots or shards, or NYUv2's .mat alone. modes: each view is taken once in each of them. hold_out: homes by id,
     or by name without digest and variant, that never train; None = the split by house holds out
-    val and test (a fifth of the homes). objects: models without context instead of rooms. most: at
+    val and test (a fifth of the homes). all_there: a name of hold_out that no place has is an error;
+    where several sources are compared, another one may have it. objects: models without context instead of rooms. most: at
     most so many training views, spread over all; 0 = all.
     """
 
@@ -164,6 +165,7 @@ class TrainingSource:
     hold_out: frozenset[str] | None = None
     objects: bool = False
     most: int = 0
+    all_there: bool = True
 
     @property
     def name(self) -> str:
@@ -241,6 +243,17 @@ def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
     return lacking
 
 
+def missing_of(source: TrainingSource) -> list[str]:
+    """The names of hold_out that no home of its places has."""
+    homes = {
+        name
+        for place in source.places
+        for ref in open_views(place).refs
+        for name in (ref.house, home_of(ref.house))
+    }
+    return sorted((source.hold_out or frozenset()) - homes)
+
+
 def is_held_out(view: Frame, source: TrainingSource) -> bool:
     """The view's home never trains."""
     if source.hold_out is not None:
@@ -258,7 +271,7 @@ def _pictures(
         homes |= {name for ref in views.refs for name in (ref.house, home_of(ref.house))}
         found += [view for view in views if is_held_out(view, source) == held_out]
     unknown = sorted((source.hold_out or frozenset()) - homes)
-    if unknown:
+    if unknown and source.all_there:
         raise BadInput("--hold-out", unknown[0], f"no such home in {source.name}")
     return _in_each_light(_spread(found, most), source, plan)
 

@@ -12,7 +12,7 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.judging.ablation import training_sets
+from pbrs_farm.study.judging.ablation import hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import (
     PAPER,
     evaluate,
@@ -252,3 +252,18 @@ def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
     colour, rows, columns = framed(np.zeros((100, 300, 3), np.uint8), small_plan())
     assert colour.shape == (32, 40, 3)
     assert (rows, columns) == (slice(0, 100), slice(87, 212))
+
+
+def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_an_error(
+    root: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other"
+    fill(FolderStore(other), {"villa-00000000": 1}, SIZE)
+    roots, light = [f"a={root}", f"b={other}"], ["mlt_il_ol"]
+    held = TrainingSource((), hold_out=frozenset({"home-2"}), all_there=False)
+    sets = training_sets(roots, light, held)
+    assert hold_out_notes(sets) == ["b_mlt_il_ol has no home home-2 to hold out"]
+    assert len(training_views(sets[1].source, small_plan())) == 1
+    nowhere = TrainingSource((), hold_out=frozenset({"home-9"}), all_there=False)
+    with pytest.raises(BadInput, match="no such home in"):
+        hold_out_notes(training_sets(roots, light, nowhere))

@@ -13,10 +13,11 @@ import pytest
 import torch
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_job import Job, train
-from pbrs_farm.study.training.training_loop import LossFailed
+from pbrs_farm.study.training.training_loop import LossFailed, seconds_a_step
 from pbrs_farm.study.training.training_views import BatchOrder
 from pbrs_farm.study.training_plan import plan_of
 from tests.study.training.made_views import small_plan, views
@@ -88,6 +89,30 @@ def test_the_weights_are_those_that_the_judge_who_chooses_liked_best(tmp_path: P
     other = small_plan(steps="4", judge_every="2")
     with pytest.raises(BadInput, match="another stop_on"):
         train(Job(other, tmp_path, stop_on="on_rooms"), views(3, other), also=also)
+
+
+@pytest.mark.parametrize("slow", ["float32", "bfloat16"])
+def test_bfloat16_is_taken_where_its_step_is_faster_and_a_run_keeps_it(
+    slow: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = small_plan(steps="1", bf16="true")
+    timed = {name: 2.0 if name == slow else 1.0 for name in ("float32", "bfloat16")}
+    where = "pbrs_farm.study.training.training_job.seconds_a_step"
+    monkeypatch.setattr(where, lambda *_: timed)
+    train(Job(plan, tmp_path), views(2, plan))
+    assert RunFolder(tmp_path).record()["plan"]["bf16"] == (slow == "float32")
+    monkeypatch.setattr(where, lambda *_: pytest.fail("measured again"))
+    train(Job(plan, tmp_path), views(2, plan))
+
+
+def test_measuring_a_step_leaves_the_network_as_it_is() -> None:
+    plan = small_plan()
+    network = torch.nn.Conv2d(3, 3, 1)
+    before = network.weight.clone()
+    seconds = seconds_a_step(network, views(2, plan), task_of("normals"), plan)
+    assert set(seconds) == {"float32", "bfloat16"}
+    assert min(seconds.values()) > 0
+    assert torch.equal(network.weight, before)
 
 
 def test_a_finished_run_is_not_trained_again(tmp_path: Path) -> None:
