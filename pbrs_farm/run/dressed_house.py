@@ -71,7 +71,7 @@ def dressed_and_repaired(
     source: SourceRef,
     recipe: Recipe,
     repaired: Callable[[House], Repaired],
-    tell: Callable[[float], None],
+    tell: Callable[[float], None] = lambda _share: None,
 ) -> tuple[House, RepairReport, DressReport | None]:
     """A house as read, dressed by its source's seed and repaired; and what was done, None: not dressed.
 
