@@ -38,7 +38,7 @@ MODULES: Final = {
     "submitting": ("submit",),
     "steering": (
         "status", "jobs", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel", "reduce",
-        "priority", "limit", "gc", "drain", "workers", "recover", "adopt", "coordinator", "worker",
+        "priority", "limit", "gc", "drain", "workers", "users", "audit", "recover", "adopt", "coordinator", "worker",
     ),
 }  # fmt: skip
 

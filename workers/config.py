@@ -94,6 +94,7 @@ class FarmConfig:
     window_min: int = _least(128, 1)  # tasks in flight per stage, at least
     resend_s: float = _above(60.0)  # a message unclaimed for so long may be lost
     webhook: Secret = field(default_factory=lambda: Secret(""))  # told when a job ends or pauses
+    token: Secret = field(default_factory=Secret)  # says which user gives orders
     metrics_port: int = _least(0, 0)  # of the coordinator's Prometheus endpoint, 0 = off
     limits: Limits = field(default_factory=Limits)
 
@@ -142,6 +143,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
         store_url=env.get("PBRS_STORE", ""),
         store=settings.store,
         webhook=Secret(value_or_file(env, "PBRS_WEBHOOK")),
+        token=Secret(value_or_file(env, "PBRS_TOKEN")),
         limits=Limits(**_read(Limits, of_limits, limits)),
     )
 
@@ -172,7 +174,7 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
 # Settings that had another name once -> their field.
 _FORMER_NAMES: Final = {"beat_s": "heartbeat_s", "forgive_s": "cooldown_s"}
 # Fields that other variables set.
-_ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook"}
+_ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook", "token"}
 
 
 def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str) -> dict[str, Any]:

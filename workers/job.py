@@ -70,6 +70,8 @@ class JobSpec(BaseModel):
     max_slots: int = Field(0, ge=0, description="tasks in flight at once; 0 = as there are slots")
     budget_h: float = Field(0.0, ge=0, description="slot-hours, then it pauses itself; 0 = none")
     after: tuple[str, ...] = Field((), description="jobs that must be done before it begins")
+    user: str = Field("", description="whose job it is; nobody's on a farm without users")
+    preempt: bool = Field(False, description="urgent: running tasks of other jobs make room for it")
     batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
     min_batches: int = Field(
@@ -87,6 +89,8 @@ _NOT_WORK = {
     "max_slots",
     "budget_h",
     "after",
+    "user",
+    "preempt",
     "rules",
     "n_houses",
     "min_batches",

@@ -21,7 +21,7 @@ GROUPS: Final = {
     "train and judge": ("train", "evaluate", "predict", "ablation"),
     "run on many machines": (
         "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",
-        "priority", "limit", "reduce", "gc", "workers", "drain", "recover", "adopt", "coordinator", "worker",
+        "priority", "limit", "reduce", "gc", "workers", "drain", "users", "audit", "recover", "adopt", "coordinator", "worker",
     ),
 }  # fmt: skip
 

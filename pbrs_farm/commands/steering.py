@@ -23,15 +23,18 @@ from pbrs_farm.commands.arguments import (
     farm_of,
     warn,
 )
+from pbrs_farm.core.errors import BadInput
 from workers.client.text import (
+    changes_text,
     explanation_text,
     failures_text,
     jobs_text,
     status_text,
+    users_text,
     workers_text,
 )
 from workers.ids import LEAST_URGENT
-from workers.ledger.task_ledger import WITH_FAILURES
+from workers.ledger.task_ledger import SPENT_DAYS, WITH_FAILURES
 
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
@@ -87,6 +90,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("worker")
     p.add_argument("--undo", action="store_true", help="let it stay")
     farm_verb("workers", _workers, "the farm's workers")
+    _add_users(farm_verb)
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
     p.set_defaults(what="recover")
     p.add_argument("job")
@@ -98,6 +102,23 @@ def add_verbs(verb: Verb) -> None:
     verb("coordinator", _coordinator, "lead the farm, or stand by")
     p = verb("worker", _worker, "work for the farm until asked to leave")
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
+
+
+def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]) -> None:
+    p = farm_verb("users", _users, "who may ask for work, and how much; users add NAME makes one")
+    p.add_argument("what", nargs="?", default="list", choices=("list", "add", "limit", "remove"))
+    p.add_argument("name", nargs="?", default="", metavar="NAME")
+    text = "of the slots, in proportion to the others who want some (1)"
+    p.add_argument("--share", type=float, metavar="X", help=text)
+    text = "tasks of all jobs of the user in flight at once; 0 = any"
+    p.add_argument("--max-slots", type=int, metavar="N", help=text)
+    text = f"that the user's jobs may take in {SPENT_DAYS} days; 0 = any"
+    p.add_argument("--slot-hours", type=float, metavar="H", help=text)
+    yes_no = ("yes", "no")
+    p.add_argument("--admin", choices=yes_no, help="may steer every job, workers and users")
+    p.add_argument("--may-preempt", choices=yes_no, help="may submit urgent jobs (--preempt)")
+    p = farm_verb("audit", _audit, "who changed what of the farm, the newest first")
+    p.add_argument("--last", type=int, default=20, metavar="N", help="lines (default 20)")
 
 
 # Verbs that change a job's state -> what they do.
@@ -229,6 +250,8 @@ def _gc(args: argparse.Namespace) -> int:
 
     farm, keep_s = farm_of(args), keep_from_text(args.keep)
     farm.ledger.ping()
+    if args.yes:
+        farm.rights.check_admin("gc --yes")
     found = garbage(farm, keep_s, time.time())
     n = remove(farm, found) if args.yes else 0
     rows = [{"kind": g.kind, "objects": len(g.found), "bytes": g.n_bytes} for g in found]
@@ -254,6 +277,43 @@ def _drain(args: argparse.Namespace) -> int:
 def _workers(args: argparse.Namespace) -> int:
     rows = farm_of(args).workers()
     _show(args, rows, lambda: workers_text(rows))
+    return 0
+
+
+def _users(args: argparse.Namespace) -> int:
+    from workers.client.users import add_user, change_user, limits_of, remove_user, user_rows
+
+    farm = farm_of(args)
+    limits = limits_of(
+        share=args.share,
+        max_slots=args.max_slots,
+        slot_hours=args.slot_hours,
+        is_admin=args.admin and args.admin == "yes",
+        may_preempt=args.may_preempt and args.may_preempt == "yes",
+    )
+    if args.what == "list" and not args.name and not limits:
+        rows = user_rows(farm)
+        _show(args, rows, lambda: users_text(rows))
+        return 0
+    if args.what == "list" or not args.name:
+        raise BadInput("users", args.what, "expected a name", hint="users add|limit|remove NAME")
+    answer: dict[str, Any] = {"user": args.name, "what": args.what}
+    if args.what == "add":
+        answer["token"] = add_user(farm, args.name, limits)
+        told = f"{args.name}'s token, kept nowhere: {answer['token']}"
+    elif args.what == "limit":
+        change_user(farm, args.name, limits)
+        told = f"{args.name} changed"
+    else:
+        remove_user(farm, args.name)
+        told = f"{args.name} removed"
+    _show(args, answer, lambda: told)
+    return 0
+
+
+def _audit(args: argparse.Namespace) -> int:
+    rows = farm_of(args).users.changes(args.last)
+    _show(args, rows, lambda: changes_text(rows))
     return 0
 
 

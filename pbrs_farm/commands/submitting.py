@@ -65,6 +65,8 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--budget", type=float, default=0.0, metavar="HOURS", help=text)
     text = "begin when this job is done, repeatable"
     p.add_argument("--after", action="append", default=[], metavar="JOB", help=text)
+    text = "urgent: running tasks of other jobs make room, and keep what they have rendered"
+    p.add_argument("--preempt", action="store_true", help=text)
     p.add_argument("--update", action="store_true", help="give the store this recipe")
     p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
     p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")
@@ -114,6 +116,9 @@ def _submitted(args: argparse.Namespace) -> str:
     farm = farm_of(args)
     farm.ledger.ping()
     farm.check_store()
+    farm.rights.who()
+    if spec.preempt:
+        farm.rights.check_preempt()
     for before in spec.after:
         farm.view(before)
     for line in farm.check_plugins(needed_plugins(refs, spec.recipe, spec.layers)):
@@ -187,6 +192,7 @@ def _spec(args: argparse.Namespace) -> JobSpec:
         priority=args.priority,
         max_slots=args.max_slots,
         budget_h=args.budget,
+        preempt=args.preempt,
         after=tuple(check_job_id(job) for job in args.after),
         batch_stages=batch_stages(want),
         seconds_per_view=seconds_per_view(recipe),

@@ -12,9 +12,11 @@ from workers.ledger.task_ledger import (
     Fault,
     Finished,
     GoOn,
+    Hold,
     HouseState,
     JobView,
     LedgerUnavailable,
+    WorkerView,
 )
 
 
@@ -153,6 +155,15 @@ class MemoryLedger:
         counts |= {f"seconds:{stage}": n for stage, n in self.seconds.items()}
         return JobView(job, self.fields, counts, {}, 0)
 
+    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None:
+        self.fields |= {"barred": ",".join(queues), "barred_why": why}
+
+    def holds(self, job: str) -> list[Hold]:
+        return []
+
+    def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
+        raise NotImplementedError
+
     def set_told(self, job: str, outcome: str) -> None:
         self.fields["told"] = outcome
 
@@ -179,6 +190,9 @@ class MemoryRegistry:
 
     def slots(self) -> dict[str, int]:
         return self.n_slots
+
+    def workers(self) -> list[WorkerView]:
+        return []
 
     def note_rejection(self, reason: str) -> None:
         self.refusals.append(reason)

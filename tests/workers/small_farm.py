@@ -10,6 +10,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.memory import descendants
@@ -99,11 +100,15 @@ class SmallFarm:
     def worker(self, name: str, slots: int = 1, prefix: tuple[str, ...] = ()) -> None:
         self.start(name, "workers.node.supervisor", slots=slots, prefix=prefix)
 
-    def submit(self, n_houses: int) -> None:
-        self.houses = [f"h{k:03d}" + "x" * (k % 2) for k in range(n_houses)]
-        houses = [HouseEntry(house_id=h) for h in self.houses]
-        spec = new_spec(recipe_from_name("preview"), rules={"shard_size": 5})
-        self.job = self.farm.submit(houses, spec).job_id
+    def submit(self, n_houses: int, prefix: str = "h", token: str = "", **fields: object) -> str:
+        """A job of so many houses; `job` is the last one, `houses` are those of all."""
+        names = [f"{prefix}{k:03d}" + "x" * (k % 2) for k in range(n_houses)]
+        self.houses = sorted({*self.houses, *names})
+        houses = [HouseEntry(house_id=h) for h in names]
+        spec = new_spec(recipe_from_name("preview"), rules={"shard_size": 5}, **fields)
+        farm = Farm(replace(self.farm.config, token=Secret(token))) if token else self.farm
+        self.job = farm.submit(houses, spec).job_id
+        return self.job
 
     def kill(self, name: str, sign: signal.Signals = signal.SIGKILL) -> None:
         """The process and all it started, as a node that loses power."""

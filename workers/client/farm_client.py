@@ -10,6 +10,7 @@ the recipe's models: `status` is asked often, of machines that are busy.
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from collections import Counter
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.store import Store, store_from_url
+from workers.client.rights import Rights
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.coordinator.shares import priority_of
@@ -38,7 +40,8 @@ from workers.ids import (
     task_from_text,
 )
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import ALIVE_S, STATES, JobView
+from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, User, hold_from_text
+from workers.ledger.user_table import UserTable
 from workers.ledger.worker_registry import Registry
 from workers.store_identity import known_store_id, store_id
 
@@ -115,8 +118,10 @@ def _row(
     if letter == STATES["READY"] and "not_before" in facts:
         row["state"] = "waits before it is tried again"
     if "claim" in facts:
-        _token, row["worker"], since = facts["claim"].split("|")
-        row["for_s"] = round(ledger.now() - float(since), 1)
+        hold = hold_from_text(job, task, facts["claim"])
+        row["worker"], row["for_s"] = hold.worker, round(ledger.now() - hold.since, 1)
+        if hold.is_preempted:
+            row["state"] += ", makes room for an urgent job"
     row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
     if "fault" in facts:
         row["fault"] = json.loads(facts["fault"])
@@ -141,6 +146,8 @@ def _holder(
 
 def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
+    if view.state == "running" and view.barred:
+        return f"others go first: {view.fields.get('barred_why', '')}"
     if view.state != "running":
         return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
     if reason := registry.breaker():
@@ -181,6 +188,14 @@ class Farm:
         self.config = config
         self.ledger = RedisLedger(config)
         self.registry = Registry(self.ledger)
+        self.users = UserTable(self.ledger)
+        self.rights = Rights(self.users, config.token)
+
+    def acting_as(self, user: User, place: str) -> Farm:
+        """The same farm as this user sees it. place: where he sits, for the audit."""
+        other = copy.copy(self)
+        other.rights = Rights(self.users, self.config.token, user, place)
+        return other
 
     @cached_property
     def store(self) -> Store:
@@ -204,6 +219,10 @@ class Farm:
         # The same work has the same id: a job that is there is left alone.
         houses, spec = completed(houses, spec)
         self.ledger.ping()
+        user = self.rights.who()
+        if spec.preempt:
+            self.rights.check_preempt()
+        spec = spec.model_copy(update={"user": user.name if user is not None else ""})
         view = self.ledger.view(spec.job_id)
         if view is not None and view.state in ("running", "paused", "done"):
             return Submitted(spec.job_id, len(houses), view.outcome)
@@ -217,7 +236,9 @@ class Farm:
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
         self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
-        return Submitted(spec.job_id, len(houses), self._load(spec, list(houses)))
+        was = self._load(spec, list(houses))
+        self.rights.note("submit", spec.job_id, f"{len(houses)} houses, {spec.recipe.name}")
+        return Submitted(spec.job_id, len(houses), was)
 
     def check_store(self) -> None:
         """Raises BadInput where workers live and none of them works on this farm's store."""
@@ -253,9 +274,12 @@ class Farm:
         """Rebuild the ledger of a job from storage, whatever Redis held of it."""
         from workers.job import houses_from_lines
 
+        self.users.restore(self.store)
         spec = self.spec(job)
+        self.rights.check_owner(job, spec.user)
         houses = [*houses_from_lines(self.store.get(job_key(job, "houses.jsonl")))]
         self._load(spec, houses, progress)
+        self.rights.note("recover", job, f"{len(houses)} houses")
         view = self.ledger.view(job)
         assert view is not None
         return view
@@ -268,6 +292,7 @@ class Farm:
         from workers.job import work_version
 
         spec = self.spec(job)
+        self.rights.check_owner(job, spec.user)
         if spec.version != work_version():
             before = (*spec.versions_before, spec.version)
             spec = spec.model_copy(update={"version": work_version(), "versions_before": before})
@@ -322,7 +347,10 @@ class Farm:
             "state": view.outcome,
             "reason": view.fields.get("reason", ""),
             "recipe": view.fields.get("recipe_name", ""),
+            "user": view.user,
             "priority": priority_of(view),
+            "is_urgent": view.is_urgent,
+            "held_back": view.fields.get("barred_why", "") if view.state == "running" else "",
             "waits_for": [j for j in view.after if not self._is_done(j)],
             "houses": {
                 "total": int(view.fields.get("n_houses", 0)),
@@ -406,10 +434,12 @@ class Farm:
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
         """Fresh attempts for these tasks, or for all that failed; those that were put back."""
         # The ledger forgets the failure, then storage does.
+        self.rights.check_owner(job, self.view(job).user)
         chosen = list(tasks) or [task for task, _fault in self.ledger.faults(job)]
         again = [t for t in chosen if self.ledger.retry(job, str(task_from_text(t)))]
         for task in again:
             self.store.delete(failed_key(job, task))
+        self.rights.note("retry", job, f"{len(again)} tasks")
         return again
 
     def pause(self, job: str) -> str:
@@ -454,9 +484,11 @@ class Farm:
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
         """The worker finishes what it runs and leaves; BadInput when there is no such worker."""
+        self.rights.check_admin("drain")
         if not self.registry.drain(worker, undo=undo):
             offer = did_you_mean(worker, [w.name for w in self.registry.workers()])
             raise BadInput(worker, "", "no such worker", hint=offer or "`workers` lists them")
+        self.rights.note("drain", worker, "undone" if undo else "told")
 
     def workers(self) -> list[dict[str, Any]]:
         """Workers seen in the last hour, each with its state: alive, draining, drained, dead.
@@ -496,9 +528,12 @@ class Farm:
         return was
 
     def _steer(self, job: str, what: str, reason: str = "") -> str:
-        state = self.ledger.steer(check_job_id(job), what, reason)
-        if not state:
+        view = self.ledger.view(check_job_id(job))
+        if view is None:
             raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
+        self.rights.check_owner(job, view.user)
+        state = self.ledger.steer(job, what, reason)
+        self.rights.note(what, job, f"{reason}, {state}" if reason else state)
         return state
 
     def _explain_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:

@@ -32,6 +32,7 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
         "state": view.outcome,
         "reason": view.fields.get("reason", ""),
         "recipe": view.fields.get("recipe_name", ""),
+        "user": view.user,
         "priority": priority_of(view),
         "houses": int(view.fields.get("n_houses", 0)),
         "houses_done": int(view.counts.get("houses:done", 0)),

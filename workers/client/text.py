@@ -22,7 +22,8 @@ def status_text(status: Mapping[str, Any]) -> str:
     lines = [
         f"job {status['job']}  {status['state']}"
         + (f": {status['reason']}" if status["reason"] else "")
-        + f"  priority {status['priority']}",
+        + f"  priority {status['priority']}{', urgent' if status.get('is_urgent') else ''}"
+        + (f"  of {status['user']}" if status.get("user") else ""),
         f"houses {houses['done']} done, {houses['open']} open, {houses['waiting']} waiting, "
         f"{houses['quarantined']} quarantined, of {houses['total']};  "
         f"{status['views_done']} views done;  {status['workers']} workers",
@@ -44,6 +45,8 @@ def status_text(status: Mapping[str, Any]) -> str:
             lines.append(f"{text}: {counts}")
     if status["state"] == WITH_FAILURES:
         lines.append(f"`pbrs-farm failures {status['job']}` says what failed")
+    if status.get("held_back"):
+        lines.append(f"others go first: {status['held_back']}")
     if status.get("waits_for"):
         lines.append(f"begins when {', '.join(status['waits_for'])} is done")
     lines += [f"refuses: {r['worker']}: {r['why']}" for r in status["refusing"]]
@@ -134,6 +137,27 @@ def jobs_text(rows: Sequence[Mapping[str, Any]]) -> str:
             f"{row['slot_hours']:>8.2f}"
         )
     return "\n".join(lines)
+
+
+def users_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A user a line: his share, his quotas, what he uses."""
+    if not rows:
+        return "no users: the farm asks nobody who he is"
+    lines = [f"{'user':<24}{'share':>7}{'running':>9}{'of':>7}{'slot-h':>9}{'of':>9}  may"]
+    for row in rows:
+        may = [name for name in ("admin", "preempt") if row[name]]
+        lines.append(
+            f"{row['user']:<24}{row['share']:>7g}{row['running']:>9}{row['max_slots'] or '-':>7}"
+            f"{row['slot_hours_used']:>9.2f}{row['slot_hours'] or '-':>9}  {', '.join(may)}"
+        )
+    return "\n".join(lines)
+
+
+def changes_text(rows: Sequence[Mapping[str, str]]) -> str:
+    """A change a line, the newest first."""
+    names = ("utc", "user", "from", "what", "of", "answer")
+    lines = ("  ".join(row[name] or "-" for name in names) for row in rows)
+    return "\n".join(lines) or "nothing was changed"
 
 
 def duration_text(seconds: float | None) -> str:

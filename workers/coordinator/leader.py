@@ -18,7 +18,8 @@ import threading
 import time
 import urllib.request
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any, Final
 from urllib.parse import urlsplit
@@ -29,18 +30,20 @@ from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.farm_alerts import FarmAlerts
 from workers.coordinator.progress_rates import Rates, mean_s
-from workers.coordinator.shares import Shares, is_in, n_ready, stage_of_lane
+from workers.coordinator.shares import Shares, is_in, is_shut, n_ready, stage_of_lane
+from workers.coordinator.teams import barred, n_in_flight, together, victims
 from workers.ids import LEASES, STAGES, TaskId, group_text, lane_of, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import (
-    MOST_TOGETHER,
-    TOGETHER_S,
     WITH_FAILURES,
     JobView,
     Ledger,
     LedgerUnavailable,
+    User,
+    Users,
     WorkerRegistry,
 )
+from workers.ledger.user_table import UserTable
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 from workers.logs import log_to_stderr
@@ -55,6 +58,7 @@ _RESEND_EVERY_S: Final = 15.0
 _RATES_EVERY_S: Final = 10.0
 _NOTICE_EVERY_S: Final = 10.0
 _LIMITS_EVERY_S: Final = 1.0
+_SPENT_EVERY_S: Final = 10.0
 _AHEAD_S: Final = 20.0  # of work on a queue; a standby leads after 15
 _WITHOUT_SLOTS: Final = 8  # messages of a stage that nobody takes yet
 
@@ -66,7 +70,8 @@ class Coordinator:
     """Leads the farm, or stands by until the leader is gone.
 
     send: puts messages on queues, each (queue, job, task, recipe digest). clock: monotonic, s.
-    notice: called now and then while it leads; tells others of jobs that ended.
+    notice: called now and then while it leads; tells others of jobs that ended. users: whose jobs
+    share the slots, without it nobody's.
     """
 
     def __init__(
@@ -77,6 +82,7 @@ class Coordinator:
         *,
         registry: WorkerRegistry,
         notice: Callable[[], None] = lambda: None,
+        users: Users | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._config = config
@@ -84,6 +90,9 @@ class Coordinator:
         self._registry = registry
         self._send = send
         self._notice = notice
+        self._table = users
+        self._users: Mapping[str, User] = {}
+        self._spent_h: Mapping[str, float] = {}  # user -> slot-hours of his jobs in the last days
         self._clock = clock
         self._token = f"{platform.node()}:{os.getpid()}:{secrets.token_hex(4)}"
         self._due: dict[str, float] = {}  # duty -> when it is due next
@@ -141,6 +150,9 @@ class Coordinator:
             self._waiting = {view.job_id for view in views if self._waits(view)}
             for view in views:
                 self._keep_budget(view)
+            self._read_users()
+            self._preempt(views)
+        views = self._with_bars(views)
         n_sent = self._dispatch([v for v in views if v.job_id not in self._waiting])
         if self._is_due("resend", _RESEND_EVERY_S):
             n_sent += self._resend(views)
@@ -163,12 +175,44 @@ class Coordinator:
             reason = f"its budget of {view.budget_h:g} slot-hours is spent"
             self._ledger.steer(view.job_id, "pause", f"{reason}; `pbrs-farm limit` raises it")
 
+    def _read_users(self) -> None:
+        if self._table is None:
+            return
+        self._users = self._table.all()
+        if any(user.slot_hours for user in self._users.values()) and self._is_due(
+            "spent", _SPENT_EVERY_S
+        ):
+            self._spent_h = self._table.spent_h()
+
+    def _preempt(self, views: list[JobView]) -> None:
+        """Tell running tasks to end where an urgent job's wait and no slot is free."""
+        if not any(view.is_urgent for view in views):
+            return
+        chosen = victims(views, self._ledger.holds, self._registry.workers())
+        for job, holds in groupby(chosen, key=lambda hold: hold.job):
+            n = self._ledger.preempt(job, self._token, list(holds))
+            _log.info("%d tasks of job %s make room for an urgent one", n, job)
+
+    def _with_bars(self, views: list[JobView]) -> list[JobView]:
+        """The jobs with the queues where others go first; tells the ledger what changed."""
+        bars, found = barred(views, self._users, self._spent_h), []
+        for view in views:
+            queues, why = bars.get(view.job_id, ((), ""))
+            if (queues, why) != (view.barred, view.fields.get("barred_why", "")):
+                self._ledger.set_barred(view.job_id, queues, why)
+                fields = {**view.fields, "barred": ",".join(queues), "barred_why": why}
+                view = replace(view, fields=fields)
+            found.append(view)
+        return found
+
     def _dispatch(self, views: list[JobView]) -> int:
         """Send what there is room for, by the jobs' priorities; how many messages."""
-        room = self._room(views)
-        given = self._shares.split(room, views)
+        windows = self._windows(views)
+        room = {lane: _room(views, lane, n) for lane, n in windows.items()}
+        given = self._shares.split(room, views, windows=windows, share_of=self._share_of)
         left = {v.job_id: _left_of(v) for v in views}  # of a job's own ceiling
-        spare = {s: n - sum(own[s] for own in given.values()) for s, n in room.items()}
+        users_left = self._left_of_users(views)
+        spare = {s: max(0, n - sum(own[s] for own in given.values())) for s, n in room.items()}
         # Each job its share and what those before it left; then what is still free to whoever has
         # more: a ready task may be waiting for its time, and one may have become ready meanwhile.
         n_sent, rest = 0, list(views)
@@ -176,12 +220,15 @@ class Coordinator:
             limited = []
             for view in rest:
                 may_send = {s: n + spare[s] for s, n in allowed[view.job_id].items()}
-                n_by_lane = self._send_of(view, _within(may_send, view, left[view.job_id]))
+                most = min(left[view.job_id], users_left.get(view.user, math.inf))
+                n_by_lane = self._send_of(view, _within(may_send, view, most))
                 if n_by_lane is None:
                     self.leading = False
                     return n_sent
                 n_sent += n_by_lane.total()
                 left[view.job_id] -= n_by_lane.total()
+                if view.user in users_left:
+                    users_left[view.user] -= n_by_lane.total()
                 spare = {s: n - n_by_lane[s] for s, n in may_send.items()}
                 if any(n_by_lane[s] == n and n_ready(view, s) > n for s, n in may_send.items()):
                     limited.append(view)
@@ -195,7 +242,10 @@ class Coordinator:
             view.job_id,
             self._token,
             max_open=self._max_open(),
-            room={stage: may_send[lane_of(stage, gpu=gpu)] for stage in STAGES},
+            room={
+                stage: 0 if is_shut(view, stage) else may_send[lane_of(stage, gpu=gpu)]
+                for stage in STAGES
+            },
         )
         if tasks is None:
             return None
@@ -205,18 +255,26 @@ class Coordinator:
             self._shares.charge(lane, view.job_id, n)
         return sent
 
-    def _room(self, views: list[JobView]) -> dict[str, int]:
-        """Lane -> messages that may be sent now, over all jobs.
+    def _share_of(self, user: str) -> float:
+        return self._users[user].share if user in self._users else 1.0
+
+    def _left_of_users(self, views: list[JobView]) -> dict[str, float]:
+        """User who has a ceiling -> how many more tasks of his jobs may be in flight."""
+        left: dict[str, float] = {u.name: u.max_slots for u in self._users.values() if u.max_slots}
+        for view in views:
+            if view.user in left:
+                left[view.user] = max(0, left[view.user] - n_in_flight(view))
+        return left
+
+    def _windows(self, views: list[JobView]) -> dict[str, int]:
+        """Lane -> messages in flight, over all jobs.
 
         Light on a GPU has a window of its own: messages that no worker takes hold up no others.
         """
-        room = {}
-        for lane in LEASES:
-            stage, here = stage_of_lane(lane), [v for v in views if is_in(v, lane)]
-            # What is queued or runs; the rest of the window may be filled.
-            in_flight = sum(v.counts.get(f"{stage}:{s}", 0) for v in here for s in "qr")
-            room[lane] = max(0, int(self._window(here, stage) - in_flight))
-        return room
+        return {
+            lane: self._window([v for v in views if is_in(v, lane)], stage_of_lane(lane))
+            for lane in LEASES
+        }
 
     def _window(self, views: list[JobView], stage: str) -> int:
         """Messages of a stage in flight: what slots run, and what they will take soon.
@@ -260,16 +318,11 @@ class Coordinator:
         for stage, of_stage in _by_stage(tasks).items():
             n_slots = max(1, self._slots.get(stage, 0))
             n_in_flight = sum(view.counts.get(f"{stage}:{s}", 0) for s in "qr") + len(of_stage)
-            most = min(self._together(view, stage), math.ceil(n_in_flight / n_slots))
+            most = min(together(view, stage), math.ceil(n_in_flight / n_slots))
             queue = queue_of(stage, gpu=gpu)
             self._send(
                 (queue, view.job_id, group_text(group), recipe) for group in _groups(of_stage, most)
             )
-
-    def _together(self, view: JobView, stage: str) -> int:
-        """How many tasks of a stage one message may name: about TOGETHER_S of work."""
-        seconds = mean_s([view], stage)
-        return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1
 
     def _is_due(self, what: str, every_s: float) -> bool:
         now = self._clock()
@@ -279,13 +332,16 @@ class Coordinator:
         return True
 
 
+def _room(views: list[JobView], lane: str, window: int) -> int:
+    """How much of a window is free: neither queued nor running."""
+    stage = stage_of_lane(lane)
+    here = [v for v in views if is_in(v, lane)]
+    return max(0, int(window - sum(v.counts.get(f"{stage}:{s}", 0) for v in here for s in "qr")))
+
+
 def _left_of(view: JobView) -> float:
     """How many more tasks of a job may be in flight."""
-    if not view.max_slots:
-        return math.inf
-    return max(
-        0, view.max_slots - sum(n for at, n in view.counts.items() if at[-2:] in (":q", ":r"))
-    )
+    return max(0, view.max_slots - n_in_flight(view)) if view.max_slots else math.inf
 
 
 def _within(may_send: dict[str, int], view: JobView, most: float) -> dict[str, int]:
@@ -368,6 +424,8 @@ def main() -> int:
         sys.stderr.write(f"pbrs-farm: {error}\n")
         return 1
     _tell_of_lost_jobs(config, ledger)
+    users = UserTable(ledger)
+    _restore_users(config, users)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
@@ -376,7 +434,9 @@ def main() -> int:
 
         serve_metrics(config, ledger)
     send = celery_sender(make_app(config))
-    Coordinator(config, ledger, send, registry=Registry(ledger), notice=notice).run(stop)
+    Coordinator(config, ledger, send, registry=Registry(ledger), notice=notice, users=users).run(
+        stop
+    )
     return 0
 
 
@@ -391,6 +451,15 @@ def _tell_of_lost_jobs(config: FarmConfig, ledger: RedisLedger) -> None:
             _log.warning("the ledger is empty and the store has job %s: `recover %s`", job, job)
     except PbrsError as error:
         _log.warning("the store is not known yet: %s", error)
+
+
+def _restore_users(config: FarmConfig, table: UserTable) -> None:
+    """Take the store's users where Redis lost them."""
+    try:
+        if config.store_url and table.restore(store_from_url(config.store_url, config.store)):
+            _log.info("users are taken from the store")
+    except PbrsError as error:
+        _log.warning("users are not known yet: %s", error)
 
 
 # Tells a URL when a job ends or pauses itself: one POST of JSON. Effects: a request, the ledger.

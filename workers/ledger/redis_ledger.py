@@ -22,6 +22,7 @@ from workers.config import FarmConfig, shown_url
 from workers.ids import LEASES, LIGHT_GPU, STAGES
 from workers.ledger.task_ledger import (
     ALIVE_S,
+    EVERYWHERE,
     MOST_TOGETHER,
     STATES,
     SUSPECT,
@@ -31,11 +32,13 @@ from workers.ledger.task_ledger import (
     Fault,
     Finished,
     GoOn,
+    Hold,
     HouseState,
     JobView,
     LedgerUnavailable,
     batches_from_text,
     fault_from_json,
+    hold_from_text,
     text_from_batches,
 )
 
@@ -47,7 +50,7 @@ _log = logging.getLogger("pbrs.ledger")
 _AWAY_S: Final = 2.0  # between two tries to reach a Redis that is not there yet
 _SCRIPTS: Final = (
     "claim", "heartbeat", "finish", "fail", "reap", "dispatch", "resend", "create", "load",
-    "retry", "steer", "lead",
+    "retry", "steer", "lead", "preempt",
 )  # fmt: skip
 _CHUNK: Final = 1000  # keys or houses in one round trip
 _LEAD_S: Final = 15
@@ -91,6 +94,7 @@ def lua_constants() -> str:
             f"local ALIVE_S = {ALIVE_S:g}",
             f"local MOST_TOGETHER = {MOST_TOGETHER}",
             f"local GPU_LEASE = '{LIGHT_GPU}'",
+            f"local EVERYWHERE = '{EVERYWHERE}'",
             "",
         ]
     )
@@ -139,6 +143,8 @@ class RedisLedger:
             "max_slots": spec.max_slots,
             "budget_h": spec.budget_h,
             "after": ",".join(spec.after),
+            "user": spec.user,
+            "preempt": int(spec.preempt),
             "max_attempts": rules.max_attempts,
             "failed_share": rules.failed_share,
             "max_quarantined": rules.max_quarantined,
@@ -239,7 +245,10 @@ class RedisLedger:
         return self.claim_many(job, [task], token=token, recipe=recipe, direct=direct)[0]
 
     def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str:
-        """Keep the leases: ok, or of the first task lost (somebody else's by now) or cancelled."""
+        """Keep the leases: ok, or of the first task lost (somebody else's by now) or cancelled.
+
+        preempted: they shall make room for an urgent job.
+        """
         return str(self._run("heartbeat", job, token, self.config.lease_s, *tasks))
 
     def finish_many(
@@ -294,6 +303,18 @@ class RedisLedger:
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
         """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
         return _tasks(self._run("resend", job, token, stage, age_s, _RESEND_MOST))
+
+    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None:
+        """Let no worker that takes one of these queues claim of the job, until it is called again."""
+        with self.errors():
+            if self.client.exists(f"{self._p(job)}job"):
+                fields = {"barred": ",".join(queues), "barred_why": why}
+                self.client.hset(f"{self._p(job)}job", mapping=fields)
+
+    def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
+        """Let these tasks end at their next heartbeat; how many were told so now, -1: not leading."""
+        pairs = [x for hold in holds for x in (hold.task, hold.token)]
+        return int(self._run("preempt", job, token, *pairs))
 
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         """Keep stage -> tasks per second for whoever asks."""
@@ -393,12 +414,15 @@ class RedisLedger:
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
                 yield task, fault_from_json(text)
 
-    def claims(self, job: str) -> dict[str, tuple[str, float]]:
-        """Task that runs now -> its worker, and since when by Redis' clock."""
+    def holds(self, job: str) -> list[Hold]:
+        """Every task of the job that runs now, or waits in a slot for others it was claimed with."""
         with self.errors():
             found = self.client.hgetall(f"{self._p(job)}claims")
-        parts = {task: text.split("|") for task, text in found.items()}
-        return {task: (p[1], float(p[2])) for task, p in parts.items() if len(p) == 3}
+        return [hold_from_text(job, task, text) for task, text in found.items()]
+
+    def claims(self, job: str) -> dict[str, tuple[str, float]]:
+        """Task that runs now -> its worker, and since when by Redis' clock."""
+        return {hold.task: (hold.worker, hold.since) for hold in self.holds(job)}
 
     def ping(self) -> None:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""

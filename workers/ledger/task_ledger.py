@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
-    "store", "draining", "blocked", "elsewhere", "alone", "unknown",
+    "store", "barred", "draining", "blocked", "elsewhere", "alone", "unknown",
 ]  # fmt: skip
 FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
@@ -30,6 +30,7 @@ TOGETHER_S: Final = (
     30.0  # of work that a slot claims at once: above a claim's cost, below what is lost
 )
 MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
+EVERYWHERE: Final = "*"  # stands for every queue where a job is barred
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
 # Classes of fault that are nobody's: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
@@ -47,6 +48,7 @@ STATES: Final = {
 }
 
 
+SPENT_DAYS: Final = 30  # over which a user's slot-hours are counted
 WITH_FAILURES: Final = "done with failures"
 
 
@@ -103,6 +105,37 @@ class GoOn:
     recipe: str  # digest of the job's recipe
     queues: tuple[str, ...]  # that its worker takes from
     is_long: bool = False  # the last task loaded a scene that is worth another one of its house
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A task that a slot holds."""
+
+    job: str
+    task: str
+    token: str  # of the slot's hold; tasks that were claimed together have one
+    worker: str
+    since: float  # by Redis' clock
+    is_preempted: bool = False  # it was told to end
+
+
+def hold_from_text(job: str, task: str, text: str) -> Hold:
+    """The hold that the ledger keeps as "<token>|<worker>|<since>", "|p" behind it once it shall end."""
+    token, worker, since, *mark = text.split("|")
+    return Hold(job, task, token, worker, float(since), bool(mark))
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """Somebody who may ask the farm for work."""
+
+    name: str
+    token_sha256: str = ""
+    share: float = 1.0  # of the slots, in proportion to the others who want some
+    max_slots: int = 0  # tasks of all his jobs in flight at once, 0 = any
+    slot_hours: float = 0.0  # that his jobs may take in SPENT_DAYS, 0 = any
+    is_admin: bool = False  # may steer every job, drain workers and change users
+    may_preempt: bool = False  # may submit urgent jobs
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +196,21 @@ class JobView:
         return tuple(filter(None, self.fields.get("after", "").split(",")))
 
     @property
+    def user(self) -> str:
+        """Whose job it is, "" for nobody's."""
+        return self.fields.get("user", "")
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether running tasks of other jobs make room for it."""
+        return self.fields.get("preempt") == "1"
+
+    @property
+    def barred(self) -> tuple[str, ...]:
+        """Queues of which whoever takes one claims nothing of it now; (EVERYWHERE,) for nobody does."""
+        return tuple(filter(None, self.fields.get("barred", "").split(",")))
+
+    @property
     def n_failed(self) -> int:
         """Tasks that failed for good."""
         return int(sum(self.counts.get(f"{s}:{STATES['FAILED']}", 0) for s in STAGES))
@@ -216,6 +264,9 @@ class Ledger(Protocol):
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
     ) -> list[str] | None: ...
     def wait(self, seconds: float) -> None: ...
+    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None: ...
+    def holds(self, job: str) -> list[Hold]: ...
+    def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int: ...
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None: ...
 
     # Steering and reading
@@ -233,9 +284,17 @@ class WorkerRegistry(Protocol):
     """Who works on the farm, as slots and the coordinator see it."""
 
     def slots(self) -> dict[str, int]: ...
+    def workers(self) -> list[WorkerView]: ...
     def note_rejection(self, reason: str) -> None: ...
     def open_breaker(self, reason: str) -> None: ...
     def breaker(self) -> str: ...
+
+
+class Users(Protocol):
+    """Who may ask for work, as the coordinator sees it."""
+
+    def all(self) -> Mapping[str, User]: ...
+    def spent_h(self) -> Mapping[str, float]: ...
 
 
 def batches_from_text(text: str) -> tuple[tuple[str, ...], ...]:

@@ -217,7 +217,8 @@ class Slot:
             # Go on: the token fences us off if the lease has run out meanwhile.
             _log.warning("no heartbeat: %s", error)
             return None
-        return None if answer == "ok" else "lost" if answer == "lost" else "cancelled"
+        why: dict[str, FaultClass | None] = {"ok": None, "lost": "lost", "preempted": "preempted"}
+        return why.get(answer, "cancelled")
 
     def _is_preempted(self) -> bool:
         return self._config.preemption_file.exists()
@@ -261,7 +262,7 @@ class Slot:
     def _rejected(self, job: str, task: TaskId, claim: Claim, *, waits: bool) -> None:
         """Say why a task is not run. waits: so that another worker comes first, where it may."""
         _log.log(
-            logging.DEBUG if claim.verdict in ("done", "early", "alone") else logging.INFO,
+            logging.DEBUG if claim.verdict in ("done", "early", "alone", "barred") else logging.INFO,
             "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
         )  # fmt: skip
         # A message came twice, or its holder died with the Celery child that took it.

@@ -5,7 +5,8 @@
 -- Unit "-" is the house as a whole, "0", "1", ... its batches of views. House "-" is the job.
 --
 -- Keys of a job (P ..):
---   job     hash: state, reason, version, recipe, stages, rules of failure, shard_size, shards_left
+--   job     hash: state, reason, user, barred (queues of which whoever takes one claims nothing of
+--           the job now, EVERYWHERE for nobody does; barred_why), version, recipe, stages, rules of failure, shard_size, shards_left
 --   n       hash of counters: "<stage>:<letter>", "done:<stage>", "houses:<how>", "batches", "views",
 --           "failures:<class>" (attempts), "failed:<class>" (tasks, for good)
 --   order   list: "<index>|<house>" not yet admitted       sources  hash: house -> source
@@ -13,10 +14,11 @@
 --   views   hash: house -> batches       shards  hash: shard -> houses still open
 --   out:<stage>  list: the outbox        later   sorted set: task by the time it becomes ready
 --   queued  sorted set: task by the time its message was sent
---   claims  hash: task -> "<token>|<worker>|<since>"       attempts, tried, rejected, failed: by task
+--   claims  hash: task -> "<token>|<worker>|<since>", and "|p" behind it where it shall end for an urgent
+--           job                                            attempts, tried, rejected, failed: by task
 --   prints  hash: fingerprint of a fault -> how often
 -- Keys of the farm (G ..): leader, jobs, known, notify, breaker, lease:<queue> (sorted set: task by the
--- end of its lease), worker:<name> (hash), workers and workers:<stage> (sorted sets: worker by heartbeat).
+-- end of its lease), spent:<day> (hash: user -> seconds), worker:<name> (hash), workers and workers:<stage> (sorted sets: worker by heartbeat).
 local P, G = KEYS[1], KEYS[2]
 
 -- What one call reads and writes. A script is atomic: each hash field is read once and written once, at
@@ -459,6 +461,18 @@ local function inputs_of(house, stage)
   return hget(P .. (stage == GEOMETRY_STAGE and 'sources' or 'views'), house) or ''
 end
 
+-- Whether a worker that takes these queues leaves the job's tasks to lie: it could do what others wait
+-- for. What merges is short, and helps everybody.
+local function goes_after_others(stage, queues)
+  local barred = job_field('barred') or ''
+  if barred == '' or stage == REDUCE_STAGE or stage == SHARD_STAGE or stage == JOB_STAGE then return false end
+  if barred == EVERYWHERE then return true end
+  for queue in string.gmatch(barred, '[^,]+') do
+    if string.find(',' .. queues .. ',', ',' .. queue .. ',', 1, true) then return true end
+  end
+  return false
+end
+
 -- May this worker run this task now? The attempt is counted before any work is done.
 -- c: token, worker, version, recipe, lease_s, direct (without a message), store ("" = not known),
 -- alone (nothing else was claimed in this call), shut (nothing more is claimed in it)
@@ -509,8 +523,11 @@ local function claim(task, c)
   local store = job_field('store_id') or ''
   if store ~= '' and c.store ~= '' and store ~= c.store then return reject('store', store, 15) end
   local self = G .. 'worker:' .. c.worker
-  hmany(self, { 'drain', 'blocked_until', 'streak' })
+  hmany(self, { 'drain', 'blocked_until', 'streak', 'queues' })
   if hget(self, 'drain') == '1' then return reject('draining', '', 0) end
+  if goes_after_others(stage, hget(self, 'queues') or '') then
+    return reject('barred', job_field('barred_why') or '', 0)
+  end
   local blocked = hget(self, 'blocked_until')
   if blocked and tonumber(blocked) > t then return reject('blocked', blocked, 2) end
 

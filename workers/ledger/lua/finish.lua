@@ -4,7 +4,7 @@
 -- and "1" after a task so long that the scene it loaded is worth another one
 -- -> {{"done" | "stale", ...}, {task, verdict, detail, inputs, task, ...} claimed now}
 local token, worker, n = ARGV[1], ARGV[2], tonumber(ARGV[3])
-local verdicts, tasks, last = {}, {}, nil
+local verdicts, tasks, last, spent = {}, {}, nil, 0
 for i = 1, n do tasks[i] = ARGV[4 * i] end
 for _, name in ipairs({ 'claims', 'attempts' }) do hmany(P .. name, tasks) end
 -- From the last to the first, so that what follows the first stands before the others.
@@ -22,6 +22,7 @@ for i = n, 1, -1 do
     hdel(P .. 'attempts', task)
     local seconds = tonumber(ARGV[4 * i + 1])
     bump('seconds:' .. stage, seconds)
+    spent = spent + seconds
     bump('timed:' .. stage, 1)
     -- Histogram over powers of two of seconds, from 1/8 s.
     bump('took:' .. stage .. ':' .. math.max(-3, math.ceil(math.log(math.max(seconds, 0.125)) / math.log(2))), 1)
@@ -30,9 +31,14 @@ for i = n, 1, -1 do
     if unit ~= '-' and house ~= '-' and not next_stage(stage) then bump('views', tonumber(ARGV[4 * i + 3])) end
   end
 end
+-- What a user's tasks took, by day.
+local user = job_field('user') or ''
+if user ~= '' and spent > 0 then
+  redis.call('HINCRBYFLOAT', G .. 'spent:' .. math.floor(now() / 86400), user, string.format('%.3f', spent))
+end
 if last then
   local self = G .. 'worker:' .. worker
-  hmany(self, { 'drain', 'blocked_until', 'streak' })
+  hmany(self, { 'drain', 'blocked_until', 'streak', 'queues' })
   if hget(self, 'streak') ~= '0' then hset(self, 'streak', 0) end
 end
 local at = 4 * n + 4

@@ -1,0 +1,80 @@
+"""What the ledger does for teams: who goes first, what a user spent, tasks that make room."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.workers.conftest import JOB_ID, spec
+from tests.workers.drive import Drive, drive, with_config
+from workers.job import HouseEntry
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import EVERYWHERE, Finished, GoOn
+from workers.ledger.user_table import UserTable
+from workers.ledger.worker_registry import Registry
+
+
+def of_user(ledger: RedisLedger, user: str) -> Drive:
+    job = spec(1).model_copy(update={"user": user})
+    ledger.create(job)
+    ledger.add_houses(job.job_id, 0, [HouseEntry(house_id="h0", source="{}")])
+    ledger.open(job.job_id, 5)
+    return Drive(ledger, job)
+
+
+def test_a_worker_leaves_a_job_to_lie_where_it_could_do_what_others_wait_for(
+    ledger: RedisLedger,
+) -> None:
+    d = drive(ledger, 1)
+    (task,) = d.dispatch()
+    for name, queues in (("w1", ("geometry", "light")), ("w2", ("geometry",))):
+        Registry(with_config(ledger, worker=name, queues=queues)).heartbeat()
+    ledger.set_barred(JOB_ID, ("light",), "it is the turn of bob")
+    claim = d.claim(task, "w1")
+    assert (claim.verdict, claim.detail) == ("barred", "it is the turn of bob")
+    # It lies in the outbox again, without an attempt, and another worker takes it.
+    assert d.dispatch() == [task]
+    assert d.claim(task, "w2").detail == "1"
+    ledger.set_barred(JOB_ID, (), "")
+    view = ledger.view(JOB_ID)
+    assert view is not None
+    assert view.barred == ()
+
+
+def test_a_job_that_stands_still_everywhere_goes_on_with_no_batch_of_its_house(
+    ledger: RedisLedger,
+) -> None:
+    d = drive(ledger, 1)
+    d.run(d.dispatch()[0])
+    first, _second = d.dispatch()
+    claim = d.claim(first)
+    ledger.set_barred(JOB_ID, (EVERYWHERE,), "spent")
+    go_on = GoOn(d.job.recipe.digest(), ("gl", "light"), is_long=True)
+    assert ledger.finish_many(JOB_ID, {first: Finished(9.0)}, claim.token, go_on) == {}
+
+
+def test_what_a_user_s_tasks_took_is_counted_and_nobody_else_s(ledger: RedisLedger) -> None:
+    table = UserTable(ledger)
+    d = of_user(ledger, "ann")
+    d.run_all()
+    drive(ledger, 1, job_id="ba9876543210").run_all()
+    n = sum(d.ran.values())  # each of a second
+    assert table.spent_h() == {"ann": pytest.approx(n / 3600)}
+
+
+def test_a_task_that_makes_room_ends_at_its_heartbeat_and_keeps_its_attempts(
+    ledger: RedisLedger,
+) -> None:
+    d = drive(ledger, 2)
+    first, second = d.dispatch()
+    claim, other = d.claim(first), d.claim(second)
+    (held,) = [hold for hold in ledger.holds(JOB_ID) if hold.task == first]
+    assert ledger.preempt(JOB_ID, "nobody", [held]) == -1
+    assert [ledger.preempt(JOB_ID, d.leader, [held]) for _ in range(2)] == [1, 0]
+    assert [hold.is_preempted for hold in ledger.holds(JOB_ID)].count(True) == 1
+    assert ledger.heartbeat(JOB_ID, [first], claim.token) == "preempted"
+    assert ledger.heartbeat(JOB_ID, [second], other.token) == "ok"
+    assert d.fail(first, claim, "preempted") == "handed back"
+    assert "attempts" not in ledger.task_facts(JOB_ID, first)
+    assert d.dispatch() == [first]
+    assert d.claim(first).detail == "1"
+    assert not any(name.startswith("failures:") for name in d.counts)

@@ -1,0 +1,80 @@
+"""Who gives an order to the farm, whether he may, and the line that says he did. Effects: Redis.
+
+A farm without users asks nobody. On one that has some, each order names its user by a token. The
+commands and the board keep these rules: they part accounts, and whoever holds Redis' own password is
+outside of them.
+"""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.store.secret import Secret
+from workers.ledger.task_ledger import User
+from workers.ledger.user_table import UserTable
+
+
+class Rights:
+    """What one who asks may do.
+
+    token: names him. acting: who he is, where that was found out already. place: where he sits.
+    """
+
+    def __init__(
+        self, users: UserTable, token: Secret, acting: User | None = None, place: str = ""
+    ) -> None:
+        self._users, self._token, self._acting = users, token, acting
+        self._place = place or platform.node()
+
+    def who(self) -> User | None:
+        """Who asks; None on a farm without users. Raises BadInput for one it does not know."""
+        if self._acting is not None or not self._users.all():
+            return self._acting
+        if not self._token:
+            hint = "an admin's `pbrs-farm users add NAME` prints a token"
+            raise BadInput(
+                "PBRS_TOKEN", "", "this farm has users: a token says who asks", hint=hint
+            )
+        found = self._users.named_by(self._token.reveal())
+        if found is None:
+            raise BadInput("PBRS_TOKEN", "", "is no user's token")
+        return found
+
+    def check_owner(self, job: str, owner: str) -> None:
+        """Raises BadInput where the job is another user's; an admin may steer all."""
+        user = self.who()
+        if user is not None and not user.is_admin and user.name != owner:
+            raise BadInput(job, "", f"is a job of {owner or 'no user'}", hint="an admin may")
+
+    def check_admin(self, what: str) -> None:
+        """Raises BadInput where a user who is no admin asks."""
+        user = self.who()
+        if user is not None and not user.is_admin:
+            raise BadInput(what, "", "only an admin may")
+
+    def check_preempt(self) -> None:
+        """Raises BadInput where a user asks who may submit no urgent job."""
+        user = self.who()
+        if user is not None and not (user.is_admin or user.may_preempt):
+            hint = f"an admin's `pbrs-farm users limit {user.name} --may-preempt yes`"
+            raise BadInput("--preempt", user.name, "may submit no urgent job", hint=hint)
+
+    def note(self, what: str, of: str, answer: str) -> None:
+        """Keep the line of a change: when, who, from where, what, and what came of it."""
+        # Also of the first user, who had no token before.
+        user = self._acting
+        if user is None and self._token:
+            user = self._users.named_by(self._token.reveal())
+        self._users.note(
+            {
+                "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+                "user": user.name if user is not None else "",
+                "from": shown(self._place),
+                "what": what,
+                "of": shown(of),
+                "answer": shown(answer, MAX_MESSAGE),
+            }
+        )

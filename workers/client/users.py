@@ -1,0 +1,96 @@
+"""The farm's users from outside: add, limit, remove, list. Effects: Redis, the store."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from pbrs_farm.core.errors import BadInput
+from workers.coordinator.teams import n_running
+from workers.ledger.task_ledger import User
+from workers.ledger.user_table import known_user, new_user
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
+
+
+def limits_of(**given: Any) -> dict[str, Any]:
+    """Fields of a User that were given; BadInput for a number that is none of a quota."""
+    limits = {name: value for name, value in given.items() if value is not None}
+    for name in ("max_slots", "slot_hours"):
+        if not 0 <= limits.get(name, 0) < math.inf:
+            raise BadInput(f"--{name.replace('_', '-')}", limits[name], "expected 0 or more")
+    if not 0 < limits.get("share", 1.0) < math.inf:
+        raise BadInput("--share", limits["share"], "expected more than 0")
+    return limits
+
+
+def add_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> str:
+    """Let somebody ask the farm for work; his token, which is kept nowhere.
+
+    The first one is an admin: from here on the farm asks who somebody is.
+    """
+    farm.rights.check_admin("users add")
+    farm.users.restore(farm.store)
+    users = farm.users.all()
+    if name in users:
+        raise BadInput("users", name, "is there already", hint="`users limit` changes what he may")
+    user, token = new_user(name, **{"is_admin": not users, **limits})
+    _check_admin_left([*users.values(), user])
+    farm.users.save({**users, name: user}, farm.store)
+    farm.rights.note("users add", name, _said(limits))
+    return token
+
+
+def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
+    """Another share or quota; jobs that run follow it within seconds."""
+    farm.rights.check_admin("users limit")
+    if not limits:
+        hint = "--share, --max-slots, --slot-hours, --admin, --may-preempt"
+        raise BadInput("users limit", name, "nothing to change", hint=hint)
+    users = farm.users.all()
+    users[name] = replace(known_user(users, name), **limits)
+    _check_admin_left(users.values())
+    farm.users.save(users, farm.store)
+    farm.rights.note("users limit", name, _said(limits))
+
+
+def remove_user(farm: Farm, name: str) -> None:
+    """His token says nothing any more; his jobs go on. The last one may go, too."""
+    farm.rights.check_admin("users remove")
+    users = farm.users.all()
+    del users[known_user(users, name).name]
+    if users:
+        _check_admin_left(users.values())
+    farm.rights.note("users remove", name, "his jobs go on")
+    farm.users.save(users, farm.store)
+
+
+def user_rows(farm: Farm) -> list[dict[str, Any]]:
+    """A row per user: share, quotas, what his jobs hold now and took in the last days."""
+    users, spent = farm.users.all(), farm.users.spent_h()
+    views = [farm.ledger.view(job) for job in farm.ledger.active_jobs()]
+    return [
+        {
+            "user": user.name,
+            "share": user.share,
+            "running": int(sum(n_running(v) for v in views if v is not None and v.user == name)),
+            "max_slots": user.max_slots,
+            "slot_hours": user.slot_hours,
+            "slot_hours_used": round(spent.get(name, 0.0), 4),
+            "admin": user.is_admin,
+            "preempt": user.is_admin or user.may_preempt,
+        }
+        for name, user in users.items()
+    ]
+
+
+def _check_admin_left(users: Iterable[User]) -> None:
+    if not any(user.is_admin for user in users):
+        raise BadInput("users", "", "nobody would be an admin any more")
+
+
+def _said(limits: Mapping[str, Any]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in limits.items()) or "no limits"
