@@ -21,6 +21,8 @@ from pbrs_farm.commands.arguments import (
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
 if TYPE_CHECKING:
+    from pbrs_farm.study.judging.evaluation import Evaluation, Trained
+    from pbrs_farm.study.judging.others_predictions import OthersPredictions
     from pbrs_farm.study.training.view_sources import TrainingSource
     from pbrs_farm.study.training_plan import TrainingPlan
 
@@ -59,6 +61,10 @@ def add_verbs(verb: Verb) -> None:
         "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
     )
     p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views of a root")
+    text = (
+        "what another program says of the same pictures, a column more; repeatable (docs/study.md)"
+    )
+    p.add_argument("--predictions", action="append", default=[], metavar="[NAME=]DIR", help=text)
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
@@ -217,9 +223,11 @@ def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, notes, open_run, report, table
     from pbrs_farm.study.judging.judged_places import judged_place
+    from pbrs_farm.study.judging.others_predictions import others_predictions
     from pbrs_farm.study.training.run_folder import made_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT
 
+    others = [others_predictions(word) for word in args.predictions]
     run = open_run(args.run, exact=args.exact)
     out = args.out or args.run / "evaluation"
     if args.on:
@@ -236,6 +244,8 @@ def _evaluate(args: argparse.Namespace) -> int:
         ))
         for word in args.on
     ]  # fmt: skip
+    for one in others:
+        evaluations = _with_column(run, evaluations, one)
     rows = report(run, evaluations)
     if args.json:
         echo_json(rows)
@@ -246,6 +256,23 @@ def _evaluate(args: argparse.Namespace) -> int:
 
         echo(str(write_evaluation(out, run, evaluations)))
     return 0
+
+
+def _with_column(
+    run: Trained, evaluations: list[Evaluation], others: OthersPredictions
+) -> list[Evaluation]:
+    """Each evaluation with a column of others' predictions, where there are some of its views."""
+    from pbrs_farm.study.judging.evaluation import with_others
+    from pbrs_farm.study.judging.others_predictions import predictions_in
+
+    found = [predictions_in(others, one.views, run.task.name) for one in evaluations]
+    if not any(each is not None for each in found):
+        text = "holds no prediction of any view that is judged"
+        raise BadInput(others.folder, "", text, hint="--on names what is judged")
+    return [
+        one if each is None else with_others(run, one, others.name, each)
+        for one, each in zip(evaluations, found, strict=True)
+    ]
 
 
 def _predict(args: argparse.Namespace) -> int:

@@ -290,6 +290,16 @@ def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
     return Evaluation(views, rows)
 
 
+def with_others(
+    run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
+) -> Evaluation:
+    """The evaluation with a column more: what another program says of the same views."""
+    if name in evaluation.rows:
+        raise BadInput("--predictions", name, "a second column of this name", hint="NAME=DIR")
+    judged = _judged(predictions, run, evaluation.views)
+    return Evaluation(evaluation.views, evaluation.rows | {name: judged})
+
+
 def _judged(predictions: Iterable[NDArray[Any]], run: Trained, views: JudgedViews) -> Judged:
     return scored(predictions, views.truths, run.task, run.plan)
 

@@ -25,6 +25,7 @@ from pbrs_farm.study.judging.evaluation import (
     spread_text,
 )
 from pbrs_farm.study.judging.judged_places import camera_of, judged_place
+from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import framed
@@ -267,3 +268,36 @@ def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_
     nowhere = TrainingSource((), hold_out=frozenset({"home-9"}), all_there=False)
     with pytest.raises(BadInput, match="no such home in"):
         hold_out_notes(training_sets(roots, light, nowhere))
+
+
+def test_predictions_of_others_are_judged_beside_the_runs_own(
+    run: Path, pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = tmp_path / "said"
+    said.mkdir()
+    towards = np.broadcast_to([0.0, 0.0, -1.0], (60, 90, 3))
+    np.save(said / "wall.npy", towards)
+    words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", f"theirs={said}"]
+    assert main([*words, "--out", str(tmp_path / "e")]) == 0
+    rows = json.loads((tmp_path / "e" / "evaluation.json").read_text())["evaluations"]
+    assert rows[0]["figures"]["theirs"]["mean_deg"] == pytest.approx(0, abs=0.3)
+    assert "theirs" in capsys.readouterr().out
+    # The same as `predict` writes it: x right, y forward, z up.
+    (said / "wall.npy").unlink()
+    axes = np.broadcast_to([0.0, -1.0, 0.0], (60, 90, 3))
+    stored = np.rint((axes + 1) * 65535 / 2).astype(np.uint16)
+    (said / "wall_normal.png").write_bytes(png_from_array(stored))
+    views = judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    found = predictions_in(OthersPredictions("theirs", said), views, "normals")
+    assert found is not None
+    (normal,) = found
+    assert normal.shape == (60, 75, 3)
+    np.testing.assert_allclose(normal[..., 2], -1, atol=1e-4)
+
+
+def test_a_folder_without_predictions_of_these_views_is_an_error(
+    run: Path, pairs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", str(pairs)]
+    assert main([*words, "--out", str(pairs / "e")]) == 1
+    assert "no prediction of any view" in capsys.readouterr().err
