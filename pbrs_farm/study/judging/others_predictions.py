@@ -117,7 +117,7 @@ def _checked(array: NDArray[Any], path: Path, task: str) -> NDArray[Any]:
     if not np.isfinite(array).all():
         raise BadInput(path, "", "holds what is no finite number")
     if task == "segmentation":
-        return np.clip(array, 0, 255).astype(np.uint8)
+        return np.asarray(np.clip(array, 0, 255), np.uint8)
     values: NDArray[Any] = array.astype(np.float32)
     if task == "normals":
         values = values / np.maximum(np.linalg.norm(values, axis=-1, keepdims=True), 1e-6)
