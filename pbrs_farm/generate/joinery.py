@@ -21,6 +21,7 @@ _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
 _PANEL_M: Final = 0.006  # how far a panel stands out
 _SASH_M: Final = 0.05  # breadth of a sash's bars
+_SASH_DEPTH_M: Final = 0.03  # from its middle to either face
 _BAR_M: Final = 0.022  # of the bars across a pane
 _PANE_M: Final = 0.006
 _WIDEST_SASH_M: Final = 0.95
@@ -31,8 +32,17 @@ LEAVES: Final = ("four", "flat", "two", "six", "one", "boards", "three", "five")
 
 HANDLES: Final = ("lever", "knob", "plate", "bar")
 
-SASHES: Final = ("plain", "rail", "grid", "transom", "halves", "slim")
-"""Designs of windows: no bars across a pane, one, a grid, a light on top, two above each other, thin bars."""
+SASHES: Final = (
+    "plain", "rail", "grid", "transom", "halves", "slim", "cross", "lattice", "thirds", "mullion",
+    "small_top", "sash_grid",
+)  # fmt: skip
+"""Designs of windows: no bars across a pane, one, a grid, a light on top, two above each other, thin bars,
+a cross, a fine grid, two bars, an upright one, panes in the light on top, a grid in the upper half."""
+
+_GRIDS: Final = {
+    "rail": (2, 1), "grid": (3, 2), "cross": (2, 2), "lattice": (4, 3), "thirds": (3, 1), "mullion": (1, 2)
+}  # fmt: skip
+"""Rows and columns of panes of a sash."""
 
 _Box = tuple[Triple, Triple]  # low and high corner
 
@@ -72,9 +82,10 @@ def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape
         handles = _handles(w, d, opening.hinge_at_start, design.handle)
         surfaces = [boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1)]
         return Shape(tuple(surfaces), (paint, metal))
-    bars, panes = _sashes(w, h, design.sash)
+    bars, panes, catches = _sashes(w, h, design)
     surfaces = [boxes_surface("frame", [*frame, *bars], 0), boxes_surface("pane", panes, 1)]
-    return Shape(tuple(surfaces), (paint, glass))
+    surfaces.append(boxes_surface("catch", catches, 2))
+    return Shape(tuple(surfaces), (paint, glass, metal))
 
 
 def _frame(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
@@ -156,29 +167,47 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     return boxes
 
 
-def _sashes(w: float, h: float, kind: str) -> tuple[list[_Box], list[_Box]]:
-    """(bars, panes): as many sashes side by side as keep each below a metre."""
+def _sashes(w: float, h: float, design: JoineryDesign) -> tuple[list[_Box], list[_Box], list[_Box]]:
+    """(bars, panes, catches): as many sashes side by side as keep each below a metre."""
     n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
     inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M
+    # Where an upper light begins, and what each of the two shows.
+    kind = design.sash
+    share, lower, upper = {
+        "transom": (0.7, "plain", "plain"), "halves": (0.5, "plain", "plain"),
+        "small_top": (0.72, "plain", "mullion"), "sash_grid": (0.5, "plain", "cross"),
+    }.get(kind, (1.0, kind, kind))  # fmt: skip
     bars: list[_Box] = []
     panes: list[_Box] = []
+    catches: list[_Box] = []
     for k in range(n):
         left, right = -inner / 2 + k * inner / n + 0.002, -inner / 2 + (k + 1) * inner / n - 0.002
-        cuts = [low, high]
-        if kind == "transom":
-            cuts = [low, low + 0.7 * (high - low), high]
-        elif kind == "halves":
-            cuts = [low, (low + high) / 2, high]
-        for a, b in pairwise(cuts):
-            _sash(bars, panes, (left, a, right, b), kind)
-    return bars, panes
+        middle = low + share * (high - low)
+        _sash(bars, panes, (left, low, right, middle), lower)
+        if share < 1:
+            _sash(bars, panes, (left, middle, right, high), upper)
+        catches += _catch(left if k % 2 else right - _SASH_M, (low + middle) / 2, design.handle)
+    return bars, panes, catches
+
+
+def _catch(x: float, y: float, kind: str) -> list[_Box]:
+    """What a sash is opened by, on the room's side of its upright bar that begins at x."""
+    at, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
+    if kind == "knob":
+        return [((at - 0.012, y - 0.012, front), (at + 0.012, y + 0.012, front + 0.03))]
+    rose = ((at - 0.013, y - 0.03, front), (at + 0.013, y + 0.03, front + 0.008))
+    if kind == "bar":
+        return [rose]
+    reach = 0.11 if kind == "lever" else 0.075
+    return [rose, ((at - 0.009, y - reach, front + 0.022), (at + 0.009, y + 0.01, front + 0.036)),
+            ((at - 0.006, y - 0.006, front + 0.008), (at + 0.006, y + 0.006, front + 0.022))]  # fmt: skip
 
 
 def _sash(
     bars: list[_Box], panes: list[_Box], inside: tuple[float, float, float, float], kind: str
 ) -> None:
     left, low, right, high = inside
-    z, t = 0.03, _SASH_M * (0.7 if kind == "slim" else 1.0)
+    z, t = _SASH_DEPTH_M, _SASH_M * (0.7 if kind == "slim" else 1.0)
     bars += [
         ((left, low, -z), (left + t, high, z)),
         ((right - t, low, -z), (right, high, z)),
@@ -186,7 +215,7 @@ def _sash(
         ((left + t, high - t, -z), (right - t, high, z)),
     ]
     # Bars part the pane into a grid of smaller ones.
-    rows, columns = {"rail": (2, 1), "grid": (3, 2)}.get(kind, (1, 1))
+    rows, columns = _GRIDS.get(kind, (1, 1))
     ys = np.linspace(low + t, high - t, rows + 1).tolist()
     xs = np.linspace(left + t, right - t, columns + 1).tolist()
     half, pane, y0, y1 = _BAR_M / 2, _PANE_M / 2, low + t, high - t

@@ -2,209 +2,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 import shapely
-from scipy import ndimage
 from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import F32, F64, Srgb8Image
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
-from pbrs_farm.core.house import Item, ItemKind, Material
+from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
-from pbrs_farm.dress.style import Rgb, Style, mix, room_style, shade
-from pbrs_farm.dress.things.assembly import Made, hung, plain
+from pbrs_farm.dress.style import Style, room_style
+from pbrs_farm.dress.textiles.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_pixels
+from pbrs_farm.dress.things.assembly import Made, hung, plain, slab
+from pbrs_farm.dress.things.bodies import loft, oval, rect
 from pbrs_farm.dress.walls.hanging import next_id
-from pbrs_farm.dress.walls.hung_things import faced_slab, jpeg_texture
+from pbrs_farm.dress.walls.hung_things import jpeg_texture
 from pbrs_farm.home.room_use import RoomKind
-
-# Pictures of rugs and mats by a seed: bordered, striped, lattice, diamonds, shag, plain.
-# Every family is a function (rng, size, inks) -> (H, W, 3) float32, sRGB-encoded, 0..1.
-
-
-Size = tuple[int, int]  # width and height in pixels
-Inks = tuple[Rgb, ...]  # ground first
-Family = Callable[[np.random.Generator, Size, Inks], F32]
-
-_PX_PER_M = 190.0
-
-
-def rug_pixels(
-    rng: np.random.Generator, width_m: float, length_m: float, style: Style, family: str = ""
-) -> Srgb8Image:
-    """(H, W, 3) uint8 of a rug so large, its length across the picture."""
-    size = max(int(length_m * _PX_PER_M), 48), max(int(width_m * _PX_PER_M), 48)
-    name = family or str(rng.choice(list(FAMILIES)))
-    picture = FAMILIES[name](rng, size, inks_of(rng, style))
-    # Yarn is never dyed evenly, and knots show.
-    pile = rng.standard_normal(picture.shape[:2], np.float32)
-    tone = 1 + 0.05 * pile + 0.12 * ndimage.gaussian_filter(pile, 5.0, mode="wrap")
-    if name != "shag":
-        tone *= 1 + 0.03 * np.sin(np.arange(size[1]) * np.pi / 1.5)[:, None]
-    return np.asarray(np.clip(picture * tone[..., None], 0.02, 0.95) * 255 + 0.5, np.uint8)
-
-
-def inks_of(rng: np.random.Generator, style: Style) -> Inks:
-    """A ground and four inks of the style, or wool as the sheep wear it."""
-    if rng.random() < 0.25:
-        wool: Rgb = (0.84, 0.8, 0.72)
-        return (wool, (0.25, 0.22, 0.2), (0.55, 0.48, 0.4), (0.7, 0.65, 0.57), (0.4, 0.34, 0.28))
-    own = [*style.textiles, style.accent]
-    own = [own[int(k)] for k in rng.permutation(len(own))]
-    ground = mix(own[0], (0.85, 0.81, 0.74), float(rng.uniform(0, 0.6)))
-    return (ground, *own[1:4], shade(own[4 % len(own)], 0.7))
-
-
-def _coordinates(size: Size) -> tuple[F32, F32]:
-    # Metres from the middle.
-    x = (np.arange(size[0]) + 0.5 - size[0] / 2) / _PX_PER_M
-    y = (np.arange(size[1]) + 0.5 - size[1] / 2) / _PX_PER_M
-    u, v = np.meshgrid(x, y)
-    return u.astype(np.float32), v.astype(np.float32)
-
-
-def _filled(size: Size, colour: Rgb) -> F32:
-    return np.broadcast_to(np.array(colour, np.float32), (size[1], size[0], 3)).copy()
-
-
-def _to_edge(u: F32, v: F32) -> F32:
-    # Metres to the nearest edge.
-    half_u, half_v = float(u.max()), float(v.max())
-    return np.asarray(np.minimum(half_u - np.abs(u), half_v - np.abs(v)), np.float32)
-
-
-def _bordered(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Borders within borders round a field of small figures and a medallion."""
-    u, v = _coordinates(size)
-    edge, picture = _to_edge(u, v), _filled(size, inks[1])
-    step = float(rng.uniform(0.07, 0.1))
-    figures = np.sin(2 * np.pi * u / step) * np.sin(2 * np.pi * v / step)
-    picture[figures > 0.55] = inks[2]
-    picture[figures < -0.75] = inks[0]
-    # Lay a medallion in the middle.
-    radius = 0.42 * float(v.max()) * 2
-    star = np.hypot(u * 0.72, v) * (1 + 0.12 * np.cos(8 * np.arctan2(v, u * 0.72)))
-    for k, part in enumerate((0.62, 0.54, 0.36, 0.3, 0.12)):
-        picture[star < part * radius] = inks[(k * 2 + 4) % 5]
-    for k, (low, high) in enumerate(
-        ((0.0, 0.03), (0.03, 0.06), (0.06, 0.2), (0.2, 0.225), (0.225, 0.26))
-    ):
-        band = (edge >= low) & (edge < high)
-        picture[band] = inks[(4, 0, 2, 0, 4)[k]]
-        if k == 2:
-            run = np.where(np.abs(u) > np.abs(v) * float(u.max() / v.max()), v, u)
-            leaf = np.abs(np.sin(2 * np.pi * run / 0.14)) * 0.06 > np.abs(edge - 0.13)
-            picture[band & leaf] = inks[3]
-    return picture
-
-
-def _striped(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Stripes of uneven width across the rug."""
-    u, _v = _coordinates(size)
-    cuts = np.sort(rng.uniform(float(u.min()), float(u.max()), int(rng.integers(6, 16))))
-    colours = np.array(inks, np.float32)[rng.integers(0, 5, len(cuts) + 1)]
-    return np.asarray(colours[np.searchsorted(cuts, u)], np.float32)
-
-
-def _lattice(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Dark lines crossing as lozenges on a light ground."""
-    u, v = _coordinates(size)
-    wide, high = float(rng.uniform(0.28, 0.45)), float(rng.uniform(0.28, 0.6))
-    picture = _filled(size, mix(inks[0], (0.86, 0.83, 0.76), 0.6))
-    wobble = 0.012 * np.sin(11 * v + 7 * u)
-    a, b = (u + wobble) / wide + v / high, (u + wobble) / wide - v / high
-    line = np.minimum(np.abs(a - np.round(a)), np.abs(b - np.round(b)))
-    picture[line < 0.04] = shade(inks[1], 0.55)
-    return picture
-
-
-def _diamonds(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Rows of diamonds in several colours, woven in steps."""
-    u, v = _coordinates(size)
-    pitch = float(rng.uniform(0.22, 0.4))
-    snap = 0.018
-    # Snap coordinates to 18 mm, so that oblique lines climb in steps.
-    u, v = np.floor(u / snap) * snap, np.floor(v / snap) * snap
-    column, row = np.round(u / pitch), np.round(v / (1.3 * pitch))
-    # The L1 distance to the nearest diamond's middle; bands of it take turns in three colours.
-    ring = np.abs(u / pitch - column) + np.abs(v / (1.3 * pitch) - row)
-    picture = _filled(size, inks[0])
-    pick = (column + 2 * row).astype(int) % 3 + 1
-    for k, (low, high) in enumerate(((0.0, 0.13), (0.2, 0.34), (0.34, 0.42))):
-        band = (ring >= low) & (ring < high)
-        picture[band] = np.array(inks, np.float32)[(pick[band] + k) % 5]
-    edge = _to_edge(u.astype(np.float32), v.astype(np.float32))
-    picture[edge < 0.07] = inks[4]
-    picture[(edge > 0.03) & (edge < 0.045)] = inks[0]
-    return picture
-
-
-def _shag(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Long pile in one colour: tufts with dark between."""
-    tuft = ndimage.gaussian_filter(rng.standard_normal((size[1], size[0])), 1.2, mode="wrap")
-    lie = ndimage.gaussian_filter(rng.standard_normal((size[1], size[0])), 14.0, mode="wrap")
-    tone = 0.9 + 0.07 * tuft / tuft.std() + 0.05 * lie / lie.std()
-    return np.asarray(_filled(size, inks[0]) * tone[..., None], np.float32)
-
-
-def _plain(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """One colour with a bound edge, or a wide border."""
-    u, v = _coordinates(size)
-    picture, edge = _filled(size, inks[0]), _to_edge(u, v)
-    picture[edge < (0.03 if rng.random() < 0.6 else 0.16)] = inks[1]
-    return picture
-
-
-def _blocks(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
-    """Large areas of colour with round corners: a modern rug."""
-    u, v = _coordinates(size)
-    picture = _filled(size, inks[0])
-    for k in range(4):
-        x, y = float(rng.uniform(u.min(), u.max())), float(rng.uniform(v.min(), v.max()))
-        a, b = float(rng.uniform(0.3, 0.8)), float(rng.uniform(0.25, 0.6))
-        inside = (np.abs(u - x) / a) ** 3 + (np.abs(v - y) / b) ** 3 < 1
-        picture[inside] = inks[1 + k % 4]
-    return picture
-
-
-FAMILIES: dict[str, Family] = {
-    "bordered": _bordered, "striped": _striped, "lattice": _lattice, "diamonds": _diamonds,
-    "shag": _shag, "plain": _plain, "blocks": _blocks,
-}  # fmt: skip
-
-
-# Lays rugs under sofas, beds and tables, mats before doors and in bathrooms.
-
 
 PART = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
+_RUG_FORMS = ("sharp", "sharp", "rounded", "fringed", "oval")
+_MAT_FORMS = ("sharp", "rounded", "oval")
 _GAP_M = 0.0005  # between the floor and the rug's back
 _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
-# Turns a slab that hangs to one that lies, its picture up.
-_LYING = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]], np.float32)
 
 
 def rug(
-    rng: np.random.Generator, width: float, length: float, style: Style, family: str = ""
-) -> Made:
-    """A rug with its length along x, lying with its back at y = 0."""
+    rng: np.random.Generator, width: float, length: float, style: Style,
+    patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS,
+) -> Made:  # fmt: skip
+    """A rug with its length along x, lying with its back at y = 0, of one of the patterns and forms.
+
+    Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
+    """
+    pattern, form = str(rng.choice(list(patterns))), str(rng.choice(list(forms)))
     thick = float(rng.uniform(0.008, 0.0095))
-    pixels = rug_pixels(rng, width, length, style, family)
-    texture = jpeg_texture(f"rug {family or 'any'}", pixels)
-    low, high = np.array([-length / 2, -width / 2]), np.array([length / 2, width / 2])
-    face, back = faced_slab("rug", low, high, (0.0, thick))
+    pixels = rug_pixels(rng, width, length, style, pattern)
+    texture = jpeg_texture(f"rug {pattern}", pixels)
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     # The back and the edge take the mean colour of the face.
     r, g, b = (round(float(c) / 255, 2) for c in pixels.reshape(-1, 3).mean(0))
-    parts = [(face, shown), (back, plain("rug edge", (r, g, b), 1.0))]
-    # Slabs stand upright like what hangs on walls: lay it down.
-    lying = [(replace(s, positions=s.positions @ _LYING.T), m) for s, m in parts]
-    return hung("rug", "rug", FLOOR_MAT, lying, [texture], Place.FLOOR)
+    edge = plain("rug edge", (r, g, b), 1.0)
+    fringe = 0.05 if form == "fringed" else 0.0
+    face, back = _slab(
+        _outline(length - 2 * fringe, width, form), thick, (length - 2 * fringe, width)
+    )
+    parts = [(face, shown), (back, edge)]
+    if fringe:
+        yarn = plain("fringe", (0.8, 0.76, 0.68), 1.0)
+        parts += [(s, yarn) for s in _fringe(rng, width, length / 2, fringe)]
+    return hung("rug", "rug", FLOOR_MAT, parts, [texture], Place.FLOOR)
+
+
+def _outline(length: float, width: float, form: str) -> list[tuple[float, float]]:
+    if form == "oval":
+        return oval(length, width, n=40)
+    if form == "half":
+        # The straight side lies at the door.
+        t = np.pi * np.arange(25) / 24
+        return [(float(length / 2 * np.cos(a)), float(width * (0.5 - np.sin(a)))) for a in t]
+    return rect(length, width, 0.08 if form == "rounded" else 0.0005)
+
+
+def _slab(
+    outline: list[tuple[float, float]], thick: float, size: tuple[float, float]
+) -> tuple[Surface, Surface]:
+    """What lies within an outline: its upper face with a picture's coordinates, and the rest."""
+    whole = loft([(outline, 0.0), (outline, thick)])
+    is_top = np.isclose(whole.positions[whole.faces][:, :, 1], thick).all(1)
+    uvs = whole.positions[:, [0, 2]] / [size[0], -size[1]] + 0.5
+    face = replace(whole, faces=whole.faces[is_top], uvs=uvs.astype(np.float32))
+    return face, replace(whole, faces=whole.faces[~is_top])
+
+
+def _fringe(rng: np.random.Generator, width: float, end: float, long: float) -> list[Surface]:
+    """Tassels at both ends of a rug."""
+    tassels = []
+    for z in np.arange(-width / 2 + 0.01, width / 2 - 0.01, 0.025):
+        for side in (-1.0, 1.0):
+            tip = end - float(rng.uniform(0.0, 0.012))
+            x0, x1 = sorted((side * (end - long), side * tip))
+            tassels.append(slab((x0, 0.0, float(z)), (x1, 0.003, float(z) + 0.012)))
+    return tassels
 
 
 def lay_rugs(
@@ -304,7 +188,7 @@ def _bath_mat(
                 turn = float(np.arctan2(out[0], out[2]))
                 if _lay_largest(
                     draft, space, room, style, rng, at, turn, [(0.5, 0.8), (0.45, 0.65)],
-                    from_wall=0.02, family="shag", bare=True,
+                    from_wall=0.02, patterns=BATH_MATS, forms=_MAT_FORMS, bare=True,
                 ):  # fmt: skip
                     return
 
@@ -333,7 +217,8 @@ def _doormats(
         turn = float(np.arctan2(out[0], out[2]))
         _lay_largest(
             draft, house_space(draft), room, style, rng, at, turn, [(0.45, 0.75), (0.4, 0.6)],
-            from_wall=0.05, family="plain", bare=True, at_doors=True,
+            from_wall=0.05, patterns=DOOR_MATS, forms=("sharp", "sharp", "rounded", "half"),
+            bare=True, at_doors=True,
         )  # fmt: skip
 
 
@@ -356,7 +241,8 @@ def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
 def _lay_largest(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator,
     middle: F64, turn: float, sizes: list[tuple[float, float]], *, from_wall: float = _FROM_WALL_M,
-    family: str = "", bare: bool = False, at_doors: bool = False,
+    patterns: Iterable[str] = RUGS, forms: Sequence[str] = _RUG_FORMS, bare: bool = False,
+    at_doors: bool = False,
 ) -> bool:  # fmt: skip
     """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
 
@@ -383,7 +269,7 @@ def _lay_largest(
                 continue
             if bare and not _is_bare(space, room, area):
                 continue
-            piece, shape = rug(rng, width, length, style, family)
+            piece, shape = rug(rng, width, length, style, tuple(patterns), forms)
             where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
             item: Item = draft.placed(
                 piece, shape, where, turn, item_id=next_id(draft, PART), room_id=room.room.id,
@@ -453,9 +339,9 @@ def _covered(draft: Draft, item: Item, style: Style, rng: np.random.Generator) -
     along, across = (0, 2) if sides[0] >= sides[2] else (2, 0)
     if sides[across] < _LEAST_M or sides[along] > _MOST_M:
         return None
-    texture = jpeg_texture(
-        "rug drawn", rug_pixels(rng, float(sides[across]), float(sides[along]), style)
-    )
+    pattern = str(rng.choice(list(RUGS)))
+    pixels = rug_pixels(rng, float(sides[across]), float(sides[along]), style, pattern)
+    texture = jpeg_texture(f"rug {pattern}", pixels)
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     number = draft.material(shown, [texture])
     # Lay the picture over the plan: its edges show at the sides, which are a centimetre high.

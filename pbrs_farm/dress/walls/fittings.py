@@ -16,11 +16,13 @@ from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.textiles.rugs import rug_pixels
+from pbrs_farm.dress.textiles.rug_patterns import RUGS, rug_pixels
 from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, transformed, turned
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
+    CUPBOARD_FORMS,
     HUNG_THINGS,
+    SWITCH_FORMS,
     clock,
     faced_slab,
     frame_material,
@@ -145,8 +147,10 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
     colour = (0.9, 0.9, 0.88) if rng.random() < 0.8 else shade(style.metal.colour, 0.8)
     if rng.random() >= share:
         return
+    # All switches of a home are of one make.
+    form = int(hanging.draft.rng("switches", "form").integers(SWITCH_FORMS))
     switch = _fitting(catalogue, "switch", rng) or HUNG_THINGS.make(
-        "wall_switch", rng, style, 1, colour
+        "wall_switch", rng, style, 1, colour, form
     )
     lit = 0
     for door in room.doors:
@@ -312,7 +316,7 @@ def _shelf(
         return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
     n_doors = max(1, round(width / 0.45))
     height = float(rng.uniform(0.38, 0.6))
-    given = (board, board, width, height, depth + 0.06, n_doors)
+    given = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
     made = HUNG_THINGS.make("wall_cupboard", rng, style, *given)
     return made, float(rng.uniform(1.4, 1.6)), 0.05
 
@@ -329,7 +333,7 @@ def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
 def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
     """A patterned cloth that hangs from a rod, a fringe at its foot."""
     fringe, rod = 0.09, 0.009
-    pixels = rug_pixels(rng, width, height, style, "")
+    pixels = rug_pixels(rng, width, height, style, str(rng.choice(list(RUGS))))
     texture = jpeg_texture("wall cloth", pixels)
     shown = Material(f"cloth {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
     r, g, b = (float(c) / 255 for c in pixels.reshape(-1, 3).mean(0))

@@ -24,7 +24,7 @@ from pbrs_farm.dress.walls.fittings import (
     wants_radiators,
 )
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
+from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS, HUNG_THINGS
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
@@ -91,6 +91,7 @@ def _hang_cupboards(
     wood = plain(f"kitchen {style.wood.name}", style.wood.mean, 0.45)
     front = wood if rng.random() < 0.35 else white
     body = white if rng.random() < 0.6 else front
+    form = int(rng.integers(CUPBOARD_FORMS))
     for k, s0, s1 in runs:
         face, s = hanging.faces[k], max(s0, 0.0)
         width = float(rng.choice([0.45, 0.5, 0.6, 0.8]))
@@ -106,7 +107,7 @@ def _hang_cupboards(
                     "open_cupboard", rng, style, body, w, height, _DEEP_M - 0.04
                 )
             else:
-                given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1)
+                given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
                 made = HUNG_THINGS.make("wall_cupboard", rng, style, *given)
             tags = ("support",) if is_open else ()
             hanging.hang(*made, k, s + w / 2, low, margin_m=0.0, tags=tags)

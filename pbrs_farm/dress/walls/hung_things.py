@@ -213,3 +213,5 @@ HUNG_THINGS: Final = things_of(
     mirror_glass=Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9)),
 )
 """What hangs on walls and needs no picture: most take their sizes and materials."""
+CUPBOARD_FORMS: Final = 6
+SWITCH_FORMS: Final = 6

@@ -18,7 +18,8 @@ from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import textiles_large
 from pbrs_farm.dress.textiles.curtains import Folds, WindowSide, bar, is_flat, panel, towel_over_bar
 from pbrs_farm.dress.textiles.large_textiles import towel_rail
-from pbrs_farm.dress.textiles.rugs import FAMILIES, inks_of, rug, rug_pixels
+from pbrs_farm.dress.textiles.rug_patterns import PATTERNS, inks_of, rug_pixels
+from pbrs_farm.dress.textiles.rugs import rug
 from pbrs_farm.geometry.solids import box
 from tests.builders import builtin_home
 
@@ -191,9 +192,9 @@ def test_a_room_with_a_rug_there_gets_no_second_one_on_it() -> None:
             assert not a.intersects(b)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_every_family_of_rugs_can_be_woven(family: str) -> None:
-    pixels = rug_pixels(np.random.default_rng(3), 1.6, 2.3, STYLE, family)
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_every_pattern_of_rugs_can_be_woven(pattern: str) -> None:
+    pixels = rug_pixels(np.random.default_rng(3), 1.6, 2.3, STYLE, pattern)
     assert pixels.shape == (304, 436, 3)
     assert pixels.std() > 2
     assert len(inks_of(np.random.default_rng(3), STYLE)) == 5

@@ -58,8 +58,9 @@ def _named(draft: Draft, name: str) -> list[Item]:
     [
         ("panel_radiator", (1.0, 0.5, Material("paint"))), ("coat_rack", (3, False)),
         ("pin_board", (0.8, 0.5, Material("frame"))), ("tool_rail", (0.9,)), ("towel_radiator", ()),
-        ("wall_cupboard", (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2)),
-        ("open_cupboard", (Material("body"), 0.8, 0.6, 0.3)), ("wall_switch", (2, (0.9, 0.9, 0.9))),
+        *(("wall_cupboard", (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2, n)) for n in range(6)),
+        ("open_cupboard", (Material("body"), 0.8, 0.6, 0.3)),
+        *(("wall_switch", (2, (0.9, 0.9, 0.9), n)) for n in range(6)),
     ],
 )  # fmt: skip
 def test_what_hangs_begins_at_its_wall_and_faces_outwards(
