@@ -6,7 +6,7 @@ No label names a house or a task, so that the number of series does not grow wit
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import (
@@ -18,9 +18,20 @@ from prometheus_client.core import (
 
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import durations, stage_views, views_per_hour
+from workers.coordinator.teams import n_running
 from workers.ids import QUEUES, STAGES
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, LedgerUnavailable, WorkerView
+from workers.ledger.task_ledger import (
+    ALIVE_S,
+    EVERYWHERE,
+    SPENT_DAYS,
+    STATES,
+    FaultClass,
+    JobView,
+    LedgerUnavailable,
+    WorkerView,
+)
+from workers.ledger.user_table import UserTable
 from workers.ledger.worker_registry import Registry
 
 
@@ -30,6 +41,7 @@ class FarmCollector:
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger
         self._registry = Registry(ledger)
+        self._table = UserTable(ledger)
 
     def collect(self) -> Iterator[Metric]:
         """All metrics; only pbrs_up 0 when Redis does not answer."""
@@ -53,6 +65,7 @@ class FarmCollector:
             slots.add_metric([stage], n)
         yield slots
         workers = self._registry.workers()
+        yield _queue_slots(workers)
         yield from _workers(workers)
         alive = sum(w.age_s <= ALIVE_S for w in workers)
         yield GaugeMetricFamily("pbrs_workers", f"workers seen in {ALIVE_S:.0f} s", value=alive)
@@ -66,6 +79,7 @@ class FarmCollector:
         views = [v for j in self._ledger.active_jobs() if (v := self._ledger.view(j)) is not None]
         yield from (_tasks(views), _done(views), _faults(views), _houses(views), _seconds(views))
         yield from self._progress(views)
+        yield from self._users(views)
         expired = CounterMetricFamily("pbrs_leases_expired", "leases that ran out", labels=["job"])
         for view in views:
             expired.add_metric([view.job_id], view.counts.get("expired", 0))
@@ -74,6 +88,9 @@ class FarmCollector:
     def _progress(self, views: list[JobView]) -> Iterator[Metric]:
         """Views an hour and time left, as `status` tells them."""
         slots = self._registry.slots()
+        held = GaugeMetricFamily(
+            "pbrs_job_held_back", "1 while its user's slot-hours are spent", labels=["job"]
+        )
         rate = GaugeMetricFamily("pbrs_views_per_hour", "views finished an hour", labels=["job"])
         left = GaugeMetricFamily("pbrs_eta_seconds", "time a job will take yet", labels=["job"])
         paused = GaugeMetricFamily("pbrs_job_paused", "1 while a job is paused", labels=["job"])
@@ -84,7 +101,31 @@ class FarmCollector:
             if etas:
                 left.add_metric([view.job_id], max(etas))
             paused.add_metric([view.job_id], view.state == "paused")
-        yield from (rate, left, paused)
+            held.add_metric([view.job_id], view.barred == (EVERYWHERE,))
+        yield from (rate, left, paused, held)
+
+    def _users(self, views: list[JobView]) -> Iterator[Metric]:
+        """A row per user: who has what of the farm."""
+        users, spent = self._table.all(), self._table.spent_h()
+        running = GaugeMetricFamily("pbrs_user_tasks_running", "tasks that run", labels=["user"])
+        hours = GaugeMetricFamily(
+            "pbrs_user_slot_hours", f"used in {SPENT_DAYS} days", labels=["user"]
+        )
+        for name in users:
+            running.add_metric([name], sum(n_running(v) for v in views if v.user == name))
+            hours.add_metric([name], spent.get(name, 0.0))
+        yield from (running, hours)
+
+
+def _queue_slots(workers: list[WorkerView]) -> Metric:
+    """Tasks of a queue that live workers can run; 0 where nobody takes it."""
+    metric = GaugeMetricFamily("pbrs_queue_slots", "slots that take it", labels=["queue"])
+    for queue in QUEUES:
+        takers = (w for w in workers if queue in w.fields.get("queues", "").split(","))
+        metric.add_metric(
+            [queue], sum(int(w.fields.get("slots", 0)) for w in takers if w.age_s <= ALIVE_S)
+        )
+    return metric
 
 
 def _workers(workers: list[WorkerView]) -> Iterator[Metric]:
@@ -125,9 +166,9 @@ def _done(views: list[JobView]) -> Metric:
 def _faults(views: list[JobView]) -> Metric:
     metric = CounterMetricFamily("pbrs_faults", "attempts that failed", labels=["job", "class"])
     for view in views:
-        for name, n in view.counts.items():
-            if name.startswith("failures:"):
-                metric.add_metric([view.job_id, name.removeprefix("failures:")], n)
+        # A class that has not failed yet is 0: Prometheus sees no rise of what was not there.
+        for name in get_args(FaultClass):
+            metric.add_metric([view.job_id, name], view.counts.get(f"failures:{name}", 0))
     return metric
 
 
