@@ -61,7 +61,9 @@ def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None)
         queries=Queries(index),
         refresher=Refresher(reader, index, farm.finished_houses if farm is not None else None),
         pictures=PictureCache(folder / "pictures"),
-        sessions=Sessions(options.token),
+        sessions=Sessions(options.token, farm.user_with)
+        if farm is not None
+        else Sessions(options.token),
         templates=environment(found),
         assets=found,
         audit=Audit(folder / "audit.jsonl"),

@@ -15,6 +15,7 @@ from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
 import anyio
+import anyio.to_thread
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
@@ -81,7 +82,9 @@ HEADERS: Final = {
 
 
 class Guard:
-    """Lets through what may pass; sets scope["session"], "" for who has shown no token."""
+    """Lets through what may pass; sets scope["session"], "" for who has shown no token, and
+    scope["user"], "" for who has shown none or the board's own.
+    """
 
     def __init__(self, app: ASGIApp, options: BoardOptions, sessions: Sessions) -> None:
         self._app, self._options, self._sessions = app, options, sessions
@@ -119,17 +122,20 @@ class Guard:
             return _told(405, "the board knows GET and POST", {"Allow": "GET, HEAD, POST"})
         # Who asks: a session's cookie, or a script that shows the token itself.
         cookie = _cookie(headers.get("cookie", ""))
-        session = cookie if cookie and self._sessions.is_open(cookie) else ""
+        user = self._sessions.user_of(cookie) if cookie else None
+        session = cookie if user is not None else ""
         scheme, _, word = headers.get("authorization", "").partition(" ")
         is_script = False
         if scheme.lower() == "bearer":
             # A wrong one counts as a wrong login; after too many the right one waits, too.
             if not self._logins.would_take(address):
                 return _too_many_tries()
-            is_script = self._sessions.knows(word)
+            found = await anyio.to_thread.run_sync(self._sessions.user_with, word)
+            is_script = found is not None
             if not is_script:
                 self._logins.takes(address)
-        scope["session"] = session
+            user = user or found
+        scope["session"], scope["user"] = session, user or ""
         scope["may_change"] = (bool(session) or is_script) and not self._options.is_readonly
         if method in _READS:
             may_read = self._options.is_private or session or is_script

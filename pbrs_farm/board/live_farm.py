@@ -96,6 +96,26 @@ class LiveFarm:
             _LOG.warning("the farm does not say which houses are done: %s", error)
         return self._finished
 
+    def user_with(self, token: str) -> str:
+        """Which user of the farm has this token; "" for none, or where the farm does not answer."""
+        try:
+            user = self.farm.users.named_by(token)
+        except PbrsError as error:
+            _LOG.warning("the farm does not say whose token it is: %s", error)
+            return ""
+        return user.name if user is not None else ""
+
+    def acting_as(self, name: str, place: str) -> Farm:
+        """The farm as a user sees it; "" is who has the board's own token, and may all.
+
+        Raises BadInput for a user who was removed.
+        """
+        from workers.ledger.task_ledger import User
+        from workers.ledger.user_table import known_user
+
+        user = known_user(self.farm.users.all(), name) if name else User("board", is_admin=True)
+        return self.farm.acting_as(user, place)
+
     def forget(self) -> None:
         """Ask anew next time: something was changed."""
         with self._asking:
@@ -169,11 +189,12 @@ class Audit:
         self._file = file
         self._lock = threading.Lock()
 
-    def note(self, *, address: str, what: str, of: str, answer: str) -> None:
-        """Write one line: when, from which address, what was done to what, and what came of it."""
+    def note(self, *, address: str, user: str, what: str, of: str, answer: str) -> None:
+        """Write one line: when, who, from which address, what was done to what, what came of it."""
         row = {
             "utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "address": address,
+            "user": user,
             "what": what,
             "of": shown(of),
             "answer": shown(answer, MAX_MESSAGE),
@@ -190,4 +211,4 @@ class Audit:
                 lines = deque(file, maxlen=_SHOWN)
         except OSError:
             return []
-        return [json.loads(line) for line in reversed(lines)]
+        return [{"user": "", **json.loads(line)} for line in reversed(lines)]

@@ -12,6 +12,7 @@ import secrets
 import threading
 import time
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import Final
 
 from pbrs_farm.store.secret import Secret
@@ -23,12 +24,17 @@ _MAX_WORD: Final = 200  # characters of a form's word that are looked at
 
 
 class Sessions:
-    """The sessions of one board."""
+    """The sessions of one board.
 
-    def __init__(self, token: Secret) -> None:
+    user_by: whose token a word is that is not the board's own, "" for nobody's.
+    """
+
+    def __init__(self, token: Secret, user_by: Callable[[str], str] = lambda _word: "") -> None:
         self._token = token
+        self._user_by = user_by
         self._key = secrets.token_bytes(32)
-        self._ends: OrderedDict[str, float] = OrderedDict()  # digest of a session -> monotonic
+        # digest of a session -> when it ends (monotonic), and whose it is
+        self._open: OrderedDict[str, tuple[float, str]] = OrderedDict()
         self._lock = threading.Lock()
 
     def knows(self, token: str) -> bool:
@@ -37,25 +43,33 @@ class Sessions:
         expected = self._token.reveal()
         return bool(expected) and hmac.compare_digest(_digest(token), _digest(expected))
 
-    def open(self) -> str:
-        """A new session's word."""
+    def user_with(self, token: str) -> str | None:
+        """Who shows a word: a user of the farm, "" with the board's own token, None for a wrong one."""
+        return "" if self.knows(token) else self._user_by(token) or None
+
+    def open(self, user: str = "") -> str:
+        """A new session's word. user: whose it is, "" with the board's own token."""
         session = secrets.token_urlsafe(32)
         with self._lock:
-            self._ends[_digest(session)] = time.monotonic() + _LIFE_S
-            while len(self._ends) > _MAX_SESSIONS:
-                self._ends.popitem(last=False)
+            self._open[_digest(session)] = (time.monotonic() + _LIFE_S, user)
+            while len(self._open) > _MAX_SESSIONS:
+                self._open.popitem(last=False)
         return session
 
     def close(self, session: str) -> None:
         """End a session."""
         with self._lock:
-            self._ends.pop(_digest(session), None)
+            self._open.pop(_digest(session), None)
 
     def is_open(self, session: str) -> bool:
         """Whether the word is that of a session which has not ended."""
+        return self.user_of(session) is not None
+
+    def user_of(self, session: str) -> str | None:
+        """Whose session it is, "" with the board's own token; None where it is none or has ended."""
         with self._lock:
-            ends = self._ends.get(_digest(session))
-        return ends is not None and time.monotonic() < ends
+            ends, user = self._open.get(_digest(session), (0.0, ""))
+        return user if time.monotonic() < ends else None
 
     def form_word(self, session: str) -> str:
         """What a form of this session must carry."""

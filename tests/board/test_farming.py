@@ -19,6 +19,7 @@ from tests.workers.conftest import config, redis_server
 from tests.workers.drive import Drive
 from workers.client.farm_client import Farm, new_spec
 from workers.client.text import workers_text
+from workers.client.users import add_user
 from workers.config import FarmConfig
 from workers.ids import log_key
 from workers.job import HouseEntry
@@ -130,6 +131,31 @@ def test_a_change_is_asked_confirmed_done_and_written_down(
     ]  # fmt: skip
     assert rows[0]["address"] == "127.0.0.1"
     assert "paused" in client.get("/farm").text
+
+
+def test_a_user_of_the_farm_changes_by_his_own_rights_and_the_line_names_him(
+    client: httpx.Client, farm: Farm, drive: Drive, tmp_path: Path
+) -> None:
+    job = drive.job.job_id
+    root = add_user(farm, "root", {})
+    ann = add_user(farm.acting_as(farm.users.all()["root"], "here"), "ann", {})
+    assert log_in(client, "x" * 32).status_code == 403
+    log_in(client, ann)
+    refused = do(client, "pause", job)
+    assert (refused.status_code, farm.view(job).state) == (409, "running")
+    assert "is a job of no user" in refused.text
+    client.cookies.clear()
+    log_in(client, root)
+    assert do(client, "pause", job).status_code == 303
+    bearer = {"Authorization": f"Bearer {root}"}
+    client.cookies.clear()
+    assert client.post("/farm/do", data={"what": "resume", "of": job}, headers=bearer).is_redirect
+    (file,) = (tmp_path / "cache").glob("*/audit.jsonl")
+    rows = [json.loads(line) for line in file.read_text().splitlines()]
+    assert [(r["user"], r["what"]) for r in rows] == [
+        ("ann", "pause"), ("root", "pause"), ("root", "resume"),
+    ]  # fmt: skip
+    assert [row["user"] for row in farm.users.changes(2)] == ["root", "root"]
 
 
 def test_a_priority_is_changed_confirmed_and_kept_for_a_recovery(

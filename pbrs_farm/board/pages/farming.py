@@ -6,7 +6,7 @@ import json
 import threading
 from collections.abc import AsyncIterator, Callable
 from functools import partial
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import anyio
 import anyio.to_thread
@@ -19,6 +19,9 @@ from pbrs_farm.board.live_farm import LiveFarm
 from pbrs_farm.board.pages.lists import board_of
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.core.errors import PbrsError
+
+if TYPE_CHECKING:
+    from workers.client.farm_client import Farm
 
 _EVERY_S: Final = 2.0  # between two looks of a page that listens
 _BEAT_S: Final = 15.0  # a line that says nothing, so that proxies keep the stream
@@ -146,21 +149,24 @@ async def steer(request: Request) -> Response:
     if what not in _OF_JOBS | _OF_WORKERS or not of:
         raise HTTPException(404, "There is no such thing to do.")
     address = request.client.host if request.client else ""
+    user = request.scope.get("user", "")
+    note = partial(board.audit.note, address=address, user=user, what=what, of=of)
     try:
-        answer = await anyio.to_thread.run_sync(partial(_do, farm, what, of, to))
+        answer = await anyio.to_thread.run_sync(
+            lambda: _do(farm.acting_as(user, address), what, of, to)
+        )
     except PbrsError as error:
-        board.audit.note(address=address, what=what, of=of, answer=f"refused: {error}")
+        note(answer=f"refused: {error}")
         return page(request, "told.html", 409, text=str(error))
-    board.audit.note(address=address, what=what, of=of, answer=answer)
+    note(answer=answer)
     farm.forget()
     return RedirectResponse(f"/farm/jobs/{of}" if what in _OF_JOBS else "/farm", 303)
 
 
-def _do(live: LiveFarm, what: str, of: str, to: str) -> str:
+def _do(farm: Farm, what: str, of: str, to: str) -> str:
     """Do it to a job or worker; what came of it, for the audit. to: the new priority of a job."""
     from workers.ids import priority_from_text
 
-    farm = live.farm
     if what == "priority":
         before, number = farm.status(of)["priority"], priority_from_text(to)
         farm.set_priority(of, number)

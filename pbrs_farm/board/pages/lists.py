@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
+import anyio.to_thread
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
@@ -104,12 +105,14 @@ async def log_in(request: Request) -> Response:
     """POST /login: a session for who shows the token."""
     board = board_of(request)
     form = await form_of(request)
-    if not board.sessions.knows(form.get("token", "").strip()):
+    token = form.get("token", "").strip()
+    user = await anyio.to_thread.run_sync(board.sessions.user_with, token)
+    if user is None:
         return page(request, "login.html", 403, fault="That is not the token of this board.")
     answer = RedirectResponse("/", 303)
     answer.set_cookie(
         COOKIE,
-        board.sessions.open(),
+        board.sessions.open(user),
         max_age=12 * 3600,
         httponly=True,
         samesite="strict",
