@@ -112,7 +112,7 @@ def test_a_user_who_comes_late_has_his_share_of_the_slots_at_once(farm: SmallFar
     admin = farm.farm.acting_as(farm.farm.users.all()["root"], "here")
     ann, bob = (add_user(admin, name, {}) for name in ("ann", "bob"))
     begin(farm, 0.3)
-    hers = farm.submit(30, "a", ann)
+    hers = farm.submit(20, "a", ann)
     farm.wait(lambda: farm.farm.view(hers).counts.get("done:gl", 0) > 4, 60, "views are made")
     his = farm.submit(6, "b", bob)
     began = time.monotonic()
