@@ -17,7 +17,7 @@ setup: ## system packages (through apt when it may) and the virtual environment;
 	@bash scripts/setup.sh
 
 demo: setup ## render a real home to labelled pictures: out/demo/sheet.png and index.html
-	@$(BIN)/pbrs-farm demo --home "$(HOME_NAME)" --views 6 --out out/demo
+	@$(BIN)/pbrs-farm demo --home "$(HOME_NAME)" --out out/demo
 
 check: setup ## lint, types, import contracts: under a minute
 	$(BIN)/ruff check .

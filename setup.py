@@ -1,20 +1,27 @@
-"""Builds the wheel: the folder `workers` is installed as `pbrs_farm_workers`, and its imports with it.
+"""Builds sdist and wheel: equal trees give equal bytes, and each says what an installation needs.
 
-A checkout keeps the folder's own name (an editable install maps nothing). Everything else stands in
+The folder `workers` is installed as `pbrs_farm_workers`, and its imports with it; a checkout keeps the
+folder's own name (an editable install maps nothing). The text for an index is README.md without what
+only a clone has. Both archives carry one time: SOURCE_DATE_EPOCH, else 1980. The rest stands in
 pyproject.toml.
 """
 
 from __future__ import annotations
 
+import gzip
+import os
 import re
 import sys
+import tarfile
 from pathlib import Path
 
 from setuptools import find_namespace_packages, setup
 from setuptools.command.build_py import build_py
+from setuptools.command.sdist import sdist
 
 FOLDER, INSTALLED = "workers", "pbrs_farm_workers"
 HERE = Path(__file__).parent
+_FIRST_OF_ZIP = "315532800"  # 1980-01-01: the first time that a wheel, which is a zip, can carry
 
 
 def renamed(source: str, modules: list[str]) -> str:
@@ -26,6 +33,23 @@ def renamed(source: str, modules: list[str]) -> str:
     source = re.sub(rf"(?<![\w./\"'-]){FOLDER}\.(?=(?:{names})\b)", f"{INSTALLED}.", source)
     source = re.sub(rf"(?<=[\"']){FOLDER}\.(?=(?:{names})\b)", f"{INSTALLED}.", source)
     return re.sub(rf"\bfrom {FOLDER} import\b", f"from {INSTALLED} import", source)
+
+
+def index_text(readme: str) -> str:
+    """README.md for an index of packages: no pictures, and no links into the repository.
+
+    A paragraph or table with a picture goes, with the caption after it; a link of another page
+    becomes its words. Addresses (https://) stay.
+    """
+    kept: list[str] = []
+    after_picture = False
+    for block in re.split(r"\n{2,}", readme.strip()):
+        has_picture = re.search(r"!\[[^\]]*\]\((?!https?://)", block) is not None
+        is_caption = after_picture and block.startswith("*") and block.endswith("*")
+        after_picture = has_picture
+        if not has_picture and not is_caption:
+            kept.append(re.sub(r"\[([^\]]*)\]\((?!https?://)[^)]*\)", r"\1", block))
+    return "\n\n".join(kept) + "\n"
 
 
 class BuildPy(build_py):
@@ -40,6 +64,33 @@ class BuildPy(build_py):
         for path in Path(self.build_lib).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             path.write_text(renamed(text, modules), encoding="utf-8")
+        # A mask of the machine's is no part of what is built.
+        for path in Path(self.build_lib).rglob("*"):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+
+
+class SameBytes(sdist):
+    """Packs the source: files by name, one time, nobody's owner, so that a second build is the first."""
+
+    def make_archive(self, base_name, format, root_dir=None, base_dir=None, owner=None, group=None):  # type: ignore[no-untyped-def]
+        """Write base_name.tar.gz of base_dir; its path."""
+        folder, target = Path(base_dir), Path(f"{base_name}.tar.gz")
+        time = int(os.environ["SOURCE_DATE_EPOCH"])
+        with (
+            target.open("wb") as file,
+            gzip.GzipFile("", "wb", 9, file, mtime=time) as packed,
+            tarfile.open(fileobj=packed, mode="w", format=tarfile.PAX_FORMAT) as tar,
+        ):
+            for path in sorted(p for p in folder.rglob("*") if p.is_file()):
+                entry = tar.gettarinfo(path, arcname=path.relative_to(folder.parent).as_posix())
+                entry.mtime, entry.mode = time, 0o755 if path.stat().st_mode & 0o100 else 0o644
+                entry.uid = entry.gid = 0
+                entry.uname = entry.gname = ""
+                entry.type, entry.linkname = tarfile.REGTYPE, ""
+                entry.size = path.stat().st_size
+                with path.open("rb") as data:
+                    tar.addfile(entry, data)
+        return str(target)
 
 
 packages = find_namespace_packages(str(HERE), include=["pbrs_farm*", f"{FOLDER}*"])
@@ -50,4 +101,11 @@ if "editable_wheel" not in sys.argv:
     packages = [*sorted(set(packages) - set(folders)), *package_dir]
 
 if __name__ == "__main__":
-    setup(packages=packages, package_dir=package_dir, cmdclass={"build_py": BuildPy})
+    os.environ.setdefault("SOURCE_DATE_EPOCH", _FIRST_OF_ZIP)
+    setup(
+        packages=packages,
+        package_dir=package_dir,
+        cmdclass={"build_py": BuildPy, "sdist": SameBytes},
+        long_description=index_text((HERE / "README.md").read_text(encoding="utf-8")),
+        long_description_content_type="text/markdown",
+    )

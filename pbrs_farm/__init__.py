@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pbrs_farm.study.reading.open_views import open_views as open
     from pbrs_farm.study.reading.views import Frame as Frame
 
-__version__ = "0.1.0"
+    __version__: str
 
 # Public name -> where it is defined.
 _PUBLIC: Final = {
@@ -65,12 +65,25 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _PUBLIC:
+    if name == "__version__":
+        found: Any = _version()
+    elif name in _PUBLIC:
+        module, _, attribute = _PUBLIC[name].partition(":")
+        found = getattr(import_module(module), attribute)
+    else:
         raise AttributeError(f"module 'pbrs_farm' has no attribute {name!r}")
-    module, _, attribute = _PUBLIC[name].partition(":")
-    found = getattr(import_module(module), attribute)
     globals()[name] = found
     return found
+
+
+def _version() -> str:
+    """What was installed, by its metadata: the git tag that it was built from."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("pbrs-farm")
+    except PackageNotFoundError:
+        return "0+unknown"  # a folder on PYTHONPATH
 
 
 def __dir__() -> list[str]:

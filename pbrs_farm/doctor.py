@@ -15,7 +15,13 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Final, Literal
 
-from pbrs_farm.installation import EXTRA_OF, install_command, is_installed, system_command
+from pbrs_farm.installation import (
+    EXTRA_OF,
+    install_command,
+    is_installed,
+    mitsuba_command,
+    system_command,
+)
 
 State = Literal["ok", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
@@ -42,15 +48,15 @@ class Finding:
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
     """Every part, in the order a house meets it."""
     # What to install where a library is missing.
-    oidn, oiio = install_command("transport"), install_command()
+    again = install_command()
     return [
         _python(),
         _packages(),
         _llvm(),
         *_variants(),
         _probe("GL", check_gl, _gl_remedy(), needed=True),
-        _probe("denoiser", check_denoiser, oidn, needed=True),
-        _probe("pictures", check_pictures, oiio, needed=True),
+        _probe("denoiser", check_denoiser, again, needed=True),
+        _probe("pictures", check_pictures, again, needed=True),
         _redis(redis_url),
         _store(store_url),
     ]
@@ -109,13 +115,11 @@ def _variant_remedy(name: str) -> str:
     """What to do where a variant of Mitsuba does not work."""
     if name == "cuda_ad_rgb":
         return "only with an NVIDIA GPU and its driver; not needed"
-    if not is_installed("mitsuba"):
-        return install_command("transport")
-    return system_command("llvm") if name == "llvm_ad_rgb" else "reinstall mitsuba and drjit"
+    return system_command("llvm") if name == "llvm_ad_rgb" else mitsuba_command()
 
 
 def _gl_remedy() -> str:
-    return system_command("gl") if is_installed("moderngl") else install_command("gl")
+    return system_command("gl") if is_installed("moderngl") else install_command()
 
 
 def _redis(url: str) -> Finding:

@@ -5,6 +5,7 @@ A wheel takes its extras by name, a checkout from its own folder; each system ha
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,33 +14,36 @@ from typing import Final
 from pbrs_farm.core.errors import MachineFailed
 
 EXTRA_OF: Final = {
-    "moderngl": "gl", "glcontext": "gl", "mitsuba": "transport", "drjit": "transport",
-    "pyoidn": "transport", "obstore": "s3", "celery": "workers", "kombu": "workers",
+    "moderngl": "", "glcontext": "", "mitsuba": "", "drjit": "", "pyoidn": "", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
     "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video", "pxr": "usd",
     "ifcopenshell": "ifc",
 }  # fmt: skip
-"""Module -> the extra of pyproject.toml that installs it."""
+"""Module -> the extra of pyproject.toml that installs it; "" where every installation has it."""
 
 # System -> what is needed -> the command that installs it.
 _COMMANDS: Final = {
     "debian": {
         "llvm": "sudo apt-get install -y libllvm19",
+        "atomic": "sudo apt-get install -y libatomic1",
         "gl": "sudo apt-get install -y libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri",
         "redis": "sudo apt-get install -y redis-server",
     },
     "ubuntu": {
         "llvm": "sudo apt-get install -y libllvm18",
+        "atomic": "sudo apt-get install -y libatomic1",
         "gl": "sudo apt-get install -y libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri",
         "redis": "sudo apt-get install -y redis-server",
     },
     "fedora": {
         "llvm": "sudo dnf install -y llvm-libs",
+        "atomic": "sudo dnf install -y libatomic",
         "gl": "sudo dnf install -y mesa-libEGL mesa-libGL mesa-dri-drivers",
         "redis": "sudo dnf install -y valkey",
     },
     "arch": {
         "llvm": "sudo pacman -S --needed llvm-libs",
+        "atomic": "sudo pacman -S --needed gcc-libs",
         "gl": "sudo pacman -S --needed mesa libglvnd",
         "redis": "sudo pacman -S --needed valkey",
     },
@@ -51,6 +55,7 @@ _COMMANDS: Final = {
 }
 _WHAT: Final = {
     "llvm": "install LLVM 17 or later (its shared library)",
+    "atomic": "install libatomic (of GCC)",
     "gl": "install EGL and OpenGL (Mesa, or the driver of the GPU)",
     "redis": "install Redis",
 }
@@ -58,11 +63,12 @@ _WHAT: Final = {
 
 def install_command(*extras: str) -> str:
     """The pip command that adds extras to this installation; without any, that repairs it."""
-    names = f"[{','.join(extras)}]" if extras else ""
+    wanted = [name for name in extras if name]
+    names = f"[{','.join(wanted)}]" if wanted else ""
     checkout = checkout_folder()
     if checkout is not None:
         return f"pip install -e '{checkout}{names}'"
-    return f"pip install {'--force-reinstall ' * (not extras)}'pbrs-farm{names}'"
+    return f"pip install {'--force-reinstall ' * (not wanted)}'pbrs-farm{names}'"
 
 
 def checkout_folder(package: Path | None = None) -> Path | None:
@@ -72,8 +78,18 @@ def checkout_folder(package: Path | None = None) -> Path | None:
 
 
 def system_command(what: str, system: str = "") -> str:
-    """The command that installs "llvm", "gl" or "redis" on this system (or the one named)."""
-    return _COMMANDS.get(system or this_system(), _WHAT)[what]
+    """The command that installs "llvm", "atomic", "gl" or "redis" on this system (or the one named)."""
+    return _COMMANDS.get(system or this_system(), _WHAT).get(what, _WHAT[what])
+
+
+def mitsuba_command() -> str:
+    """The command that repairs a Mitsuba that cannot be imported: its library, else itself."""
+    if sys.platform == "linux":
+        try:
+            ctypes.CDLL("libatomic.so.1")
+        except OSError:
+            return system_command("atomic")
+    return install_command()
 
 
 def this_system(os_release: Path = Path("/etc/os-release")) -> str:

@@ -97,7 +97,7 @@ with tarfile.open(sys.argv[1]) as tar:
 UNPACK
 else
   [ -x "$VENV/bin/python" ] || "$python" -m venv "$VENV"
-  "$VENV/bin/pip" install -q ".[gl,transport,workers]" pytest hypothesis
+  "$VENV/bin/pip" install -q ".[workers]" pytest hypothesis
 fi
 
 mkdir -p out/bench

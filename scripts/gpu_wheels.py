@@ -26,7 +26,7 @@ from typing import Final
 from library_cuts import without_debug, without_networks
 
 HERE: Final = Path(__file__).resolve().parent
-EXTRAS: Final = ("gl", "transport", "workers")
+EXTRAS: Final = ("workers",)
 TEST_PACKAGES: Final = ("pytest", "hypothesis")
 # What a requirement asks for below Python 3.11.3 only: pip judges that by the Python that packs.
 _FOR_OLDER_PYTHON: Final = ("async-timeout",)

@@ -52,6 +52,9 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--bare", action="store_true", help="the home as it was drawn, not dressed")
     add_dress(p)
     _add_run(p, "preview")
+    # A stranger's first command ends in seconds.
+    p.set_defaults(views=6)
+    p.epilog = "six views unless --views asks for others"
 
     p = verb("run", _run, "houses -> repaired houses -> cameras -> pictures and labels")
     add = p.add_argument

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.installation import system_command
 
 _SRGB8_ALPHA8: Final = 0x8C43  # OpenGL's internal format: the GPU decodes sRGB when it samples
 _MAX_TEXTURE_PX: Final = 4096  # every OpenGL 3.3 driver takes as much
@@ -45,8 +46,7 @@ def open_context() -> Any:
             context.enable(moderngl.DEPTH_TEST)
             return context
     text = f"no headless OpenGL 3.3 on this machine ({'; '.join(faults)})"
-    hint = "`pbrs-farm doctor` says what to install; on Debian libegl1 libgl1-mesa-dri"
-    raise MachineFailed(text, hint=hint)
+    raise MachineFailed(text, hint=system_command("gl"))
 
 
 def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:

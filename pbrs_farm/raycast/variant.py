@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import mitsuba_command
 
 MIN_LLVM: Final = 17  # older ones (14 to 16) crash inside Dr.Jit's first compilation
 _LIBRARY_PLACES: Final = (
@@ -34,9 +35,9 @@ def _module(name: str) -> Any:
     """Mitsuba or Dr.Jit, imported by name; raises MachineFailed where it is not installed."""
     try:
         return importlib.import_module(name)
-    except ImportError as error:
-        hint = "pip install 'pbrs-farm[transport]'"
-        raise MachineFailed(f"Mitsuba cannot be imported: {error}", hint=hint) from error
+    except (ImportError, NameError) as error:  # NameError: Dr.Jit without a library that it wants
+        text = f"Mitsuba cannot be imported: {error}"
+        raise MachineFailed(text, hint=mitsuba_command()) from error
 
 
 def llvm_version(library: Path) -> tuple[int, ...]:

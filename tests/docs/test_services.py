@@ -108,8 +108,7 @@ def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None
     alone = ["--no-build-isolation", "--no-index", "--quiet", "--disable-pip-version-check"]
     pip = [sys.executable, "-m", "pip"]
     subprocess.run([*pip, *build[1:], *alone], cwd=source, check=True)
-    wheel = re.sub(r"\[.*\]$", "", install[-1])
-    assert (source / wheel).is_file(), wheel
+    (wheel,) = (str(p) for p in source.glob(install[-1]))
     site = tmp_path / "site"
     words = ["install", wheel, "--no-deps", "--target", str(site), *alone[1:]]
     subprocess.run([*pip, *words], cwd=source, check=True)

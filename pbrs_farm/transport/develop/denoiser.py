@@ -17,6 +17,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import RadianceImage, UnitVectors
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.transport.light_result import LightResult
 
 
@@ -53,8 +54,8 @@ def _pyoidn() -> Any:
         with _hidden("torch"):
             import pyoidn
     except ImportError as error:
-        hint = "pip install 'pbrs-farm[transport]'"
-        raise MachineFailed(f"the denoiser cannot be loaded: {error}", hint=hint) from error
+        text = f"the denoiser cannot be loaded: {error}"
+        raise MachineFailed(text, hint=install_command()) from error
     return pyoidn
 
 
