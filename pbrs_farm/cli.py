@@ -30,7 +30,7 @@ MODULES: Final = {
     "making": ("demo", "run", "objects", "step"),
     "scattering": ("scatter",),
     "explaining": ("dress", "catalogue", "repair", "cameras"),
-    "using": ("sheet", "verify", "relight"),
+    "using": ("sheet", "verify", "relight", "pull"),
     "labelling": ("export", "pack", "classes", "label-sheet"),
     "selecting": ("reference", "select"),
     "studying": ("train", "evaluate", "predict", "ablation"),

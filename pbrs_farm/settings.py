@@ -32,7 +32,7 @@ def settings_from_environment(environment: Mapping[str, str] | None = None) -> S
     """Settings from PBRS_* variables; NAME_FILE gives the path of a file that holds NAME's value.
 
     PBRS_REDIS_URL, PBRS_S3_ENDPOINT, PBRS_S3_REGION, PBRS_S3_ACCESS_KEY, PBRS_S3_SECRET_KEY,
-    PBRS_S3_ALLOW_HTTP (1), PBRS_FSYNC (1). Raises BadInput when such a file cannot be read.
+    PBRS_S3_ALLOW_HTTP (1), PBRS_FSYNC (1), PBRS_STORE_LAYOUT (files, packed). Raises BadInput when such a file cannot be read.
     """
     env = dict(os.environ if environment is None else environment)
     s3 = S3Settings(
@@ -44,7 +44,11 @@ def settings_from_environment(environment: Mapping[str, str] | None = None) -> S
     )
     redis_url = value_or_file(env, "PBRS_REDIS_URL") or DEFAULT_REDIS
     return Settings(
-        store=StoreSettings(fsync=value_or_file(env, "PBRS_FSYNC") == "1", s3=s3),
+        store=StoreSettings(
+            fsync=value_or_file(env, "PBRS_FSYNC") == "1",
+            s3=s3,
+            layout=value_or_file(env, "PBRS_STORE_LAYOUT"),
+        ),
         redis_url=Secret(redis_url),
     )
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pbrs_farm.core import edits, keys, made_home
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
+from pbrs_farm.store import laid_out
 from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 
 
@@ -24,7 +25,8 @@ def work_version() -> str:
 
     steps = {name: step.version for name, step in plan.STEPS.items()}
     houses = (dressed_house.VERSION, dressed_house.STAND_INS_VERSION, edits.VERSION)
-    return keys.digest(steps, houses, made_home.VERSION)[:12]
+    # Workers that do not know how a root lies would not find what others made.
+    return keys.digest(steps, houses, made_home.VERSION, laid_out.FORMAT)[:12]
 
 
 # What a job is and where its own objects are stored.

@@ -34,7 +34,7 @@ def add_verbs(verb: Verb) -> None:
     text = "finished views in the form another tool reads; or the homes, for simulators"
     p = verb("export", _export, text)
     add = p.add_argument
-    add("folder", type=Path)
+    add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--to", required=True, choices=forms, help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
@@ -78,6 +78,8 @@ def _export(args: argparse.Namespace) -> int:
     from pbrs_farm.export.chosen_view import Choice
     from pbrs_farm.export.export_views import export, remarks_of
     from pbrs_farm.formats.class_map import class_map
+    from pbrs_farm.run.output_root import as_files
+    from pbrs_farm.settings import settings_from_environment
 
     # None is all there is: layers (but radiance), modes, the stored size.
     choice = Choice(
@@ -88,10 +90,11 @@ def _export(args: argparse.Namespace) -> int:
         classes=class_map(args.classes) if args.classes else None,
     )
     shares = shares_from_text(args.split) if args.split else None
-    out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
-    n_views, n_files = export(
-        args.folder, out, args.to, selection=args.selection, choice=choice, shares=shares
-    )
+    out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
+    with as_files(args.folder, settings_from_environment().store) as folder:
+        n_views, n_files = export(
+            folder, out, args.to, selection=args.selection, choice=choice, shares=shares
+        )
     echo(f"{out}: {n_views} views, {n_files} files")
     for remark in remarks_of(out):
         warn(remark)
@@ -100,14 +103,17 @@ def _export(args: argparse.Namespace) -> int:
 
 def _export_homes(args: argparse.Namespace) -> int:
     from pbrs_farm.export.home_export import export_homes
+    from pbrs_farm.run.output_root import as_files
+    from pbrs_farm.settings import settings_from_environment
 
     options = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
     options |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
     for option, value in options.items():
         if value is not None:
             raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
-    out = args.out or Path(f"{args.folder.resolve().name}_{args.to}")
-    n_homes, n_files, remarks = export_homes(args.folder, out, args.to)
+    out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
+    with as_files(args.folder, settings_from_environment().store) as folder:
+        n_homes, n_files, remarks = export_homes(folder, out, args.to)
     echo(f"{out}: {counted(n_homes, 'home')}, {n_files} files")
     for remark in remarks:
         warn(remark)

@@ -1,4 +1,4 @@
-"""Verbs that use what was made: sheet, verify, relight. Effects: read and write an output folder."""
+"""Verbs that use what was made: sheet, verify, relight, pull. Effects: read and write an output folder."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add sheet, verify and relight."""
+    """Add sheet, verify, relight and pull."""
     text = "contact sheet (sheet.png) and gallery (index.html) of an output folder"
     p = verb("sheet", _sheet, text)
     p.add_argument("folder", type=Path)
@@ -34,7 +34,7 @@ def add_verbs(verb: Verb) -> None:
         " the light transport on rooms with known answers",
     )
     add = p.add_argument
-    add("folder", type=Path, nargs="?", help="the folder of --out")
+    add("folder", metavar="ROOT", nargs="?", help="the folder of --out, or s3://bucket/prefix")
     text = "no files: furnace rooms, Metropolis against path, exact facts; under a minute"
     add("--light", action="store_true", help=text)
     add("--all", action="store_true", help="every pixel instead of a sample")
@@ -55,6 +55,24 @@ def add_verbs(verb: Verb) -> None:
     add("--list", action="store_true", help="print the view's lamps, relight nothing")
     add("--out", type=Path, help="PNG to write (default VIEW_relit.png here)")
     add("--no-denoise", action="store_true", help="develop the raw radiance")
+
+    p = verb("pull", _pull, "copy a store's views into a folder of files; what is there stays")
+    p.add_argument("root", metavar="ROOT", help="s3://bucket/prefix, or a folder")
+    p.add_argument("--out", type=Path, required=True, help="the folder")
+
+
+def _pull(args: argparse.Namespace) -> int:
+    from pbrs_farm.run.output_root import pull
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    if "://" not in args.root and not Path(args.root).is_dir():
+        raise BadInput(
+            args.root, "", "no such folder", hint="the folder of --out, or a store's URL"
+        )
+    n_copied, n_there = pull(store_from_url(args.root, settings_from_environment().store), args.out)
+    echo(f"{args.out}: {n_copied} files copied, {n_there} were there")
+    return 0
 
 
 def _sheet(args: argparse.Namespace) -> int:
@@ -117,11 +135,14 @@ def _verify(args: argparse.Namespace) -> int:
 def _verify_folder(args: argparse.Namespace) -> int:
     from pbrs_farm.check import verify
     from pbrs_farm.progress import counting_bar
+    from pbrs_farm.run.output_root import as_files
+    from pbrs_farm.settings import settings_from_environment
 
     if args.sample is not None:
         at_least("--sample", args.sample, 1)
-    with counting_bar("views") as tell:
-        certificate = verify(args.folder, sample=args.sample, all_pixels=args.all, tell=tell)
+    settings = settings_from_environment().store
+    with as_files(args.folder, settings) as folder, counting_bar("views") as tell:
+        certificate = verify(folder, sample=args.sample, all_pixels=args.all, tell=tell)
     if args.json:
         echo_json(certificate.model_dump(mode="json"))
     else:

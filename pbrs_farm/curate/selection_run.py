@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -36,7 +36,8 @@ from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.scores import SCORES, Scorer, merged
 from pbrs_farm.selection.similarity import Binning, BinningRow
 from pbrs_farm.selection.verdicts import REASONS, verdicts
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.laid_out import LaidOutStore
+from pbrs_farm.store.object_store import Store, get_or_none
 
 # The summary of a selection: yield, reasons, tallies per house and room type.
 
@@ -222,14 +223,23 @@ def verdict_table(store: Store, run: str = "default") -> Any:
 
 def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
     """The histograms of one house, from its pack when that is up to date."""
-    views = _houses(store, keys.house_key(house))[house]
+    views = _houses(store, house)[house]
     return _pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
 
-def _houses(store: Store, below: str = f"{keys.FOLDERS[0]}/") -> dict[str, dict[str, bool]]:
-    """House id -> view id -> whether it has a histogram.json, in order."""
+def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
+    """House id -> view id -> whether it has a histogram.json, in order; of one house where it is named.
+
+    A remote store is not listed where a manifest names its views.
+    """
+    manifest = keys.house_key(house, keys.MANIFEST) if house else keys.MANIFEST
+    rows = get_or_none(store, manifest) if isinstance(store, LaidOutStore) else None
+    if rows is not None:
+        found_keys: Iterable[str] = sha256_by_key(rows)
+    else:
+        found_keys = store.list(keys.house_key(house) if house else f"{keys.FOLDERS[0]}/")
     found: dict[str, dict[str, bool]] = {}
-    for key in store.list(below):
+    for key in found_keys:
         at = keys.parse_house_key(key)
         if at is not None and at.view is not None and at.file in ("histogram.json", "view.json"):
             views = found.setdefault(at.house, {})

@@ -1,6 +1,6 @@
 """done/<step>[.<view>].json: the marker that says a step is done (architecture rule 4).
 
-Effects: read_marker reads the store.
+Effects: those of the stores it is given.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 from pbrs_farm.core.errors import StoreFailed
 from pbrs_farm.core.record import Record
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.store.object_store import Store, get_or_none
+from pbrs_farm.store.object_store import Store, get_or_none, put_done
 
 
 class StoredFile(Record):
@@ -51,3 +51,13 @@ def read_marker(store: Store, key: str) -> Marker | None:
         return None if data is None else Marker.model_validate_json(data)
     except ValidationError:
         raise StoreFailed(key, "not a marker", hint="remove it to do the step again") from None
+
+
+def copy_done(of: Store, to: Store, key: str) -> Marker | None:
+    """Copy what a step made and its marker, which it gives, over what is there; None where there is none."""
+    marker = read_marker(of, key)
+    if marker is not None:
+        files = {file.key: of.get(file.key) for file in marker.files}
+        to.delete(key)
+        put_done(to, key, marker.json_bytes(), files)
+    return marker

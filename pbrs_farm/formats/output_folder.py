@@ -18,6 +18,7 @@ from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.regular_files import read_given
+from pbrs_farm.store.object_store import LAYOUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,9 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
 
     Raises BadInput if root is no output folder or a JSON file in it cannot be read.
     """
+    if (root / LAYOUT).is_file():
+        hint = "pbrs-farm pull ROOT --out FOLDER, then that folder"
+        raise BadInput(root, LAYOUT, "its views are packed, and this reads files", hint=hint)
     # Homes first, then objects without context.
     roots = [root / name for name in keys.FOLDERS if (root / name).is_dir()]
     if not roots:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
@@ -12,7 +15,9 @@ from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.run.attributions import write_attribution
-from pbrs_farm.store.object_store import Store, get_or_none
+from pbrs_farm.store import StoreSettings, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.object_store import LAYOUT, Store, get_or_none
 
 
 def attribution(store: Store, house_id: str) -> str:
@@ -79,3 +84,33 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
         # From now on a marker's name alone does not say that its step is done.
         store.put(keys.RECIPE_REPLACED, json.dumps({"last": differing}).encode())
         store.put(keys.RECIPE, data)
+
+
+def pull(of: Store, folder: Path) -> tuple[int, int]:
+    """Copy an output root, however it lies, into a folder of files; how many were copied, how many were there.
+
+    A file that is there with its size is not read again, but for manifests and the like of the root.
+    """
+    to, n_copied, n_there = FolderStore(folder), 0, 0
+    for key in of.list():
+        if key == LAYOUT or key.startswith("jobs/"):
+            continue  # of the store, not of the root
+        here = to.head(key) if key.startswith(tuple(f"{top}/" for top in keys.FOLDERS)) else None
+        there = of.head(key) if here is not None else None
+        if here is not None and there is not None and here.n_bytes == there.n_bytes:
+            n_there += 1
+            continue
+        to.put(key, of.get(key))
+        n_copied += 1
+    return n_copied, n_there
+
+
+@contextmanager
+def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
+    """The folder of an output root: the one named, or of a URL or a packed root a copy, removed afterwards."""
+    if "://" not in word and not (Path(word) / LAYOUT).is_file():
+        yield Path(word)
+        return
+    with TemporaryDirectory(prefix="pbrs-root-") as folder:
+        pull(store_from_url(word, settings), Path(folder))
+        yield Path(folder)

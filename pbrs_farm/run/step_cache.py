@@ -29,7 +29,7 @@ from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.store.object_store import Store, get_or_none
+from pbrs_farm.store.object_store import Store, get_or_none, put_done
 from pbrs_farm.transport.light_result import Arrays
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
@@ -102,12 +102,13 @@ def run_unless_done(
     if old is not None and not is_valid:
         work.store.delete(key)
 
-    # Do the step, put its files, then its marker.
+    # Do the step, put its files, then its marker: both at once where the store packs them.
     started = time.perf_counter()
     made = function(replace(work, inputs=inputs, digest=digest))
     if is_valid:
         work.store.delete(key)
-    files = tuple(_put(work, name, file, made.files[file]) for file in sorted(made.files))
+    data = {_file_key(work, name, file): made.files[file] for file in sorted(made.files)}
+    files = tuple(StoredFile(key=k, n_bytes=len(d), sha256=keys.sha256(d)) for k, d in data.items())
     if old is not None:
         _remove_stale(work, old, files)
     marker = Marker(
@@ -122,7 +123,7 @@ def run_unless_done(
         attempt=attempt,
         finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    work.store.put_if_absent(key, marker.json_bytes())
+    put_done(work.store, key, marker.json_bytes(), data)
     if made.unfinished:
         work.store.delete(made.unfinished)
     return Outcome(marker, was_done=False)
@@ -210,13 +211,10 @@ def required_source(work: Work) -> SourceRef:
     return work.source
 
 
-def _put(work: Work, step: str, file: str, data: bytes) -> StoredFile:
+def _file_key(work: Work, step: str, file: str) -> str:
     if plan.STEPS[step].per_view:
-        key = keys.view_key(work.house_id, work.view_id or "", file)
-    else:
-        key = keys.house_key(work.house_id, file)
-    work.store.put(key, data)
-    return StoredFile(key=key, n_bytes=len(data), sha256=keys.sha256(data))
+        return keys.view_key(work.house_id, work.view_id or "", file)
+    return keys.house_key(work.house_id, file)
 
 
 def _remove_stale(work: Work, old: Marker, files: Collection[StoredFile]) -> None:

@@ -24,7 +24,7 @@ from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
-from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
@@ -240,11 +240,7 @@ class Renderer:
 def _copy_steps(of: Store, to: Store, house: str, view: str, steps: Iterable[str]) -> None:
     """Copy what steps of a view have made, those that are done."""
     for step in steps:
-        marker = read_marker(of, key := keys.marker_key(house, step, view))
-        if marker is not None:
-            for file in marker.files:
-                to.put(file.key, of.get(file.key))
-            to.put(key, marker.json_bytes())
+        copy_done(of, to, keys.marker_key(house, step, view))
 
 
 RENDERER: Final = Renderer()

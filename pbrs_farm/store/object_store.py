@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 
@@ -14,6 +14,8 @@ from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
 _MAX_KEY: Final = 900  # characters; S3 takes 1024 bytes with the prefix
 _MAX_SEGMENT: Final = 200  # characters; file systems take 255 bytes
+
+LAYOUT: Final = "layout.json"  # there where an output root is packed (store/laid_out.py)
 
 CONTENT_TYPES: Final = {
     "png": "image/png",
@@ -83,6 +85,25 @@ def get_or_none(store: Store, key: str) -> bytes | None:
         return store.get(key)
     except ObjectMissing:
         return None
+
+
+@runtime_checkable
+class PackingStore(Store, Protocol):
+    """A store that has a way of its own to put what a step made."""
+
+    def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
+        """As the function put_done."""
+        ...
+
+
+def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
+    """Put what a step made, by key, and then the marker under `key`, if-absent: it is seen last."""
+    if isinstance(store, PackingStore):
+        store.put_done(key, marker, files)
+        return
+    for file, data in files.items():
+        store.put(file, data)
+    store.put_if_absent(key, marker)
 
 
 def check_key(key: str) -> str:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 from urllib.parse import unquote, urlsplit
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.object_store import MemoryStore, Store
+from pbrs_farm.store.object_store import LAYOUT, MemoryStore, Store
 from pbrs_farm.store.s3 import S3Settings, S3Store
+
+LAYOUTS: Final = ("files", "packed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +21,13 @@ class StoreSettings:
 
     fsync: bool = False  # of folders
     s3: S3Settings = field(default_factory=S3Settings)
+    # Of roots that begin: "files" or "packed"; "" packs in S3 alone. A root keeps what it began with.
+    layout: str = ""
+
+    def __post_init__(self) -> None:
+        if self.layout not in ("", *LAYOUTS):
+            hint = f"of {', '.join(LAYOUTS)}"
+            raise BadInput("PBRS_STORE_LAYOUT", self.layout, "no such layout", hint=hint)
 
 
 def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
@@ -30,12 +40,25 @@ def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
     if url == "memory:":
         return MemoryStore()
     if parts.scheme == "file" and parts.netloc in ("", "localhost") and parts.path:
-        return FolderStore(Path(unquote(parts.path)), fsync=settings.fsync)
+        return _folder(Path(unquote(parts.path)), settings)
     if parts.scheme == "s3" and parts.netloc and "@" not in parts.netloc:
-        return S3Store(parts.netloc, parts.path, settings.s3)
+        return _laid_out(S3Store(parts.netloc, parts.path, settings.s3), settings.layout != "files")
     if not parts.scheme and url:
-        return FolderStore(Path(url), fsync=settings.fsync)
+        return _folder(Path(url), settings)
     # Do not repeat a URL that may hold a password.
     shown = f"{parts.scheme}:..." if "@" in url else repr(url)
     hint = "file:///folder, s3://bucket/prefix or memory:"
     raise BadInput(shown, "", "not a store", hint=hint)
+
+
+def _folder(root: Path, settings: StoreSettings) -> Store:
+    """A folder; as a packed root where it is one (a copy of a bucket, say) or is to become one."""
+    store, packs = FolderStore(root, fsync=settings.fsync), settings.layout == "packed"
+    return _laid_out(store, packs) if packs or (root / LAYOUT).is_file() else store
+
+
+def _laid_out(store: Store, packs: bool) -> Store:
+    # Imported where needed: shards are read without pydantic.
+    from pbrs_farm.store.laid_out import LaidOutStore
+
+    return LaidOutStore(store, packs)

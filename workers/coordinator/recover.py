@@ -1,4 +1,4 @@
-"""The ledger rebuilt from storage: one listing of the markers, one look at each unfinished house.
+"""The ledger rebuilt from storage: the names of the markers, one look at each unfinished house.
 
 Effects: reads the store, writes Redis. Attempts start afresh; tasks that had failed for good and
 left a record are tried again.
@@ -7,14 +7,15 @@ left a record are tried again.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import groupby, islice
 from typing import Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.store.object_store import Store
+from pbrs_farm.store.laid_out import LaidOutStore
+from pbrs_farm.store.object_store import Store, get_or_none
 from workers.ids import GEOMETRY, REDUCE
 from workers.job import HouseEntry, JobSpec
 from workers.ledger.redis_ledger import RedisLedger
@@ -38,8 +39,9 @@ def rebuild(
     Where markers may be of another recipe or version every house begins anew: its tasks look into
     each marker, and what holds is not made again.
     """
-    # One listing for all houses, then a look at each that has begun.
-    done = done_steps(store) if houses and names_tell(store, spec) else {}
+    # The markers' names of all houses, then a look at each that has begun.
+    tells = bool(houses) and names_tell(store, spec)
+    done = done_steps(store, [house.house_id for house in houses]) if tells else {}
     progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
     with ThreadPoolExecutor(_THREADS) as pool:
@@ -66,15 +68,33 @@ def names_tell(store: Store, spec: JobSpec) -> bool:
     return all(r.get("version") == spec.version and not r.get("versions_before") for r in rows)
 
 
-def done_steps(store: Store) -> dict[str, frozenset[str]]:
-    """House -> names of its markers, from one listing of the store."""
+def done_steps(store: Store, houses: Sequence[str]) -> dict[str, frozenset[str]]:
+    """House -> names of its markers: a folder is listed once, elsewhere each house is asked for its own."""
+    if isinstance(store, LaidOutStore):
+        with ThreadPoolExecutor(_THREADS) as pool:
+            found = zip(houses, pool.map(partial(_names_of_house, store), houses), strict=True)
+            return {house: names for house, names in found if names}
+    return _names_of_markers(store.list(f"{keys.FOLDERS[0]}/"))
+
+
+def _names_of_house(store: LaidOutStore, house: str) -> frozenset[str]:
+    # A manifest was made from the markers; where views are packed it spares a look into each pack.
+    data = get_or_none(store, keys.house_key(house, keys.MANIFEST)) if store.is_packed else None
+    if data is None:
+        return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
+    rows = [json.loads(line) for line in data.splitlines()]
+    placed = [(row["step"], keys.parse_house_key(row["key"])) for row in rows]
+    return frozenset(keys.marker_name(step, at.view) for step, at in placed if at is not None)
+
+
+def _names_of_markers(found: Iterable[str]) -> dict[str, frozenset[str]]:
     # Keys look like houses/<id>/done/<step>[.<view>].json
     names: dict[str, list[str]] = {}
-    for key in store.list(f"{keys.FOLDERS[0]}/"):
+    for key in found:
         at = keys.parse_house_key(key)
         if at is not None and at.step:
             names.setdefault(at.house, []).append(keys.marker_name(at.step, at.view))
-    return {house: frozenset(found) for house, found in names.items()}
+    return {house: frozenset(steps) for house, steps in names.items()}
 
 
 def _state(

@@ -31,6 +31,7 @@ from pbrs_farm.run.run_task import limit_threads
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
+from pbrs_farm.store.laid_out import LaidOutStore, one_task
 from pbrs_farm.store.object_store import get_or_none
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
@@ -161,7 +162,15 @@ _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
     """The runner of a worker or of `recover`."""
     store = store_from_url(config.store_url, config.store)
-    patient = RetryingStore(store, config.storage_patience_s, on_waiting)
+
+    def with_patience(inner: Store) -> Store:
+        return RetryingStore(inner, config.storage_patience_s, on_waiting)
+
+    # Patience lies below the layout, which may ask the store twice for a key.
+    if isinstance(store, LaidOutStore):
+        patient: Store = store.around(with_patience)
+    else:
+        patient = with_patience(store)
     return HouseRunner(patient, n_threads=max(1, (os.cpu_count() or 1) // config.slots))
 
 
@@ -177,27 +186,32 @@ class HouseRunner:
     def run(self, request: Request, on_step: OnText) -> Result:
         """One task; raises what its steps raise."""
         spec = self._spec(request.job_id)
+        with one_task(self._store, reads_whole=request.stage in (GL, LIGHT)) as store:
+            return self._run(store, request, spec, on_step)
+
+    def _run(self, store: Store, request: Request, spec: JobSpec, on_step: OnText) -> Result:
         if request.stage == GEOMETRY:
-            return self._geometry(request, spec, on_step)
+            return self._geometry(store, request, spec, on_step)
         if request.stage in (GL, LIGHT):
             # What light needs of the house: the first batch that comes here makes it.
             if request.stage == LIGHT:
                 for step in plan.needed_of_house("light", request.house):
-                    self._step(request, spec, on_step, step)
+                    self._step(store, request, spec, on_step, step)
             for view in request.views:
                 for step in steps_of_stage(spec, request.stage):
-                    self._step(request, spec, on_step, step, view=view)
+                    self._step(store, request, spec, on_step, step, view=view)
         elif request.stage == REDUCE:
             on_step("finish")
-            finish_house(self._store, request.house)
+            finish_house(store, request.house)
             if spec.reference:
-                self._pack_histograms(request.house, spec, on_step)
+                self._pack_histograms(store, request.house, spec, on_step)
         elif request.stage == SHARD:
             merge_shard(self._store, spec, int(request.unit.removeprefix("s")), on_step)
         elif request.stage == JOB:
+            # Selection looks for its views in the root's manifest.
+            merge_job(self._store, spec, on_step)
             if spec.reference:
                 self._select(spec, on_step)
-            merge_job(self._store, spec, on_step)
         return Result(n_views=len(request.views))
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
@@ -213,7 +227,7 @@ class HouseRunner:
         has_manifest = self._store.head(keys.house_key(house, keys.MANIFEST)) is not None
         return Survey(batches=batches, missing=units, reduced=finished and has_manifest)
 
-    def _geometry(self, request: Request, spec: JobSpec, on_step: OnText) -> Result:
+    def _geometry(self, store: Store, request: Request, spec: JobSpec, on_step: OnText) -> Result:
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
@@ -226,16 +240,16 @@ class HouseRunner:
                 here = spec.model_copy(update={"recipe": recipe})
             for step in _steps_before_views(spec, request.house):
                 at = here if step == "house" else spec
-                self._step(request, at, on_step, step, source=source)
+                self._step(store, request, at, on_step, step, source=source)
         return Result(batches=self._batches(spec, request.house))
 
-    def _pack_histograms(self, house: str, spec: JobSpec, on_step: OnText) -> None:
+    def _pack_histograms(self, store: Store, house: str, spec: JobSpec, on_step: OnText) -> None:
         """The house's histograms in one object, so that the job's selection reads one a house."""
         from pbrs_farm.core.lighting import Mode
         from pbrs_farm.curate.selection_run import house_pack
 
         on_step("histograms")
-        house_pack(self._store, house, Mode(spec.recipe.selection.score_mode))
+        house_pack(store, house, Mode(spec.recipe.selection.score_mode))
 
     def _select(self, spec: JobSpec, on_step: OnText) -> None:
         """Selection over the views there are; a run of the job's name, so that it adds up."""
@@ -270,6 +284,7 @@ class HouseRunner:
 
     def _step(
         self,
+        store: Store,
         request: Request,
         spec: JobSpec,
         on_step: OnText,
@@ -281,7 +296,7 @@ class HouseRunner:
         on_step(step if view is None else f"{step} {view}")
         limit_threads(step, self._n_threads)
         work = Work(
-            store=self._store,
+            store=store,
             recipe=spec.recipe,
             house_id=request.house,
             house_cache=self._house_cache,

@@ -83,4 +83,6 @@ def _setting_from_text(text: str) -> Setting:
     store = row.pop("store")
     s3 = store["s3"] | {name: Secret(store["s3"][name]) for name in _SECRETS}
     recipe = Recipe.model_validate_json(row.pop("recipe"))
-    return Setting(**row, recipe=recipe, store=StoreSettings(store["fsync"], S3Settings(**s3)))
+    return Setting(
+        **row, recipe=recipe, store=StoreSettings(store["fsync"], S3Settings(**s3), store["layout"])
+    )

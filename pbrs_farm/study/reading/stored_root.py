@@ -18,7 +18,7 @@ from pbrs_farm.core.layers import LAYERS as ALL_LAYERS
 from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.layer_file import layer_from_bytes
-from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.formats.marker import copy_done, read_marker
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.output_root import attribution, claim_root, finish_root
 from pbrs_farm.store import Store, store_from_url
@@ -181,8 +181,10 @@ def copy_view(of: Store, to: Store, ref: ViewRef) -> None:
         at = keys.parse_house_key(key)
         if at is None or at.file == keys.MANIFEST or at.view not in (None, ref.view):
             continue
-        if at.file != _CAMERAS and at.step != "cameras":
+        if at.view is None and at.file != _CAMERAS and at.step != "cameras":
             to.put(key, of.get(key))
+        elif at.step and at.view is not None:
+            copy_done(of, to, key)
     _copy_cameras(of, to, ref.house)
 
 
@@ -195,13 +197,11 @@ def _merge_view(of: Store, to: Store, ref: ViewRef) -> None:
 
     truth = None
     for step in STEPS.values():
-        marker = read_marker(of, key := keys.marker_key(ref.house, step.name, ref.view))
-        truth = marker if step.name == "truth" else truth
-        if not step.per_view or marker is None or step.name in ("truth", "view"):
-            continue
-        for file in marker.files:
-            to.put(file.key, of.get(file.key))
-        to.put(key, marker.json_bytes())
+        key = keys.marker_key(ref.house, step.name, ref.view)
+        if step.name == "truth":
+            truth = read_marker(of, key)
+        elif step.per_view and step.name != "view":
+            copy_done(of, to, key)
     _copy_cameras(of, to, ref.house)
     layers = tuple(truth.facts.get("layers", ())) if truth is not None else ()
     recipe = recipe_from_json(of.get(keys.RECIPE), f"{of.url}: {keys.RECIPE}")

@@ -1,0 +1,634 @@
+"""How an output root lies in a remote store: a view's files packed, houses spread over prefixes.
+
+Callers name objects by the keys of core/keys.py; this module alone says which object of the store
+holds them. Effects: those of the store it wraps.
+
+    layout.json                                     says that a root is packed; without it every key is an object
+    houses/<hh>/<house>/...                         hh: first two hex digits of the sha256 of the house's id
+    houses/<hh>/<house>/packs/<group>.<view>.tar    what the steps of a group made of a view, with their markers
+    houses/<hh>/<house>/packs/<step>.<view>.tar     the same of one step, done after its group's pack was written
+
+A pack is an uncompressed tar that appears whole: its steps are done, or they are not. Its first
+member is an index; it is followed by the markers and by the files, small ones first.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import tarfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Final
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import ObjectMissing, StoreFailed
+from pbrs_farm.store.object_store import LAYOUT, Head, Store, check_key, check_prefix, get_or_none
+
+FORMAT: Final = 1  # of layout.json and of packs; a reader refuses a later one
+# Group -> steps of a view that are written together.
+GROUPS: Final = {
+    "labels": ("truth", "opengl_dl", "opengl_il"),
+    "light": ("light",),
+    "pictures": ("develop", "view"),
+}
+_GROUP: Final = {step: group for group, steps in GROUPS.items() for step in steps}
+_ORDER: Final = tuple(GROUPS)
+
+_INDEX: Final = "index.json"
+_BLOCK: Final = 512  # of a tar
+_HEAD_BYTES: Final = 2**16  # read at first: the index, the markers, small files
+_WHOLE_BYTES: Final = 2**22  # read at first by a task, which needs labels and pictures anyway
+_RECENT_S: Final = 10.0  # an index read so lately is believed
+_MOST_RECENT: Final = 256
+
+
+# A pack: bytes <-> what the steps made.
+
+
+@dataclass(frozen=True, slots=True)
+class Pack:
+    """What is known of a pack: its index, and as much of its beginning as was read."""
+
+    rows: Mapping[str, tuple[str, int, int]]  # name -> step, first byte, number of bytes
+    head: bytes
+
+    def held(self, name: str) -> bytes | None:
+        """The bytes of a member, None where the beginning that was read ends before it does."""
+        _step, start, n_bytes = self.rows[name]
+        end = start + n_bytes
+        return self.head[start:end] if end <= len(self.head) else None
+
+
+def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
+    """The tar of what steps made: step -> name below the view's folder, or of its marker -> bytes."""
+    found = [
+        (name, step, data) for step, members in steps.items() for name, data in members.items()
+    ]
+    found.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
+    # Places count from the index's end, so that its length does not depend on them.
+    rows, at = [], 0
+    for name, step, data in found:
+        at += _BLOCK
+        rows.append([name, step, at, len(data)])
+        at += _padded(len(data))
+    index = json.dumps({"format": FORMAT, "members": rows}, separators=(",", ":")).encode()
+    out = io.BytesIO()
+    with tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as tar:
+        for name, data in [(_INDEX, index), *((name, data) for name, _step, data in found)]:
+            entry = tarfile.TarInfo(name)
+            entry.size = len(data)
+            tar.addfile(entry, io.BytesIO(data))
+    return out.getvalue()
+
+
+def pack_from_head(data: bytes, key: str) -> Pack | None:
+    """The pack that begins with data; None where its index is longer. StoreFailed where it is none."""
+    try:
+        entry = tarfile.TarInfo.frombuf(data[:_BLOCK], "ascii", "strict")
+        if entry.name != _INDEX:
+            raise ValueError(entry.name)
+        base = _BLOCK + _padded(entry.size)
+        if len(data) < _BLOCK + entry.size:
+            return None
+        index = json.loads(data[_BLOCK : _BLOCK + entry.size])
+        if index["format"] != FORMAT:
+            raise StoreFailed(key, "written by a newer pbrs_farm", hint="install that version")
+        rows = {
+            str(n): (str(step), base + int(at), int(size)) for n, step, at, size in index["members"]
+        }
+    except (tarfile.HeaderError, ValueError, KeyError, TypeError):
+        raise StoreFailed(key, "is no pack of a view", hint="remove it: it is made again") from None
+    return Pack(rows, data)
+
+
+def _padded(n_bytes: int) -> int:
+    return -(-n_bytes // _BLOCK) * _BLOCK
+
+
+# Which object holds a key.
+
+
+def marker_of(step: str) -> str:
+    """Name of a step's marker in a pack."""
+    return f"done/{step}.json"
+
+
+def house_folder(house: str) -> str:
+    """Where a house's objects lie in a packed root, with a trailing slash."""
+    top = keys.FOLDERS[keys.is_object(house)]
+    return f"{top}/{keys.sha256(house.encode())[:2]}/{house}/"
+
+
+def pack_key(house: str, view: str, group: str) -> str:
+    """The object that holds what a group of steps, or a step, made of a view."""
+    return f"{house_folder(house)}packs/{group}.{view}.tar"
+
+
+def _object_key(key: str) -> str:
+    """The object of a key that is of no view."""
+    top, _, rest = key.partition("/")
+    house, slash, below = rest.partition("/")
+    return f"{house_folder(house)}{below}" if top in keys.FOLDERS and slash else key
+
+
+def _key_of_object(found: str) -> str:
+    top, _, rest = found.partition("/")
+    return f"{top}/{rest.partition('/')[2]}" if top in keys.FOLDERS else found
+
+
+def _name_of(at: keys.HouseKey) -> str:
+    return marker_of(at.step) if at.step else at.file
+
+
+def _groups_of(at: keys.HouseKey) -> tuple[str, ...]:
+    """The groups that may hold a view's file or marker, the likeliest first."""
+    if at.step:
+        return (_GROUP.get(at.step, at.step),)
+    if at.file == "radiance.exr":
+        return ("light",)
+    if at.file in ("view.json", "histogram.json") or at.file.startswith("mlt_"):
+        return ("pictures",)
+    return ("labels", "pictures")  # plugins write layers and pictures of any name
+
+
+def _steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:
+    """Steps of a group whose own packs may hold what its pack lacks."""
+    steps = (at.step,) if at.step else GROUPS[group]
+    return tuple(step for step in steps if step != group)
+
+
+# The store.
+
+
+@dataclass(slots=True)
+class _Pending:
+    """What steps of one view and group made and is not written yet."""
+
+    house: str
+    view: str
+    group: str
+    steps: dict[str, dict[str, bytes]] = field(default_factory=dict)
+
+    def find(self, at: keys.HouseKey) -> bytes | None:
+        if (at.house, at.view) != (self.house, self.view):
+            return None
+        found = (members.get(_name_of(at)) for members in self.steps.values())
+        return next((data for data in found if data is not None), None)
+
+
+@dataclass(slots=True)
+class _Task:
+    """What is remembered while one task runs."""
+
+    n_head: int
+    packs: dict[str, Pack | None] = field(default_factory=dict)  # None: there is none
+    absent: set[str] = field(default_factory=set)  # packs that were not there when first asked for
+    objects: dict[str, bytes | None] = field(default_factory=dict)  # markers of the house
+    pending: _Pending | None = None
+
+
+class LaidOutStore:
+    """A remote store that reads either layout, and packs output roots that begin in it.
+
+    packs: whether a new root is packed. A root keeps the layout it began with.
+    """
+
+    def __init__(self, inner: Store, packs: bool = True) -> None:
+        self.inner = inner
+        self._packs = packs
+        self._known: bool | None = None  # is it packed? None: nothing lies there yet
+        self._recent: dict[str, tuple[float, Pack | None]] = {}  # object -> until when, its index
+        self._task: _Task | None = None
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # What was read lately stays here.
+        return LaidOutStore, (self.inner, self._packs)
+
+    @property
+    def url(self) -> str:
+        return self.inner.url
+
+    def around(self, wrap: Callable[[Store], Store]) -> LaidOutStore:
+        """The same layout over a wrapped store."""
+        return LaidOutStore(wrap(self.inner), self._packs)
+
+    @property
+    def is_packed(self) -> bool:
+        """Whether the root that lies here is packed. Raises StoreFailed for a later layout."""
+        if self._known is None:
+            # The layout is written before the recipe: ask in the other order.
+            has_begun = self.inner.head(keys.RECIPE) is not None
+            data = get_or_none(self.inner, LAYOUT)
+            if data is None and not has_begun:
+                return False
+            self._known = data is not None and _is_packed(data)
+        return self._known
+
+    @contextmanager
+    def task(self, *, reads_whole: bool) -> Iterator[LaidOutStore]:
+        """This store for the time of one task: what it read of markers it does not ask again.
+
+        What steps of one group make of a view is written together, at the latest at the end, also
+        where the task fails. reads_whole: packs are read at once, since their pictures are needed.
+        """
+        store = LaidOutStore(self.inner, self._packs)
+        # Ask once in a worker's life, not once a task.
+        _ask = self.is_packed
+        store._known = self._known
+        store._task = _Task(_WHOLE_BYTES if reads_whole else _HEAD_BYTES)
+        try:
+            yield store
+        finally:
+            try:
+                store._flush()
+            finally:
+                store._task = None
+
+    def put(self, key: str, data: bytes | memoryview) -> None:
+        at = self._of_view(key)
+        if at is not None:
+            raise StoreFailed(key, "a packed root takes a view's files with their marker")
+        self._forget(key)
+        self.inner.put(self._object(key), data)
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        at = self._of_view(key)
+        if at is not None:
+            raise StoreFailed(key, "a packed root takes a view's files with their marker")
+        if key == keys.RECIPE and self._packs and self.inner.head(key) is None:
+            # Say how the root lies before it begins.
+            row = {"format": FORMAT, "layout": "packed"}
+            self.inner.put_if_absent(LAYOUT, (json.dumps(row) + "\n").encode())
+        self._forget(key)
+        return self.inner.put_if_absent(self._object(key), data)
+
+    def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
+        """Put what a step made and its marker: of a view in a pack, both at once."""
+        at = self._of_view(key)
+        if at is None:
+            for file, data in files.items():
+                self.put(file, data)
+            self.put_if_absent(key, marker)
+            return
+        # Keep it for the pack of its group while the task makes the rest of that.
+        assert at.view is not None
+        group = _GROUP.get(at.step, at.step)
+        self._flush_unless(at.house, at.view, group)
+        task = self._task
+        pending = (task and task.pending) or _Pending(at.house, at.view, group)
+        members = {_name_of(_parsed(file)): data for file, data in files.items()}
+        pending.steps[at.step] = {marker_of(at.step): marker, **members}
+        if task is not None:
+            task.pending = pending
+        if task is None or len(GROUPS.get(group, ())) < 2:  # nothing follows
+            self._flush(pending)
+
+    def get(self, key: str) -> bytes:
+        at = self._of_view(key)
+        if at is None:
+            return self._get_object(key)
+        if (waiting := self._waiting(at)) is not None:
+            return waiting
+        # Once more where a pack was written, or written anew, since its index was read.
+        for is_fresh in (False, True) if not at.step else (True, True):
+            found = self._found(at, is_fresh=is_fresh)
+            if found is None and is_fresh:
+                break
+            if found is not None and (data := self._member(*found)) is not None:
+                return data
+        raise ObjectMissing(key, f"no such object in {self.url}")
+
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        at = self._of_view(key)
+        if at is None:
+            return self.inner.get_range(self._object(key), start, n_bytes)
+        if (waiting := self._waiting(at)) is not None:
+            return waiting[start : start + n_bytes]
+        found = self._found(at)
+        if found is None:
+            raise ObjectMissing(key, f"no such object in {self.url}")
+        place, pack, name = found
+        _step, first, size = pack.rows[name]
+        n_bytes = min(n_bytes, size - start)
+        return self.inner.get_range(place, first + start, n_bytes) if n_bytes > 0 else b""
+
+    def head(self, key: str) -> Head | None:
+        at = self._of_view(key)
+        if at is None:
+            return self.inner.head(self._object(key))
+        if (waiting := self._waiting(at)) is not None:
+            return Head(len(waiting), time.time())
+        found = self._found(at, is_fresh=bool(at.step))
+        if found is None:
+            return None
+        place, pack, name = found
+        whole = self.inner.head(place)
+        return Head(pack.rows[name][2], whole.modified_s if whole is not None else 0.0)
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        """As Store.list. In a packed root the index of each pack below the prefix is read."""
+        check_prefix(prefix)
+        self._flush()
+        if not self.is_packed:
+            return self.inner.list(prefix)
+        return self._list(prefix)
+
+    def delete(self, key: str) -> None:
+        at = self._of_view(key)
+        if at is None:
+            self._forget(key)
+            self.inner.delete(self._object(key))
+        elif at.step:
+            self._drop(at)
+        # A file of a view goes with its marker.
+
+    # Where a key is.
+
+    def _object(self, key: str) -> str:
+        check_key(key)
+        is_of_house = key.partition("/")[0] in keys.FOLDERS
+        return _object_key(key) if is_of_house and self.is_packed else key
+
+    def _of_view(self, key: str) -> keys.HouseKey | None:
+        """What the key of a view's file or marker says in a packed root, else None."""
+        check_key(key)
+        if key.partition("/")[0] not in keys.FOLDERS or not self.is_packed:
+            return None
+        at = keys.parse_house_key(key)
+        return at if at is not None and at.view is not None else None
+
+    def _found(self, at: keys.HouseKey, *, is_fresh: bool = False) -> tuple[str, Pack, str] | None:
+        """The object that holds a key, its index, and the key's name there."""
+        house, view, name = at.house, at.view or "", _name_of(at)
+        for group in _groups_of(at):
+            # Without the pack of its group no step of it is done.
+            place = pack_key(house, view, group)
+            pack = self._pack(place, is_fresh=is_fresh)
+            if pack is None or name in pack.rows:
+                if pack is not None:
+                    return place, pack, name
+                continue
+            for step in _steps_of(at, group):
+                place = pack_key(house, view, step)
+                own = self._pack(place, is_fresh=is_fresh)
+                if own is not None and name in own.rows:
+                    return place, own, name
+        return None
+
+    # Reading.
+
+    def _get_object(self, key: str) -> bytes:
+        """An object of no view; in a task the house's markers and its description are kept."""
+        place, task = self._object(key), self._task
+        at = keys.parse_house_key(key) if task is not None else None
+        if task is None or at is None or not (at.step or at.file == "house.json"):
+            return self.inner.get(place)
+        if key not in task.objects:
+            task.objects[key] = get_or_none(self.inner, place)
+        if (data := task.objects[key]) is None:
+            raise ObjectMissing(key, f"no such object in {self.url}")
+        return data
+
+    def _waiting(self, at: keys.HouseKey) -> bytes | None:
+        """What the task has not written yet. To ask for a later group's marker ends the one before."""
+        task = self._task
+        if task is None or task.pending is None:
+            return None
+        is_same_view = (at.house, at.view) == (task.pending.house, task.pending.view)
+        later = _ORDER[_ORDER.index(task.pending.group) + 1 :]
+        if at.step and (not is_same_view or _GROUP.get(at.step) in later):
+            self._flush()
+            return None
+        return task.pending.find(at)
+
+    def _pack(self, place: str, *, is_fresh: bool = False) -> Pack | None:
+        task, now = self._task, time.monotonic()
+        if task is not None and place in task.packs:
+            return task.packs[place]
+        if task is not None and _before(place) in task.absent:
+            # Pictures are made from light that was not there: nor were they, or they are stale.
+            return None
+        until, held = self._recent.get(place, (0.0, None))
+        if not is_fresh and until > now:
+            return held
+        pack = self._read(place)
+        if task is not None and pack is None:
+            task.absent.add(place)
+        self._remember(place, pack)
+        return pack
+
+    def _read(self, place: str) -> Pack | None:
+        # Of the light everybody but the step that made it wants the marker alone.
+        is_light = place.rpartition("/")[2].startswith("light.")
+        n_head = self._task.n_head if self._task is not None and not is_light else _HEAD_BYTES
+        try:
+            pack = pack_from_head(self.inner.get_range(place, 0, n_head), place)
+            pack = pack or pack_from_head(self.inner.get(place), place)
+        except ObjectMissing:
+            return None
+        if pack is None:
+            raise StoreFailed(place, "is no pack of a view", hint="remove it: it is made again")
+        return pack
+
+    def _remember(self, place: str, pack: Pack | None) -> None:
+        task = self._task
+        if task is None:
+            while len(self._recent) >= _MOST_RECENT:
+                self._recent.pop(next(iter(self._recent), ""), None)
+            self._recent[place] = (time.monotonic() + _RECENT_S, pack)
+            return
+        if task.n_head > _HEAD_BYTES:
+            # Pictures of one view at a time are enough.
+            view = place.partition("/packs/")[2].partition(".")[2]
+            task.packs = {k: p for k, p in task.packs.items() if k.endswith(f".{view}")}
+        task.packs[place] = pack
+
+    def _member(self, place: str, pack: Pack, name: str) -> bytes | None:
+        """A member's bytes; None where another pack lies there now."""
+        if (held := pack.held(name)) is not None:
+            return held
+        _step, start, n_bytes = pack.rows[name]
+        try:
+            data = self.inner.get_range(place, start - _BLOCK, _BLOCK + n_bytes)
+            entry = tarfile.TarInfo.frombuf(data[:_BLOCK], "ascii", "strict")
+        except (ObjectMissing, tarfile.HeaderError):
+            entry = None
+        if entry is None or (entry.name, entry.size) != (name, n_bytes):
+            self._lose(place)
+            return None
+        return data[_BLOCK:]
+
+    def _list(self, prefix: str) -> Iterator[str]:
+        top, _, rest = prefix.partition("/")
+        house, slash, below = rest.partition("/")
+        folders, view = [prefix], ""
+        if top in keys.FOLDERS and slash:
+            folder = house_folder(house)
+            folders = [f"{folder}{below}"]
+            if below.startswith(("views/", "done/")):
+                folders = [f"{folder}packs/", *([f"{folder}done/"] if below == "done/" else [])]
+                view = below.removeprefix("views/").partition("/")[0] if below[0] == "v" else ""
+        seen: set[str] = set()
+        last = ""
+        for folder in folders:
+            for found in self.inner.list(folder):
+                key = _key_of_object(found)
+                parts = key.split("/")
+                if len(parts) != 4 or parts[2] != "packs" or parts[0] not in keys.FOLDERS:
+                    yield key
+                    continue
+                if parts[1] != last:
+                    seen, last = set(), parts[1]
+                of = parts[3].partition(".")[2].removesuffix(".tar")
+                if view and of != view:
+                    continue
+                for name in self._names(found, parts[1], of):
+                    if name.startswith(prefix) and name not in seen:
+                        seen.add(name)
+                        yield name
+
+    def _names(self, place: str, house: str, view: str) -> Iterator[str]:
+        pack = self._pack(place, is_fresh=True)
+        for name, (step, _start, _size) in pack.rows.items() if pack is not None else ():
+            is_marker = name == marker_of(step)
+            yield (
+                keys.marker_key(house, step, view)
+                if is_marker
+                else keys.view_key(house, view, name)
+            )
+
+    # Writing.
+
+    def _flush_unless(self, house: str, view: str, group: str) -> None:
+        """Write what waits unless it is of this group of this view."""
+        pending = self._task.pending if self._task is not None else None
+        if pending is not None and (pending.house, pending.view, pending.group) != (
+            house,
+            view,
+            group,
+        ):
+            self._flush()
+
+    def _flush(self, pending: _Pending | None = None) -> None:
+        task = self._task
+        pending = pending or (task.pending if task is not None else None)
+        if pending is None:
+            return
+        self._write(pending)
+        if task is not None:
+            task.pending = None
+
+    def _write(self, pending: _Pending) -> None:
+        house, view, group = pending.house, pending.view, pending.group
+        place = pack_key(house, view, group)
+        known = self._task.packs.get(place) if self._task is not None else None
+        if self._task is not None:
+            self._task.absent.discard(_before(place))
+        if known is None:
+            data = pack_bytes(pending.steps)
+            if self.inner.put_if_absent(place, data):
+                self._wrote(place, data)
+                return
+            known = self._read(place)
+            self._remember(place, known)
+        # Steps that are done after the pack was written, or that another writer's lacks, have their own.
+        for step, members in pending.steps.items():
+            name = marker_of(step)
+            if known is not None and name in known.rows:
+                held = self._member(place, known, name)
+                if held is not None and _digest(held) == _digest(members[name]):
+                    continue
+                self._take_out(house, view, step)
+            own = pack_key(house, view, step)
+            data = pack_bytes({step: members})
+            self.inner.put(own, data)
+            self._wrote(own, data)
+
+    def _wrote(self, place: str, data: bytes) -> None:
+        self._recent.pop(place, None)
+        if self._task is not None:
+            self._remember(place, pack_from_head(data, place))
+
+    def _drop(self, at: keys.HouseKey) -> None:
+        self._flush()
+        self._take_out(at.house, at.view or "", at.step)
+
+    def _take_out(self, house: str, view: str, step: str) -> None:
+        """Take a step out of the packs that hold it, whole packs at a time; other steps stay."""
+        group = _GROUP.get(step, step)
+        place = pack_key(house, view, group)
+        if step != group:
+            self.inner.delete(pack_key(house, view, step))
+            self._lose(pack_key(house, view, step))
+        data = get_or_none(self.inner, place)
+        pack = pack_from_head(data, place) if data is not None else None
+        if pack is None or marker_of(step) not in pack.rows:
+            return
+        rest: dict[str, dict[str, bytes]] = {}
+        for name, (of, _start, _size) in pack.rows.items():
+            member = pack.held(name)
+            if of != step and member is not None:
+                rest.setdefault(of, {})[name] = member
+        self._lose(place)
+        # An empty pack stays where a step of the group has its own: those are found through it.
+        if rest or any(self._pack(pack_key(house, view, s)) for s in _others(group, step)):
+            self.inner.put(place, pack_bytes(rest))
+        else:
+            self.inner.delete(place)
+
+    def _forget(self, key: str) -> None:
+        if self._task is not None:
+            self._task.objects.pop(key, None)
+
+    def _lose(self, place: str) -> None:
+        self._recent.pop(place, None)
+        if self._task is not None:
+            self._task.packs.pop(place, None)
+
+
+def _before(place: str) -> str:
+    """Of the pack of a view's pictures that of its light, else ""."""
+    folder, _, name = place.rpartition("/")
+    return f"{folder}/light.{name.removeprefix('pictures.')}" if name[:9] == "pictures." else ""
+
+
+def _digest(marker: bytes) -> object:
+    try:
+        return json.loads(marker).get("digest")
+    except (ValueError, AttributeError):
+        return marker
+
+
+def _others(group: str, step: str) -> Iterable[str]:
+    return (other for other in GROUPS.get(group, ()) if other not in (step, group))
+
+
+def _parsed(key: str) -> keys.HouseKey:
+    at = keys.parse_house_key(key)
+    if at is None or at.view is None:
+        raise StoreFailed(key, "no file of a view")
+    return at
+
+
+def _is_packed(data: bytes) -> bool:
+    try:
+        row = json.loads(data)
+        layout, number = row["layout"], row["format"]
+    except (ValueError, KeyError, TypeError):
+        raise StoreFailed(LAYOUT, "damaged", hint='{"format": 1, "layout": "packed"}') from None
+    if layout not in ("packed", "files") or number != FORMAT:
+        raise StoreFailed(LAYOUT, "written by a newer pbrs_farm", hint="install that version")
+    return bool(layout == "packed")
+
+
+@contextmanager
+def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
+    """The store for the time of one task (LaidOutStore.task); any other as it is."""
+    if not isinstance(store, LaidOutStore):
+        yield store
+        return
+    with store.task(reads_whole=reads_whole) as own:
+        yield own

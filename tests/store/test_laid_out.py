@@ -1,0 +1,412 @@
+"""A packed root: the same keys and bytes as files give, in few requests, and nothing lost."""
+
+from __future__ import annotations
+
+import io
+import tarfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreUnavailable
+from pbrs_farm.core.recipe import recipe_from_name, with_settings
+from pbrs_farm.formats.marker import copy_done, read_marker
+from pbrs_farm.run import plan
+from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.output_root import as_files, claim_root, finish_house, pull
+from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
+from pbrs_farm.store import MemoryStore, Store, StoreSettings, store_from_url
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.laid_out import GROUPS, LaidOutStore, one_task, pack_bytes, pack_key
+from pbrs_farm.store.object_store import Head, put_done
+from workers.coordinator.recover import done_steps
+
+RECIPE = recipe_from_name("fast")
+HOUSE, VIEW = "studio-0123abcd", "room0_3"
+LABELS, LIGHT = ("truth", "opengl_dl", "opengl_il"), ("light", "develop", "view")
+# What the steps of a view write; radiance is larger than what is read of a pack at first.
+FILES = {
+    "truth": {"depth.png": b"d" * 700, "behind_glass/depth.png": b"", "normal.png": b"n" * 90_000},
+    "opengl_dl": {"opengl_dl.png": b"o" * 3000},
+    "opengl_il": {"opengl_il.png": b"i" * 3001},
+    "light": {"radiance.exr": b"r" * 200_000},
+    "develop": {"mlt_il_ol.png": b"m" * 512},
+    "view": {"view.json": b"{}", "histogram.json": b"[1]"},
+}
+
+
+class CountingStore(MemoryStore):
+    """Counts requests, and stops answering writes after so many."""
+
+    def __init__(self, most_writes: float = float("inf")) -> None:
+        super().__init__()
+        self.calls: Counter[str] = Counter()
+        self.listed: list[str] = []
+        self.most_writes = most_writes
+
+    def _written(self, call: str) -> None:
+        self.calls[call] += 1
+        self.most_writes -= 1
+        if self.most_writes < 0:
+            raise StoreUnavailable("killed", "here")
+
+    def put(self, key: str, data: bytes | memoryview) -> None:
+        self._written("put")
+        super().put(key, data)
+
+    def put_if_absent(self, key: str, data: bytes) -> bool:
+        self._written("put")
+        return super().put_if_absent(key, data)
+
+    def delete(self, key: str) -> None:
+        self._written("delete")
+        super().delete(key)
+
+    def get(self, key: str) -> bytes:
+        self.calls["get"] += 1
+        return super().get(key)
+
+    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
+        self.calls["get"] += 1
+        return super().get(key)[start : start + n_bytes]
+
+    def head(self, key: str) -> Head | None:
+        self.calls["get"] += 1
+        return super().head(key)
+
+    def list(self, prefix: str = "") -> Iterator[str]:
+        self.listed.append(prefix)
+        return super().list(prefix)
+
+
+def packed(inner: Store | None = None) -> LaidOutStore:
+    store = LaidOutStore(inner if inner is not None else CountingStore())
+    claim_root(store, RECIPE, update=False)
+    return store
+
+
+def do(store: Store, *steps: str, view: str = VIEW, recipe: object = RECIPE) -> None:
+    """Do steps as the farm does; each reads what its inputs have made, too."""
+    work = Work(store, recipe, HOUSE, HouseCache(), view_id=view)  # type: ignore[arg-type]
+    for name in steps:
+        files = FILES.get(name, {f"{name}.json": b"{}"})
+        run_unless_done(name, work, lambda _work, files=files: StepOutput(files))
+
+
+def house_done(store: Store) -> None:
+    for step in ("cameras", "illuminance"):
+        run_unless_done(step, Work(store, RECIPE, HOUSE, HouseCache()), lambda _w: StepOutput({}))
+
+
+def view_done(store: Store, view: str = VIEW) -> None:
+    for steps in (LABELS, LIGHT):
+        with one_task(store, reads_whole=True) as own:
+            do(own, *steps, view=view)
+
+
+@pytest.fixture(autouse=True)
+def _house_without_source(monkeypatch: pytest.MonkeyPatch) -> None:
+    # The steps of a view ask for their house's marker, not for its source.
+    monkeypatch.setattr("pbrs_farm.run.step_cache._extra", lambda _name, _work: None)
+
+
+def prepared(inner: Store | None = None) -> LaidOutStore:
+    store = packed(inner)
+    run_unless_done(
+        "house",
+        Work(store, RECIPE, HOUSE, HouseCache()),
+        lambda _w: StepOutput({"house.json": b"{}"}),
+    )
+    house_done(store)
+    return store
+
+
+def all_of(store: Store) -> dict[str, bytes]:
+    """Every object of the houses by key, markers without their clocks."""
+    found = {}
+    for key in store.list("houses/"):
+        marker = read_marker(store, key) if "/done/" in key else None
+        calm = {"seconds": 0.0, "worker": "", "finished_utc": ""}
+        found[key] = (
+            store.get(key) if marker is None else marker.model_copy(update=calm).json_bytes()
+        )
+    return found
+
+
+def test_a_packed_root_holds_what_a_root_of_files_does() -> None:
+    files = MemoryStore()
+    claim_root(files, RECIPE, update=False)
+    run_unless_done(
+        "house",
+        Work(files, RECIPE, HOUSE, HouseCache()),
+        lambda _w: StepOutput({"house.json": b"{}"}),
+    )
+    house_done(files)
+    store = prepared()
+    for one in (files, store):
+        view_done(one)
+        view_done(one, "room0_4")
+        finish_house(one, HOUSE)
+    assert all_of(store) == all_of(files)
+    folder = keys.view_key(HOUSE, VIEW)
+    assert sorted(store.list(folder)) == sorted(files.list(folder))
+    done = keys.house_key(HOUSE, "done/")
+    assert sorted(store.list(done)) == sorted(files.list(done))
+    for key in files.list(folder):
+        head = store.head(key)
+        assert head is not None
+        assert head.n_bytes == len(files.get(key))
+        assert store.get_range(key, 1, 5) == files.get(key)[1:6]
+
+
+def test_recover_finds_the_markers_without_a_list_of_views() -> None:
+    inner = CountingStore()
+    store = prepared(inner)
+    view_done(store)
+    expected = {keys.marker_name(step, VIEW) for step in (*LABELS, *LIGHT)}
+    inner.listed.clear()
+    for _has_manifest in (False, True):
+        names = done_steps(store, [HOUSE, "another"])
+        assert names.keys() == {HOUSE}
+        assert names[HOUSE] >= expected | {"house"}
+        finish_house(store, HOUSE)
+    assert all(
+        "/done/" in prefix or "/packs/" in prefix or "unfinished" in prefix
+        for prefix in inner.listed
+    )
+
+
+def test_every_step_of_a_view_has_a_group() -> None:
+    steps = {name for name, step in plan.STEPS.items() if step.per_view}
+    assert steps == {step for group in GROUPS.values() for step in group}
+
+
+def test_a_view_costs_three_writes_and_at_most_nine_reads() -> None:
+    inner = CountingStore()
+    store = prepared(inner)
+    views = [f"room0_{n}" for n in range(4)]
+    inner.calls.clear()
+    inner.listed.clear()
+    for steps in (LABELS, LIGHT):
+        with one_task(store, reads_whole=True) as own:
+            for view in views:
+                do(own, *steps, view=view)
+    assert inner.calls["put"] == 3 * len(views)
+    with one_task(store, reads_whole=False) as own:
+        finish_house(own, HOUSE)
+    assert inner.calls["put"] == 3 * len(views) + 1
+    assert inner.calls["get"] <= 9 * len(views)
+    # What lies under views/ is never listed, nor anything of other houses.
+    assert inner.listed
+    assert all(HOUSE in prefix and "/views/" not in prefix for prefix in inner.listed)
+
+
+@pytest.mark.parametrize("n_writes", range(4))
+def test_killed_at_any_write_the_next_run_makes_the_rest_and_loses_nothing(n_writes: int) -> None:
+    inner = CountingStore()
+    store = prepared(inner)
+    whole = prepared()
+    view_done(whole)
+    inner.most_writes = n_writes
+    with pytest.raises(StoreUnavailable) if n_writes < 3 else one_task(inner, reads_whole=False):
+        view_done(store)
+    before = all_of(store)
+    inner.most_writes = float("inf")
+    # Whatever has a marker has its files.
+    for key in before:
+        if "/done/" in key and (marker := read_marker(store, key)) is not None:
+            assert {file.key for file in marker.files} <= before.keys()
+    again = LaidOutStore(inner)
+    view_done(again)
+    assert all_of(again) == all_of(whole)
+    assert before.items() <= all_of(again).items()
+
+
+def test_a_step_that_fails_leaves_those_before_it_done() -> None:
+    store = prepared()
+
+    def task() -> None:
+        with one_task(store, reads_whole=True) as own:
+            do(own, "truth", "opengl_dl")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        task()
+    assert read_marker(store, keys.marker_key(HOUSE, "opengl_dl", VIEW)) is not None
+
+
+def test_what_a_task_has_made_is_seen_by_it_at_once_and_by_others_whole() -> None:
+    store = prepared()
+    with one_task(store, reads_whole=True) as own:
+        do(own, "truth")
+        assert own.get(keys.view_key(HOUSE, VIEW, "depth.png")) == FILES["truth"]["depth.png"]
+        assert store.head(keys.view_key(HOUSE, VIEW, "depth.png")) is None
+        # Light takes long: what came before it is written first.
+        read_marker(own, keys.marker_key(HOUSE, "light", VIEW))
+        assert read_marker(LaidOutStore(store.inner), keys.marker_key(HOUSE, "truth", VIEW))
+
+
+def test_two_writers_of_one_group_both_keep_what_they_made() -> None:
+    store = prepared()
+    with one_task(store, reads_whole=True) as a, one_task(store, reads_whole=True) as b:
+        do(a, "truth", "opengl_dl")
+        do(b, "truth", "opengl_il")
+    for step in LABELS:
+        assert read_marker(store, keys.marker_key(HOUSE, step, VIEW)) is not None
+    file = keys.view_key(HOUSE, VIEW, "opengl_dl.png")
+    assert store.get(file) == FILES["opengl_dl"]["opengl_dl.png"]
+    assert len([k for k in store.list("houses/") if k.endswith("opengl_dl.png")]) == 1
+
+
+def test_a_step_made_anew_leaves_the_others_of_its_pack() -> None:
+    store = prepared()
+    view_done(store)
+    store.delete(keys.marker_key(HOUSE, "truth", VIEW))
+    with pytest.raises(ObjectMissing):
+        store.get(keys.view_key(HOUSE, VIEW, "depth.png"))
+    assert (
+        store.get(keys.view_key(HOUSE, VIEW, "opengl_il.png"))
+        == FILES["opengl_il"]["opengl_il.png"]
+    )
+    with one_task(store, reads_whole=True) as own:
+        do(own, "truth")
+    assert store.get(keys.view_key(HOUSE, VIEW, "depth.png")) == FILES["truth"]["depth.png"]
+    # Once more, now from its own pack; the last step takes the pack with it.
+    for step in LABELS:
+        store.delete(keys.marker_key(HOUSE, step, VIEW))
+    packs = [
+        k for k in store.inner.list("houses/") if "/packs/labels." in k or "/packs/truth." in k
+    ]
+    assert packs == []
+
+
+def test_stale_pictures_give_way_to_those_of_new_light() -> None:
+    store = prepared()
+    view_done(store)
+    # Another recipe: light is made anew, and with it what is developed from it.
+    store.delete(keys.marker_key(HOUSE, "light", VIEW))
+    other = with_settings(RECIPE, {"light.spp": 3})
+    with one_task(store, reads_whole=True) as own:
+        do(own, *LIGHT, recipe=other)
+    files = MemoryStore()
+    claim_root(files, RECIPE, update=False)
+    for step in ("house", "cameras", "illuminance"):
+        key = keys.marker_key(HOUSE, step)
+        files.put(key, store.get(key))
+    with one_task(files, reads_whole=True) as own:
+        do(own, *LABELS)
+        do(own, *LIGHT, recipe=other)
+    for step in LIGHT:
+        key = keys.marker_key(HOUSE, step, VIEW)
+        found, expected = read_marker(store, key), read_marker(files, key)
+        assert found is not None
+        assert expected is not None
+        assert found.digest == expected.digest
+        assert [store.get(file.key) for file in found.files] == [
+            files.get(f.key) for f in found.files
+        ]
+
+
+def test_a_pack_written_anew_under_a_reader_gives_the_new_bytes() -> None:
+    store = prepared()
+    reader = LaidOutStore(store.inner)
+    view_done(store)
+    key = keys.view_key(HOUSE, VIEW, "normal.png")
+    assert reader.get(key) == FILES["truth"]["normal.png"]
+    store.delete(keys.marker_key(HOUSE, "opengl_dl", VIEW))
+    assert reader.get(key) == FILES["truth"]["normal.png"]
+
+
+def test_a_pack_is_a_tar_of_the_views_folder() -> None:
+    store = prepared()
+    view_done(store)
+    data = store.inner.get(pack_key(HOUSE, VIEW, "labels"))
+    with tarfile.open(fileobj=io.BytesIO(data)) as tar:
+        names = tar.getnames()
+        file = tar.extractfile("normal.png")
+        assert file is not None
+        assert file.read() == FILES["truth"]["normal.png"]
+    assert names[0] == "index.json"
+    assert {"done/truth.json", "behind_glass/depth.png", "opengl_dl.png"} <= set(names)
+
+
+def test_houses_lie_under_two_digits_of_their_hash() -> None:
+    store = prepared()
+    view_done(store)
+    digits = keys.sha256(HOUSE.encode())[:2]
+    inner = [*store.inner.list("houses/")]
+    assert inner
+    assert all(key.startswith(f"houses/{digits}/{HOUSE}/") for key in inner)
+
+
+def test_an_older_root_stays_as_it_began() -> None:
+    inner = MemoryStore()
+    claim_root(inner, RECIPE, update=False)
+    inner.put(keys.view_key(HOUSE, VIEW, "depth.png"), b"old")
+    store = LaidOutStore(inner)
+    claim_root(store, RECIPE, update=False)
+    assert not store.is_packed
+    assert store.get(keys.view_key(HOUSE, VIEW, "depth.png")) == b"old"
+    put_done(
+        store, keys.marker_key(HOUSE, "truth", VIEW), b"{}", {keys.view_key(HOUSE, VIEW, "a"): b"1"}
+    )
+    assert inner.get(keys.view_key(HOUSE, VIEW, "a")) == b"1"
+
+
+def test_a_root_that_is_not_there_yet_may_become_packed_while_it_is_looked_at() -> None:
+    inner = MemoryStore()
+    early = LaidOutStore(inner)
+    assert [*early.list()] == []
+    view = prepared(inner)
+    view_done(view)
+    assert early.head(keys.view_key(HOUSE, VIEW, "view.json")) is not None
+
+
+def test_a_later_layout_is_refused() -> None:
+    inner = MemoryStore()
+    inner.put("layout.json", b'{"format": 2, "layout": "packed"}')
+    with pytest.raises(StoreFailed, match="newer"):
+        LaidOutStore(inner).get("houses/h/house.json")
+    inner.put(pack_key(HOUSE, VIEW, "light"), b"no tar")
+    inner.put("layout.json", b'{"format": 1, "layout": "packed"}')
+    with pytest.raises(StoreFailed, match="no pack"):
+        LaidOutStore(inner).get(keys.view_key(HOUSE, VIEW, "radiance.exr"))
+
+
+def test_a_folder_is_packed_when_asked_and_known_as_such_after(tmp_path: Path) -> None:
+    settings = StoreSettings(layout="packed")
+    store = store_from_url(str(tmp_path / "root"), settings)
+    prepared_store = prepared(store.inner if isinstance(store, LaidOutStore) else store)
+    view_done(prepared_store)
+    found = store_from_url(str(tmp_path / "root"))
+    assert isinstance(found, LaidOutStore)
+    assert all_of(found) == all_of(prepared_store)
+    # As files: for verbs that read folders, and to keep.
+    with as_files(str(tmp_path / "root"), replace(settings, layout="")) as folder:
+        assert (folder / keys.view_key(HOUSE, VIEW, "depth.png")).read_bytes() == b"d" * 700
+    assert pull(found, tmp_path / "copy")[1] == 0
+    assert pull(found, tmp_path / "copy")[0] == 1  # the recipe
+    assert all_of(FolderStore(tmp_path / "copy")) == all_of(found)
+
+
+def test_a_view_is_copied_from_one_layout_to_the_other() -> None:
+    store, files = prepared(), MemoryStore()
+    view_done(store)
+    for step in (*LABELS, *LIGHT):
+        copy_done(store, files, keys.marker_key(HOUSE, step, VIEW))
+    back = packed()
+    for step in (*LABELS, *LIGHT):
+        copy_done(files, back, keys.marker_key(HOUSE, step, VIEW))
+    assert all_of(back) == all_of(files)
+
+
+def test_an_index_longer_than_what_is_read_at_first_is_read_whole() -> None:
+    store = packed()
+    members = {f"layer_{n:04d}.png": b"x" for n in range(2000)}
+    data = pack_bytes({"truth": {"done/truth.json": b"{}", **members}})
+    store.inner.put(pack_key(HOUSE, VIEW, "labels"), data)
+    assert store.get(keys.view_key(HOUSE, VIEW, "layer_1999.png")) == b"x"
