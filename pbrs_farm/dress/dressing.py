@@ -31,6 +31,7 @@ from pbrs_farm.dress.surfaces import surfaces
 from pbrs_farm.dress.swap import swap
 from pbrs_farm.dress.textiles import textiles_large
 from pbrs_farm.dress.walls import walls
+from pbrs_farm.dress.wear import wear
 
 Part = Callable[[Draft, Catalogue, Style, float], None]
 
@@ -46,6 +47,7 @@ _FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
 _THINGS: Final[tuple[tuple[str, Part], ...]] = (
     ("surfaces", joinery),
     ("parts", parts),
+    ("parts", wear),
     ("lamps", lamps),
     ("textiles", textiles_large),
     ("walls", walls),

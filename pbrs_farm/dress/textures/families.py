@@ -5,6 +5,7 @@ Effects: JPEGs are encoded through a temporary file; a draft keeps what was made
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -265,7 +266,9 @@ def _cells(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:
 # Every kind of procedural surface by name, and the material it gives a house.
 
 
-_FINE, _COARSE = (1024, 1024), (512, 512)  # pixels of one repeat
+_TEXEL_M: Final = 0.0015  # at most: what a camera of 640 pixels a metre away tells apart
+_STEP_PX: Final = 128
+_COARSE = (512, 512)  # pixels of one repeat of what is finer by itself
 _FLOOR_M = (2.0, 2.0)
 _SIZE_M: Final = {
     "strip": _FLOOR_M, "planks": (2.4, 2.4), "laminate": (2.6, 1.92), "herringbone": _FLOOR_M,
@@ -303,6 +306,12 @@ class PatternMaterial:
     def mean_rgb(self) -> Rgb:
         """The mean linear colour; waits for a material that is still painted."""
         return self.mean()
+
+
+def pixels_of(size_m: tuple[float, float]) -> Shape2:
+    """Rows and columns of a repeat of that size: texels of 1.5 mm or less."""
+    width, height = (_STEP_PX * math.ceil(side / _TEXEL_M / _STEP_PX) for side in size_m)
+    return height, width
 
 
 _Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
@@ -367,29 +376,31 @@ def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Te
 
 
 def _strip(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = rows_of_planks(rng, _FINE, size_of(p), 28, 4)
+    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 28, 4)
     return _planks(rng, p, layout, PlankLook(variation=0.05))
 
 
 def _boards(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     # Long boards: a wide repeat, a joint or two in each row.
-    layout = rows_of_planks(rng, _FINE, size_of(p), int(rng.choice([12, 14, 17])), 1)
+    layout = rows_of_planks(
+        rng, pixels_of(size_of(p)), size_of(p), int(rng.choice([12, 14, 17])), 1
+    )
     look = PlankLook(bevel_m=0.003, variation=0.04, roughness=0.42)
     return _planks(rng, p, layout, look)
 
 
 def _laminate(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = rows_of_planks(rng, (768, 1024), size_of(p), 10, 2)
+    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 10, 2)
     return _planks(rng, p, layout, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
 
 
 def _herringbone(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = herringbone(_FINE, size_of(p), int(rng.choice([5, 6, 7])), 2)
+    layout = herringbone(pixels_of(size_of(p)), size_of(p), int(rng.choice([5, 6, 7])), 2)
     return _planks(rng, p, layout, PlankLook(variation=0.05))
 
 
 def _chevron(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = chevron(_FINE, size_of(p), 4, int(rng.choice([14, 16])))
+    layout = chevron(pixels_of(size_of(p)), size_of(p), 4, int(rng.choice([14, 16])))
     return _planks(rng, p, layout, PlankLook(variation=0.045))
 
 
@@ -400,24 +411,24 @@ def _planks(
 
 
 # Rows and columns in one repeat of that size, shift of every other row, joint, bevel; pixels.
-_TILES: dict[str, tuple[tuple[float, float], Laying, float, tuple[int, int]]] = {
-    "10": ((1.0, 1.0), Laying(10, 10, 0.0, 0.003), 0.003, _COARSE),
-    "15": ((1.2, 1.2), Laying(8, 8, 0.0, 0.003), 0.003, _COARSE),
-    "20": ((1.6, 1.6), Laying(8, 8, 0.0, 0.003), 0.003, _FINE),
-    "30": ((1.8, 1.8), Laying(6, 6, 0.0, 0.003), 0.002, _FINE),
-    "45": ((1.8, 1.8), Laying(4, 4, 0.0, 0.003), 0.002, _FINE),
-    "60": ((2.4, 2.4), Laying(4, 4, 0.0, 0.002), 0.001, _FINE),
-    "30x60": ((2.4, 2.4), Laying(8, 4, 0.5, 0.002), 0.001, _FINE),
-    "20x40": ((1.6, 1.6), Laying(8, 4, 0.0, 0.002), 0.002, _FINE),
-    "subway": ((1.2, 1.2), Laying(16, 8, 0.5, 0.002), 0.006, _FINE),
-    "mosaic": ((0.5, 0.5), Laying(20, 20, 0.0, 0.002), 0.002, _COARSE),
+_TILES: dict[str, tuple[tuple[float, float], Laying, float]] = {
+    "10": ((1.0, 1.0), Laying(10, 10, 0.0, 0.003), 0.003),
+    "15": ((1.2, 1.2), Laying(8, 8, 0.0, 0.003), 0.003),
+    "20": ((1.6, 1.6), Laying(8, 8, 0.0, 0.003), 0.003),
+    "30": ((1.8, 1.8), Laying(6, 6, 0.0, 0.003), 0.002),
+    "45": ((1.8, 1.8), Laying(4, 4, 0.0, 0.003), 0.002),
+    "60": ((2.4, 2.4), Laying(4, 4, 0.0, 0.002), 0.001),
+    "30x60": ((2.4, 2.4), Laying(8, 4, 0.5, 0.002), 0.001),
+    "20x40": ((1.6, 1.6), Laying(8, 4, 0.0, 0.002), 0.002),
+    "subway": ((1.2, 1.2), Laying(16, 8, 0.5, 0.002), 0.006),
+    "mosaic": ((0.5, 0.5), Laying(20, 20, 0.0, 0.002), 0.002),
 }
 
 
 def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
     laid, kind = _laid(p)
-    size, laying, bevel, shape = _TILES[laid]
+    size, laying, bevel = _TILES[laid]
     grout = p.tints[-1] if len(p.tints) > 1 else (0.72, 0.71, 0.68)
     colours = p.tints[:-1] if len(p.tints) > 1 else p.tints
     if kind == "stone":
@@ -426,7 +437,7 @@ def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     else:
         mottle = 0.004 if min(colours[0]) > 0.8 else 0.012
         glaze = Glaze(colours, kind or "plain", mottle, 0.009, 0.14, 0.5, bevel, grout)
-    return tile_maps(rng, shape, size, laying, glaze)
+    return tile_maps(rng, pixels_of(size), size, laying, glaze)
 
 
 def _laid(p: Pattern) -> tuple[str, str]:
@@ -437,15 +448,18 @@ def _laid(p: Pattern) -> tuple[str, str]:
 
 def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     size, laying = size_of(p), Laying(4, 4, 0.0, 0.002)
-    sheet = marble(rng, _FINE, p.tints[0], p.tints[-1])
-    body = cut_from(rng, sheet, tile_grid(_FINE, size, laying))
+    shape = pixels_of(size)
+    sheet = marble(rng, shape, p.tints[0], p.tints[-1])
+    body = cut_from(rng, sheet, tile_grid(shape, size, laying))
     grout = p.tints[0]
-    return tile_maps(rng, _FINE, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body)  # fmt: skip
+    return tile_maps(rng, shape, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body)  # fmt: skip
 
 
 def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     n = int(rng.choice([7, 8, 10]))
-    return terracotta_maps(rng, _FINE, size_of(p), Laying(n, n, 0.0, 0.007), p.tints[0])
+    return terracotta_maps(
+        rng, pixels_of(size_of(p)), size_of(p), Laying(n, n, 0.0, 0.007), p.tints[0]
+    )
 
 
 def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
@@ -467,16 +481,26 @@ FAMILIES: dict[str, _Painter] = {
     "tiles": _tiles,
     "marble": _marble,
     "terracotta": _terracotta,
-    "brick": lambda r, p: brick_maps(r, _FINE, size_of(p), p.tints[0], painted=False),
-    "painted brick": lambda r, p: brick_maps(r, _FINE, size_of(p), p.tints[0], painted=True),
-    "paint": lambda r, p: paint_maps(r, _COARSE, size_of(p), p.tints[0]),
-    "plaster": lambda r, p: plaster_maps(r, _FINE, size_of(p), p.tints[0]),
-    "smooth plaster": lambda r, p: plaster_maps(r, _COARSE, size_of(p), p.tints[0], depth=0.35),
-    "concrete": lambda r, p: concrete_maps(r, _FINE, size_of(p), p.tints[0]),
-    "carpet": lambda r, p: carpet_maps(r, _COARSE, size_of(p), p.tints[0], loops=False),
-    "loop carpet": lambda r, p: carpet_maps(r, _COARSE, size_of(p), p.tints[0], loops=True),
+    "brick": lambda r, p: brick_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=False
+    ),
+    "painted brick": lambda r, p: brick_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=True
+    ),
+    "paint": lambda r, p: paint_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "plaster": lambda r, p: plaster_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "smooth plaster": lambda r, p: plaster_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], depth=0.35
+    ),
+    "concrete": lambda r, p: concrete_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "carpet": lambda r, p: carpet_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=False
+    ),
+    "loop carpet": lambda r, p: carpet_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=True
+    ),
     "wallpaper": _wallpaper,
-    "grain": lambda r, p: grain_maps(r, p.wood),
+    "grain": lambda r, p: grain_maps(r, p.wood, edge_px=pixels_of(size_of(p))[0]),
     "weave": lambda r, p: _cloth(r, p, twill=False),
     "twill": lambda r, p: _cloth(r, p, twill=True),
     "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),

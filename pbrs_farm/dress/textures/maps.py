@@ -120,7 +120,7 @@ def _wrapped(numbers: np.ndarray, size: int) -> np.ndarray:
 
 _COLOUR_QUALITY = 92
 _MAP_QUALITY = 90
-_RELIEF_PX = 512  # longest edge of roughness and normal maps
+_RELIEF_PX = 1024  # longest edge of roughness and normal maps
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -231,7 +231,7 @@ def plank_maps(
     """Wood cut into the layout's planks. darkness: -1 bleached .. 1 stained."""
     shape = (layout.plank.shape[0], layout.plank.shape[1])
     pixel_m = size_m[0] / shape[1]
-    sheet = wood_sheet(rng, wood, pixel_m=pixel_m) if sheet is None else sheet
+    sheet = wood_sheet(rng, wood, (512, shape[1]), pixel_m) if sheet is None else sheet
     n = layout.n_planks
     # Cut each plank from a place of its own, one half of them turned round.
     rows = _placed(rng, layout.across, layout.plank, n, sheet.shape[0])

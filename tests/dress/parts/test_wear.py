@@ -1,0 +1,62 @@
+"""Smudges and brushed steel: how rough a surface is in the mean stays, what is matt stays as it was."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.wear import SIZE_M, wear
+from tests.dress.furniture import house, solid
+
+FRONT = Material("coated front", specular=(0.4, 0.4, 0.4), roughness=0.3)
+STEEL = Material("brushed steel", specular=(0.78, 0.77, 0.75), roughness=0.38)
+
+
+def _worn(material: Material, size: float = 1.0, share: float = 1.0) -> Draft:
+    thing = solid("t", [1, 0, 1], [1 + size, size, 1 + size], NYU40_NAMES.index("cabinet"))
+    draft = Draft(replace(house(thing), materials=(material,)), 5)
+    wear(draft, EMPTY, style_for(draft.rng("style"), ""), share)
+    return draft
+
+
+def _mean(draft: Draft, texture_id: str | None) -> float:
+    data = draft.textures[str(texture_id)].data
+    return float(np.asarray(Image.open(io.BytesIO(data))).mean()) / 255
+
+
+@pytest.mark.parametrize("material", [FRONT, STEEL])
+def test_a_smooth_front_is_as_rough_as_before_in_the_mean(material: Material) -> None:
+    draft = _worn(material)
+    surface = draft.items[0].surfaces[0]
+    worn = draft.materials[surface.material]
+    assert (worn.normal_texture_id is not None) == (material is STEEL)
+    mean = (worn.roughness or 0) * _mean(draft, worn.roughness_texture_id)
+    assert mean == pytest.approx(material.roughness, rel=0.15)
+    assert surface.uvs is not None
+    assert np.ptp(surface.uvs[:, 0]) == pytest.approx(1.0 / SIZE_M[0], rel=0.7)
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        replace(FRONT, roughness=0.8), replace(FRONT, roughness=None),
+        replace(FRONT, kind=MaterialKind.MIRROR), replace(STEEL, name="chrome"),
+    ],
+)  # fmt: skip
+def test_what_is_matt_a_mirror_or_chrome_stays(kept: Material) -> None:
+    draft = _worn(kept)
+    assert draft.items[0] is draft.source.items[0]
+
+
+def test_small_things_stay_and_a_share_of_none_touches_nothing() -> None:
+    for draft in (_worn(FRONT, size=0.2), _worn(FRONT, share=0.0)):
+        assert draft.items[0] is draft.source.items[0]
