@@ -84,7 +84,8 @@ def smudge_map(rng: np.random.Generator) -> F32:
             )
     for _ in range(int(rng.integers(2, 6))):
         y, x = rng.random(2)
-        _stamp(touched, float(y), float(x), *(2 * [float(rng.uniform(0.008, 0.016))]), 0.72)
+        r = float(rng.uniform(0.008, 0.016))
+        _stamp(touched, float(y), float(x), r, r, 0.72)
     return np.asarray(np.clip(rough + 0.26 * blurred(touched, 0.8), 0.0, 1.0), np.float32)
 
 
