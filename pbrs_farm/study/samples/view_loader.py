@@ -293,11 +293,15 @@ class ViewLoader:
         self._epoch, self._n_batches = state["epoch"], state["n_batches"]
 
     def __iter__(self) -> Iterator[Tensors]:
+        epoch = self._epoch
         for batch in self._rest_of_epoch():
-            # Count it before it is used: who has it has read it.
+            # Count it before it is used: who has it has read it. Loops that know the length ask for
+            # no batch after the last one.
             self._n_batches += 1
+            if self._n_batches == len(self):
+                self._epoch, self._n_batches = epoch + 1, 0
             yield batch
-        self._epoch, self._n_batches = self._epoch + 1, 0
+        self._epoch, self._n_batches = epoch + 1, 0
 
     def _rest_of_epoch(self) -> Any:
         dataset, made = self._dataset, self._made

@@ -102,6 +102,17 @@ def test_a_loader_goes_on_where_its_state_says(places, packed, workers):
 
 
 @pytest.mark.parametrize("packed", [False, True])
+def test_a_loop_that_asks_for_no_batch_beyond_the_length_gets_whole_epochs(places, packed):
+    whole, counted = loader_of(places[packed], 0), loader_of(places[packed], 0)
+    batches = [*ids_of(whole), *ids_of(whole)]
+    found = []
+    for _ in range(2):
+        epoch = iter(counted)
+        found += [next(epoch)["id"] for _ in range(len(counted))]
+    assert found == batches
+
+
+@pytest.mark.parametrize("packed", [False, True])
 def test_ranks_read_different_views_and_equally_many(places, packed):
     ranks = [ids_of(loader_of(places[packed], 0, rank=r, world=2)) for r in range(2)]
     read = [{at for batch in batches for at in batch} for batches in ranks]
