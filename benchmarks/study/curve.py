@@ -77,7 +77,7 @@ def main(words: list[str] | None = None) -> None:
         return
     if args.render:
         for name in (*roots_of_homes(args.homes), *JUDGES):
-            _rendered(name, args.jobs)
+            rendered(name, args.jobs)
         return
     wanted = Wanted(args.homes, args.seeds, args.jobs, tuple(args.on), tuple(args.set), args.place)
     for n_homes, n_views in () if args.draw else POINTS:
@@ -126,8 +126,8 @@ def run_words(name: str) -> list[str]:
 
 def _make_point(wanted: Wanted, n_homes: int, n_views: int) -> None:
     blocks = roots_of_homes(n_homes)
-    places = [wanted.place] if wanted.place else [_rendered(name, wanted.jobs) for name in blocks]
-    on = [f"{name}={_rendered(name, wanted.jobs)}" for name in JUDGES] + list(wanted.on)
+    places = [wanted.place] if wanted.place else [rendered(name, wanted.jobs) for name in blocks]
+    on = [f"{name}={rendered(name, wanted.jobs)}" for name in JUDGES] + list(wanted.on)
     for seed in range(wanted.seeds if n_views <= MANY else 1):
         run = CURVE / "runs" / f"{n_homes}homes_{n_views}views_seed{seed}"
         # A run that was judged on all of this is done.
@@ -142,7 +142,7 @@ def _make_point(wanted: Wanted, n_homes: int, n_views: int) -> None:
         _command(["evaluate", str(run), *judging, "--out", str(run / "evaluation")])
 
 
-def _rendered(name: str, jobs: int) -> str:
+def rendered(name: str, jobs: int) -> str:
     """The root, made where it is missing. What it cost is written last: cost.json says it is whole."""
     out = CURVE / name
 

@@ -28,30 +28,36 @@ from benchmarks.study.lived_in import RUNS
 from benchmarks.study.loading import UNITS as LOADING_UNITS
 from benchmarks.study.loading import loading_figures
 from benchmarks.study.rendered import FOLDER, HELD_OUT, rendered
+from benchmarks.study.shipped import UNITS as SHIPPED_UNITS
+from benchmarks.study.shipped import shipped_figures
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.metrics.edge_scores import edge_counts, n_matched
 
 if TYPE_CHECKING:
     from pbrs_farm.study.training.view_sources import TrainingSource
 
-UNITS = LOADING_UNITS | {
-    "study.normals_heldout": "degrees, mean on held-out homes: bare, photo cameras, mlt_il_ol, plan tiny",
-    "study.normals_margin": "degrees below the mean-normal baseline on them",
-    "study.normals_train": "degrees, mean on its training views",
-    "study.matching_equal": "share of 24 fixtures whose count is the min-cost assignment's",
-    "study.iou_equal": "share of 8 fixtures whose mIoU is torchmetrics' within 1e-6",
-    "study.resume_equal": "1 = a killed run went on to the same weights",
-    "study.ablation_s": "s: the built-in home rendered and its four lights compared; a test that must pass",
-    "study.overfit_deg": "degrees, 4 views at 80x60 by heart in 300 steps",
-    "study.seg_miou_margin": "mIoU over the most frequent class, tiny, held-out homes",
-    "study.edges_ods": "ODS of HED tuned minus untouched at its better size, held-out homes",
-    "study.edges_ods_tuned": "ODS of HED tuned on 640 views",
-    "study.edges_ods_untouched": "ODS of HED as it comes, at the views' size or enlarged twice, the better one",
-    "study.boundary_core_s": "CPU-s a 425x560 picture at 33 thresholds",
-    "study.dressed_gain": "degrees by which training on dressed homes beats bare on dressed held-out homes",
-    "study.dressed_gain_spread": "degrees, its standard deviation over seeds",
-    "study.bench_cpu_s": "CPU-s of all parts, homes rendered before",
-}
+UNITS = (
+    LOADING_UNITS
+    | SHIPPED_UNITS
+    | {
+        "study.normals_heldout": "degrees, mean on held-out homes: bare, photo cameras, mlt_il_ol, plan tiny",
+        "study.normals_margin": "degrees below the mean-normal baseline on them",
+        "study.normals_train": "degrees, mean on its training views",
+        "study.matching_equal": "share of 24 fixtures whose count is the min-cost assignment's",
+        "study.iou_equal": "share of 8 fixtures whose mIoU is torchmetrics' within 1e-6",
+        "study.resume_equal": "1 = a killed run went on to the same weights",
+        "study.ablation_s": "s: the built-in home rendered and its four lights compared; a test that must pass",
+        "study.overfit_deg": "degrees, 4 views at 80x60 by heart in 300 steps",
+        "study.seg_miou_margin": "mIoU over the most frequent class, tiny, held-out homes",
+        "study.edges_ods": "ODS of HED tuned minus untouched at its better size, held-out homes",
+        "study.edges_ods_tuned": "ODS of HED tuned on 640 views",
+        "study.edges_ods_untouched": "ODS of HED as it comes, at the views' size or enlarged twice, the better one",
+        "study.boundary_core_s": "CPU-s a 425x560 picture at 33 thresholds",
+        "study.dressed_gain": "degrees by which training on dressed homes beats bare on dressed held-out homes",
+        "study.dressed_gain_spread": "degrees, its standard deviation over seeds",
+        "study.bench_cpu_s": "CPU-s of all parts, homes rendered before",
+    }
+)
 _OVERFIT = {
     "width_px": "80", "height_px": "60", "batch": "4", "steps": "300", "flip": "false",
     "gain": "0", "gamma": "0", "tint": "0", "hue": "0", "noise": "0", "judge_every": "0",
@@ -74,7 +80,7 @@ def main() -> None:
         "matching": _matching, "iou": _iou, "boundary": _boundary_seconds, "resume": _resume, "builtin": _builtin,
         "loading": loading_figures, "heart": lambda: _by_heart(folder),
         "normals": lambda: _normals(folder), "classes": lambda: _classes(folder),
-        "edges": lambda: _edges(folder),
+        "edges": lambda: _edges(folder), "shipped": shipped_figures,
     }  # fmt: skip
     figures: Figures = {}
     cpu_s, failed = 0.0, []

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import pytest
+
+from benchmarks.study import curve
 from benchmarks.study.curve import POINTS, run_words
 from benchmarks.study.curve_pictures import Point, curve_page, curve_picture
+from pbrs_farm.store.folder import FolderStore
+from tests.study.small_roots import fill
 
 JUDGED = [
     Point(10, 100, {"made": (30.0, 32.0), "training": (9.0, 9.2)}),
@@ -33,3 +40,32 @@ def test_a_line_joins_the_points_of_fewest_homes_and_others_stand_apart() -> Non
 def test_every_point_has_equally_many_views_a_home_or_fewer_and_its_roots_are_apart() -> None:
     assert all(views <= 10 * homes for homes, views in POINTS)
     assert run_words("homes_011")[1] == "made:11..20"
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_points_are_trained_judged_drawn_and_not_made_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("torch")
+
+    def rendered(name: str, _jobs: int) -> str:
+        made = tmp_path / name
+        if not made.exists():
+            fill(FolderStore(made), {f"{name.replace('_', '-')}-00000000": 4}, (40, 32))
+            row = {"figures": {"homes": 1, "views": 4}, "cpu_s": 8.0}
+            (made / "cost.json").write_text(json.dumps(row))
+        return str(made)
+
+    monkeypatch.setattr(curve, "CURVE", tmp_path)
+    monkeypatch.setattr(curve, "POINTS", ((10, 4), (20, 4)))
+    monkeypatch.setattr(curve, "rendered", rendered)
+    small = ["width_px=40", "height_px=32", "batch=2", "steps=2", "threads=1", "judge_every=0"]
+    words = ["--seeds", "1", "--set", *small]
+    curve.main(words)
+    page = (tmp_path / "curve.md").read_text()
+    assert "| 10 | 4 | 1 |" in page
+    assert "Equal views, 4: of 10 homes against 20: made" in page
+    assert "8 CPU-seconds a home" in page
+    monkeypatch.setattr(curve, "_command", lambda _words: pytest.fail("made twice"))
+    curve.main(words)

@@ -56,7 +56,10 @@ def pack_weights(root: Path, out: Path) -> RunFolder:
     digest = hashlib.sha256(packed.weights.read_bytes()).hexdigest()
     record = run.record | {"source": " + ".join(names), "weights_sha256": digest}
     packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
-    card = model_card(run, record | {"step": position.step}, _evaluations(root))
+    evaluations = _evaluations(root)
+    # Each view's own error is of no use without the views.
+    packed.write("judged.json", [row | {"errors": {}} for row in evaluations])
+    card = model_card(run, record | {"step": position.step}, evaluations)
     packed.write_text("README.md", card)
     return packed
 
@@ -73,7 +76,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     homes = record["homes"]["train"]
     stop = record.get("stop_on", "")
     chosen = f"step {record['step']:,} of {plan.steps:,}"
-    chosen += f", chosen by the error {stop.removeprefix('on_')}" if stop else ""
+    chosen += f", chosen by the error on {stop.removeprefix('on_')}" if stop else ""
     said = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
         f"# {task.name}, plan {plan.name}",
@@ -95,11 +98,16 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         " It knows rooms of made homes by day and by lamplight; photographs of other places, people,"
         " animals and close-ups are unlike anything it saw.",
         "## Whose works it saw",
-        "\n".join(f"- {line.removeprefix('- ')}" for line in record.get("credits", []))
-        or "The run names none.",
+        "\n".join(f"- {line}" for line in _credits(record)) or "The run names none.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
     ]  # fmt: skip
     return "\n\n".join(said) + "\n"
+
+
+def _credits(record: Mapping[str, Any]) -> list[str]:
+    """Each credit once; headings between them left out."""
+    lines = (str(line).removeprefix("- ") for line in record.get("credits", []))
+    return list(dict.fromkeys(line for line in lines if not line.endswith(":")))
 
 
 def _figures(run: Trained, evaluations: list[dict[str, Any]]) -> str:

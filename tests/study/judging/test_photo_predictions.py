@@ -161,3 +161,19 @@ def test_predict_without_a_photograph_says_how(
 ) -> None:
     assert main(["predict", str(run), "--out", "nowhere"]) == 1
     assert "no photograph is named" in capsys.readouterr().err
+
+
+def test_shipped_weights_are_small_whole_and_have_a_card() -> None:
+    from pbrs_farm.study.judging.evaluation import open_run
+    from pbrs_farm.study.judging.packed_weights import SHIPPED, shipped_run
+
+    tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
+    assert "normals" in tasks
+    for task in tasks:
+        run = open_run(shipped_run(task))  # checks the sha256
+        assert run.task.name == task
+        assert run.folder.weights.stat().st_size <= 6e6
+        card = (run.folder.root / "README.md").read_text()
+        assert "## Limits" in card
+        assert "CC-BY" in card
+        assert "/var/" not in (run.folder.root / "run.json").read_text()
