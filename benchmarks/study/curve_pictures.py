@@ -74,7 +74,7 @@ def _cell(values: Sequence[float]) -> str:
 
 
 def curve_picture(points: Sequence[Point]) -> str:
-    """An SVG: error over views, a line a judge through the points of most homes; rings: fewer homes a view."""
+    """An SVG: error over views, a line a judge through the points of fewest homes; rings: more homes."""
     svg = svg_file(viewBox=f"0 0 {_WIDTH} {_HEIGHT}", width=_WIDTH, height=_HEIGHT,
                    font_family="system-ui, sans-serif", font_size=12)  # fmt: skip
     element(svg, "rect", width=_WIDTH, height=_HEIGHT, fill="#ffffff")
