@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm dist docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -61,6 +61,9 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 	@$(study-packages)
 	$(BIN)/pytest -n 2 --dist loadfile -m "study and not slow and not gpu"
 
+test-manual: setup ## the docstrings' examples and the pages' Python, run to their end
+	$(BIN)/pytest -m slow tests/docs
+
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
 	@$(BIN)/python -c "import nbclient, nbformat, ipykernel" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check -e ".[notebooks]"
 	$(BIN)/pytest -m notebooks tests/docs/test_notebooks.py
@@ -69,8 +72,9 @@ test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL
 	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl" tests/transport tests/workers
 
-bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm and hostile (NAME=cameras for one), under 25 minutes
+bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm, release and hostile (NAME=cameras for one), under 25 minutes
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
+	@$(if $(filter release,$(NAME)),$(BIN)/python -c "import build, twine" 2>/dev/null || $(BIN)/pip install -q -e ".[release]")
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
@@ -95,6 +99,12 @@ bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in 
 
 bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
 	$(BIN)/python -m benchmarks farm
+
+dist: setup ## sdist and wheel into dist/, dated as the last commit: a second build gives the same bytes
+	@$(BIN)/python -c "import build, twine" 2>/dev/null || $(BIN)/pip install -q -e ".[release]"
+	rm -rf dist
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build
+	$(BIN)/python -m twine check --strict dist/*
 
 docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
 	@$(BIN)/python -c "import mkdocstrings, material" 2>/dev/null || $(BIN)/pip install -q -e ".[docs]"

@@ -50,6 +50,7 @@ OWN_TARGET: Final = {
     "truth": "truth",
     "inputs": "inputs",
     "docs": "docs_figures",
+    "release": "release",
 }
 
 

@@ -7,6 +7,7 @@ and writes nothing.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import statistics
@@ -17,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+from benchmarks.api_examples import faults, public_names
 from benchmarks.figures import write_report
 
 REPO: Final = Path(__file__).parents[1]
@@ -27,6 +29,7 @@ UNITS: Final = {
     "docs.readme_lines": "lines of README.md",
     "docs.dead_links": "warnings of `mkdocs build --strict`",
     "docs.howto": "pages of docs/howto",
+    "docs.api_examples": "share of the public Python names whose docstring has an example that ran here and was right",
 }
 
 _CODE: Final = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
@@ -53,6 +56,7 @@ def main() -> None:
         "docs.readme_lines": len((REPO / "README.md").read_text(encoding="utf-8").splitlines()),
         "docs.dead_links": dead_links(),
         "docs.howto": len([p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index"]),
+        "docs.api_examples": share_of_examples(),
     }
     write_report("docs", figures, UNITS)
 
@@ -122,6 +126,17 @@ def dead_links() -> int:
         if line.startswith("WARNING"):
             print(line)
     return sum(line.startswith("WARNING") for line in lines)
+
+
+def share_of_examples() -> float:
+    """Runs the docstrings' examples; the share of public names whose one is right."""
+    right: list[str] = []
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        for of_homes in (False, True):
+            for name, fault in faults(Path(folder), of_homes=of_homes):
+                right += [] if fault else [name]
+                print(fault, end="")
+    return round(len(right) / len(public_names()), 3)
 
 
 def by_page() -> None:

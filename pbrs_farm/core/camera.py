@@ -111,7 +111,12 @@ class CameraBlur:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """Intrinsics and pose; the pose is that of mid-shutter."""
+    """Intrinsics and pose; the pose is that of mid-shutter.
+
+    >>> camera = Camera(intrinsics_from_k((64, 48), None, 60), np.eye(4))
+    >>> camera.eye.tolist()
+    [0.0, 0.0, 0.0]
+    """
 
     intrinsics: Intrinsics
     world_from_camera: Matrix4  # OpenGL axes, metres
@@ -124,7 +129,11 @@ class Camera:
         towards: F64,
         up: tuple[float, float, float] = (0.0, 1.0, 0.0),
     ) -> Camera:
-        """A camera at eye (3,) looking along towards (3,), any length; up must not be parallel to it."""
+        """A camera at eye (3,) looking along towards (3,), any length; up must not be parallel to it.
+
+        >>> Camera.look(intrinsics_from_k((64, 48), None, 60), np.zeros(3), (0, 0, -2)).towards[2]
+        np.float64(-1.0)
+        """
         # The camera looks along -z: build the right-handed frame from its back.
         back = -np.asarray(towards, np.float64)
         back = back / np.linalg.norm(back)
@@ -153,7 +162,8 @@ class Camera:
         pixels of that size, x right, y down) is given. Raises BadInput for a target at the eye, an
         up vector along the view, or a K that is none.
 
-            >>> Camera.look_at((1, 1.5, 2), (3, 0.8, 2), size=(640, 480), hfov_deg=70)
+            >>> Camera.look_at((1, 1.5, 2), (3, 1.5, 2), size=(640, 480), hfov_deg=70).towards.tolist()
+            [1.0, 0.0, 0.0]
         """
         start, end = np.asarray(eye, np.float64), np.asarray(target, np.float64)
         towards = end - start
@@ -175,6 +185,9 @@ class Camera:
         """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
 
         Raises BadInput for a pose that is no rigid motion.
+
+            >>> Camera.from_opencv(np.diag([1, -1, -1, 1]), size=(64, 48)).eye.tolist()
+            [0.0, 0.0, 0.0]
         """
         pose = np.asarray(world_from_camera, np.float64)
         turn = pose[:3, :3] if pose.shape == (4, 4) else np.zeros((3, 3))
@@ -185,22 +198,37 @@ class Camera:
 
     @property
     def eye(self) -> F64:
-        """(3,) position in the world, metres."""
+        """(3,) position in the world, metres.
+
+        >>> Camera.look_at((1, 1.5, 2), (3, 0.8, 2)).eye.tolist()
+        [1.0, 1.5, 2.0]
+        """
         return self.world_from_camera[:3, 3]
 
     @property
     def towards(self) -> F64:
-        """(3,) unit view direction in the world."""
+        """(3,) unit view direction in the world.
+
+        >>> Camera.look_at((0, 0, 0), (0, 0, -3)).towards.tolist()
+        [0.0, 0.0, -1.0]
+        """
         return np.asarray(-self.world_from_camera[:3, 2])
 
     def with_size(self, width_px: int, height_px: int) -> Camera:
-        """The same camera on another pixel grid."""
+        """The same camera on another pixel grid.
+
+        >>> Camera.look_at((0, 0, 0), (1, 0, 0)).with_size(64, 48).intrinsics.width_px
+        64
+        """
         return replace(self, intrinsics=self.intrinsics.resized(width_px, height_px))
 
     def pixels_of(self, points: NDArray[np.floating]) -> F64:
         """(N, 2) pixel coordinates (x, y) of points (N, 3) of the world, in metres.
 
         NaN for those the lens does not see; others may lie beside the picture.
+
+            >>> Camera.look_at((0, 0, 0), (0, 0, -1)).pixels_of(np.array([[0, 0, -3.0]])).tolist()
+            [[320.0, 240.0]]
         """
         return self.intrinsics.pixels(self._from_world(points) * _FLIP)
 
@@ -209,6 +237,9 @@ class Camera:
 
         Along the optical axis (negative behind the camera), of a lens without planar depth the
         distance from the eye.
+
+            >>> Camera.look_at((0, 0, 0), (0, 0, -1)).depths_of(np.array([[1, 0, -3.0]])).tolist()
+            [3.0]
         """
         local = self._from_world(points)
         if self.intrinsics.lens.depth_is_planar:
@@ -221,7 +252,11 @@ class Camera:
 
     @property
     def blind(self) -> Mask | None:
-        """(H, W) bool: the pixel has no ray (outside a fisheye's circle); None: every one has."""
+        """(H, W) bool: the pixel has no ray (outside a fisheye's circle); None: every one has.
+
+        >>> Camera.look_at((0, 0, 0), (0, 0, -1)).blind is None
+        True
+        """
         if self.intrinsics.lens.model != "fisheye":
             return None
         blind = np.asarray(~_lens_grid(self.intrinsics).any(-1))
@@ -232,12 +267,20 @@ class Camera:
 
         t along a ray is the pixel's depth_z: directions have unit length along the optical axis,
         of a lens without planar depth unit length; (0, 0, 0) where a pixel is blind.
+
+            >>> origin, directions = Camera.look_at((0, 1, 0), (0, 1, -1), size=(64, 48)).rays()
+            >>> origin.tolist(), directions.shape
+            ([0.0, 1.0, 0.0], (48, 64, 3))
         """
         origin, directions = self.exact_rays()
         return origin.astype(np.float32), directions.astype(np.float32)
 
     def exact_rays(self) -> tuple[F64, F64]:
-        """As rays, in float64."""
+        """As rays, in float64.
+
+        >>> Camera.look_at((0, 1, 0), (0, 1, -1), size=(64, 48)).exact_rays()[1].dtype
+        dtype('float64')
+        """
         i = self.intrinsics
         if not i.lens.is_pinhole:
             return self.eye, _lens_grid(i) @ self.world_from_camera[:3, :3].T

@@ -69,7 +69,11 @@ __all__ = [
 
 
 class Recipe(FieldGroup):
-    """The full set of fields one output root is made with."""
+    """The full set of fields one output root is made with.
+
+    >>> recipe_from_name("preview").image.width_px
+    320
+    """
 
     name: str = "fast"
     seed: int = Field(0, ge=0, lt=2**64)
@@ -122,11 +126,18 @@ class Recipe(FieldGroup):
 
         A field of _CAME_LATER is left out at its default, and a group of such fields alone with
         them, so that what was stored before the field existed keeps its digest.
+
+            >>> recipe_from_name("fast").digest() == recipe_from_name("fast", {"light.spp": "64"}).digest()
+            False
         """
         return self._digest(groups, with_light_groups=self.light.groups != "two")
 
     def picture_digest(self, *groups: str) -> str:
-        """As digest, without light.groups: it adds layers and changes no picture, so no seed."""
+        """As digest, without light.groups: it adds layers and changes no picture, so no seed.
+
+        >>> isinstance(recipe_from_name("fast").picture_digest(), str)
+        True
+        """
         return self._digest(groups, with_light_groups=False)
 
     def _digest(self, groups: tuple[str, ...], *, with_light_groups: bool) -> str:

@@ -64,9 +64,11 @@ class Home:
     steps as `pbrs-farm run`, and stays in memory for the next call. Its id names all that it is
     made of: equal homes have equal ids on every machine.
 
-        >>> home = pf.load("Studio").dress(seed=3)
-        >>> home.rooms, home.items.near("table")
-        >>> frame = pf.render(home, home.cameras("photo", n=1)[0])
+        >>> home = pf.load("builtin", recipe="preview")
+        >>> home.rooms["Living room"].name, len(home.items.near("dining table")) > 0
+        ('Living room', True)
+        >>> pf.render(home, home.cameras("photo", n=1)[0], modes=[]).size
+        (320, 240)
     """
 
     source: SourceRef
@@ -75,12 +77,20 @@ class Home:
 
     @property
     def id(self) -> str:
-        """Names the home in folders, tables and seeds."""
+        """Names the home in folders, tables and seeds.
+
+        >>> home.id == pf.load("builtin").id
+        True
+        """
         return self.source.house_id
 
     @cached_property
     def recipe(self) -> Recipe:
-        """The fields it is made and rendered with."""
+        """The fields it is made and rendered with.
+
+        >>> home.recipe.name
+        'preview'
+        """
         return with_settings(self.base, dict(self.settings))
 
     @property
@@ -88,22 +98,37 @@ class Home:
         """Its geometry, materials, lamps and rooms as frozen arrays (pbrs_farm.core.house).
 
         This process keeps those of the last homes: a list of a thousand homes holds none.
+
+            >>> len(home.house.rooms) == len(home.rooms)
+            True
         """
         return RENDERER.house(self.source, self.recipe).house
 
     @property
     def report(self) -> RepairReport:
-        """What repair changed and measured."""
+        """What repair changed and measured.
+
+        >>> home.report.fallback_lights >= 0
+        True
+        """
         return RENDERER.house(self.source, self.recipe).report
 
     @property
     def rooms(self) -> Rooms:
-        """Its rooms as a table; home.rooms["Kitchen"] finds one by name or id."""
+        """Its rooms as a table; home.rooms["Kitchen"] finds one by name or id.
+
+        >>> home.rooms["Living room"].name
+        'Living room'
+        """
         return Rooms(self.house)
 
     @property
     def items(self) -> Items:
-        """Everything in it as a table; home.items["table 2"], .near(name), .named("chair*")."""
+        """Everything in it as a table; home.items["table 2"], .near(name), .named("chair*").
+
+        >>> len(home.items) > 10
+        True
+        """
         return Items(self.house)
 
     def __repr__(self) -> str:
@@ -120,6 +145,9 @@ class Home:
 
         fields: of the recipe's group `dress`, such as clutter=0.5 or style="loft".
         Raises BadInput for seed 0 and for a home that has edits already.
+
+            >>> home.dress(seed=3).id == home.id
+            False
         """
         if self.source.edits:
             raise BadInput(self.id, "dress", "a home is dressed before it is edited")
@@ -134,6 +162,9 @@ class Home:
         """The home made watertight and lit, now; others are repaired when they are first looked at.
 
         fields: of the recipe's group `repair`, such as lamp_lx=150. The words are in `report`.
+
+            >>> home.repair(lamp_lx=150).recipe.repair.lamp_lx
+            150.0
         """
         home = self.set(**{f"repair.{k}": v for k, v in fields.items()})
         _ = home.house
@@ -144,6 +175,9 @@ class Home:
 
         Each thing is one node, prim or model with a collider and its lamps; docs/formats.md describes
         the forms, and `pf.load` reads each of them but sdf. Raises BadInput where the folder holds something.
+
+            >>> home.export("as_gltf").is_dir()
+            True
         """
         from pbrs_farm.export.home_export import export_house
 
@@ -154,6 +188,9 @@ class Home:
         """The home under other recipe fields: home.set(**{"light.spp": 64}).
 
         Raises BadRecipe for a field there is not, or a value that does not fit.
+
+            >>> home.set(**{"light.spp": 64}).recipe.light.spp
+            64
         """
         if not fields:
             return self
@@ -165,13 +202,20 @@ class Home:
         """The home with the sun there, in degrees: azimuth from -z towards +x, elevation -90 to 90.
 
         Below 0 it is dusk, below -12 night.
+
+            >>> home.sun(azimuth=120, elevation=5).recipe.sky.sun_elevation_deg
+            5.0
         """
         fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
         told = {name: value for name, value in fields.items() if value is not None}
         return self.set(**{"sky.kind": "sunsky", **told})
 
     def sky(self, panorama: str | Path) -> Home:
-        """The home under a latitude-longitude HDR picture (.hdr or .exr), or one of a folder of them."""
+        """The home under a latitude-longitude HDR picture (.hdr or .exr), or one of a folder of them.
+
+        >>> home.sky("panorama.hdr").recipe.sky.kind
+        'panorama'
+        """
         if not Path(panorama).exists():
             raise BadInput(panorama, "", "no such file or folder")
         return self.set(**{"sky.kind": "panorama", "sky.panoramas": str(Path(panorama).resolve())})
@@ -197,6 +241,9 @@ class Home:
 
         Raises BadInput where it fits nowhere, for a pose that is no rigid motion, a name that is
         taken, an item there is not.
+
+            >>> home.place(can, on="dining table", seed=1).items["can 1"].name
+            'can 1'
         """
         from pbrs_farm.scene.placing import free_pose, upright_at
 
@@ -229,6 +276,9 @@ class Home:
         where it fell; else each stands upright by itself.
 
         Raises BadInput where less than n fit, MachineFailed where the extra is not installed.
+
+            >>> len(home.scatter([can], n=2, on="dining table").items) - len(home.items)
+            2
         """
         if physics:
             from pbrs_farm.scene.physics import settled_poses as poses
@@ -245,11 +295,20 @@ class Home:
         return self._edited(*edits)
 
     def without(self, items: ItemLike) -> Home:
-        """The home without items: ids, names, patterns such as "chair*", or items."""
+        """The home without items: ids, names, patterns such as "chair*", or items.
+
+        >>> len(home.without("sofa").items) < len(home.items)
+        True
+        """
         return self._edited(RemoveItems(items=self._ids(items)))
 
     def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
-        """The home with items moved by (x, y, z) metres and turned about the vertical of their middle."""
+        """The home with items moved by (x, y, z) metres and turned about the vertical of their middle.
+
+        >>> moved = home.move("sofa", by=(0.1, 0, 0))
+        >>> np.round(moved.items["sofa"].bounds - home.items["sofa"].bounds, 3)[0].tolist()
+        [0.1, 0.0, 0.0]
+        """
         ids = self._ids(items)
         bounds = np.array([item.bounds for item in self.house.items if item.id in ids])
         middle = (np.nanmin(bounds[:, 0], 0) + np.nanmax(bounds[:, 1], 0)) / 2
@@ -263,12 +322,20 @@ class Home:
     def paint(
         self, items: ItemLike, colour: str | Sequence[float], roughness: float | None = None
     ) -> Home:
-        """The home with items in one plain colour: "#c8b8a0", or sRGB in 0..1."""
+        """The home with items in one plain colour: "#c8b8a0", or sRGB in 0..1.
+
+        >>> home.paint("sofa", "#c8b8a0").id == home.id
+        False
+        """
         edit = PaintItems(items=self._ids(items), rgb=_rgb(colour), roughness=roughness)
         return self._edited(edit)
 
     def material(self, items: ItemLike, picture: str | Path, scale_m: float = 1.0) -> Home:
-        """The home with items covered by a picture, repeated every scale_m metres."""
+        """The home with items covered by a picture, repeated every scale_m metres.
+
+        >>> home.material("sofa", "wood.png", scale_m=0.5).id == home.id
+        False
+        """
         path = Path(picture)
         try:
             data = read_regular(path, MAX_DIGEST_BYTES)
@@ -283,7 +350,11 @@ class Home:
         return self._edited(edit)
 
     def light(self, items: ItemLike, lm: float, kelvin: float | None = None) -> Home:
-        """The home with lamps of another flux in lumen, and another colour where kelvin is given."""
+        """The home with lamps of another flux in lumen, and another colour where kelvin is given.
+
+        >>> home.light("floor lamp", lm=800, kelvin=2700).id == home.id
+        False
+        """
         rgb = None if kelvin is None else _rgb_of_kelvin(kelvin)
         return self._edited(SetLight(items=self._ids(items), lm=_flux(lm), rgb_linear=rgb))
 
@@ -297,7 +368,11 @@ class Home:
         angle_deg: float = 60.0,
         name: str = "",
     ) -> Home:
-        """The home with one more bulb at (x, y, z), or a spot of a full angle where towards is given."""
+        """The home with one more bulb at (x, y, z), or a spot of a full angle where towards is given.
+
+        >>> len(home.add_light((2, 2.2, 2), lm=400).items) - len(home.items)
+        1
+        """
         aim = None if towards is None else np.asarray(towards, np.float64) - np.asarray(at)
         if aim is not None and not np.linalg.norm(aim) > 0:
             raise BadInput("add_light", "towards", "is where the light itself is")
@@ -349,7 +424,11 @@ class Home:
     # Looking and rendering.
 
     def plan(self, cameras: Sequence[Camera | Viewpoint] = ()) -> str:
-        """Its plan as SVG text: rooms with names, outlines of items, lamps, and cameras if given."""
+        """Its plan as SVG text: rooms with names, outlines of items, lamps, and cameras if given.
+
+        >>> home.plan().startswith("<svg")
+        True
+        """
         from pbrs_farm.sample.camera_map import plan_svg
 
         return plan_svg(self.house, [self.viewpoint(camera).view for camera in cameras])
@@ -357,7 +436,11 @@ class Home:
     def sketches(
         self, cameras: Sequence[Camera | Viewpoint], edge_px: int = 160
     ) -> list[NDArray[np.uint8]]:
-        """A small OpenGL picture (H, W, 3) sRGB from each camera, edge_px along its longer edge."""
+        """A small OpenGL picture (H, W, 3) sRGB from each camera, edge_px along its longer edge.
+
+        >>> home.sketches([camera], edge_px=32)[0].shape
+        (24, 32, 3)
+        """
         small = []
         for camera in (self.viewpoint(one).camera for one in cameras):
             width, height = camera.intrinsics.width_px, camera.intrinsics.height_px
@@ -372,6 +455,9 @@ class Home:
         """Viewpoints by the rules of a preset, best first in each room; n: so many, spread over rooms.
 
         fields: of the recipe's group `cameras`, such as hfov_rad=1.2.
+
+            >>> len(home.cameras("photo", n=2))
+            2
         """
         told = {"preset": preset, **fields} if preset is not None else fields
         home = self.set(**{f"cameras.{name}": value for name, value in told.items()})
@@ -401,6 +487,9 @@ class Home:
         distance_m and elevation_deg: between which they are drawn. min_visible: the share of the
         item looked at that nothing may hide. K: 3 x 3, instead of hfov_deg. Equal seeds give equal cameras. Raises BadInput where
         fewer are found.
+
+            >>> len(home.cameras_around("sofa", n=1))
+            1
         """
         from pbrs_farm.scene.aiming import cameras_around
 
@@ -422,7 +511,11 @@ class Home:
         return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 
     def viewpoint(self, camera: Camera | Viewpoint) -> Viewpoint:
-        """A camera as a viewpoint of this home, with the room that it is in."""
+        """A camera as a viewpoint of this home, with the room that it is in.
+
+        >>> home.viewpoint(camera).room in {room.id for room in home.house.rooms}
+        True
+        """
         if isinstance(camera, Viewpoint):
             return camera
         return viewpoint_of(camera, self.house, self.recipe.cameras)
@@ -456,7 +549,11 @@ class Rooms(Table):
         return found[0]
 
     def has(self, name: str) -> bool:
-        """Whether a room has this id or name."""
+        """Whether a room has this id or name.
+
+        >>> home.rooms.has("Living room"), home.rooms.has("Ballroom")
+        (True, False)
+        """
         return any(name in (r.id, r.name) for r in self._house.rooms)
 
 
@@ -492,7 +589,11 @@ class Items(Table):
         return [item for item in self._items if item.name.lower() == name.lower()]
 
     def named(self, pattern: str) -> tuple[Item, ...]:
-        """The items whose id, name or class matches, "chair*" for instance; BadInput where none does."""
+        """The items whose id, name or class matches, "chair*" for instance; BadInput where none does.
+
+        >>> len(home.items.named("floor*")) > 0
+        True
+        """
         for key in (_ids, _words):
             found = tuple(i for i in self._items if any(fnmatchcase(w, pattern) for w in key(i)))
             if found:
@@ -504,7 +605,11 @@ class Items(Table):
         return found
 
     def near(self, name: str, within_m: float = 1.5) -> Items:
-        """The items whose box lies within so many metres of an item's, nearest first."""
+        """The items whose box lies within so many metres of an item's, nearest first.
+
+        >>> len(home.items.near("dining table")) > 0
+        True
+        """
         target = self.named(name)[0]
         low, high = target.bounds
         found = []
@@ -597,7 +702,8 @@ def load(
     Nothing but the file's digest is read before the home is looked at. Raises BadHouse for a word
     that names no home, BadRecipe for a recipe or a field that is none.
 
-        >>> home = pf.load("Studio")
+        >>> pf.load("builtin", "preview", **{"light.spp": 64}).recipe.light.spp
+        64
     """
     return Home(resolve(str(home), models=str(models)), recipe_of(recipe)).set(**settings)
 
@@ -607,7 +713,8 @@ def make(seed: int, rooms: str = "", **options: Any) -> Home:
 
     rooms: of bedrooms, "2" or "1..3". options: as of `made:` words, such as area="60..90".
 
-        >>> home = pf.make(7, rooms="1..2").dress(seed=7)
+        >>> pf.make(7, rooms="1..2").id == pf.make(8, rooms="1..2").id
+        False
     """
     words = {**({"rooms": rooms} if rooms else {}), **options}
     recipe = words.pop("recipe", "fast")

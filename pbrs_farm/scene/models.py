@@ -32,30 +32,50 @@ _UP: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A mesh that homes can hold many instances of; pose them with `Home.place` and `Home.scatter`."""
+    """A mesh that homes can hold many instances of; pose them with `Home.place` and `Home.scatter`.
+
+    >>> pf.model("can.ply", category="bottle")
+    <Model can: ...
+    """
 
     ref: ModelRef
     up: str = "y"  # the axis of its file that points up when it stands
 
     @property
     def id(self) -> str:
-        """What its instances are called in tables and poses."""
+        """What its instances are called in tables and poses.
+
+        >>> can.id
+        'can'
+        """
         return self.ref.id
 
     @property
     def shape(self) -> ModelShape:
-        """Surfaces, materials and pictures in its own frame, metres; read once a process."""
+        """Surfaces, materials and pictures in its own frame, metres; read once a process.
+
+        >>> np.ptp(can.shape.bounds, axis=0).shape
+        (3,)
+        """
         return model_shape(self.ref, ReadFields())
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Extent along x, y and z of its own frame."""
+        """Extent along x, y and z of its own frame.
+
+        >>> round(can.size_m[2], 3)
+        0.11
+        """
         x, y, z = np.ptp(self.shape.bounds, axis=0)
         return float(x), float(y), float(z)
 
     @property
     def upright(self) -> F64:
-        """(3, 3) rotation that stands it up in a world with y up."""
+        """(3, 3) rotation that stands it up in a world with y up.
+
+        >>> (can.upright @ (0, 0, 1)).tolist()
+        [0.0, 1.0, 0.0]
+        """
         return _UP[self.up]
 
     def __repr__(self) -> str:
@@ -82,7 +102,8 @@ def model(
 
     Raises BadInput, naming the file, for a mesh that is missing, empty, not finite or 900 m large.
 
-        >>> mug = pf.model("mug.glb", category="cup", size_m=0.1)
+        >>> pf.model("can.ply", category="bottle", size_m=0.2).size_m[2]
+        0.2...
     """
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
@@ -114,7 +135,8 @@ def model(
 def models(pattern: str | Path, **options: object) -> list[Model]:
     """The models that a pattern or a folder names, in order of name; options as of `model`.
 
-        >>> cans = pf.models("ycb/*.ply", unit="mm")
+        >>> [thing.id for thing in pf.models("*.ply")]
+        ['can']
 
     Raises BadInput where there is none, or one that cannot be read.
     """

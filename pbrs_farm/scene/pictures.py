@@ -64,8 +64,9 @@ def render(
     The same bytes as `pbrs-farm run` makes of that home, recipe and view. A camera in no room is a
     warning. Raises BadInput for a mode, a layer or a size that is none, RenderFailed.
 
-        >>> frame = pf.render(home, pf.Camera.look_at((2, 1.5, 3), (4, 0.8, 3)), layers=["albedo"])
-        >>> frame.colour.shape, frame.depth.max()
+        >>> frame = pf.render(home, camera, modes=["opengl_dl"], layers=["albedo"])
+        >>> frame.colour.shape, frame.layer("albedo").shape
+        ((48, 64, 3), (48, 64, 3))
     """
     given = [cameras] if isinstance(cameras, Camera | Viewpoint) else list(cameras)
     found = [home.viewpoint(camera) for camera in given]
@@ -170,7 +171,9 @@ def render_homes(
     Returns the frames of out. A home that cannot be made costs itself alone and is a warning;
     raises BadRecipe where recipes disagree or out holds another, BadInput where nothing was made.
 
-        >>> pf.render_homes([kitchen(seed) for seed in range(10)], out="out/kitchens", views=6)
+        >>> small = home.set(**{"image.width_px": 64, "image.height_px": 48})
+        >>> len(pf.render_homes([small], out="homes", views=1, modes=["opengl_dl"]))
+        1
     """
     every = [homes] if isinstance(homes, Home) else list(homes)
     if not every:

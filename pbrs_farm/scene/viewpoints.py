@@ -34,17 +34,29 @@ class Viewpoint:
 
     @property
     def id(self) -> str:
-        """`<room>_<sector>` and a number where a sector has several."""
+        """`<room>_<sector>` and a number where a sector has several.
+
+        >>> home.viewpoint(camera).id == frame.ref.view
+        True
+        """
         return self.view.id
 
     @property
     def camera(self) -> Camera:
-        """Its pose and intrinsics."""
+        """Its pose and intrinsics.
+
+        >>> home.viewpoint(camera).camera is camera
+        True
+        """
         return self.view.camera
 
     @property
     def room(self) -> str:
-        """The id of its room; "out" outside all."""
+        """The id of its room; "out" outside all.
+
+        >>> home.viewpoint(camera).room == frame.room
+        True
+        """
         return self.view.room_id
 
     def __repr__(self) -> str:
@@ -80,7 +92,11 @@ class Viewpoints(Sequence[Viewpoint]):
 
     @property
     def table(self) -> Table:
-        """A row a viewpoint: id, room, eye, score, objects in sight."""
+        """A row a viewpoint: id, room, eye, score, objects in sight.
+
+        >>> len(home.cameras(n=2).table)
+        2
+        """
         rows: list[dict[str, Any]] = [
             {
                 "id": one.id, "room": one.room, "eye": [round(float(v), 2) for v in one.camera.eye],

@@ -16,6 +16,10 @@ def open_views(place: str | Path | Store) -> Views:
     place: a folder, file:///folder, s3://bucket/prefix, or a Store. Nothing but names is read
     before a view is asked for. Raises BadInput where there is no view, StoreFailed where the store
     does not answer.
+
+        >>> frame.save("opened")
+        >>> pf.open("opened")[0].size
+        (64, 48)
     """
     store = place if not isinstance(place, str | Path) else store_from_url(str(place))
     if isinstance(store, FolderStore) and not store.root.is_dir():

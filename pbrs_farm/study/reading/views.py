@@ -98,6 +98,10 @@ class Frame:
 
     The same whether `pbrs_farm.render` made it just now or `pbrs_farm.open` found it in a folder, a
     bucket or shards. Arrays are (H, W) or (H, W, C); pixel (row 0, column 0) is top left.
+
+        >>> frame = pf.render(home, camera, modes=["opengl_dl"])
+        >>> frame.colour.shape, frame.depth.shape
+        ((48, 64, 3), (48, 64))
     """
 
     ref: ViewRef
@@ -105,57 +109,101 @@ class Frame:
 
     @property
     def id(self) -> str:
-        """`<house>/<view>`."""
+        """`<house>/<view>`.
+
+        >>> frame.id == f"{home.id}/{frame.ref.view}"
+        True
+        """
         return self.ref.id
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The lighting modes it has a picture of."""
+        """The lighting modes it has a picture of.
+
+        >>> frame.modes
+        ('opengl_dl',)
+        """
         return self.source.modes(self.ref)
 
     @property
     def room(self) -> str:
-        """The id of its room."""
+        """The id of its room.
+
+        >>> frame.room in {room.id for room in home.house.rooms}
+        True
+        """
         return self.source.facts(self.ref).room
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height as stored, pixels."""
+        """Width and height as stored, pixels.
+
+        >>> frame.size
+        (64, 48)
+        """
         return self.source.facts(self.ref).size
 
     @property
     def k(self) -> NDArray[np.float64]:
-        """(3, 3): (x right, y down, z forward) to pixels."""
+        """(3, 3): (x right, y down, z forward) to pixels.
+
+        >>> frame.k[:2, 2].tolist()
+        [32.0, 24.0]
+        """
         return np.array(self.source.facts(self.ref).K, np.float64)
 
     @property
     def world_from_camera_opencv(self) -> NDArray[np.float64]:
-        """(4, 4) pose: metres, world y up, camera x right, y down, z forward."""
+        """(4, 4) pose: metres, world y up, camera x right, y down, z forward.
+
+        >>> np.allclose(frame.world_from_camera_opencv[:3, 3], camera.eye)
+        True
+        """
         return np.array(self.source.facts(self.ref).world_from_camera_opencv, np.float64)
 
     @property
     def table(self) -> dict[str, Any]:
-        """view.json: instances with their boxes and classes, sky, seeds (docs/formats.md)."""
+        """view.json: instances with their boxes and classes, sky, seeds (docs/formats.md).
+
+        >>> len(frame.table["instances"]) == len(frame.instances)
+        True
+        """
         return self.source.table(self.ref)
 
     @property
     def layers(self) -> tuple[str, ...]:
-        """All layers it has, optional ones too; pbrs_farm.core.layers.LAYER says unit and axes of each."""
+        """All layers it has, optional ones too; pbrs_farm.core.layers.LAYER says unit and axes of each.
+
+        >>> {"depth", "normal", "instance"} <= set(frame.layers)
+        True
+        """
         return self.source.layers(self.ref)
 
     def layer(self, name: str) -> NDArray[Any]:
-        """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ..."""
+        """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ...
+
+        >>> frame.layer("depth").dtype
+        dtype('uint16')
+        """
         return self.source.layer(self.ref, name)
 
     @property
     def colour(self) -> NDArray[np.uint8]:
-        """(H, W, 3) sRGB of the best mode there is: mlt_il_ol, else mlt_ol, else an OpenGL mode."""
+        """(H, W, 3) sRGB of the best mode there is: mlt_il_ol, else mlt_ol, else an OpenGL mode.
+
+        >>> frame.colour.shape, frame.colour.dtype
+        ((48, 64, 3), dtype('uint8'))
+        """
         if not self.modes:
             raise BadInput(self.source.url, self.id, "no picture in any mode")
         return self.picture(next(mode for mode in reversed(MODES) if mode in self.modes))
 
     def picture(self, mode: str) -> NDArray[np.uint8]:
-        """(H, W, 3) sRGB in a lighting mode; BadInput for one that was not rendered."""
+        """(H, W, 3) sRGB in a lighting mode; BadInput for one that was not rendered.
+
+        >>> (frame.picture("opengl_dl") == frame.colour).all()
+        np.True_
+        """
         if mode not in self.modes:
             hint = f"of {', '.join(self.modes) or 'none'}"
             raise BadInput(self.source.url, self.id, f"no picture in {mode}", hint=hint)
@@ -163,17 +211,29 @@ class Frame:
 
     @property
     def depth(self) -> NDArray[np.float32]:
-        """(H, W) metres along the optical axis; 0 = nothing."""
+        """(H, W) metres along the optical axis; 0 = nothing.
+
+        >>> 0 < frame.depth.max() < 20
+        np.True_
+        """
         return np.asarray(self._array("depth"), np.float32)
 
     @property
     def normal(self) -> NDArray[np.float32]:
-        """(H, W, 3) unit, camera axes x right, y down, z forward; 0 = nothing."""
+        """(H, W, 3) unit, camera axes x right, y down, z forward; 0 = nothing.
+
+        >>> np.allclose(np.linalg.norm(frame.normal[24, 32]), 1, atol=0.01)
+        True
+        """
         return np.asarray(self._array("normal"), np.float32)
 
     @property
     def classes(self) -> NDArray[np.uint8]:
-        """(H, W) NYU40 class; 0 = none."""
+        """(H, W) NYU40 class; 0 = none.
+
+        >>> set(np.unique(frame.classes)) <= set(range(41))
+        True
+        """
         return np.asarray(self._array("class40"), np.uint8)
 
     def classes_by(self, table: str | Path | ClassMap) -> NDArray[np.uint16]:
@@ -181,6 +241,9 @@ class Frame:
 
         Raises BadInput for a table that is wrong, naming its line, and for a frame of shards, which
         have no table of instances.
+
+            >>> set(np.unique(frame.classes_by("mine.csv"))) <= {0, 1, 2}
+            True
         """
         classes, rows = class_map(table), self.table.get("instances")
         if rows is None:
@@ -190,18 +253,30 @@ class Frame:
 
     @property
     def instance(self) -> NDArray[np.uint16]:
-        """(H, W) instance id, as in `instances`; 0 = nothing."""
+        """(H, W) instance id, as in `instances`; 0 = nothing.
+
+        >>> set(np.unique(frame.instance)) - {0} <= {row["id"] for row in frame.instances}
+        True
+        """
         return np.asarray(self._array("instance"), np.uint16)
 
     @property
     def instances(self) -> Table:
-        """What is seen, a row an instance: class, pixels, boxes, and the pose of placed models."""
+        """What is seen, a row an instance: class, pixels, boxes, and the pose of placed models.
+
+        >>> sum(row["pixels"] for row in frame.instances) <= 48 * 64
+        True
+        """
         columns = ("id", "name", "class", "pixels", "visible_fraction", "truncated", "box2d")
         return Table(columns, self.table["instances"])
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is wrong but recoverable: a dark room, a camera in no room."""
+        """What is wrong but recoverable: a dark room, a camera in no room.
+
+        >>> frame.warnings
+        ()
+        """
         return tuple(self.table.get("warnings", ()))
 
     def _array(self, name: str, mode: str | None = None) -> NDArray[Any]:
@@ -215,6 +290,10 @@ class Frame:
 
         Frames of several homes and cameras may share a place as long as they share a recipe.
         Raises BadRecipe where the place holds another recipe, BadInput for a frame of shards.
+
+            >>> frame.save("one")
+            >>> pf.open("one")[0].id == frame.id
+            True
         """
         self.source.save([self.ref], place)
 
@@ -228,7 +307,11 @@ class Frame:
         return f"<div><code>{html.escape(self.id)}</code><br>{cells}</div>"
 
     def sample(self, request: SampleRequest | None = None) -> Sample:
-        """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None."""
+        """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None.
+
+        >>> frame.sample(SampleRequest(("depth",), "opengl_dl")).depth.shape
+        (48, 64)
+        """
         return self.source.read(self.ref, request or SampleRequest())
 
 
@@ -237,6 +320,10 @@ class Views(Sequence[Frame]):
     """Frames of one source, in the order of their ids.
 
     left_out: id -> why, of views that `only` looked at and could not keep.
+
+        >>> views = pf.render(home, [camera], modes=[])
+        >>> len(views)
+        1
     """
 
     source: ViewSource
@@ -259,7 +346,12 @@ class Views(Sequence[Frame]):
         return (Frame(ref, self.source) for ref in self.refs)
 
     def save(self, place: str | Path) -> None:
-        """Write all of them into one place, as Frame.save."""
+        """Write all of them into one place, as Frame.save.
+
+        >>> views.save("all")
+        >>> len(pf.open("all"))
+        1
+        """
         self.source.save(self.refs, place)
 
     def __repr__(self) -> str:
@@ -274,12 +366,20 @@ class Views(Sequence[Frame]):
 
     @property
     def homes(self) -> tuple[str, ...]:
-        """The ids of houses (and objects without context) there are views of."""
+        """The ids of houses (and objects without context) there are views of.
+
+        >>> views.homes == (home.id,)
+        True
+        """
         return tuple(dict.fromkeys(ref.house for ref in self.refs))
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The lighting modes that some view has."""
+        """The lighting modes that some view has.
+
+        >>> views.modes
+        ('opengl_dl',)
+        """
         return tuple(dict.fromkeys(m for ref in self.refs for m in self.source.modes(ref)))
 
     def only(
@@ -296,6 +396,9 @@ class Views(Sequence[Frame]):
 
         selection: only what that run of `pbrs-farm select` keeps. A view that lacks a file of request (a run goes on, or was made without that mode) is left
         out and named in left_out. Raises BadInput where none is left.
+
+            >>> len(views.only(houses=[home.id]))
+            1
         """
         if split is not None and split not in SPLITS:
             raise BadInput("split", split, "no such split", hint=f"of {', '.join(SPLITS)}")

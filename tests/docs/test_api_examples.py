@@ -1,0 +1,31 @@
+"""The examples in docstrings run and print what they say; nine public names in ten have one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.api_examples import example_of, faults, public_names
+
+
+def test_nine_public_names_in_ten_have_an_example() -> None:
+    names = public_names()
+    lacking = [name for name, named in names.items() if example_of(name, named) is None]
+    assert len(lacking) <= len(names) / 10, lacking
+
+
+def test_the_examples_of_cameras_and_recipes_run(tmp_path: Path) -> None:
+    found = list(faults(tmp_path, of_homes=False))
+    assert len(found) >= 12
+    assert [fault for _name, fault in found if fault] == []
+
+
+@pytest.mark.slow
+def test_the_examples_of_homes_and_frames_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = list(faults(tmp_path, of_homes=True))
+    assert len(found) >= 60
+    assert "".join(fault for _name, fault in found) == ""
