@@ -31,7 +31,7 @@ from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.farm_alerts import FarmAlerts
 from workers.coordinator.progress_rates import Rates, mean_s
 from workers.coordinator.shares import Shares, is_in, is_shut, n_ready, stage_of_lane
-from workers.coordinator.teams import barred, n_in_flight, together, victims
+from workers.coordinator.teams import TURN, barred, n_in_flight, together, victims
 from workers.ids import LEASES, STAGES, TaskId, group_text, lane_of, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import (
@@ -59,6 +59,7 @@ _RATES_EVERY_S: Final = 10.0
 _NOTICE_EVERY_S: Final = 10.0
 _LIMITS_EVERY_S: Final = 1.0
 _SPENT_EVERY_S: Final = 10.0
+_TURN_S: Final = 1.0  # that a user holds more than his share before others go first
 _AHEAD_S: Final = 20.0  # of work on a queue; a standby leads after 15
 _WITHOUT_SLOTS: Final = 8  # messages of a stage that nobody takes yet
 
@@ -91,6 +92,7 @@ class Coordinator:
         self._send = send
         self._notice = notice
         self._table = users
+        self._over_since: dict[str, float] = {}  # job that lets others go first -> since when
         self._users: Mapping[str, User] = {}
         self._spent_h: Mapping[str, float] = {}  # user -> slot-hours of his jobs in the last days
         self._clock = clock
@@ -195,9 +197,14 @@ class Coordinator:
 
     def _with_bars(self, views: list[JobView]) -> list[JobView]:
         """The jobs with the queues where others go first; tells the ledger what changed."""
-        bars, found = barred(views, self._users, self._spent_h), []
+        bars, found, now = barred(views, self._users, self._spent_h), [], self._clock()
+        # What is over within a second needs no bar; what is urgent or spent waits for none.
+        self._over_since = {job: self._over_since.get(job, now) for job in bars}
         for view in views:
-            queues, why = bars.get(view.job_id, ((), ""))
+            job = view.job_id
+            queues, why = bars.get(job, ((), ""))
+            if why.startswith(TURN) and now - self._over_since[job] < _TURN_S:
+                queues, why = (), ""
             if (queues, why) != (view.barred, view.fields.get("barred_why", "")):
                 self._ledger.set_barred(view.job_id, queues, why)
                 fields = {**view.fields, "barred": ",".join(queues), "barred_why": why}

@@ -29,6 +29,7 @@ from workers.ledger.task_ledger import (
 
 _LANES: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU)  # each is a queue; what merges is short
 _NOBODY: Final = User("")
+TURN: Final = "it is the turn of"  # begins the reason of a bar among users
 
 Barred = dict[str, tuple[tuple[str, ...], str]]  # job -> queues where others go first, and why
 
@@ -67,11 +68,24 @@ def barred(
             if _n_slots(view, lane, "QUEUED"):
                 waiting[view.user].add(lane)
                 urgent |= {lane: view.job_id} if view.is_urgent else {}
-    over = {name: n / users.get(name, _NOBODY).share for name, n in held.items()}
+
+    def share(name: str) -> float:
+        return users.get(name, _NOBODY).share
+
+    over = {name: n / share(name) for name, n in held.items()}
     found: Barred = {}
     for view in running:
         user, spent = users.get(view.user, _NOBODY), spent_h.get(view.user, 0.0)
-        first = [name for name in waiting if over[name] < over[view.user]]
+        # By more than the next slot would mend: else two would take turns at every task.
+        first = [
+            name
+            for name in waiting
+            if over[name] < over[view.user]
+            and (
+                not held[name]
+                or (held[name] + 1) / share(name) <= (held[view.user] - 1) / share(view.user)
+            )
+        ]
         if user.slot_hours and spent >= user.slot_hours:
             said = f"{user.name} has used {round(spent, 2):g} of {user.slot_hours:g} slot-hours"
             more = f"of {SPENT_DAYS} days; `pbrs-farm users limit` raises it"
@@ -82,7 +96,7 @@ def barred(
         elif first and not view.is_urgent:
             lanes = set().union(*(waiting[name] for name in first))
             names = ", ".join(sorted(name or "jobs without a user" for name in first))
-            found[view.job_id] = tuple(sorted(lanes)), f"it is the turn of {names}"
+            found[view.job_id] = tuple(sorted(lanes)), f"{TURN} {names}"
     return found
 
 

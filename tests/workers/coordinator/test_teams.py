@@ -50,12 +50,16 @@ def test_an_urgent_job_fills_the_window_first_even_where_it_is_full() -> None:
 
 
 def test_jobs_of_who_holds_more_leave_what_comes_to_who_waits_and_only_there() -> None:
-    ann, bob = job("a", "ann", gl_r=3, gl_q=5), job("b", "bob", gl_r=1, light_q=2)
+    ann, bob = job("a", "ann", gl_r=4, gl_q=5), job("b", "bob", gl_r=1, light_q=2)
     assert barred([ann, bob], {}, {}) == {"a": (("light",), "it is the turn of bob")}
     # By shares, and never because of somebody who has nothing that waits.
     assert barred([ann, bob], {"ann": User("ann", share=3.0)}, {}) == {}
     assert barred([ann, job("b", "bob", light_w=2)], {}, {}) == {}
     assert barred([ann, job("a2", "ann", light_q=9)], {}, {}) == {}
+    # Who has nothing goes first, and one slot more or less is no matter.
+    one, two = job("a", "ann", geometry_r=1), job("a", "ann", geometry_r=2)
+    assert barred([one, job("b", "bob", light_q=2)], {}, {}).keys() == {"a"}
+    assert barred([two, job("b", "bob", geometry_r=1, light_q=2)], {}, {}) == {}
 
 
 def test_an_urgent_job_that_waits_goes_before_all_others() -> None:

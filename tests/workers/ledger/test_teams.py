@@ -31,7 +31,9 @@ def test_a_worker_leaves_a_job_to_lie_where_it_could_do_what_others_wait_for(
     ledger.set_barred(JOB_ID, ("light",), "it is the turn of bob")
     claim = d.claim(task, "w1")
     assert (claim.verdict, claim.detail) == ("barred", "it is the turn of bob")
-    # It lies in the outbox again, without an attempt, and another worker takes it.
+    # It is ready again after a second, without an attempt, and another worker takes it.
+    assert d.dispatch() == []
+    ledger.client.zadd(f"{ledger.config.prefix}{{{JOB_ID}}}:later", {task: 0})
     assert d.dispatch() == [task]
     assert d.claim(task, "w2").detail == "1"
     ledger.set_barred(JOB_ID, (), "")

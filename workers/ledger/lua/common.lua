@@ -526,7 +526,7 @@ local function claim(task, c)
   hmany(self, { 'drain', 'blocked_until', 'streak', 'queues' })
   if hget(self, 'drain') == '1' then return reject('draining', '', 0) end
   if goes_after_others(stage, hget(self, 'queues') or '') then
-    return reject('barred', job_field('barred_why') or '', 0)
+    return reject('barred', job_field('barred_why') or '', 1)
   end
   local blocked = hget(self, 'blocked_until')
   if blocked and tonumber(blocked) > t then return reject('blocked', blocked, 2) end
