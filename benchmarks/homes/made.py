@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
@@ -118,7 +119,24 @@ def _of_plans(rows: Rows, again: dict[int, str]) -> dict[str, Any]:
         "area_error": round(max(abs(e) for e in errors.values()), 3),
         "pieces_per_m2": round(float(np.median([r["pieces_per_m2"] for r in fine])), 3),
         "walkable": round(float(np.median([r["walkable"] for r in fine])), 3),
+        **_families(fine),
         "distinct": round(_distinct([r["walls"] for r in fine]), 4),
+    }
+
+
+def _families(rows: Rows) -> dict[str, Any]:
+    """How common the families of plans are, and what they were made for."""
+    rows = [r for r in rows if "family" in r]
+    if not rows:
+        return {}
+    shares = {k: n / len(rows) for k, n in Counter(r["family"] for r in rows).items()}
+    print("   families", {k: round(v, 3) for k, v in sorted(shares.items())})
+    print("   outlines", Counter(r["outline"] for r in rows))
+    return {
+        "families": sum(share >= 0.05 for share in shares.values()),
+        "rarest_family": round(min(shares.values()), 3),
+        "not_rectangular": round(float(np.mean([r["outline"] != "rectangle" for r in rows])), 3),
+        "rooms_through_rooms": round(float(np.mean([r["through"] for r in rows])), 3),
     }
 
 
@@ -185,6 +203,10 @@ UNITS = {
     "made.area_error": "of the median area of a type of room, from people's, the worst of five types",
     "made.pieces_per_m2": "pieces on the floor a m2, median of homes",
     "made.walkable": "share of the floor that a way 0.6 m wide reaches, median of homes",
+    "made.families": "families of plans that 5 % of seeds or more have",
+    "made.rarest_family": "share of seeds of the rarest family",
+    "made.not_rectangular": "share of homes whose outline is an L, a U or the like",
+    "made.rooms_through_rooms": "share of homes with a bedroom that one enters from no hall",
     "made.distinct": "share of plans that differ from every other by more than one wall",
     "made.repaired": "homes read and repaired",
     "made.not_repaired": "of them, refused",

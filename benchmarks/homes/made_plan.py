@@ -48,7 +48,31 @@ def measured(plan: Plan, pieces: tuple[PlacedPiece, ...]) -> dict[str, Any]:
         "walkable": round(walkable, 4),
         "faults": faults,
         "walls": _wall_rows(plan),
+        "family": plan.family,
+        "outline": outline(plan),
+        "through": _has_room_through_room(plan),
+        "height": plan.height,
     }
+
+
+def outline(plan: Plan) -> str:
+    """The shape of its outer wall: a rectangle, an L, a U, or what has other corners."""
+    ground = [Polygon(w.corners()) for w in plan.walls if w.height is None]
+    ground += [Polygon(r.polygon) for r in plan.rooms if r.type is not RoomType.BALCONY]
+    whole: Any = shapely.unary_union(ground).buffer(0.2, join_style="mitre")
+    around = Polygon(whole.exterior).buffer(-0.2, join_style="mitre").simplify(0.01)
+    n = len(around.exterior.coords) - 1
+    # Eight corners are a U where a piece of one side is missing: the convex hull is a rectangle.
+    is_u = n == 8 and len(around.convex_hull.simplify(0.01).exterior.coords) == 5
+    return {4: "rectangle", 6: "L"}.get(n, "U" if is_u else "other")
+
+
+def _has_room_through_room(plan: Plan) -> bool:
+    """Whether a bedroom has a door, and none that opens to the hall."""
+    doors = [{o.room, o.other} for o in plan.openings if o.kind not in _WINDOWS]
+    halls = {i for i, r in enumerate(plan.rooms) if r.type is RoomType.HALL}
+    beds = [i for i, r in enumerate(plan.rooms) if r.type is RoomType.BEDROOM]
+    return any(not any(pair & halls for pair in doors if i in pair) for i in beds)
 
 
 def _aspect(polygon: Any) -> float:

@@ -33,6 +33,8 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _add_make(p: argparse.ArgumentParser) -> None:
+    from pbrs_farm.core.made_home import PLANS
+
     p.set_defaults(handler=_make)
     add = p.add_argument
     add("count", nargs="?", type=int, default=1, metavar="N", help="how many (default 1)")
@@ -41,6 +43,8 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     add("--rooms", metavar="LOW..HIGH", help="bedrooms, 0 to 4, e.g. 2..4")
     add("--area", metavar="LOW..HIGH", help="floor of all rooms in square metres, e.g. 60..90")
     add("--style", metavar="NAME", help="of furniture and paints, e.g. nordic")
+    text = f"family of the plans (default: one by seed): {', '.join(PLANS)}"
+    add("--plans", metavar="NAME", help=text)
     add("--storeys", metavar="N", help="1 or 2 with a staircase between (default 1)")
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
@@ -158,7 +162,11 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")
     if args.floor is not None:
         raise BadInput("--floor", str(args.floor), "needs --plan FILE")
-    options = [f"{k}={v}" for k in ("rooms", "area", "style", "storeys") if (v := getattr(args, k))]
+    options = [
+        f"{k}={v}"
+        for k in ("rooms", "area", "style", "plans", "storeys")
+        if (v := getattr(args, k))
+    ]
     options += ["furniture=none"] * args.empty
     given = [f"--{k}" for k in ("rooms", "area") if args.programme and getattr(args, k)]
     if args.programme and args.storeys not in (None, "1"):

@@ -24,6 +24,11 @@ MAX_HOMES: Final = 1_000_000
 STYLES: Final = ("classic", "mixed", "modern", "nordic", "vintage")
 """Of furniture; none named: one of them by seed."""
 
+PLANS: Final = (
+    "flat", "alpine", "japanese", "loft", "mediterranean", "nordic", "old_town", "us",
+)  # fmt: skip
+"""Families of plans (generate/plan_families.toml); none named: one of them by seed."""
+
 _AREA_OF_HOMES: Final = ((28, 60), (36, 85), (48, 115), (62, 150), (76, 180))
 """Smallest and largest floor of all rooms, square metres, by the number of bedrooms."""
 
@@ -44,6 +49,7 @@ class MadeHome:
     style: str = ""  # of furniture and paints; "" = drawn by seed
     furniture: bool = True
     storeys: int = 1
+    plans: str = ""  # the family of its plan; "" = drawn by seed
 
     @property
     def word(self) -> str:
@@ -56,6 +62,8 @@ class MadeHome:
                 parts.append(f"{key}={low}..{high}")
         if self.style:
             parts.append(f"style={self.style}")
+        if self.plans:
+            parts.append(f"plans={self.plans}")
         if self.storeys != plain.storeys:
             parts.append(f"storeys={self.storeys}")
         if not self.furniture:
@@ -98,11 +106,9 @@ def made_homes(word: str) -> list[MadeHome]:
         elif key == "area":
             home = replace(home, area=_range(word, value, 1000))
         elif key == "style":
-            if value not in STYLES:
-                raise BadInput(
-                    word, option[:60], "no such style", hint=f"one of {', '.join(STYLES)}"
-                )
-            home = replace(home, style=value)
+            home = replace(home, style=_one_of(STYLES, word, option, "no such style"))
+        elif key == "plans":
+            home = replace(home, plans=_one_of(PLANS, word, option, "no such family of plans"))
         elif key == "storeys":
             home = replace(home, storeys=_range(word, value, 99)[1])
         elif key == "furniture" and value == "none":
@@ -150,6 +156,13 @@ def expanded(words: list[str]) -> list[str]:
         else:
             found.append(word)
     return found
+
+
+def _one_of(names: tuple[str, ...], word: str, option: str, text: str) -> str:
+    value = option.partition("=")[2]
+    if value not in names:
+        raise BadInput(word, option[:60], text, hint=f"one of {', '.join(names)}")
+    return value
 
 
 def _range(word: str, text: str, most: int) -> tuple[int, int]:

@@ -25,6 +25,7 @@ from pbrs_farm.generate.programme import (
     drawn_area,
     drawn_programme,
     scaled_rooms,
+    with_family,
 )
 from pbrs_farm.generate.slicing import STEP_M, IntRect, drawn_outline
 from pbrs_farm.generate.staircase import SLAB_M, Stair, stair_between
@@ -39,13 +40,17 @@ def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
     """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
-    where = layout(programme, rng, is_fixed=True) if programme else _drawn_layout(rng, wishes)
-    return plan_of_layout(where, drawn_height(rng), rng)
+    if programme:
+        plans = (wishes and wishes.plans) or programme.plans
+        where = layout(replace(programme, plans=plans), rng, is_fixed=True)
+    else:
+        where = _drawn_layout(rng, with_family(wishes or Wishes(), rng))
+    return plan_of_layout(where, _drawn_height(where, rng), rng)
 
 
-def drawn_height(rng: np.random.Generator) -> float:
-    """From floor to ceiling, metres: mostly what people draw."""
-    return float(rng.choice([2.4, 2.5, 2.5, 2.5, 2.6, 2.7]))
+def _drawn_height(where: Layout, rng: np.random.Generator) -> float:
+    """From floor to ceiling, metres."""
+    return float(rng.choice(where.programme.family.heights))
 
 
 def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Plan:
@@ -54,10 +59,10 @@ def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Pl
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)
     all_rooms, all_walls, openings = openings_of(where, runs, walls, rooms, rng)
-    return Plan(all_rooms, all_walls, openings, height)
+    return Plan(all_rooms, all_walls, openings, height, where.programme.plans)
 
 
-def _drawn_layout(rng: np.random.Generator, wishes: Wishes | None) -> Layout:
+def _drawn_layout(rng: np.random.Generator, wishes: Wishes) -> Layout:
     """Rectangles for a programme by seed; for another one where it has none."""
     for _ in range(_PROGRAMMES):
         try:
@@ -82,6 +87,7 @@ _BEDROOM_SHARES: Final = (0.25, 0.5, 0.25)
 
 def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan, Plan], Stair]:
     """The lower and the upper plan of a home, and its stairs. Raises BadInput if none is found."""
+    wishes = with_family(wishes, rng)
     n_bedrooms = _drawn_bedrooms(rng, wishes)
     for _ in range(_CORES):
         lower, upper = _programmes(rng, wishes, n_bedrooms)
@@ -95,7 +101,7 @@ def drawn_storeys(rng: np.random.Generator, wishes: Wishes) -> tuple[tuple[Plan,
             layouts.append(found)
         if len(layouts) < 2:
             continue
-        height = drawn_height(rng)
+        height = _drawn_height(layouts[0], rng)
         plans = (
             plan_of_layout(layouts[0], height, rng), plan_of_layout(layouts[1], height, rng),
         )  # fmt: skip
@@ -142,8 +148,8 @@ def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Progr
         for rooms in storeys
     )
     open_kitchen = bool(rng.random() < 0.4)
-    return Programme(lower, open_kitchen=open_kitchen, balcony=False), Programme(
-        upper, is_upper=True
+    return Programme(lower, open_kitchen=open_kitchen, plans=wishes.plans), Programme(
+        upper, is_upper=True, plans=wishes.plans
     )
 
 
@@ -240,6 +246,8 @@ def drawn_home(
     A plan whose rooms cannot hold what they must is drawn anew; after a number of tries the home
     that breaks fewest gates is given, which says which.
     """
+    # A family whose plans are rare is none the rarer: it is drawn once.
+    wishes = with_family(wishes or Wishes(), rng) if programme is None else wishes
     best: DrawnHome | None = None
     for _ in range(_TRIES):
         plans, stair = _drawn_plans(rng, wishes, programme)

@@ -161,6 +161,7 @@ class Plan:
     walls: tuple[PlanWall, ...]
     openings: tuple[PlanOpening, ...]
     height: float  # floor to ceiling, metres
+    family: str = ""  # of plans that it is drawn by; none of a plan that a user gave
 
     def openings_of(self, room: int) -> tuple[PlanOpening, ...]:
         """The doors and windows of a room, from either side."""

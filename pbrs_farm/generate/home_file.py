@@ -31,6 +31,7 @@ from pbrs_farm.generate.floor_plan import (
 )
 from pbrs_farm.generate.joinery import JoineryDesign, drawn_design, joinery
 from pbrs_farm.generate.model_file import material_name, model_files
+from pbrs_farm.generate.plan_families import FLAT, PlanFamily, plan_families
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
 
@@ -49,14 +50,13 @@ class Paints:
     joinery: JoineryDesign
 
 
-def drawn_paints(rng: np.random.Generator) -> Paints:
-    """Soft walls, light ceilings, doors and windows of one paint."""
-    walls = ("F4F1EA", "EFEBE0", "E8ECEA", "F3E9DC", "E6E3DA", "DDE4E6", "F6F3EE", "EDE6DD")
-    chosen = [walls[i] for i in rng.permutation(len(walls))[:3]]
-    white, oak, grey = (0.93, 0.92, 0.90), (0.66, 0.50, 0.33), (0.45, 0.46, 0.47)
-    wood = (white, white, oak, grey)[int(rng.integers(4))]
-    design = drawn_design(rng, wood)
-    return Paints(tuple(chosen), "EEF1F1", "B08A62", "C9C6BF", "FAFAF8", design)
+def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
+    """Three paints of a family for walls, doors and windows of one paint."""
+    chosen = [family.walls[i] for i in rng.permutation(len(family.walls))[:3]]
+    wood = family.joinery[int(rng.integers(len(family.joinery)))]
+    red, green, blue = (int(wood[k : k + 2], 16) / 255 for k in (0, 2, 4))
+    design = drawn_design(rng, (red, green, blue), family.leaves, family.sashes)
+    return Paints(tuple(chosen), "EEF1F1", family.floor, "C9C6BF", family.ceiling, design)
 
 
 # A furnished plan as a Sweet Home 3D file.
@@ -76,7 +76,7 @@ _DOOR_NAMES: Final = {
 _FLOOR_GROUPS: Final = {
     RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
 }  # fmt: skip
-_DRY_FLOOR: Final = "wood"
+_DRY_FLOOR: Final = "dry"
 _OPEN_WELLS: Final = {"level-0": "ceiling", "level-1": "floor"}
 _LEVEL_NAMES: Final = ("Ground floor", "Upper floor")
 
@@ -106,9 +106,10 @@ def home_file(
     contents = _Contents()
     _add_properties(home, placed, origin)
     _add_surroundings(home, plan)
-    paints = drawn_paints(_fork(rng))
+    family = plan_families()[plan.family or FLAT]
+    paints = drawn_paints(_fork(rng), family)
     # One wood and one tile for the whole home.
-    floors = _drawn_floors(catalogue, rng)
+    floors = _drawn_floors(catalogue, family, rng)
     levels = _add_levels(home, storeys, stair)
     for storey, level in zip(storeys, levels, strict=True):
         for opening in storey.plan.openings:
@@ -388,13 +389,15 @@ def _wall_colour(plan: Plan, room: PlanRoom | None, paints: Paints) -> str:
     return paints.walls[plan.rooms.index(room) % len(paints.walls)]
 
 
-def _drawn_floors(catalogue: Catalogue, rng: np.random.Generator) -> dict[str, Picture]:
-    """By group, the picture of every floor of that group."""
+def _drawn_floors(
+    catalogue: Catalogue, family: PlanFamily, rng: np.random.Generator
+) -> dict[str, Picture]:
+    """By use, the picture of every floor of dry rooms and of wet ones."""
     chosen = {}
-    for group in (_DRY_FLOOR, "tiles"):
+    for use, group in ((_DRY_FLOOR, family.dry_floor), ("tiles", "tiles")):
         pictures = [p for p in catalogue.pictures if p.group == group]
         if pictures:
-            chosen[group] = pictures[int(rng.integers(len(pictures)))]
+            chosen[use] = pictures[int(rng.integers(len(pictures)))]
     return chosen
 
 

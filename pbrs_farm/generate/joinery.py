@@ -6,6 +6,7 @@ front (the room a door swings into) towards +z. A home has one design of doors a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -58,10 +59,13 @@ class JoineryDesign:
     colour: Triple = (0.93, 0.92, 0.90)  # sRGB of their wood
 
 
-def drawn_design(rng: np.random.Generator, colour: Triple) -> JoineryDesign:
+def drawn_design(
+    rng: np.random.Generator, colour: Triple, leaves: Sequence[str] = LEAVES,
+    sashes: Sequence[str] = SASHES,
+) -> JoineryDesign:  # fmt: skip
     """A home's design; all are equally common."""
     leaf, entrance, handle, sash = (
-        choices[int(rng.integers(len(choices)))] for choices in (LEAVES, LEAVES, HANDLES, SASHES)
+        choices[int(rng.integers(len(choices)))] for choices in (leaves, leaves, HANDLES, sashes)
     )
     return JoineryDesign(leaf, entrance, handle, sash, colour)
 

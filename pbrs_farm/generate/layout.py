@@ -126,11 +126,17 @@ def _keeps_rules(
     inner, rest = cut
     wish, host = (programme.rooms[k] for k in pair)
     halls, living = parts[first_of(programme, RoomType.HALL)], parts[0]
+
+    def ways_to(type_: RoomType) -> tuple[IntRect, ...]:
+        from_ = programme.entered_from(type_)
+        rooms = zip(programme.rooms, parts, strict=True)
+        return tuple(rect for room, rects in rooms if room.type in from_ for rect in rects)
+
     if host.type is RoomType.KITCHEN:
         wide = 2.0 if programme.open_kitchen else DOOR_WALL_M
         if _shared(rest, (*halls, *living)) < wide:
             return False
-    elif _shared(rest, halls) < door_m(host.type):
+    elif _shared(rest, ways_to(host.type)) < door_m(host.type):
         return False
     # What is left of a living room keeps the way to its kitchen.
     if host.type is RoomType.LIVING:
@@ -139,7 +145,7 @@ def _keeps_rules(
         if _shared(kitchen, ways) < (2.0 if programme.open_kitchen else DOOR_WALL_M):
             return False
     # A wardrobe is entered from its bedroom, a store of a kitchen from there.
-    if _opens_to_hall(wish, host) and _shared((inner,), halls) < door_m(wish.type):
+    if _opens_to_hall(wish, host) and _shared((inner,), ways_to(wish.type)) < door_m(wish.type):
         return False
     lit = max(daylight_length(r, brief, notch) for r in rest) * STEP_M
     return not host.type.is_habitable or lit >= daylight_m(host.area)
@@ -308,7 +314,7 @@ def _easier(programme: Programme) -> list[tuple[str, Programme]]:
     steps = [("", programme)]
     for left_out, change in (
         ("these rooms adjacent", {"adjacent": ()}),
-        ("a notch or a second arm", {"notch": 0.0, "l_shaped": False}),
+        ("a notch or a second arm", {"notch": 0.0, "is_court": False, "l_shaped": False}),
         ("sides without daylight", {"n_blind_sides": 0}),
     ):
         easier = replace(steps[-1][1], **change)
@@ -346,18 +352,22 @@ def _solved_layout(
             continue
         guests = tuple(programme.rooms[g] for g, host in hosts.items() if host == number)
         for share in _arms(wish, programme):
-            leaf = _leaf(wish, share, guests)
+            leaf = _leaf(wish, share, guests, programme.family.hall_aspect)
             leaves.append(_around(core, wish.type, leaf, programme) if core else leaf)
             owner.append(number)
     if programme.notch:
-        leaves.append(SliceLeaf(programme.notch, 1.5, 2.5, is_corner=True))
+        is_court = programme.is_court
+        leaves.append(
+            SliceLeaf(programme.notch, 1.5, 2.5, is_corner=not is_court, is_court=is_court)
+        )
     lit = core.lit_sides if core else lit_sides(programme.n_blind_sides, rng)
     outline, n_moves = ((core.width, core.depth), _STOREY_MOVES) if core else (None, N_MOVES)
     contacts = _contacts(programme, owner, hosts)
+    ratios = programme.family.outline_ratio
     n_solved = 0
     hall = owner.index(first_of(programme, RoomType.HALL))
     for _ in range(n_tries):
-        found = solved(tuple(leaves), contacts, hall, lit, rng, outline, n_moves)
+        found = solved(tuple(leaves), contacts, hall, lit, rng, outline, n_moves, ratios)
         if found is None:
             continue
         brief, rects = found
@@ -382,7 +392,9 @@ def _arms(wish: RoomWish, programme: Programme) -> tuple[float, ...]:
     return (0.68, 0.32) if l_shaped else (1.0,)
 
 
-def _leaf(wish: RoomWish, share: float, guests: tuple[RoomWish, ...] = ()) -> SliceLeaf:
+def _leaf(
+    wish: RoomWish, share: float, guests: tuple[RoomWish, ...], hall_aspect: float
+) -> SliceLeaf:
     area = wish.area * share + sum(guest_area(g, wish) for g in guests)
     # A hall is long: walls take more of it.
     half_round = 2.6 if wish.type is RoomType.HALL else 2.0
@@ -391,7 +403,8 @@ def _leaf(wish: RoomWish, share: float, guests: tuple[RoomWish, ...] = ()) -> Sl
     lit = daylight_m(wish.area) if wish.type.is_habitable and not is_arm else 0.0
     entrance = 1.3 if wish.type is RoomType.HALL else 0.0
     narrow = 2.4 if is_arm else MIN_WIDTH[wish.type]
-    return SliceLeaf(gross, narrow, MAX_ASPECT[wish.type], outer=lit, any_outer=entrance)
+    aspect = hall_aspect if wish.type is RoomType.HALL else MAX_ASPECT[wish.type]
+    return SliceLeaf(gross, narrow, aspect, outer=lit, any_outer=entrance)
 
 
 def _around(core: Core, type_: RoomType, leaf: SliceLeaf, programme: Programme) -> SliceLeaf:
@@ -406,7 +419,7 @@ def _around(core: Core, type_: RoomType, leaf: SliceLeaf, programme: Programme) 
 
 
 def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> tuple[Contact, ...]:
-    """Which rooms meet: all the hall, the kitchen the living room, wet rooms each other if they can."""
+    """Which rooms meet: all those they are entered from, the kitchen the living room, wet rooms each other if they can."""
 
     def leaves_of(*types: RoomType) -> tuple[int, ...]:
         return tuple(i for i, o in enumerate(owner) if programme.rooms[o].type in types)
@@ -433,7 +446,7 @@ def _contacts(programme: Programme, owner: list[int], hosts: dict[int, int]) -> 
                 contacts.append(Contact(i, halls, DOOR_WALL_M, is_hard=False))
         elif type_ not in (RoomType.HALL, RoomType.STAIRS):
             wall = hall_wall_m(programme.rooms[o], guest_of.get(o))
-            contacts.append(Contact(i, halls, wall))
+            contacts.append(Contact(i, leaves_of(*programme.entered_from(type_)), wall))
         # Keep pipes short.
         wet = leaves_of(RoomType.KITCHEN, RoomType.BATHROOM, RoomType.WC)
         others = tuple(j for j in wet if j != i)

@@ -35,7 +35,9 @@ def made(home: MadeHome, catalogue: Catalogue, programme: Programme | None = Non
 
     Raises BadInput for wishes that no home meets.
     """
-    wishes = Wishes(home.bedrooms, (float(home.area[0]), float(home.area[1])), home.storeys)
+    wishes = Wishes(
+        home.bedrooms, (float(home.area[0]), float(home.area[1])), home.storeys, home.plans
+    )
     # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
     rng = np.random.default_rng(keys.seed("made", home.version, *words))

@@ -22,6 +22,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.layout import Layout
+from pbrs_farm.generate.plan_families import PlanFamily
 from pbrs_farm.generate.plan_walls import OUTER_M, OUTSIDE, PARAPET_M, WallRun, balcony, open_pairs
 from pbrs_farm.generate.slicing import STEP_M
 
@@ -48,6 +49,11 @@ class WallDrawing:
     def types(self) -> list[RoomType]:
         """Of each room."""
         return [room.type for room in self.rooms]
+
+    @property
+    def family(self) -> PlanFamily:
+        """Whose habits it follows."""
+        return self.layout.programme.family
 
     def wall_of(self, run: WallRun, at: float) -> tuple[int, float]:
         """(number, metres from its start) of the wall that holds the coordinate `at` of a run."""
@@ -181,9 +187,8 @@ def _leads_out(plan: Plan, opening: PlanOpening) -> bool:
 # The windows and the balcony of a plan.
 
 
-_WINDOW_M, _WINDOW_HEIGHT_M, _SILL_M = 1.3, 1.3, 0.9
 _WIDEST_M: Final = 2.4
-_FRENCH_HEIGHT_M, _FRENCH_SILL_M = 2.1, 0.1
+_FRENCH_SILL_M: Final = 0.1
 _BALCONY_M: Final = 4.5
 _CLEAR_M: Final = 0.35  # between a window and a corner or another window
 
@@ -216,8 +221,8 @@ def add_balcony(drawing: WallDrawing) -> None:
     drawing.walls.extend(parapet)
     drawing.rims += [parapet[0].start, parapet[-1].end]
     # Its doors light a large room by themselves.
-    glass = 1.1 * drawing.rooms[living].area * GLASS_SHARE
-    width = round(min(max(glass / _FRENCH_HEIGHT_M, 1.8), 3.0, high - low - 2 * _CLEAR_M), 2)
+    glass, height = 1.1 * drawing.rooms[living].area * GLASS_SHARE, drawing.family.french_height
+    width = round(min(max(glass / height, 1.8), 3.0, high - low - 2 * _CLEAR_M), 2)
     middle = (low + high) / 2
     wall, along = drawing.wall_of(run, middle)
     drawing.openings.append(
@@ -226,7 +231,7 @@ def add_balcony(drawing: WallDrawing) -> None:
             wall,
             round(along, 4),
             width,
-            _FRENCH_HEIGHT_M,
+            height,
             _FRENCH_SILL_M,
             living,
             len(drawing.rooms) - 1,
@@ -236,7 +241,7 @@ def add_balcony(drawing: WallDrawing) -> None:
 
 def add_windows(drawing: WallDrawing, room: int) -> None:
     """Windows until a room's glass is an eighth of its floor; small ones where water runs."""
-    here = drawing.rooms[room]
+    here, usual = drawing.rooms[room], drawing.family.window
     runs = [r for r in drawing.runs if r.rooms == {room, OUTSIDE} and is_lit(r, drawing.layout)]
     runs.sort(key=lambda r: (-r.length, r.line, r.low))
     if here.type in (RoomType.BATHROOM, RoomType.WC):
@@ -248,19 +253,21 @@ def add_windows(drawing: WallDrawing, room: int) -> None:
     if here.type is RoomType.HALL:
         # A hall has a window where its outer wall is long.
         if runs and runs[0].length > 2.6 and drawing.rng.random() < 0.5:
-            _add_window(drawing, runs[0], room, (0.8, _WINDOW_HEIGHT_M, _SILL_M))
+            _add_window(drawing, runs[0], room, (0.8, usual.height, usual.sill))
         return
-    french = here.type in (RoomType.LIVING, RoomType.STUDIO) and drawing.rng.random() < 0.5
-    height, sill = (_FRENCH_HEIGHT_M, _FRENCH_SILL_M) if french else (_WINDOW_HEIGHT_M, _SILL_M)
+    is_living = here.type in (RoomType.LIVING, RoomType.STUDIO)
+    height, sill = usual.height, usual.sill
+    if is_living and drawing.rng.random() < drawing.family.french:
+        height, sill = drawing.family.french_height, _FRENCH_SILL_M
     glass = sum(o.width * o.height for o in drawing.openings if _is_window_of(o, room))
-    wanted = here.area * GLASS_SHARE * float(drawing.rng.uniform(1.05, 1.35))
+    wanted = here.area * GLASS_SHARE * float(drawing.rng.uniform(*drawing.family.glass))
     # Fill the longest wall first, with two windows at most; make them wider where it is short.
     for run in runs:
         missing = wanted - glass
         if missing <= 0:
             break
         for gap in drawing.gaps(run):
-            n = min(max(math.ceil(missing / (_WINDOW_M * height)), 1), 3)
+            n = min(max(math.ceil(missing / (usual.width * height)), 1), 3)
             added = _add_row(drawing, run, gap, room, (n, missing, height, sill))
             glass, missing = glass + added, missing - added
             if missing <= 0:
@@ -333,15 +340,15 @@ def _widen(drawing: WallDrawing, room: int, wanted: float) -> None:
         if glass >= wanted:
             return
         drawing.openings[i] = PlanOpening(
-            OpeningKind.FRENCH_WINDOW, old.wall, old.along, old.width, _FRENCH_HEIGHT_M,
-            _FRENCH_SILL_M, old.room, old.other,
+            OpeningKind.FRENCH_WINDOW, old.wall, old.along, old.width,
+            drawing.family.french_height, _FRENCH_SILL_M, old.room, old.other,
         )  # fmt: skip
 
 
 # Doors, windows and the balcony of a plan.
 
 
-DOOR_HEIGHT_M: Final = 2.1
+_PASSAGES_M: Final = (1.5, 1.2)  # the wider one where it fits
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95
 _FROM_CORNER_M: Final = 0.10  # of a door's frame
 _LEAST_CORNER_M: Final = 0.03
@@ -388,7 +395,10 @@ def _add_doors(drawing: WallDrawing, room: int) -> None:
     if bedrooms is not None:
         _add_doors_of_en_suite(drawing, room, bedrooms)
         return
-    for others in _doors_to(drawing.types, type_):
+    is_living = type_ in (RoomType.LIVING, RoomType.STUDIO)
+    if is_living and drawing.rng.random() < drawing.family.passage and _add_passage(drawing, room):
+        return
+    for others in _doors_to(drawing, type_):
         # Two leaves that hit each other are the last choice.
         if any(
             _add_door(drawing, run, room, OpeningKind.DOOR, width, may_meet=may_meet)
@@ -396,14 +406,31 @@ def _add_doors(drawing: WallDrawing, room: int) -> None:
             for run in _runs_between(drawing, room, others)
         ):
             break
-    # A closed kitchen often has a second door, to the living room.
+    # A closed kitchen often has a second door, to the living room; a bedroom of some families.
     if type_ is RoomType.KITCHEN and not drawing.layout.programme.open_kitchen:
-        living = numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)
-        between = [r for r in drawing.runs if room in r.rooms and r.rooms & set(living)]
-        joined = any({o.room, o.other} == {room, *living} for o in drawing.openings)
-        if between and not joined and drawing.rng.random() < 0.6:
-            longest = max(between, key=lambda r: (r.length, r.line, r.low))
-            _add_door(drawing, longest, room, OpeningKind.DOOR, width, may_meet=False)
+        _add_second_door(drawing, room, 0.6)
+    elif type_ is RoomType.BEDROOM and drawing.family.enfilade:
+        _add_second_door(drawing, room, drawing.family.enfilade)
+
+
+def _add_second_door(drawing: WallDrawing, room: int, chance: float) -> None:
+    """A door to the living room beside, where none is; chance: how often."""
+    living = numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)
+    between = [r for r in drawing.runs if room in r.rooms and r.rooms & set(living)]
+    joined = any({o.room, o.other} == {room, *living} for o in drawing.openings)
+    if between and not joined and drawing.rng.random() < chance:
+        longest = max(between, key=lambda r: (r.length, r.line, r.low))
+        _add_door(drawing, longest, room, OpeningKind.DOOR, _DOOR_M, may_meet=False)
+
+
+def _add_passage(drawing: WallDrawing, room: int) -> bool:
+    """A wide hole to the hall without a leaf; False where there is no room."""
+    halls = numbers(drawing.types, RoomType.HALL)
+    return any(
+        _add_door(drawing, run, room, OpeningKind.PASSAGE, width)
+        for width in _PASSAGES_M
+        for run in _runs_between(drawing, room, halls)
+    )
 
 
 def _runs_between(drawing: WallDrawing, room: int, others: Iterable[int]) -> list[WallRun]:
@@ -424,7 +451,8 @@ def _add_doors_of_en_suite(drawing: WallDrawing, room: int, bedrooms: tuple[int,
                 break
 
 
-def _doors_to(types: list[RoomType], type_: RoomType) -> Iterable[list[int]]:
+def _doors_to(drawing: WallDrawing, type_: RoomType) -> Iterable[list[int]]:
+    types = drawing.types
     halls = numbers(types, RoomType.HALL)
     if type_ is RoomType.KITCHEN:
         return halls, numbers(types, RoomType.LIVING, RoomType.STUDIO)
@@ -434,7 +462,7 @@ def _doors_to(types: list[RoomType], type_: RoomType) -> Iterable[list[int]]:
         return halls, numbers(types, RoomType.KITCHEN)
     if type_ is RoomType.BATHROOM:
         return halls, numbers(types, RoomType.BEDROOM)
-    return (halls,)
+    return [numbers(types, one) for one in drawing.layout.programme.entered_from(type_)]
 
 
 def _add_door(
@@ -467,10 +495,11 @@ def _add_door(
         span = (at - width / 2 - 0.02, at + width / 2 + 0.02)
         if any(a < span[1] and b > span[0] for a, b in drawing.taken(run)):
             continue
-        swing = drawing.swing(run, at, width, into)
-        if not may_meet and drawing.meets_swing(into, swing):
-            continue
-        drawing.swings.append((into, swing))
+        if kind is not OpeningKind.PASSAGE:
+            swing = drawing.swing(run, at, width, into)
+            if not may_meet and drawing.meets_swing(into, swing):
+                continue
+            drawing.swings.append((into, swing))
         wall, along = drawing.wall_of(run, at)
         drawing.openings.append(
             PlanOpening(
@@ -478,7 +507,7 @@ def _add_door(
                 wall,
                 round(along, 4),
                 width,
-                DOOR_HEIGHT_M,
+                drawing.family.door_height,
                 0.0,
                 into,
                 None if behind == OUTSIDE else behind,

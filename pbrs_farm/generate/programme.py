@@ -19,6 +19,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.made_home import check_wishes
 from pbrs_farm.core.record import Record
 from pbrs_farm.generate.floor_plan import RoomType
+from pbrs_farm.generate.plan_families import FLAT, PlanFamily, drawn_family, plan_families
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_given
 
 MEDIAN_AREA: Final = {
@@ -47,9 +48,7 @@ AREA_RANGE: Final = {
 """Smallest and largest, square metres."""
 
 _SPREAD: Final = {RoomType.BEDROOM: 0.16, RoomType.LIVING: 0.20}  # of the logarithm; others .18
-_BEDROOMS: Final = (0, 1, 2, 3, 4)
-_BEDROOM_SHARES: Final = (0.10, 0.25, 0.35, 0.22, 0.08)
-_HALL_SHARE: Final = (0.11, 0.16)  # of all other rooms
+_LIVING: Final = (RoomType.LIVING, RoomType.STUDIO)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +72,21 @@ class Programme:
     balcony: bool = False
     adjacent: tuple[tuple[int, tuple[int, ...]], ...] = ()  # room shares a wall with one of others
     is_upper: bool = False  # the storey above: one comes up the stairs, not in by a front door
+    is_court: bool = False  # the notch lies in the middle of a side: the outline is a U
+    plans: str = FLAT  # the family that it is of
+
+    @property
+    def family(self) -> PlanFamily:
+        """What homes of its family have in common."""
+        return plan_families()[self.plans]
+
+    def entered_from(self, type_: RoomType) -> tuple[RoomType, ...]:
+        """The rooms that the door of a room may open to, the preferred one first."""
+        family, types = self.family, {wish.type for wish in self.rooms}
+        found: tuple[RoomType, ...] = (RoomType.HALL,)
+        if type_ is RoomType.BEDROOM and family.bedrooms_at != "hall" and types & set(_LIVING):
+            found = _LIVING if family.bedrooms_at == "living" else (*_LIVING, RoomType.HALL)
+        return found
 
     @property
     def area(self) -> float:
@@ -104,6 +118,7 @@ class Wishes:
     bedrooms: tuple[int, int] = (0, 4)
     area: tuple[float, float] = (20.0, 250.0)  # of all rooms, square metres
     storeys: int = 1
+    plans: str = ""  # family of plans; "" = drawn by seed
 
     def __post_init__(self) -> None:
         """Raise BadInput for ranges that no home can meet."""
@@ -112,32 +127,41 @@ class Wishes:
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
     """A programme by seed: studio to four bedrooms, closed or open kitchen, WC, store, wardrobe."""
-    wishes = wishes or Wishes()
+    wishes = with_family(wishes or Wishes(), rng)
     # Draw until the area is as wished; then scale the rooms to it.
     for _ in range(64):
-        programme = _drawn(rng, wishes.bedrooms)
+        programme = _drawn(rng, wishes.bedrooms, wishes.plans)
         if wishes.area[0] <= programme.area <= wishes.area[1]:
             return programme
     area = float(np.clip(programme.area, *wishes.area))
     return replace(programme, rooms=tuple(scaled_rooms(programme.rooms, area)))
 
 
-def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
-    shares = np.array(_BEDROOM_SHARES)[bedrooms[0] : bedrooms[1] + 1]
+def with_family(wishes: Wishes, rng: np.random.Generator) -> Wishes:
+    """The wishes with a family of plans: one by seed where none is wished."""
+    return replace(wishes, plans=wishes.plans or drawn_family(rng, wishes.bedrooms))
+
+
+def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int], plans: str) -> Programme:
+    family = plan_families()[plans]
+    # A number of bedrooms that the family lacks is drawn where nothing else is wished.
+    shares = np.array(family.bedroom_shares)[bedrooms[0] : bedrooms[1] + 1] + 1e-9
     n = int(rng.choice(np.arange(bedrooms[0], bedrooms[1] + 1), p=shares / shares.sum()))
     types = [RoomType.STUDIO if n == 0 else RoomType.LIVING, RoomType.KITCHEN]
     types += [RoomType.BEDROOM] * n + [RoomType.BATHROOM]
     # Add the small rooms that larger homes have more often.
-    if n >= 4 or (n == 3 and rng.random() < 0.3):
+    if n >= 4 or (
+        n >= 2 and rng.random() < family.second_bathroom * (n == 3 or family.second_bathroom > 0.3)
+    ):
         types.append(RoomType.BATHROOM)
     for type_, chances in (
         (RoomType.WC, (0, 0.1, 0.4, 0.7, 0.8)),
         (RoomType.STORE, (0, 0.2, 0.3, 0.4, 0.5)),
         (RoomType.WARDROBE, (0, 0.1, 0.2, 0.3, 0.4)),
     ):
-        if rng.random() < chances[n]:
+        if rng.random() < chances[n] * family.small_rooms.get(type_, 1.0):
             types.append(type_)
-    rooms = [RoomWish(t, drawn_area(rng, t)) for t in types]
+    rooms = [RoomWish(t, drawn_area(rng, t, family.areas.get(t, 1.0))) for t in types]
     # Homes with few bedrooms have smaller living rooms and kitchens.
     if n <= 1:
         rooms = [
@@ -148,23 +172,29 @@ def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int]) -> Programme:
         ]
     # The hall takes its share of what it opens to.
     total = sum(r.area for r in rooms)
-    hall = max(total * rng.uniform(*_HALL_SHARE), 3.0 + 0.95 * len(rooms))
+    doors = Programme(tuple(rooms), plans=plans)
+    n_doors = sum(RoomType.HALL in found for found in map(doors.entered_from, types))
+    hall = max(total * rng.uniform(*family.hall_share), 3.0 + 0.95 * n_doors)
     rooms.append(RoomWish(RoomType.HALL, float(hall)))
     # Many rooms need many sides with daylight.
-    blind = min(int(rng.choice([0, 1, 2], p=[0.45, 0.4, 0.15])), (2, 2, 2, 1, 0)[n])
+    blind = min(int(rng.choice([0, 1, 2], p=family.blind_shares)), (2, 2, 2, 1, 0)[n])
+    is_court = bool(n >= 1 and rng.random() < family.court)
+    has_notch = is_court or (n >= 1 and rng.random() < family.l_outline)
     return Programme(
         tuple(rooms),
-        open_kitchen=bool(rng.random() < (0.7 if n == 0 else 0.5)),
+        open_kitchen=bool(rng.random() < max(family.open_kitchen, 0.7 * (n == 0))),
         n_blind_sides=blind,
-        notch=float(total * rng.uniform(0.06, 0.12)) if n >= 1 and rng.random() < 0.3 else 0.0,
-        l_shaped=bool(n in (2, 3) and rng.random() < 0.25),
-        balcony=bool(rng.random() < 0.4),
+        notch=float(total * rng.uniform(*family.notch)) if has_notch else 0.0,
+        l_shaped=bool(n in (2, 3) and rng.random() < family.l_shaped),
+        balcony=bool(rng.random() < family.balcony),
+        is_court=is_court,
+        plans=plans,
     )
 
 
-def drawn_area(rng: np.random.Generator, type_: RoomType) -> float:
-    """Square metres of a room of that type by seed."""
-    area = MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD.get(type_, 0.18))))
+def drawn_area(rng: np.random.Generator, type_: RoomType, larger: float = 1.0) -> float:
+    """Square metres of a room of that type by seed; larger: by so much than people's median."""
+    area = larger * MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD.get(type_, 0.18))))
     return float(np.clip(area, *AREA_RANGE[type_]))
 
 

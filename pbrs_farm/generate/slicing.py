@@ -22,6 +22,7 @@ import numpy as np
 STEP_M: Final = 0.05
 _WALL_STEPS: Final = 3  # what walls take from a room's width, about
 _AREA_SHARES: Final = (0.72, 1.4)  # of its wished area that a leaf has at least and at most
+_ARM_STEPS: Final = 50  # of the outline beside a court, at least
 _UNMET: Final = 1.5  # cost of a hard rule that is not met, beside how far it is from it
 
 IntRect = tuple[int, int, int, int]  # x0, z0, x1, z1 in steps
@@ -37,6 +38,7 @@ class SliceLeaf:
     outer: float = 0.0  # least length of outer wall with daylight
     any_outer: float = 0.0  # least length of any outer wall
     is_corner: bool = False  # a notch of the outline: it lies in a corner and counts as outside
+    is_court: bool = False  # such a notch in the middle of a side
     pinned: IntRect | None = None  # exactly where it lies; at most one leaf of a brief
     holds: IntRect | None = None  # what it must reach around
 
@@ -80,7 +82,9 @@ class Rules:
             (leaf.min_width, leaf.max_aspect, _has_place(leaf)) for leaf in brief.leaves
         ]
         self._contacts = [(c.leaf, c.others, c.length, c.is_hard) for c in brief.contacts]
-        self._notches = [i for i, leaf in enumerate(brief.leaves) if leaf.is_corner]
+        self._notches = [
+            i for i, leaf in enumerate(brief.leaves) if leaf.is_corner or leaf.is_court
+        ]
 
     def judge(self, rects: list[IntRect]) -> tuple[float, int]:
         """(cost, hard rules that are broken) of one rectangle for each leaf."""
@@ -126,6 +130,8 @@ class Rules:
         """
         if leaf.is_corner:
             return self._off_corner(rect)
+        if leaf.is_court:
+            return self._off_middle(rect)
         if leaf.pinned:
             return sum(abs(a - b) for a, b in zip(rect, leaf.pinned, strict=True)) * STEP_M
         missed = _missing_around(rect, leaf.holds) if leaf.holds else 0.0
@@ -157,9 +163,19 @@ class Rules:
         spans = x1 - x0 == self._brief.width or z1 - z0 == self._brief.depth
         return 0.0 if at_x and at_z and not spans else 2.0 - at_x - at_z + spans
 
+    def _off_middle(self, rect: IntRect) -> float:
+        """Metres by which a court misses one side of the outline, or an arm beside it its width."""
+        (x0, z0, x1, z1), (width, depth) = rect, (self._width, self._depth)
+        at_x, at_z = (x0 == 0) + (x1 == width), (z0 == 0) + (z1 == depth)
+        if at_x + at_z != 1:
+            return 2.0
+        arms = (z0, depth - z1) if at_x else (x0, width - x1)
+        return sum(max(_ARM_STEPS - arm, 0) for arm in arms) * STEP_M
+
 
 def _has_place(leaf: SliceLeaf) -> bool:
-    return bool(leaf.outer or leaf.any_outer or leaf.is_corner or leaf.pinned or leaf.holds)
+    is_notch = leaf.is_corner or leaf.is_court
+    return bool(leaf.outer or leaf.any_outer or is_notch or leaf.pinned or leaf.holds)
 
 
 def _missed_area(leaf: SliceLeaf, rect: IntRect) -> float:
@@ -234,9 +250,11 @@ class _Tree:
         return _Tree(self.vertical[:], self.children[:], self.leaf_at[:])
 
 
-def drawn_outline(area: float, rng: np.random.Generator) -> tuple[int, int]:
-    """Width and depth in steps of a rectangle of that area: 0.6 to 1.7 times as wide as it is deep."""
-    width = math.sqrt(area * float(rng.uniform(0.6, 1.7)))
+def drawn_outline(
+    area: float, rng: np.random.Generator, ratios: tuple[float, float] = (0.6, 1.7)
+) -> tuple[int, int]:
+    """Width and depth in steps of a rectangle of that area; ratios: width by depth."""
+    width = math.sqrt(area * float(rng.uniform(*ratios)))
     return round(width / STEP_M), round(area / width / STEP_M)
 
 
@@ -248,12 +266,14 @@ def solved(
     rng: np.random.Generator,
     outline: tuple[int, int] | None = None,
     n_moves: int = N_MOVES,
+    ratios: tuple[float, float] = (0.6, 1.7),
 ) -> tuple[Brief, list[IntRect]] | None:
     """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
 
-    outline: its width and depth in steps; another one of the leaves' area each time if not told.
+    outline: its width and depth in steps; another one of the leaves' area and of these ratios each
+    time if not told.
     """
-    w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng)
+    w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng, ratios)
     brief = Brief(leaves, contacts, hall, w, d, lit_sides, given_places(leaves))
     rects, unmet = _annealed(brief, _Random(rng), n_moves)
     return None if unmet else (brief, rects)

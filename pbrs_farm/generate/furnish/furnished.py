@@ -243,7 +243,11 @@ def furnished(
         others = [ground(p) for pieces in found.values() for p in pieces if p.elevation < 0.4]
         brief = brief_of(plan, space, shelf, room_rng)
         placed = arrangement_of(brief, space, [*others, *taken], room_rng)
-        pieces = [p for s in placed.standing for p in s.pieces(number)]
+        # A low ceiling makes tall pieces lower.
+        pieces = [
+            replace(p, height=min(p.height, round(plan.height - p.elevation - 0.02, 4)))
+            for s in placed.standing for p in s.pieces(number)
+        ]  # fmt: skip
         pieces += ceiling_lamps(space, plan.rooms[number].type, pieces, shelf)
         found[number] = pieces
     return tuple(p for number in sorted(found) for p in found[number])
