@@ -60,10 +60,11 @@ def outline(plan: Plan) -> str:
     ground = [Polygon(w.corners()) for w in plan.walls if w.height is None]
     ground += [Polygon(r.polygon) for r in plan.rooms if r.type is not RoomType.BALCONY]
     whole: Any = shapely.unary_union(ground).buffer(0.2, join_style="mitre")
-    around = Polygon(whole.exterior).buffer(-0.2, join_style="mitre").simplify(0.01)
+    around: Any = Polygon(whole.exterior).buffer(-0.2, join_style="mitre").simplify(0.01)
     n = len(around.exterior.coords) - 1
     # Eight corners are a U where a piece of one side is missing: the convex hull is a rectangle.
-    is_u = n == 8 and len(around.convex_hull.simplify(0.01).exterior.coords) == 5
+    hull: Any = around.convex_hull.simplify(0.01)
+    is_u = n == 8 and len(hull.exterior.coords) == 5
     return {4: "rectangle", 6: "L"}.get(n, "U" if is_u else "other")
 
 
