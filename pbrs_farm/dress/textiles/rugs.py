@@ -26,6 +26,7 @@ from pbrs_farm.home.room_use import RoomKind
 PART = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
+_BORDERED = ("bordered", "plain", "sisal", "diamonds", "faded")
 _RUG_FORMS = ("sharp", "sharp", "rounded", "fringed", "oval")
 _MAT_FORMS = ("sharp", "rounded", "oval")
 _GAP_M = 0.0005  # between the floor and the rug's back
@@ -41,6 +42,11 @@ def rug(
     Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
     """
     pattern, form = str(rng.choice(list(patterns))), str(rng.choice(list(forms)))
+    # A border runs along straight sides, rings along round ones.
+    if form == "oval" and pattern in _BORDERED:
+        form = "rounded"
+    elif pattern == "rings":
+        form = "oval"
     thick = float(rng.uniform(0.008, 0.0095))
     pixels = rug_pixels(rng, width, length, style, pattern)
     texture = jpeg_texture(f"rug {pattern}", pixels)
