@@ -30,20 +30,31 @@ def job_file(words: list[str]) -> dict[str, Any] | None:
     """The job that a command's one word names, None where it names homes. Raises BadInput."""
     if len(words) != 1 or not words[0].endswith(".toml") or not Path(words[0]).is_file():
         return None
-    try:
-        job = tomllib.loads(text_given(Path(words[0])))
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise BadInput(words[0], "", f"is no TOML: {error}") from None
+    job = _tables(words[0])
     # A programme of a made home is TOML, too; it names no homes.
-    if "homes" not in job:
-        return None
+    return _checked(job, words[0]) if "homes" in job else None
+
+
+def job_like(file: str, homes: list[str]) -> dict[str, Any]:
+    """The job of a template, a job's file whose own homes do not count, with these. Raises BadInput."""
+    return _checked({**_tables(file), "homes": homes}, file)
+
+
+def _tables(file: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text_given(Path(file)))
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        raise BadInput(file, "", f"is no TOML: {error}") from None
+
+
+def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
     homes = job["homes"]
     if not isinstance(homes, list) or not homes or any(not isinstance(h, str) for h in homes):
-        raise BadInput(words[0], "homes", "expected a list of homes")
+        raise BadInput(file, "homes", "expected a list of homes")
     for name, table in job.items():
         if name != "homes" and (name not in _TABLES or not isinstance(table, dict)):
             hint = did_you_mean(name, [*_TABLES, "homes"]) or f"[{'], ['.join(_TABLES)}]"
-            raise BadInput(words[0], name, "is no table of a job", hint=hint)
+            raise BadInput(file, name, "is no table of a job", hint=hint)
     return job
 
 
@@ -51,6 +62,17 @@ def submit_words(job: Mapping[str, Any], parser: argparse.ArgumentParser, file: 
     """The words of submit that the job's homes and tables render and select stand for."""
     options = option_words({**job.get("render", {}), **job.get("select", {})}, file, parser)
     return [*options, "--", *job["homes"]]
+
+
+def submit_arguments(
+    job: Mapping[str, Any], given: argparse.Namespace, parser: argparse.ArgumentParser, file: str
+) -> argparse.Namespace:
+    """The arguments of submit that the job stands for; what was given beside its file counts before it."""
+    chosen = parser.parse_args(submit_words(job, parser, file))
+    for name, value in vars(given).items():
+        if name not in ("homes", "parser") and value != parser.get_default(name):
+            setattr(chosen, name, value)
+    return chosen
 
 
 def option_words(

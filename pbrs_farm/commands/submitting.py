@@ -30,7 +30,7 @@ from pbrs_farm.commands.arguments import (
     views_wanted,
     warn,
 )
-from pbrs_farm.commands.job_file import job_file, option_words, submit_words
+from pbrs_farm.commands.job_file import job_file, job_like, option_words, submit_arguments
 from pbrs_farm.core.errors import BadInput
 from workers.ids import DEFAULT_PRIORITY, LEAST_URGENT, check_job_id
 from workers.ledger.task_ledger import WITH_FAILURES
@@ -67,13 +67,15 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--after", action="append", default=[], metavar="JOB", help=text)
     text = "urgent: running tasks of other jobs make room, and keep what they have rendered"
     p.add_argument("--preempt", action="store_true", help=text)
+    text = "a job.toml as a template: its options, for the homes that are named here"
+    p.add_argument("--like", default="", metavar="FILE", help=text)
     p.add_argument("--update", action="store_true", help="give the store this recipe")
     p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
     p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")
 
 
 def _submit(args: argparse.Namespace) -> int:
-    described = job_file(args.homes)
+    described = job_like(args.like, args.homes) if args.like else job_file(args.homes)
     if described is not None:
         return _submit_file(args, described)
     _submitted(args)
@@ -142,11 +144,8 @@ def _submitted(args: argparse.Namespace) -> str:
 
 def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
     """Submit what a job.toml says; with a table pack, wait for the job's end and pack its views."""
-    file = args.homes[0]
-    words = submit_words(job, args.parser, file)
-    chosen = args.parser.parse_args(words)
-    chosen.store, chosen.json = args.store or chosen.store, args.json
-    chosen.dry_run = args.dry_run or chosen.dry_run
+    file = args.like or args.homes[0]
+    chosen = submit_arguments(job, args, args.parser, file)
     pack = option_words(job.get("pack", {}), file)
     name = _submitted(chosen)
     if not pack or not name:

@@ -7,7 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.commands.job_file import job_file, option_words, submit_words
+from pbrs_farm.commands.job_file import (
+    job_file,
+    job_like,
+    option_words,
+    submit_arguments,
+    submit_words,
+)
 from pbrs_farm.core.errors import BadInput
 
 JOB = """
@@ -59,6 +65,20 @@ def test_tables_are_options_and_lists_are_many_words(tmp_path: Path) -> None:
     assert args.set == ["light.spp=64", "light.denoise=true"]
     assert args.modes == ["path", "opengl_dl"]
     assert option_words(job["pack"], "job.toml") == ["--out", "shards"]
+
+
+def test_a_template_s_options_hold_for_the_homes_named_beside_it_but_for_those_given(
+    tmp_path: Path,
+) -> None:
+    job, p = job_like(written(tmp_path, JOB), ["x.sh3d"]), parser()
+    given = p.parse_args(["x.sh3d", "--views", "9"])
+    args = submit_arguments(job, given, p, "job.toml")
+    assert (args.homes, args.recipe, args.views, args.gpu) == (["x.sh3d"], "fast", "9", True)
+    assert job_like(written(tmp_path, "[pack]\n"), ["x"]) == {"homes": ["x"], "pack": {}}
+    with pytest.raises(BadInput, match="rendr: is no table of a job"):
+        job_like(written(tmp_path, "[rendr]\n"), ["x"])
+    with pytest.raises(BadInput, match=r"none\.toml"):
+        job_like(str(tmp_path / "none.toml"), ["x"])
 
 
 def test_homes_and_programmes_are_no_jobs(tmp_path: Path) -> None:
