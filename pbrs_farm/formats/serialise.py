@@ -113,6 +113,9 @@ _SCALARS: Final[dict[Any, CoreSchema]] = {
 def _schema(hint: Any, shape: tuple[int | None, ...] | None = None) -> CoreSchema:
     """What pydantic checks a value of that type by; shape: of an array."""
     origin, args = typing.get_origin(hint), typing.get_args(hint)
+    # Of Python 3.12 on numpy's NDArray is an alias by the `type` statement, which hides what it names.
+    if (aliased := getattr(origin, "__value__", None)) is not None:
+        return _schema(aliased[args], shape)
     if origin is np.ndarray:
         dtype = typing.get_args(args[1])[0]
         return cs.no_info_plain_validator_function(functools.partial(_array, dtype, shape))
