@@ -27,7 +27,7 @@ check: setup ## lint, types, import contracts: under a minute
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
+	$(BIN)/pytest -n 2 --dist worksteal --durations=25 -m "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not study and not notebooks"
 
 test-slow: setup ## the tests that take minutes
 	$(BIN)/pytest -m slow
@@ -53,7 +53,7 @@ test-sweethome3d: setup ## the real program opens ten made homes and saves them:
 	$(BIN)/pytest -m sweethome3d tests/sweethome3d
 
 define study-packages
-$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check "torch==2.13.0"; \
+$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check --no-compile "torch==2.13.0"; \
 $(BIN)/pip install -q --disable-pip-version-check -e ".[study,study-peers]"
 endef
 
@@ -61,7 +61,8 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 	@$(study-packages)
 	$(BIN)/pytest -n 2 --dist loadfile -m "study and not slow and not gpu"
 
-test-manual: setup ## the docstrings' examples and the pages' Python, run to their end
+test-manual: setup ## every how-to page, the docstrings' examples and the pages' Python, run to their end
+	@$(study-packages)
 	$(BIN)/pytest -m slow tests/docs
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time

@@ -174,7 +174,7 @@ main() {
     echo "setup: no venv module: $(command_for python3-venv)" >&2
     exit 1
   }
-  if ! PYTHONUNBUFFERED=1 $VENV/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off \
+  if ! PYTHONUNBUFFERED=1 $VENV/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off --no-compile \
     -e ".[$EXTRAS]" 2>&1 | tee $LOG | told_of_pip >&2; then
     tail -n 20 $LOG >&2
     echo "setup: pip failed; all that it said: $LOG" >&2

@@ -65,6 +65,7 @@ def wait_for_redis(port: int) -> None:
     raise AssertionError("redis-server does not answer")
 
 
+@pytest.mark.slow
 def test_the_operators_job_runs_to_its_end_and_what_the_table_says_works(
     services: None, capsys: pytest.CaptureFixture[str]
 ) -> None:

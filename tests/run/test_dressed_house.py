@@ -23,6 +23,7 @@ from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
 
 GENERATED = {"dress.catalogue": "generated"}
+FEW = {"dress.clutter": "0", "dress.textiles": "0", "dress.swap": "0", "surroundings.kind": "none"}
 
 
 def credit(name: str, licence: str, n: int = 1) -> Credit:
@@ -75,7 +76,7 @@ def test_a_share_outside_0_to_1_is_refused(value):
 
 def test_the_house_step_writes_what_dressing_did_beside_what_repair_did():
     store = MemoryStore()
-    recipe = recipe_from_name("preview", GENERATED)
+    recipe = recipe_from_name("preview", GENERATED | FEW)
     (source,) = variants(resolve("builtin"), [2])
     work = Work(store, recipe, source.house_id, HouseCache(), source=source)
     run_step("house", work)
@@ -84,7 +85,7 @@ def test_the_house_step_writes_what_dressing_did_beside_what_repair_did():
     house = json.loads(store.get(keys.house_key(source.house_id, "house.json")))
     assert house["id"] == source.house_id
     # Another share of anything is another house.
-    again = recipe_from_name("preview", GENERATED | {"dress.walls": "0.5"})
+    again = recipe_from_name("preview", GENERATED | FEW | {"dress.walls": "0.5"})
     assert run_step("house", work).was_done
     assert not run_step("house", Work(store, again, work.house_id, HouseCache(), source)).was_done
 
@@ -163,6 +164,7 @@ def test_the_verb_writes_the_bundle_the_report_and_a_picture(tmp_path: Path, cap
     words = ["dress", "builtin", "--seed", "2", "--out", str(tmp_path), "--catalogue", "generated",
              "--recipe", "preview", "--size", "96x72", "--set", "light.spp=1",
              "--set", "light.pilot_spp=0", "--set", "cameras.cell_m=1"]  # fmt: skip
+    words += [word for field, value in FEW.items() for word in ("--set", f"{field}={value}")]
     assert main(words) == 0
     for name in ("before_after.png", "house.glb", "house.json", "dress.json", "repair.json"):
         assert (tmp_path / name).stat().st_size > 100, name

@@ -35,6 +35,7 @@ print(*sorted(m for m in set(sys.modules) - before if m.startswith("pbrs_farm"))
 """
 
 
+@pytest.mark.slow
 def test_light_waits_for_no_module_of_ours(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
 

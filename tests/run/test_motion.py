@@ -130,7 +130,10 @@ def test_verify_recomputes_pairs_and_finds_a_share_that_is_wrong(
     "lens",
     [
         pytest.param({"lens.model": "radtan", "lens.k1": "-0.2"}, marks=pytest.mark.slow),
-        {"lens.preset": "fisheye180", "image.width_px": "64", "image.height_px": "64"},
+        pytest.param(
+            {"lens.preset": "fisheye180", "image.width_px": "64", "image.height_px": "64"},
+            marks=pytest.mark.slow,
+        ),
         {"lens.model": "equirect", "image.width_px": "64", "image.height_px": "32"},
     ],
     ids=lambda fields: fields.get("lens.model", "fisheye"),

@@ -40,7 +40,8 @@ def listed(out: Path) -> set[str]:
     return {json.loads(line)["key"].rpartition("/")[2] for line in lines}
 
 
-@pytest.mark.parametrize("mode", [pytest.param("opengl_dl", marks=pytest.mark.slow), "opengl_il"])
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["opengl_dl", "opengl_il"])
 def test_layers_stay_whatever_later_runs_ask_for(tmp_path: Path, mode: str) -> None:
     made(tmp_path, HELD)
     first = {path: path.read_bytes() for path in tmp_path.glob("houses/*/views/*/*.*")}

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -21,24 +22,42 @@ FIELDS = [word for name, value in SMALL.items() for word in ("--set", f"{name}={
 FEW = ["--modes", "opengl_dl", "--recipe", "preview", *FIELDS]
 
 
+EXAMPLES = sorted((REPO / "examples/plugins").iterdir())
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of a machine that has all example plugins."""
-    folder = tmp_path_factory.mktemp("plugins")
-    examples = sorted((REPO / "examples/plugins").iterdir())
-    assert sorted(p.name for p in examples) == sorted(GROUPS)
-    # Build from copies: setuptools writes beside what it builds.
+    """The environment of a machine that has all example plugins, as pip leaves them there."""
+    site = tmp_path_factory.mktemp("plugins") / "site"
+    assert sorted(p.name for p in EXAMPLES) == sorted(GROUPS)
+    for example in EXAMPLES:
+        project = tomllib.loads((example / "pyproject.toml").read_text())["project"]
+        info = site / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+        info.mkdir(parents=True)
+        head = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+        (info / "METADATA").write_text(head)
+        groups = project["entry-points"].items()
+        rows = [f"[{g}]\n" + "".join(f"{k} = {v}\n" for k, v in e.items()) for g, e in groups]
+        (info / "entry_points.txt").write_text("\n".join(rows))
+        for file in example.glob("*.py"):
+            (site / file.name).write_bytes(file.read_bytes())
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(REPO)])}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
+def test_pip_installs_an_example_with_its_entry_points(example: Path, tmp_path: Path) -> None:
+    # Build from a copy: setuptools writes beside what it builds.
+    copy = tmp_path / "src"
+    copy.mkdir()
+    for file in example.glob("*.*"):
+        (copy / file.name).write_bytes(file.read_bytes())
     words = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"]
-    words += ["--no-index", "--target", str(folder / "site")]
-    for example in examples:
-        copy = folder / "src" / example.name
-        copy.mkdir(parents=True)
-        for file in example.glob("*.*"):
-            (copy / file.name).write_bytes(file.read_bytes())
-        words.append(str(copy))
+    words += ["--no-index", "--target", str(tmp_path / "site"), str(copy)]
     subprocess.run(words, check=True, capture_output=True, text=True)
-    path = os.pathsep.join([str(folder / "site"), str(REPO)])
-    return {**os.environ, "PYTHONPATH": path}
+    (found,) = (tmp_path / "site").glob("*.dist-info/entry_points.txt")
+    assert f"[pbrs_farm.{example.name}]" in found.read_text()
+    assert all((tmp_path / "site" / file.name).exists() for file in example.glob("*.py"))
 
 
 def run(env: dict[str, str], folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
@@ -87,6 +106,14 @@ def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_pa
 
 def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: Path) -> None:
     words = ["--dress", "3", "--catalogue", "generated", "--set", "dress.passes=red_chairs"]
+    words += [
+        "--set",
+        "dress.clutter=0",
+        "--set",
+        "dress.walls=0",
+        "--set",
+        "surroundings.kind=none",
+    ]
     done(installed, tmp_path, "run", "builtin", *words, "--views", "1", "--out", "o", *FEW)
     report = json.loads(next((tmp_path / "o").glob("houses/*/dress.json")).read_text())
     assert report["changed"]["red_chairs"] >= 2
@@ -97,8 +124,7 @@ def test_pictures_of_a_plugin_stand_beside_the_modes(
 ) -> None:
     words = ["run", "builtin", "--views", "1", "--recipe", "preview", *FIELDS]
     words += ["--modes", "mlt_il_ol", "--out", "o"]
-    done(installed, tmp_path, *words)
-    done(installed, tmp_path, *words, "--set", "tone.pictures=dusk", "--update")
+    done(installed, tmp_path, *words, "--set", "tone.pictures=dusk")
     (view,) = (tmp_path / "o").glob("houses/*/views/*")
     by_day, at_dusk = (np.asarray(Image.open(view / f"{n}.png")) for n in ("mlt_ol", "dusk"))
     assert at_dusk.shape == by_day.shape

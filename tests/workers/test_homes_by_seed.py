@@ -56,6 +56,7 @@ def products(files: dict[str, bytes]) -> dict[str, bytes]:
     return {k: v for k, v in files.items() if k.startswith("houses/") and "/done/" not in k}
 
 
+@pytest.mark.slow
 def test_a_farms_pictures_of_homes_by_seed_are_the_same_bytes_as_a_runs(tmp_path: Path) -> None:
     recipe, store = small(), MemoryStore()
     farmed(store, recipe)

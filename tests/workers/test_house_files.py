@@ -86,7 +86,8 @@ def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.Mo
     recipe = recipe_from_name(
         "preview",
         {"dress.catalogue": "generated", "cameras.cell_m": "1", "cameras.score_width_px": "80",
-         "cameras.score_height_px": "60"},
+         "cameras.score_height_px": "60", "dress.clutter": "0", "dress.textiles": "0",
+         "surroundings.kind": "none"},
     )  # fmt: skip
     _houses, spec = completed([entry], new_spec(recipe, modes=("opengl_dl",)))
     store = MemoryStore()

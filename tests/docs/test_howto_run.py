@@ -1,0 +1,161 @@
+"""Every how-to page does what it says: its commands and its Python, run in order on small pictures.
+
+What a page shows large is made small: two homes for twenty, a view for four, 64 pixels for 640. What needs a
+farm, a server or a GPU is left to the tests of those (NOT_HERE); everything else runs to its end.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.formats.recipe_toml import toml_from_recipe
+from tests.docs.test_manual import HOWTO, REPO, name_of
+from tests.scene.homes import SMALL
+
+pytestmark = pytest.mark.slow
+
+NOT_HERE = ("coordinator", "worker", "status", "failures", "board")  # and submit without --dry-run
+SHRUNK = (
+    (r"made:1\.\.(20|1000)\b", "made:1..2"), (r"--dress 1\.\.\d+", "--dress 1..2"), (r"--frames \d+", "--frames 3"),
+    (r"--views \d+", "--views 1"), (r"--scenes \d+", "--scenes 1"), (r"--count \d+", "--count 2"),
+    (r"--size 512x512", "--size 64x64"), (r"--size 1024x512", "--size 128x64"), (r"--size 320x240", "--size 48x36"),
+    (r"--size (1280x720|160x120)", "--size 64x48"), (r"--recipe (preview|fast|paper)", "--recipe small.toml"),
+)  # fmt: skip
+SHRUNK_PYTHON = (
+    (r'recipe="preview"', 'recipe="small.toml"'), (r"range\(1, 11\)", "range(1, 3)"), (r"views=4", "views=1"),
+    (r"cameras_around\(n=4\)", "cameras_around(n=1)"), (r"size=\(1280, 720\)", "size=(64, 36)"),
+    (r"600\.0, 0, 640\], \[0, 600, 360\]", "30.0, 0, 32], [0, 30, 18]"),
+)  # fmt: skip
+NEEDS = {  # what a page takes from a page before it
+    "hugging_face": "run made:1..20 --dress 1 --recipe fast --modes mlt_il_ol --out out/homes",
+    "night": "run Studio --recipe preview --views 1 --out out/day",
+    "train": "run Studio --recipe preview --modes mlt_il_ol --out out/other",
+    "predict": "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
+}
+
+
+@pytest.mark.parametrize("page", HOWTO, ids=name_of)
+def test_a_howto_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    _provide(tmp_path, text)
+    if page.stem in NEEDS:
+        _command(f"pbrs-farm {NEEDS[page.stem]}", tmp_path)
+    if page.stem == "predict":
+        train = "pbrs-farm train normals out/homes --out out/runs/normals --set steps=2"
+        _command(train, tmp_path)
+    n_run = 0
+    for language, block in re.findall(r"^```(sh|python|)\n(.*?)^```", text, re.M | re.S):
+        if language == "python":
+            _python(block, tmp_path)
+            n_run += 1
+            continue
+        for line in block.splitlines():
+            if _is_run_here(line):
+                _command(line, tmp_path)
+                n_run += 1
+    assert n_run > 0 or page.stem == "cluster"
+
+
+def _is_run_here(line: str) -> bool:
+    words = shlex.split(line, comments=True)
+    if words[:2] == ["pip", "install"]:
+        return True
+    if not words or words[0] != "pbrs-farm" or words[1] in NOT_HERE or "--fetch" in words:
+        return False
+    return words[1] != "submit" or "--dry-run" in words
+
+
+def _command(line: str, folder: Path) -> None:
+    for large, small in SHRUNK:
+        line = re.sub(large, small, line)
+    words = shlex.split(line, comments=True)
+    if words[0] == "pip":
+        words = [sys.executable, "-m", *words, "-q", "--no-deps", "--no-build-isolation"]
+        words += ["--no-index", "--target", str(folder / "site")]
+    else:
+        if words[1] in ("run", "scatter") and "--recipe" not in words:
+            words += ["--recipe", "small.toml"]
+        if words[1] == "run" and not {"--views", "--frames"} & {*words}:
+            words += ["--views", "2"]
+        if words[1] == "train" and "--set" not in words:
+            words += ["--set", "steps=2"]
+        words = [sys.executable, "-m", "pbrs_farm.cli", *(_placed(w, folder) for w in words[1:])]
+    made = subprocess.run(
+        words, cwd=folder, env=_environment(folder), capture_output=True, text=True, timeout=900
+    )
+    assert made.returncode == 0, f"{line}\n{made.stdout[-2000:]}\n{made.stderr[-3000:]}"
+    if "--out" in words:
+        out = folder / words[words.index("--out") + 1]
+        assert out.is_file() or any(out.iterdir()), f"{line}: nothing in {out}"
+
+
+def _placed(word: str, folder: Path) -> str:
+    """houses/HOUSE/views/VIEW of a page, as the first view that lies there."""
+    root, found, _ = word.partition("/houses/HOUSE/views/VIEW")
+    if not found:
+        return word
+    view = next((folder / root).glob("houses/*/views/*"))
+    return str(view.relative_to(folder))
+
+
+def _python(block: str, folder: Path) -> None:
+    for large, small in SHRUNK_PYTHON:
+        block = re.sub(large, small, block)
+    block += "\nif 'first_row' in globals():\n    assert first_row()\n"
+    # A spawned process reads the script again.
+    (folder / "page.py").write_text(f"if __name__ == '__main__':\n{_indented(block)}")
+    words = [sys.executable, "page.py"]
+    made = subprocess.run(
+        words, cwd=folder, env=_environment(folder), capture_output=True, text=True, timeout=900
+    )
+    assert made.returncode == 0, f"{block}\n{made.stderr[-3000:]}"
+
+
+def _indented(block: str) -> str:
+    return "".join(f"    {line}\n" for line in block.splitlines())
+
+
+def _environment(folder: Path) -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder / "site"), str(REPO)])}
+
+
+def _provide(folder: Path, text: str) -> None:
+    """Beside a page: a small recipe, the files that it shows, and models and photographs of a user."""
+    small = recipe_from_name("preview", {name: str(value) for name, value in SMALL.items()})
+    (folder / "small.toml").write_text(toml_from_recipe(small))
+    # A block under a sentence that names a file is that file.
+    for name, block in re.findall(r"`(mine\.\w+)`[^`]*?```\w*\n(.*?)^```", text, re.M | re.S):
+        (folder / name).write_text(block)
+    if not (folder / "mine.csv").exists():
+        (folder / "mine.csv").write_text("from,id,name\nchair,1,seat\nsofa,1,seat\nbed,2,bed\n")
+    for models in ("my_models", "my_objects"):
+        (folder / models).mkdir()
+        for name, size in (("mug", 0.1), ("carton", 0.14)):
+            edge = 1000 * size if models == "my_models" and "--unit mm" in text else size
+            trimesh.creation.box([edge, edge, 1.2 * edge]).export(folder / models / f"{name}.glb")
+    camera = {"fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "width": 64, "height": 48}
+    (folder / "camera.json").write_text(json.dumps({**camera, "depth_scale": 1.0}))
+    pose = np.diag([1.0, -1, -1, 1])
+    pose[:3, 3] = 1.5, 1.5, 2.0
+    row = {"world_from_camera_opencv": pose.tolist(), "K": [[40.0, 0, 32], [0, 40, 24], [0, 0, 1]]}
+    (folder / "cameras.json").write_text(json.dumps([{**row, "width_px": 64, "height_px": 48}]))
+    way = ("0.0 1.5 1.5 2.0 0 0 0 1", "0.5 1.6 1.5 2.0 0 0 0 1", "1.0 1.7 1.5 2.0 0 0 0 1")
+    (folder / "way.txt").write_text("\n".join(way) + "\n")
+    (folder / "my-photos").mkdir()
+    pixels = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
+    for path in (folder / "my-photos/one.jpg", folder / "kitchen.jpg"):
+        Image.fromarray(pixels).save(path)
+    shutil.copytree(REPO / "examples/plugins/layers", folder / "my_plugin")
