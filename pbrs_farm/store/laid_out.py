@@ -151,7 +151,7 @@ def _groups_of(at: keys.HouseKey) -> tuple[str, ...]:
         return ("light",)
     if at.file in ("view.json", "histogram.json") or at.file.startswith("mlt_"):
         return ("pictures",)
-    return ("labels", "pictures")  # plugins write layers and pictures of any name
+    return ("labels", "pictures", "light")  # plugins write layers and pictures of any name
 
 
 def _steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:

@@ -16,6 +16,8 @@ from pathlib import Path
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, StoreUnavailable
 from pbrs_farm.store import Head, Store, store_from_url
+from pbrs_farm.store.laid_out import LaidOutStore
+from pbrs_farm.store.object_store import put_done
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.job import JobSpec
@@ -27,8 +29,16 @@ def control_folder() -> Path:
 
 
 def runner(config: FarmConfig, on_waiting: OnText) -> FakeRunner:
-    store = UnhealthyStore(store_from_url(config.store_url, config.store), control_folder())
-    return FakeRunner(RetryingStore(store, config.storage_patience_s, on_waiting), control_folder())
+    store = store_from_url(config.store_url, config.store)
+
+    def with_patience(inner: Store) -> Store:
+        unhealthy = UnhealthyStore(inner, control_folder())
+        return RetryingStore(unhealthy, config.storage_patience_s, on_waiting)
+
+    # As the real runner's: patience lies below the layout.
+    is_laid_out = isinstance(store, LaidOutStore)
+    patient = store.around(with_patience) if is_laid_out else with_patience(store)
+    return FakeRunner(patient, control_folder())
 
 
 class UnhealthyStore:
@@ -131,8 +141,8 @@ class FakeRunner:
             return
         self._work()
         key = keys.view_key(house, view, f"{step}.png") if view else keys.house_key(house, step)
-        self._store.put(key, f"{house} {step} {view}".encode() * 10)
-        self._store.put_if_absent(marker, keys.digest(house, step, view).encode())
+        made = {key: f"{house} {step} {view}".encode() * 10}
+        put_done(self._store, marker, keys.digest(house, step, view).encode(), made)
 
     def _work(self) -> None:
         slow = self._control / "slow"

@@ -19,6 +19,7 @@ from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.object_store import LAYOUT
 from pbrs_farm.store.secret import Secret
 from tests.workers.fake_runner import FakeRunner, batches_of
 from tests.workers.redis_server import RedisServer
@@ -155,11 +156,11 @@ class SmallFarm:
         return Counter(path.read_text().splitlines() if path.exists() else ())
 
     def objects(self) -> dict[str, bytes]:
-        """What is stored, the farm's own jobs/ and the recipe apart."""
+        """What is stored, the farm's own jobs/, the recipe and the layout apart."""
         return {
             key: self.store.get(key)
             for key in self.store.list()
-            if not key.startswith("jobs/") and key != "recipe.json"
+            if not key.startswith("jobs/") and key not in ("recipe.json", LAYOUT)
         }
 
     def expected(self, *, without: tuple[str, ...] = ()) -> dict[str, bytes]:
@@ -186,7 +187,10 @@ class SmallFarm:
 
     def check_complete(self, *, n_repeats: int) -> int:
         """Nothing lost, nothing else there, at most n_repeats starts beyond the first; how many."""
-        assert self.objects() == self.expected()
+        there, wanted = self.objects(), self.expected()
+        missing, more = sorted(wanted.keys() - there.keys()), sorted(there.keys() - wanted.keys())
+        assert (missing, more) == ([], []), f"missing {missing}, too many {more}"
+        assert [key for key in wanted if there[key] != wanted[key]] == []
         view = self.farm.view(self.job)
         n_batches = sum(len(batches_of(h)) for h in self.houses)
         n_markers = Counter(

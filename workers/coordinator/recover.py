@@ -6,6 +6,7 @@ left a record are tried again.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -80,11 +81,13 @@ def done_steps(store: Store, houses: Sequence[str]) -> dict[str, frozenset[str]]
 def _names_of_house(store: LaidOutStore, house: str) -> frozenset[str]:
     # A manifest was made from the markers; where views are packed it spares a look into each pack.
     data = get_or_none(store, keys.house_key(house, keys.MANIFEST)) if store.is_packed else None
-    if data is None:
-        return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
-    rows = [json.loads(line) for line in data.splitlines()]
-    placed = [(row["step"], keys.parse_house_key(row["key"])) for row in rows]
-    return frozenset(keys.marker_name(step, at.view) for step, at in placed if at is not None)
+    # One that cannot be read is no reason to give a house up.
+    with contextlib.suppress(ValueError, KeyError, TypeError):
+        rows = [json.loads(line) for line in (data or b"").splitlines()]
+        placed = [(row["step"], keys.parse_house_key(row["key"])) for row in rows]
+        if placed:
+            return frozenset(keys.marker_name(step, at.view) for step, at in placed if at)
+    return _names_of_markers(store.list(keys.house_key(house, "done/"))).get(house, frozenset())
 
 
 def _names_of_markers(found: Iterable[str]) -> dict[str, frozenset[str]]:
