@@ -36,9 +36,9 @@ def runner(config: FarmConfig, on_waiting: OnText) -> FakeRunner:
         return RetryingStore(unhealthy, config.storage_patience_s, on_waiting)
 
     # As the real runner's: patience lies below the layout.
-    is_laid_out = isinstance(store, LaidOutStore)
-    patient = store.around(with_patience) if is_laid_out else with_patience(store)
-    return FakeRunner(patient, control_folder())
+    if isinstance(store, LaidOutStore):
+        return FakeRunner(store.around(with_patience), control_folder())
+    return FakeRunner(with_patience(store), control_folder())
 
 
 class UnhealthyStore:
