@@ -14,6 +14,7 @@ pytestmark = pytest.mark.skipif(
 MAX_LAUNCHES = 200
 
 
+@pytest.mark.slow
 def test_launches_are_as_many_as_reckoned_and_few(monkeypatch: pytest.MonkeyPatch) -> None:
     from benchmarks.light.launches import SIZE, counted, counts_of, reckoned, sunny_shade
     from pbrs_farm.transport.metropolis import metropolis_view

@@ -108,6 +108,7 @@ def one_floor(writer: GlbWriter, corners: list[list[float]]) -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 def test_a_suncg_house_notices_its_rooms_models_textures_and_tables(tmp_path: Path) -> None:
     house_id = suncg_root.write_root(tmp_path)
     folder = tmp_path / "house" / house_id

@@ -82,6 +82,7 @@ def test_homes_of_a_plugin_are_words(installed: dict[str, str], tmp_path: Path) 
     done(installed, tmp_path, "verify", "o")
 
 
+@pytest.mark.slow
 def test_a_reader_of_a_plugin_reads_its_files(installed: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "mine.room").write_text('{"width": 4, "depth": 3, "height": 2.5}')
     done(installed, tmp_path, "run", "mine.room", "--views", "1", "--out", "o", *FEW)
@@ -104,6 +105,7 @@ def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_pa
     assert "1 bed" in (tmp_path / "words/words.tsv").read_text()
 
 
+@pytest.mark.slow
 def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: Path) -> None:
     words = ["--dress", "3", "--catalogue", "generated", "--set", "dress.passes=red_chairs"]
     words += [
@@ -119,6 +121,7 @@ def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: P
     assert report["changed"]["red_chairs"] >= 2
 
 
+@pytest.mark.slow
 def test_pictures_of_a_plugin_stand_beside_the_modes(
     installed: dict[str, str], tmp_path: Path
 ) -> None:

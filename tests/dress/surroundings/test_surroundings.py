@@ -62,6 +62,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_one_another_place(home: H
     assert bits(1) != bits(2)
 
 
+@pytest.mark.slow
 def test_upper_storeys_look_down_and_houses_see_the_ground(home: House) -> None:
     def depths(house: House) -> set[float]:
         grounds = [

@@ -1,14 +1,19 @@
 """Procedural surfaces: they repeat without a seam, and equal patterns give equal pixels."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import WOODS
-from pbrs_farm.dress.textures.families import FAMILIES, Pattern, maps_of, pattern_material, size_of
+from pbrs_farm.dress.textures import families
+from pbrs_farm.dress.textures.families import FAMILIES, Pattern, pattern_material, size_of
 from pbrs_farm.dress.textures.maps import blurred, noise, normals_from_height
 from pbrs_farm.dress.textures.wallpaper import PATTERNS
 from tests.builders import builtin_home
+
+maps_of = cache(families.maps_of)  # each is painted once for the tests of this module
 
 GREEN = ((0.7, 0.75, 0.7), (0.5, 0.6, 0.5), (0.3, 0.5, 0.4))
 ALL = [
@@ -39,7 +44,7 @@ def test_the_size_of_a_pattern_is_known_before_it_is_painted(pattern: Pattern) -
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_equal_patterns_give_equal_pixels_and_other_seeds_others(family: str) -> None:
-    a, b, c = (maps_of(Pattern(family, s, GREEN, variant="20" if family == "tiles" else "stripes")) for s in (1, 1, 2))  # fmt: skip
+    a, b, c = (families.maps_of(Pattern(family, s, GREEN, variant="20" if family == "tiles" else "stripes")) for s in (1, 1, 2))  # fmt: skip
     assert np.array_equal(a.colour, b.colour)
     assert not np.array_equal(a.colour, c.colour)
 

@@ -132,7 +132,7 @@ def shaded_room() -> tuple[House, Camera]:
     [
         pytest.param(coated_room, 0.02, marks=pytest.mark.slow),
         (slot_room, 0.02),
-        (shaded_room, 0.08),
+        pytest.param(shaded_room, 0.08, marks=pytest.mark.slow),
     ],
 )
 def test_reconnected_suffixes_leave_the_mean_as_path_has_it(

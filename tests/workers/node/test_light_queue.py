@@ -90,6 +90,7 @@ def lit_by_the_queue(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return str(marker.facts["variant"])
 
 
+@pytest.mark.slow
 def test_a_worker_of_the_gpus_queue_renders_light_with_what_the_machine_has(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
