@@ -370,7 +370,7 @@ FORMS: Final[Mapping[str, Writer]] = {
 }
 
 # Forms that can tell a user's own classes; those of plugins may.
-_BY_CLASS: Final = ("coco", "hdf5", "webdataset", "yolo", "ply", "captions")
+_BY_CLASS: Final = ("coco", "hdf5", "webdataset", *_YOLO_FORMS, "ply", "captions")
 
 
 def known_forms() -> tuple[str, ...]:

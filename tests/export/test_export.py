@@ -244,6 +244,16 @@ def test_yolo_counts_the_users_classes_from_0_and_boxes_all(root, tmp_path, own)
     assert [int(line.split()[0]) for line in lines] == numbers
 
 
+def test_polygons_have_the_numbers_of_the_users_classes(root, tmp_path, own):
+    export(root, tmp_path / "seg", "yolo-seg", choice=own)
+    assert '  0: "rest"\n' in (tmp_path / "seg/data.yaml").read_text()
+    lines = next((tmp_path / "seg/labels").glob("*__v0.txt")).read_text().splitlines()
+    rows = json.loads((view_folder(root) / "view.json").read_text())["instances"]
+    assert len(lines) >= len(rows)
+    numbers = {{"wall": 2, "floor": 2, "bed": 0}.get(r["class"], 1) for r in rows}
+    assert {int(line.split()[0]) for line in lines} == numbers
+
+
 @pytest.mark.parametrize("size", [None, (64, 48)])
 def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
     choice = replace(own, size=size)
