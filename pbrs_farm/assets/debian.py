@@ -1,7 +1,8 @@
 """Debian packages as a source of data: downloaded once, through apt where it is, read without installing.
 
 Effects: runs `apt-get download` (no root; apt's signed index vouches for the file), or downloads the
-pinned file where apt is missing (its sha256 vouches for it), and keeps packages in a cache folder. Nothing of a package is committed or shipped.
+pinned file where apt is missing or has no package lists (its sha256 vouches for it), and keeps packages
+in a cache folder. Nothing of a package is committed or shipped.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed
 
-# Debian's packages as pinned files, for machines without apt: place, size and sha256. Effects:
+# Debian's packages as pinned files, for machines where apt gives none: place, size and sha256. Effects:
 # downloads.
 # The sums are those of Debian 12's signed index. The pool drops a file when Debian replaces it;
 # then a mirror that keeps it ($PBRS_DEBIAN_MIRROR) or the file itself, put into the cache, will
@@ -101,7 +102,7 @@ def download_pinned(pin: Pin, folder: Path) -> Path:
 
 def _hint(pin: Pin) -> str:
     return (
-        f"no apt-get here: get {pin.file_name} and put it into $PBRS_CACHE or ~/.cache/pbrs_farm,"
+        f"get {pin.file_name} and put it into $PBRS_CACHE or ~/.cache/pbrs_farm,"
         " or name a mirror in PBRS_DEBIAN_MIRROR"
     )
 
@@ -152,7 +153,7 @@ def cached_deb(package: str, tested_version: str, folder: Path | None = None) ->
 
 
 def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb:
-    """The package from the cache, else downloaded: through apt, or as the pinned file without apt.
+    """The package from the cache, else downloaded: through apt, else as the pinned file.
 
     Raises MachineFailed, with what to do, where neither can give it.
     """
@@ -169,19 +170,33 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
     folder.mkdir(parents=True, exist_ok=True)
     # Download beside the cache, then move: a package is there whole or not at all.
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        if shutil.which("apt-get") is None and package in PINS:
-            download_pinned(PINS[package], Path(scratch))
-        elif shutil.which("apt-get") is None:
-            hint = f"put Debian's {package}_{tested_version}_all.deb into {folder}"
-            raise MachineFailed(f"no apt-get here to fetch {package}", hint=hint)
-        else:
-            _download(package, Path(scratch))
+        _fetch(package, tested_version, Path(scratch))
         debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
         if not debs:
-            raise MachineFailed(f"apt-get download {package} left no file", hint=_HINT)
+            raise MachineFailed(f"no file of {package} came", hint=_HINT)
         target = folder / debs[0].name
         debs[0].replace(target)
     return _deb(package, tested_version, target)
+
+
+def _fetch(package: str, tested_version: str, scratch: Path) -> None:
+    """Through apt; where apt is missing, or refuses as it does without its lists, the pinned file."""
+    has_apt = shutil.which("apt-get") is not None
+    if not has_apt and package not in PINS:
+        hint = f"put Debian's {package}_{tested_version}_all.deb into the cache folder"
+        raise MachineFailed(f"no apt-get here to fetch {package}", hint=hint)
+    if not has_apt:
+        download_pinned(PINS[package], scratch)
+        return
+    try:
+        _download(package, scratch)
+    except MachineFailed as refused:
+        if package not in PINS:
+            raise
+        try:
+            download_pinned(PINS[package], scratch)
+        except MachineFailed as failed:
+            raise MachineFailed(f"{refused}; {failed}", hint=_HINT) from None
 
 
 def _deb(package: str, tested_version: str, path: Path) -> Deb:

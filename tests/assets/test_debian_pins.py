@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import subprocess
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -76,6 +77,20 @@ def test_a_mirror_without_it_says_what_to_do(mirror: dict[str, bytes], tmp_path:
     assert mirror == {}
     with pytest.raises(MachineFailed, match=r"404.*put it into.*PBRS_DEBIAN_MIRROR"):
         download_pinned(PIN, tmp_path)
+
+
+def test_where_apt_has_no_lists_the_pinned_file_is_fetched(
+    mirror: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess([], 100, "", "E: Unable to locate package sweethome3d\n")
+
+    monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/apt-get")
+    monkeypatch.setattr("subprocess.run", refuse)
+    with pytest.raises(MachineFailed, match=r"Unable to locate.*404.*apt-get update"):
+        fetched_deb(PIN.package, "1.0", tmp_path)
+    mirror[f"/debian/{PIN.path}"] = DATA
+    assert fetched_deb(PIN.package, "1.0", tmp_path).sha256 == PIN.sha256
 
 
 def test_what_is_pinned_is_what_is_tested() -> None:

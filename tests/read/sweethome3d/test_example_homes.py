@@ -139,6 +139,7 @@ def test_without_apt_lists_the_command_to_type_is_named(
 
     monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/apt-get")
     monkeypatch.setattr("subprocess.run", refuse)
+    monkeypatch.setenv("PBRS_DEBIAN_MIRROR", "http://127.0.0.1:1")
     with pytest.raises(MachineFailed, match=r"Unable to locate.*apt-get update"):
         homes_package.fetch(tmp_path)
 
