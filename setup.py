@@ -16,6 +16,7 @@ import tarfile
 from pathlib import Path
 
 from setuptools import find_namespace_packages, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
 
@@ -64,9 +65,21 @@ class BuildPy(build_py):
         for path in Path(self.build_lib).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             path.write_text(renamed(text, modules), encoding="utf-8")
-        # A mask of the machine's is no part of what is built.
-        for path in Path(self.build_lib).rglob("*"):
-            path.chmod(0o755 if path.is_dir() else 0o644)
+        unmask(Path(self.build_lib))
+
+
+def unmask(folder: Path) -> None:
+    """Give what is in a folder the same rights everywhere: a machine's mask is no part of what is built."""
+    for path in folder.rglob("*"):
+        path.chmod(0o755 if path.is_dir() else 0o644)
+
+
+class Wheel(bdist_wheel):
+    """Packs the wheel; its own description has no mask either."""
+
+    def write_wheelfile(self, wheelfile_base: str, *words: object, **named: object) -> None:
+        super().write_wheelfile(wheelfile_base, *words, **named)
+        unmask(Path(wheelfile_base))
 
 
 class SameBytes(sdist):
@@ -105,7 +118,7 @@ if __name__ == "__main__":
     setup(
         packages=packages,
         package_dir=package_dir,
-        cmdclass={"build_py": BuildPy, "sdist": SameBytes},
+        cmdclass={"bdist_wheel": Wheel, "build_py": BuildPy, "sdist": SameBytes},
         long_description=index_text((HERE / "README.md").read_text(encoding="utf-8")),
         long_description_content_type="text/markdown",
     )
