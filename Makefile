@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm dist docs format clean
+.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm dist image docs format clean
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -106,6 +106,9 @@ dist: setup ## sdist and wheel into dist/, dated as the last commit: a second bu
 	rm -rf dist
 	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build
 	$(BIN)/python -m twine check --strict dist/*
+
+image: setup ## the Docker image (TARGET=gpu for the other): version from git, base by digest, SBOM in out/image
+	@bash scripts/image.sh
 
 docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
 	@$(BIN)/python -c "import mkdocstrings, material" 2>/dev/null || $(BIN)/pip install -q -e ".[docs]"
