@@ -109,7 +109,7 @@ def test_the_compose_files_are_valid(words: list[str]) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("folder", ["base", "overlays/small", "overlays/gpu"])
+@pytest.mark.parametrize("folder", ["base", "overlays/small", "overlays/gpu", "overlays/site"])
 def test_the_kustomizations_build(folder: str) -> None:
     if shutil.which("kubectl") is None:
         pytest.skip("no kubectl")
