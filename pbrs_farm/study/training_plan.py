@@ -44,6 +44,7 @@ class TrainingPlan:
     clip_norm: float = 1.0  # longest gradient, 0 = any
     schedule: str = "one_cycle"  # one_cycle, steps, constant
     warm_up: float = 0.15  # of one_cycle: share of the steps in which the rate rises
+    average: float = 0.0  # share of a running mean of weights that a step keeps, 0 = no mean
     rate_factor: float = 0.5  # of steps: the rate times this ...
     rate_every: int = 300_000  # ... each time so many steps are done
     released_rates: bool = False  # HED's rates of conv5, sides and fuse against the rest's
@@ -92,6 +93,8 @@ class TrainingPlan:
                 f"{self.width_px}x{self.height_px}: network residual wants a side above 32 pixels"
             )
             raise BadInput("plan", "width_px, height_px", text)
+        if not 0 <= self.average < 1:
+            raise BadInput("plan", "average", f"expected 0 to below 1, got {self.average}")
         if self.memory_gb < 0:
             raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")
         for name, choices in _CHOICES.items():
@@ -105,6 +108,8 @@ _FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views
 
 _CHOICES: Final = {
     "task": TASKS,
+# Fields that came later and change nothing at 0: left out there, so that runs of before go on.
+_LATER: Final = ("hue", "average")
     "encoding": ("centred", "caffe", "imagenet"),
     "optimiser": ("adamw", "rmsprop", "sgd"),
     "schedule": ("one_cycle", "steps", "constant"),
@@ -213,9 +218,11 @@ def plan_as_json(plan: TrainingPlan) -> dict[str, Any]:
 
 def plan_as_trained(plan: TrainingPlan) -> dict[str, Any]:
     """Every field that weights or figures depend on: what a run that goes on must share."""
-    row = {name: value for name, value in asdict(plan).items() if name not in _FREE}
-    # A field that came later is left out where it changes nothing: runs of before go on.
-    return row if plan.hue else {name: value for name, value in row.items() if name != "hue"}
+    return {
+        name: value
+        for name, value in asdict(plan).items()
+        if name not in _FREE and (value or name not in _LATER)
+    }
 
 
 def plan_from_json(row: dict[str, Any], file: str) -> TrainingPlan:

@@ -52,10 +52,13 @@ class Position:
 
 
 def save_checkpoint(
-    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, position: Position
-) -> None:
-    """Write all that a training needs to go on to the same weights."""
+    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, position: Position,
+    average: nn.Module | None = None,
+) -> None:  # fmt: skip
+    """Write all that a training needs to go on to the same weights; average: their running mean."""
     tensors = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
+    if average is not None:
+        tensors |= {f"average.{name}": tensor for name, tensor in average.state_dict().items()}
     for number, state in optimiser.state_dict()["state"].items():
         for key, value in state.items():
             if value is not None:
@@ -71,14 +74,18 @@ def save_weights(path: Path, network: nn.Module, position: Position) -> None:
 
 
 def load_checkpoint(
-    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer | None = None
-) -> Position:
-    """Take the state from a file into the network and, where given, the optimiser and torch's generator.
+    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer | None = None,
+    average: nn.Module | None = None,
+) -> Position:  # fmt: skip
+    """Take the state from a file into the network and, where given, the optimiser (with torch's
+    generator) and the running mean.
 
     Raises BadInput where the file is damaged or of another network.
     """
     tensors, position = read_tensors(path)
     _into(network, _below(tensors, "model."), path)
+    if average is not None:
+        _into(average, _below(tensors, "average."), path)
     if optimiser is not None:
         state: dict[int, dict[str, Tensor]] = {}
         for name, tensor in _below(tensors, "optimiser.").items():

@@ -17,6 +17,7 @@ from typing import Any, Final
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
+from torch.optim.swa_utils import AveragedModel
 
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.study.networks.vgg import RATE_OF_FUSE, RATE_OF_SIDES, RATE_OF_STAGE_5, EdgeHed
@@ -207,6 +208,23 @@ def _released_groups(network: nn.Module, plan: TrainingPlan) -> list[dict[str, A
     return groups
 
 
+def running_mean(network: nn.Module, plan: TrainingPlan) -> AveragedModel | None:
+    """The exponential mean over steps of weights and of what normalisation knows; None without one.
+
+    A step keeps plan.average of it, and less in the first steps ((1 + n) / (10 + n) after n of them),
+    so that random first weights are soon forgotten.
+    """
+    if not plan.average:
+        return None
+
+    def mean(older: Tensor, newer: Tensor, n_averaged: Tensor | int) -> Tensor:
+        n = int(n_averaged)
+        kept = min(plan.average, (1 + n) / (10 + n))
+        return kept * older + (1 - kept) * newer
+
+    return AveragedModel(network, avg_fn=mean, use_buffers=True)
+
+
 # The training loop.
 
 
@@ -251,8 +269,10 @@ def train_network(
 ) -> nn.Module:  # fmt: skip
     """Train from the folder's checkpoint, or from the network's own weights; writes weights last.
 
-    judge: asked each plan.judge_every steps; what it says becomes a row of the metrics. stop_on: the
-    name of one of its errors; the weights are then those of the step where it was least. Raises
+    observe: hears each row of the metrics. judge: asked each plan.judge_every steps; what it says
+    becomes such a row. stop_on: the
+    name of one of its errors; the weights are then those of the step where it was least. With
+    plan.average the running mean of the weights is judged, written and given back. Raises
     LossFailed, naming the view, when the loss is no number; BadInput when the checkpoint is of
     something else.
     """
@@ -262,7 +282,9 @@ def train_network(
     optimiser = optimiser_of(network, plan)
     # What a checkpoint must agree with to be gone on from.
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
-    first = _resumed(folder, network, optimiser, where)
+    average = running_mean(network, plan)
+    first = _resumed(folder, network, optimiser, where, average)
+    told: nn.Module = network if average is None else average.module
     if share.is_first:
         # Rows of steps after the checkpoint go: these steps are run again.
         folder.keep_metrics_until(first)
@@ -276,6 +298,8 @@ def train_network(
     for step, read in zip(steps, views.batches(steps, plan, seed, own), strict=True):
         loss_sum, n_summed = loss_sum + loop.step(step, read), n_summed + 1
         done = step + 1
+        if average is not None and done % plan.accumulate == 0:
+            average.update_parameters(network)
         if not share.is_first:
             continue
         if done % plan.log_every == 0 or done == plan.steps:
@@ -285,18 +309,19 @@ def train_network(
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
         if _is_judged(plan, done, stop_on):
             judging = time.monotonic()
-            errors, least = judge(network), folder.least(stop_on)
+            errors, least = judge(told), folder.least(stop_on)
             folder.add_metrics({"step": done} | errors)
+            observe({"step": done} | errors)
             if stop_on and (errors[stop_on] < least or least == inf):
-                save_weights(folder.best, network, _at(where, done))
+                save_weights(folder.best, told, _at(where, done))
             started += time.monotonic() - judging
         # A checkpoint holds no gradients, so it waits until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
-            save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done))
+            save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done), average)
     if share.is_first:
-        best = load_checkpoint(folder.best, network) if stop_on else _at(where, plan.steps)
-        save_weights(folder.weights, network, best)
-    return network
+        best = load_checkpoint(folder.best, told) if stop_on else _at(where, plan.steps)
+        save_weights(folder.weights, told, best)
+    return told
 
 
 def _is_judged(plan: TrainingPlan, done: int, stop_on: str) -> bool:
@@ -341,12 +366,13 @@ def _at(position: Position, step: int) -> Position:
 
 
 def _resumed(
-    folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, where: Position
-) -> int:
+    folder: RunFolder, network: nn.Module, optimiser: torch.optim.Optimizer, where: Position,
+    average: nn.Module | None,
+) -> int:  # fmt: skip
     """Take up the checkpoint, if there is one; the number of steps that are done. Writes nothing."""
     if not folder.checkpoint.exists():
         return 0
-    position = load_checkpoint(folder.checkpoint, network, optimiser)
+    position = load_checkpoint(folder.checkpoint, network, optimiser, average)
     if _at(position, 0) != where:
         raise BadInput(folder.checkpoint, "", "a checkpoint of another task, plan, seed or views")
     return position.step

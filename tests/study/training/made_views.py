@@ -28,6 +28,11 @@ def small_plan(task: str = "normals", **changed: str) -> TrainingPlan:
     return plan_of(task, "tiny", SMALL | changed)
 
 
+def killed_plan(word: str) -> TrainingPlan:
+    """The plan of a run that a test kills: of a task, or of normals with a running mean."""
+    return small_plan(average="0.9") if word == "mean" else small_plan(word)
+
+
 def sample(number: int, size: tuple[int, int] = (40, 32)) -> Sample:
     """A box of three walls whose corner lies elsewhere in each view."""
     width, height = size

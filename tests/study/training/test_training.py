@@ -20,21 +20,21 @@ from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_loop import LossFailed, seconds_a_step
 from pbrs_farm.study.training.training_views import BatchOrder
 from pbrs_farm.study.training_plan import plan_of
-from tests.study.training.made_views import small_plan, views
+from tests.study.training.made_views import killed_plan, small_plan, views
 
 pytestmark = pytest.mark.study
 
 _KILLED = """
 import os, signal, sys
 from pathlib import Path
-from tests.study.training.made_views import small_plan, views
+from tests.study.training.made_views import killed_plan, views
 from pbrs_farm.study.training.training_job import Job, train
 
 def killed(row):
     if row["step"] == 5:
         os.kill(os.getpid(), signal.SIGKILL)
 
-plan = small_plan(sys.argv[2])
+plan = killed_plan(sys.argv[2])
 train(Job(plan, Path(sys.argv[1]), seed=3), views(5, plan), observe=killed)
 """
 
@@ -51,9 +51,9 @@ train(Job(plan, Path(sys.argv[1])), views(3, plan), views(2, plan))
 """
 
 
-@pytest.mark.parametrize("task", ["normals", "boundaries"])
+@pytest.mark.parametrize("task", ["normals", "boundaries", "mean"])
 def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> None:
-    plan = small_plan(task)
+    plan = killed_plan(task)
     train(Job(plan, tmp_path / "whole", seed=3), views(5, plan))
     words = [sys.executable, "-c", _KILLED, str(tmp_path / "killed"), task]
     died = subprocess.run(words, capture_output=True, text=True, timeout=120)
@@ -89,6 +89,28 @@ def test_the_weights_are_those_that_the_judge_who_chooses_liked_best(tmp_path: P
     other = small_plan(steps="4", judge_every="2")
     with pytest.raises(BadInput, match="another stop_on"):
         train(Job(other, tmp_path, stop_on="on_rooms"), views(3, other), also=also)
+
+
+def test_a_running_mean_of_weights_is_judged_kept_and_gone_on_with(tmp_path: Path) -> None:
+    plan = small_plan(steps="4", average="0.5", judge_every="1", checkpoint_every="3")
+    told: list[dict[str, torch.Tensor]] = []
+
+    def also(network: torch.nn.Module) -> dict[str, float]:
+        told.append({name: x.clone() for name, x in network.state_dict().items()})
+        return {}
+
+    train(Job(plan, tmp_path / "mean"), views(3, plan), also=also)
+    plain = small_plan(steps="4", judge_every="1", checkpoint_every="3")
+    means, told = told, []
+    train(Job(plain, tmp_path / "plain"), views(3, plain), also=also)
+    kept = [0.0, 2 / 11, 3 / 12, 4 / 13]  # (1 + n) / (10 + n), all below a half
+    for name in ("head.weight", "stem.first.1.running_var"):
+        mean = torch.zeros_like(told[0][name])
+        for share, step, found in zip(kept, told, means, strict=True):
+            mean = share * mean + (1 - share) * step[name]
+            torch.testing.assert_close(found[name], mean)
+    saved, _ = read_tensors(RunFolder(tmp_path / "mean").weights)
+    assert all(torch.equal(saved[f"model.{name}"], x) for name, x in means[-1].items())
 
 
 @pytest.mark.parametrize("slow", ["float32", "bfloat16"])
@@ -227,7 +249,15 @@ def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
     plan = small_plan(steps="2", hue="0")
     first = train(Job(plan, tmp_path), views(3, plan))
     record = RunFolder(tmp_path).record()
-    for name in ("hue", "workers", "memory_gb", "judge_every", "judge_views", "final_views"):
+    for name in (
+        "hue",
+        "average",
+        "workers",
+        "memory_gb",
+        "judge_every",
+        "judge_views",
+        "final_views",
+    ):
         del record["plan"][name]
     RunFolder(tmp_path).write("run.json", record)
     assert train(Job(plan, tmp_path), views(3, plan))["network"] == first["network"]
