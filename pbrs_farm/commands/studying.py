@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from pbrs_farm.study.training.view_sources import TrainingSource
     from pbrs_farm.study.training_plan import TrainingPlan
 
-TASKS = ("normals", "segmentation", "boundaries")
+TASKS = ("normals", "segmentation", "boundaries", "depth")
+LOGGERS = ("tensorboard", "wandb")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
 
 
@@ -47,6 +48,8 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
     text = "the name of an --on whose least error chooses the step that the weights are of"
     p.add_argument("--stop-on", default="", metavar="NAME", help=text)
+    text = "where curves are shown beside metrics.jsonl: tensorboard, wandb (extras of these names)"
+    p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
     export = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; of a finished run, too"
     p.add_argument("--export", choices=("onnx", "weights"), help=export)
 
@@ -132,6 +135,7 @@ def _need_torch() -> None:
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.judged_places import judge_of_places, judged_place
+    from pbrs_farm.study.training.loggers import loggers
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.training_views import ViewArrays
@@ -141,6 +145,7 @@ def _train(args: argparse.Namespace) -> int:
         left_out,
         training_views,
     )
+    from pbrs_farm.study.training_plan import plan_as_json
 
     plan, source = _plan(args, args.task), _source(args)
     device_of(plan)  # before views are read
@@ -170,11 +175,16 @@ def _train(args: argparse.Namespace) -> int:
     # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
 
-    def tell(row: dict[str, float]) -> None:
-        if row["step"] % every == 0 or row["step"] == plan.steps:
-            echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
+    with loggers(args.log, args.out, plan_as_json(plan)) as log:
 
-    if train(job, views, held_out, tell, judge_of_places(judged_on, plan)):
+        def tell(row: dict[str, float]) -> None:
+            log(row)
+            is_told = row["step"] % every == 0 or row["step"] == plan.steps
+            if is_told and "loss" in row:
+                echo(f"step {row['step']:>7,} loss {row['loss']:.4f} {row['views_s']:.1f} views/s")
+
+        figures = train(job, views, held_out, tell, judge_of_places(judged_on, plan))
+    if figures:
         _print_run(args.out)
         if args.export:
             _EXPORTS[args.export](args.out)
