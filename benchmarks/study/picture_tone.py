@@ -1,10 +1,15 @@
 """How near our pictures' tones and detail are to photographs of rooms. Effects: renders below out/tone, writes out/bench/tone.json.
 
 Views of made homes that nobody looked at while the tones were set, 160x120, recipe fast.
+
+    python -m benchmarks.study.picture_tone             those homes
+    python -m benchmarks.study.picture_tone ROOT...     finished views of other output folders
 """
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +19,8 @@ from scipy import ndimage
 import pbrs_farm.cli
 from benchmarks.figures import write_report
 from pbrs_farm.core.arrays import F64, Srgb8Image
-from pbrs_farm.formats.layer_file import layer_from_bytes
+from pbrs_farm.study.reading.open_views import open_views
+from pbrs_farm.study.reading.views import Frame
 
 HOMES: Final = "made:60041..60046"
 N_VIEWS: Final = 5  # of each
@@ -37,19 +43,12 @@ UNITS: Final = {
 }
 
 
-def main() -> None:
+def main(places: Sequence[str] = ()) -> None:
     """Render what is not there yet, measure, write the figures."""
-    words = ["--dress", "1", "--size", "160x120", "--views", str(N_VIEWS), "--modes", "mlt_il_ol"]
-    words += ["--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120"]
-    code = pbrs_farm.cli.main(["run", HOMES, *words, "--layers", "normal_world", "--out", str(OUT)])
-    if code:
-        raise RuntimeError("some views failed")
-    views = sorted(OUT.glob("houses/*/views/*/mlt_il_ol.png"))
-    rows = np.array([picture_row(_layer("mlt_il_ol", path)) for path in views])
+    views = [frame for place in places or [_rendered()] for frame in open_views(place)]
+    rows = np.array([picture_row(frame.picture("mlt_il_ol")) for frame in views])
     spread, dark, light, chroma, detail = rows.mean(axis=0).tolist()
-    slanted = [
-        slanted_share(_layer("normal_world", p.with_name("normal_world.exr"))) for p in views
-    ]
+    slanted = [slanted_share(_world_normals(frame)) for frame in views]
     ours = {"spread": spread, "dark": dark, "light": light, "chroma": chroma}
     gaps = {name: abs(ours[name] / told - 1) for name, told in PHOTOGRAPHS.items()}
     figures = {f"study.{name}": round(value, 4) for name, value in ours.items()}
@@ -62,6 +61,14 @@ def main() -> None:
         "study.views": len(views),
     }
     write_report("tone", figures, UNITS)
+
+
+def _rendered() -> str:
+    words = ["--dress", "1", "--size", "160x120", "--views", str(N_VIEWS), "--modes", "mlt_il_ol"]
+    words += ["--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120"]
+    if pbrs_farm.cli.main(["run", HOMES, *words, "--out", str(OUT)]):
+        raise RuntimeError("some views failed")
+    return str(OUT)
 
 
 def picture_row(picture: Srgb8Image) -> F64:
@@ -80,9 +87,10 @@ def slanted_share(normals: F64) -> float:
     return float(((angle > 15) & (angle < 75) & is_hit).mean())
 
 
-def _layer(name: str, path: Path) -> Srgb8Image:
-    return np.asarray(layer_from_bytes(name, path.read_bytes(), str(path)))
+def _world_normals(frame: Frame) -> F64:
+    """(H, W, 3) y up; 0 where nothing is hit."""
+    return np.asarray(frame.normal @ frame.world_from_camera_opencv[:3, :3].T)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
