@@ -275,7 +275,7 @@ def _with_column(
     from pbrs_farm.study.judging.evaluation import with_others
     from pbrs_farm.study.judging.others_predictions import predictions_in
 
-    found = [predictions_in(others, one.views, run.task.name) for one in evaluations]
+    found = [predictions_in(others, one.views, run.plan) for one in evaluations]
     if not any(each is not None for each in found):
         text = "holds no prediction of any view that is judged"
         raise BadInput(others.folder, "", text, hint="--on names what is judged")

@@ -20,6 +20,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.curate.photographs import NyuMat, Photo
 from pbrs_farm.study.tasks.study_task import Arrays
+from pbrs_farm.study.tasks.tasks import classes_of
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.truth.boundary import instance_boundary
@@ -126,13 +127,15 @@ PLANE_TRUTH: Final = (
 )
 
 
-def normals_of_photo(photo: Photo, K: F64) -> tuple[F32, Mask]:
-    """Normals and mask of a photograph's depth."""
-    return normals_of_depth(photo.depth_mm / np.float64(1000), K)
+DEPTH_TRUTH: Final = "the photograph's own depth along the axis, where it has one"
 
 
-def normal_truth(normal: F32, valid: Mask) -> Arrays:
-    """In the form of NormalsTask's targets."""
+def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
+    """What a photograph's depth says, at its own size, in the form of the task's targets."""
+    depth_m = photo.depth_mm / np.float64(1000)
+    if plan.task == "depth":
+        return {"depth": depth_m.astype(np.float32)}
+    normal, valid = normals_of_depth(depth_m, K)
     return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid}
 
 
@@ -155,7 +158,8 @@ _K: Final = np.array([[518.85790, 0, 325.58245], [0, 519.46961, 253.73617], [0, 
 _CROP: Final = (slice(44, 471), slice(40, 601))  # Eigen's rows and columns
 NYU_TRUTHS: Final = {
     "normals": PLANE_TRUTH,
-    "segmentation": "40 classes by classMapping40.mat, where labelled",
+    "depth": DEPTH_TRUTH,
+    "segmentation": "classes by classMapping40.mat, where labelled",
     "boundaries": "lines where the instance changes; matched within 0.011 of the diagonal",
 }
 
@@ -212,13 +216,13 @@ def _truth(
     path: Path, at: int, photo: Photo, plan: TrainingPlan, classes: NDArray[np.uint8]
 ) -> Arrays:
     """A whole picture's truth in the form of the task's targets."""
-    if plan.task == "normals":
-        return normal_truth(*normals_of_photo(photo, _K))
+    if plan.task in ("normals", "depth"):
+        return photo_truth(photo, _K, plan)
     labels = _row(path, "labels", at)
     if plan.task == "segmentation":
         if int(labels.max(initial=0)) >= len(classes):
             raise BadInput(path, f"image {at + 1}", f"label {labels.max()} is beyond the class map")
-        return {"labels": classes[labels]}
+        return {"labels": classes_of(classes[labels], plan)}
     # An instance is a number within its class.
     instance = labels.astype(np.int64) * 1000 + _row(path, "instances", at)
     return {"edges": instance_boundary(instance) > 0}

@@ -12,7 +12,7 @@ from typing import Any, Final, get_type_hints
 
 from pbrs_farm.core.errors import BadInput
 
-TASKS: Final = ("normals", "segmentation", "boundaries")
+TASKS: Final = ("normals", "segmentation", "boundaries", "depth")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class TrainingPlan:
     # Pictures
     width_px: int = 160
     height_px: int = 120
-    n_classes: int = 40
+    n_classes: int = 40  # of segmentation: 40 as they are, 13 = NYU13
     enlarge: int = 1  # pictures times this before the network, its maps back after it
     encoding: str = (
         "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet
@@ -97,6 +97,9 @@ class TrainingPlan:
             raise BadInput("plan", "average", f"expected 0 to below 1, got {self.average}")
         if self.memory_gb < 0:
             raise BadInput("plan", "memory_gb", f"expected 0 or more, got {self.memory_gb}")
+        if self.task == "depth" and self.turn_deg:
+            text = "depth along the axis is another one where the camera turns: 0 alone"
+            raise BadInput("plan", "turn_deg", text)
         for name, choices in _CHOICES.items():
             if getattr(self, name) not in choices:
                 text = f"expected one of {', '.join(choices)}, got {getattr(self, name)}"
@@ -105,11 +108,11 @@ class TrainingPlan:
 
 # Fields that change neither weights nor figures: a run may go on with others.
 _FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views")
+# Fields that came later and change nothing at 0: left out there, so that runs of before go on.
+_LATER: Final = ("hue", "average")
 
 _CHOICES: Final = {
     "task": TASKS,
-# Fields that came later and change nothing at 0: left out there, so that runs of before go on.
-_LATER: Final = ("hue", "average")
     "encoding": ("centred", "caffe", "imagenet"),
     "optimiser": ("adamw", "rmsprop", "sgd"),
     "schedule": ("one_cycle", "steps", "constant"),
@@ -159,11 +162,12 @@ _TINY_EDGES = TrainingPlan(
     "tiny", "boundaries", "hed_tiny", steps=800, rate=2e-3, encoding="caffe", noise=0.01,
     judge_every=200, **_EDGE_JUDGING,
 )  # fmt: skip
+_TINY_DEPTH = replace(_TINY_NORMALS, task="depth", steps=2000, turn_deg=0.0, judge_every=200)
 
 PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     (plan.name, plan.task): plan
     for plan in (
-        _TINY_NORMALS, _TINY_CLASSES, _TINY_EDGES,
+        _TINY_NORMALS, _TINY_CLASSES, _TINY_EDGES, _TINY_DEPTH,
         _PAPER_NORMALS, _PAPER_CLASSES, _PAPER_EDGES,
         # The released code divides by 5 every 150 k steps.
         replace(_PAPER_NORMALS, name="released", rate_factor=0.2, rate_every=150_000),

@@ -97,8 +97,14 @@ def _card(
     }
     height, width = views.colour[k].shape[:2]
     urls = {name: _url(_fitted(name, picture, width, height)) for name, picture in pictures.items()}
-    said = f"{error:.1f} degrees" if task.name == "normals" else f"{100 * error:.0f} % wrong"
+    said = (
+        f"{error:.1f} degrees" if task.name == "normals" else f"{100 * error:.0f} % {_wrong(task)}"
+    )
     return {"id": shown(views.ids[k], MAX_PLACE), "error": said, "pictures": urls}
+
+
+def _wrong(task: StudyTask) -> str:
+    return "spread of depth" if task.name == "depth" else "wrong"
 
 
 def _fitted(name: str, picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
@@ -115,6 +121,10 @@ def _error_picture(task: StudyTask, prediction: NDArray[Any], truth: Arrays) -> 
         known = truth["valid"]
     elif task.name == "segmentation":
         errors, known = (prediction != truth["labels"]).astype(np.float64), truth["labels"] > 0
+    elif task.name == "depth":
+        known = truth["depth"] > 0
+        ratio = np.log(np.maximum(prediction, 1e-6) / np.where(known, truth["depth"], 1))
+        errors = np.abs(ratio) / np.log(2)  # twice or half as far is white
     else:
         # Missed edges and invented ones alike.
         errors = np.abs(prediction - truth["edges"])

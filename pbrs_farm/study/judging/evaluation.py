@@ -34,12 +34,15 @@ from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
 UNDERFIT: Final = 0.8  # training error above this share of the baseline's: nothing may be ranked
 
+_UNITS: Final = ("_deg", "_m")  # that names of figures end with; others are shares
 _TITLES: Final = {
     "mean_deg": "mean, degrees", "median_deg": "median, degrees",
     "rms_deg": "RMS, degrees", "below_5": "< 5", "below_7_5": "< 7.5",
     "below_11_25": "< 11.25", "below_22_5": "< 22.5", "below_30": "< 30",
     "mean_iou": "mean IoU", "pixel_accuracy": "pixel accuracy",
     "mean_accuracy": "mean accuracy", "weighted_iou": "f.w. IoU",
+    "scale_invariant": "scale-invariant", "abs_rel": "absolute relative",
+    "below_1_25": "ratio < 1.25", "rms_m": "RMS, metres",
     "ods": "ODS", "ois": "OIS", "ap": "AP", "r50": "R50",
 }  # fmt: skip
 
@@ -50,10 +53,10 @@ def title_of(figure: str) -> str:
 
 
 def shown_figure(figure: str, value: float) -> str:
-    """Degrees with two places, shares as per cent with one; "-" for none."""
+    """Degrees and metres with two places, shares as per cent with one; "-" for none."""
     if not math.isfinite(value):
         return "-"
-    return f"{value:.2f}" if figure.endswith("_deg") else f"{100 * value:.1f} %"
+    return f"{value:.2f}" if figure.endswith(_UNITS) else f"{100 * value:.1f} %"
 
 
 def spread_text(figure: str, values: Sequence[float]) -> str:
@@ -61,7 +64,7 @@ def spread_text(figure: str, values: Sequence[float]) -> str:
     mean = shown_figure(figure, statistics.fmean(values))
     if len(values) < 2:
         return mean
-    scale = 1 if figure.endswith("_deg") else 100
+    scale = 1 if figure.endswith(_UNITS) else 100
     return f"{mean} ± {scale * statistics.stdev(values):.2f}"
 
 
@@ -124,6 +127,7 @@ PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
     ),
 }
 
+_PAPER_CLASSES: Final = 40  # of segmentation
 # Lighting mode -> its name in the paper.
 _NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "OpenGL-IL",
                  "opengl_dl": "OpenGL-DL"}  # fmt: skip
@@ -333,15 +337,22 @@ def table(run: Trained, evaluations: list[Evaluation]) -> str:
     rows = []
     for k, figure in enumerate(run.task.figures):
         cells = [shown_figure(figure, figures[figure]) for _, figures in columns]
-        known = shown_figure(figure, paper.figures[k]) if k < len(paper.figures) else "-"
-        rows.append([title_of(figure), *cells, known])
-    tuned = f", then {paper.tuned}" if paper.tuned else ""
-    said = f"paper: {paper.pretrained}{tuned}, on NYUv2"
-    return markdown(["", *(title for title, _ in columns), said], rows)
+        known = shown_figure(figure, paper.figures[k]) if paper and k < len(paper.figures) else "-"
+        rows.append([title_of(figure), *cells, *([known] if paper else [])])
+    titles = ["", *(title for title, _ in columns)]
+    if paper:
+        tuned = f", then {paper.tuned}" if paper.tuned else ""
+        titles.append(f"paper: {paper.pretrained}{tuned}, on NYUv2")
+    return markdown(titles, rows)
 
 
-def _paper(run: Trained) -> PaperRow:
-    """The paper's row beside this run: of its light, or of the light it was tuned from."""
+def _paper(run: Trained) -> PaperRow | None:
+    """The paper's row beside this run: of its light, or of the light it was tuned from.
+
+    None where the paper says nothing: of depth, and of other classes than NYU40.
+    """
+    if run.task.name not in PAPER or run.plan.n_classes != _PAPER_CLASSES:
+        return None
     mode = str(run.record["mode"])
     if mode != NYU_LIGHT:
         return paper_row(run.task.name, mode)
@@ -369,7 +380,8 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
     for one in evaluations:
         said.append(f"truth of {one.views.name}: {one.views.truth}")
         said += _said_of_groups(run.task, one)
-    said.append("the paper's numbers are of other pictures, another truth and 568,793 views")
+    if _paper(run):
+        said.append("the paper's numbers are of other pictures, another truth and 568,793 views")
     return said
 
 
@@ -388,10 +400,11 @@ def _said_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
 
 def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
     """Everything of the table and more, as JSON."""
+    paper = _paper(run)
     return {
         "run": run.record,
         "trained": run.figures,
         "evaluations": [one.as_json() for one in evaluations],
-        "paper": asdict(_paper(run)),
+        "paper": asdict(paper) if paper else None,
         "notes": notes(run, evaluations),
     }

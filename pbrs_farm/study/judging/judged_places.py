@@ -18,14 +18,14 @@ from pbrs_farm.curate.photographs import pairs_in, photo_from_pair
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.study.judging.evaluation import JudgedViews, judged_of_arrays
 from pbrs_farm.study.photographs import (
+    DEPTH_TRUTH,
     NYU_HOME,
     NYU_TRUTHS,
     PLANE_TRUTH,
     framed,
     has_splits,
-    normal_truth,
-    normals_of_photo,
     nyu_pictures,
+    photo_truth,
 )
 from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
@@ -166,20 +166,21 @@ class PhotoCamera:
 
 
 def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
-    """Every pair below a folder; BadInput for one without intrinsics, and for another task than normals."""
-    if plan.task != "normals":
-        text = f"photographs with depth say nothing of {plan.task}: normals alone"
+    """Every pair below a folder, for normals and depth; BadInput for one without intrinsics."""
+    if plan.task not in ("normals", "depth"):
+        text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
         raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
     ids, colours, truths = [], [], []
     for pair in pairs_in(folder):
         camera = camera_of(pair.rgb.parent, folder)
         photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=False)
         colour, rows, columns = framed(photo.rgb, plan)
-        normal, valid = normals_of_photo(photo, camera.matrix())
+        truth = photo_truth(photo, camera.matrix(), plan)
         ids.append(pair.id)
         colours.append(colour)
-        truths.append(normal_truth(normal[rows, columns], valid[rows, columns]))
-    return JudgedViews(name, PLANE_TRUTH, tuple(ids), np.stack(colours), tuple(truths))
+        truths.append({key: array[rows, columns] for key, array in truth.items()})
+    said = PLANE_TRUTH if plan.task == "normals" else DEPTH_TRUTH
+    return JudgedViews(name, said, tuple(ids), np.stack(colours), tuple(truths))
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:

@@ -1,7 +1,7 @@
 """What other programs say of the same pictures, as files: judged as a run's own predictions. Effects: reads them.
 
 A file a picture, named by the picture's id (`kitchen/0001`) or its last part: NAME_normal.png,
-NAME_semantic.png or NAME_edges.png as `predict` writes them, or NAME.npy: normals (H, W, 3) in
+NAME_semantic.png (NAME_nyu13.png of 13 classes) or NAME_edges.png as `predict` writes them, or NAME.npy: normals (H, W, 3) in
 OpenCV's axes (x right, y down, z forward), ids of classes, or edges 0..1.
 """
 
@@ -17,15 +17,28 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
+from pbrs_farm.study.tasks.tasks import class_names
+from pbrs_farm.study.training_plan import TrainingPlan
 
-KINDS: Final = {"normals": "normal", "segmentation": "semantic", "boundaries": "edges"}
-"""Task -> what its file's name ends with."""
+_KINDS: Final = {
+    "normals": "normal",
+    "segmentation": "semantic",
+    "boundaries": "edges",
+    "depth": "depth",
+}
 _MOST_VALUES: Final = 300_000_000  # of an array; more is refused
+
+
+def file_kind(plan: TrainingPlan) -> str:
+    """What the names of a plan's predictions end with: normal, semantic (NYU40), nyu13, edges, depth."""
+    is_grouped = plan.task == "segmentation" and class_names(plan) == NYU13_NAMES
+    return "nyu13" if is_grouped else _KINDS[plan.task]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,41 +59,42 @@ def others_predictions(word: str) -> OthersPredictions:
 
 
 def predictions_in(
-    others: OthersPredictions, views: JudgedViews, task: str
+    others: OthersPredictions, views: JudgedViews, plan: TrainingPlan
 ) -> Iterator[NDArray[Any]] | None:
     """A prediction of each view, of its truth's size, in order; None where there is a file for none.
 
     A picture of another form than the truth is cut about its middle, as photographs are. Raises
     BadInput for a view that alone has no file, and for a file that is none.
     """
-    files = _files_of(others.folder, views.ids, task)
+    kind = file_kind(plan)
+    files = _files_of(others.folder, views.ids, kind)
     if not any(files):
         return None
     for at, file in zip(views.ids, files, strict=True):
         if file is None:
-            text = f"no prediction of {at}: {_names(at, task)[0]} and the like"
+            text = f"no prediction of {at}: {_names(at, kind)[0]} and the like"
             raise BadInput(others.folder, "", text, hint="all pictures of a place, or none")
     return (
-        _fitted(_read(file, task), size)
+        _fitted(_read(file, plan.task), size)
         for file, size in zip(files, views.sizes, strict=True)
         if file is not None
     )
 
 
-def _files_of(folder: Path, ids: Sequence[str], task: str) -> list[Path | None]:
+def _files_of(folder: Path, ids: Sequence[str], kind: str) -> list[Path | None]:
     """The file of each view. The last part of an id names it where no other id ends so."""
     ends = Counter(at.rpartition("/")[2] for at in ids)
     found: list[Path | None] = []
     for at in ids:
         end = at.rpartition("/")[2]
-        names = _names(at, task) + (_names(end, task) if ends[end] == 1 else [])
+        names = _names(at, kind) + (_names(end, kind) if ends[end] == 1 else [])
         found.append(next((folder / name for name in names if (folder / name).is_file()), None))
     return found
 
 
-def _names(at: str, task: str) -> list[str]:
+def _names(at: str, kind: str) -> list[str]:
     # A photograph that is called NAME_rgb is predicted under that name.
-    return [f"{at}{more}{end}" for more in ("", "_rgb") for end in (f"_{KINDS[task]}.png", ".npy")]
+    return [f"{at}{more}{end}" for more in ("", "_rgb") for end in (f"_{kind}.png", ".npy")]
 
 
 def _read(path: Path, task: str) -> NDArray[Any]:
@@ -95,7 +109,9 @@ def _read(path: Path, task: str) -> NDArray[Any]:
         # From the layer's axes, x right, y forward, z up, to OpenCV's.
         x, y, z = np.moveaxis(stored.astype(np.float64) * 2 / 65535 - 1, -1, 0)
         return _checked(np.stack([x, -z, y], -1), path, task)
-    return _checked(stored / 255.0 if task == "boundaries" else stored, path, task)
+    # Edges are 255 x how likely, depth is in millimetres.
+    unit = {"boundaries": 255.0, "depth": 1000.0}.get(task)
+    return _checked(stored / unit if unit else stored, path, task)
 
 
 def _array(path: Path, data: bytes) -> NDArray[Any]:

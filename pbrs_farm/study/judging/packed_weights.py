@@ -24,7 +24,8 @@ from pbrs_farm.study.training_plan import plan_as_json
 SHIPPED: Final = Path(__file__).parents[1] / "weights"
 _SAYS: Final = {
     "normals": "the direction of the surface at each pixel",
-    "segmentation": "which of NYU's 40 classes each pixel is of",
+    "segmentation": "which of NYU's {n_classes} classes each pixel is of",
+    "depth": "how far each pixel's surface is along the camera's axis",
     "boundaries": "how likely each pixel is an edge of an object",
 }
 _MOST_HOMES: Final = 12  # named on the card; of more, these and how many
@@ -80,7 +81,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     said = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
         f"# {task.name}, plan {plan.name}",
-        f"Says {_SAYS[task.name]}, from one colour picture of a room. Network `{plan.network}`,"
+        f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room. Network `{plan.network}`,"
         f" {record['weights']:,} weights in half floats, trained at {size}.",
         f"```\npbrs-farm predict --task {task.name} PHOTO... --out seen\n```",
         "## What it was trained on",

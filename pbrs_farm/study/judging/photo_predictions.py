@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pbrs_farm.core.arrays import Srgb8Image
-from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
@@ -28,6 +27,8 @@ from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.images import decode_photo, jpeg_from_array, png_from_array
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import Trained
+from pbrs_farm.study.judging.others_predictions import file_kind
+from pbrs_farm.study.tasks.tasks import class_names
 from pbrs_farm.study.training.prediction import predicted
 from pbrs_farm.study.training.run_folder import made_folder
 
@@ -105,7 +106,7 @@ def predict_photographs(run: Trained, files: Sequence[Path], out: Path) -> Itera
     """Write each photograph's prediction below out, and the page last; a row a photograph as it is done.
 
     A picture that cannot be read is a row with an "error", and the rest goes on. The files are
-    docs/formats.md's: normal.png (16 bits), semantic.png (NYU40 ids), or edges.png (255 x how likely
+    docs/formats.md's: normal.png (16 bits), semantic.png or nyu13.png (ids), depth.png (mm), or edges.png (255 x how likely
     an edge is), each behind the photograph's name; NAME_shown.png is for eyes. Raises BadInput where
     out cannot be written to.
     """
@@ -178,20 +179,25 @@ def _written(
 ) -> dict[str, Any]:
     """The files of one photograph; its row."""
     name, picture = photograph.name, run.task.picture(prediction)
+    kind = file_kind(run.plan)
     row: dict[str, Any] = {"photograph": name}
     if run.task.name == "normals":
         # From OpenCV's axes to the layer's: x right, y forward, z up.
         axes = np.stack([prediction[..., 0], prediction[..., 2], -prediction[..., 1]], axis=-1)
         stored = np.rint((axes.astype(np.float64) + 1) * 65535 / 2).astype(np.uint16)
-        data, kind = layer_bytes("normal", stored), "normal"
+        data = layer_bytes(kind, stored)
     elif run.task.name == "segmentation":
-        data, kind = layer_bytes("semantic", prediction.astype(np.uint8)), "semantic"
-        counts = np.bincount(prediction.ravel(), minlength=len(NYU40_NAMES)) / prediction.size
+        names = class_names(run.plan)
+        data = layer_bytes(kind, prediction.astype(np.uint8))
+        counts = np.bincount(prediction.ravel(), minlength=len(names)) / prediction.size
         named = [k for k in np.argsort(-counts).tolist() if counts[k] >= _LEAST_SHARE and k]
-        row["classes"] = {NYU40_NAMES[k]: round(float(counts[k]), 4) for k in named}
+        row["classes"] = {names[k]: round(float(counts[k]), 4) for k in named}
+    elif run.task.name == "depth":
+        # Layers hold millimetres; what is farther than they can say is the farthest.
+        data = layer_bytes(kind, np.clip(np.rint(prediction * 1000), 1, 65535).astype(np.uint16))
     else:
         edges = np.rint(255 * np.clip(np.asarray(prediction, np.float64), 0, 1)).astype(np.uint8)
-        data, kind = png_from_array(edges), "edges"
+        data = png_from_array(edges)
     file = f"{name}_{kind}.png"
     (out / file).write_bytes(data)
     (out / f"{name}_shown.png").write_bytes(png_from_array(picture))

@@ -29,7 +29,7 @@ class TaskScorer(Protocol):
 
 
 class StudyTask(Protocol):
-    """One of normals, segmentation and boundaries."""
+    """One of normals, segmentation, boundaries and depth."""
 
     name: str
     layers: tuple[str, ...]  # of a Request
@@ -61,7 +61,7 @@ class StudyTask(Protocol):
         """(B, ...) what the output says of each pixel, as Scorer.add takes it."""
         ...
 
-    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+    def baseline(self, targets: list[Arrays], plan: TrainingPlan) -> tuple[str, F32]:
         """Its name, and the prediction that needs no picture, from the training views' targets."""
         ...
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -12,12 +12,13 @@ from torch import Tensor
 from torch.nn import functional
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.angular import AngularErrors
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.networks.vgg import edges_of_sides
 from pbrs_farm.study.reading.view_sample import Sample
+from pbrs_farm.study.tasks.depth_task import DepthTask
 from pbrs_farm.study.tasks.study_task import Arrays, Batch, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
 
@@ -71,7 +72,22 @@ def _n_mean(counted: Tensor, over: str) -> Tensor | float:
     return counted.sum().clamp(min=1) / counted.shape[0]
 
 
-# Semantic segmentation: NYU40's classes, judged by one confusion matrix; pure.
+# Semantic segmentation: NYU40's or NYU13's classes, judged by one confusion matrix; pure.
+
+_NYU13: Final = len(NYU13_NAMES) - 1
+
+
+def class_names(plan: TrainingPlan) -> tuple[str, ...]:
+    """Name of each id of a plan's classes; 0 is "none"."""
+    return NYU13_NAMES if plan.n_classes == _NYU13 else NYU40_NAMES
+
+
+def classes_of(class40: NDArray[np.uint8], plan: TrainingPlan) -> NDArray[np.uint8]:
+    """NYU40 ids as the plan's classes: grouped to NYU13 where it has 13, else as they are."""
+    if plan.n_classes != _NYU13:
+        return class40
+    grouped: NDArray[np.uint8] = NYU13_FROM_NYU40[np.minimum(class40, len(NYU40_NAMES) - 1)]
+    return grouped
 
 
 class ClassesTask:
@@ -81,7 +97,7 @@ class ClassesTask:
     layers: tuple[str, ...] = ("colour", "class40")
     figures: tuple[str, ...] = ("mean_iou", "pixel_accuracy", "mean_accuracy", "weighted_iou")
     error_name: str = "share of pixels of another class"
-    truth: str = "rendered: NYU40 class of the surface seen, where it has one"
+    truth: str = "rendered: class of the surface seen, where it has one"
 
     def n_out(self, plan: TrainingPlan) -> int:
         """A score a class."""
@@ -92,12 +108,13 @@ class ClassesTask:
         if sample.class40 is None:
             raise BadInput(sample.id, "class40", "the view has no classes")
         # A class beyond the network's would be an index outside its scores.
-        highest = int(sample.class40.max(initial=0))
+        labels = classes_of(sample.class40, plan)
+        highest = int(labels.max(initial=0))
         if highest > plan.n_classes:
             name = f" ({NYU40_NAMES[highest]})" if highest < len(NYU40_NAMES) else ""
             text = f"holds class {highest}{name}; the network has {plan.n_classes}"
             raise BadInput(sample.id, "class40", text)
-        return {"labels": sample.class40}
+        return {"labels": labels}
 
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
         """Cross entropy over labelled pixels."""
@@ -118,7 +135,7 @@ class ClassesTask:
         # Channel 0 is class 1: no label has no score.
         return np.asarray((output.argmax(1) + 1).to(torch.uint8).numpy(force=True))
 
-    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+    def baseline(self, targets: list[Arrays], plan: TrainingPlan) -> tuple[str, F32]:
         """The class that most pixels of the training views have, everywhere."""
         # No label (0) must not win.
         counts = np.zeros(256, np.int64)
@@ -126,7 +143,8 @@ class ClassesTask:
             counts += np.bincount(target["labels"].ravel(), minlength=256)
         counts[0] = 0
         most = max(int(counts.argmax()), 1)
-        name = NYU40_NAMES[most] if most < len(NYU40_NAMES) else str(most)
+        names = class_names(plan)
+        name = names[most] if most < len(names) else str(most)
         return f"always {name}", np.full(targets[0]["labels"].shape, most, np.float32)
 
     def scorer(self, plan: TrainingPlan) -> ClassScorer:
@@ -228,7 +246,7 @@ class NormalsTask:
         unit = functional.normalize(output.float(), dim=1, eps=1e-6)
         return np.asarray(unit.permute(0, 2, 3, 1).contiguous().numpy(force=True))
 
-    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+    def baseline(self, targets: list[Arrays], plan: TrainingPlan) -> tuple[str, F32]:
         """The mean normal of each pixel: half of what is known of a room needs no picture."""
         total = np.zeros(targets[0]["normal"].shape, np.float64)
         for target in targets:
@@ -327,7 +345,7 @@ class EdgesTask:
         edges = edges_of_sides(output) if output.shape[1] > 1 else torch.sigmoid(output[:, 0])
         return np.asarray(edges.numpy(force=True))
 
-    def baseline(self, targets: list[Arrays]) -> tuple[str, F32]:
+    def baseline(self, targets: list[Arrays], plan: TrainingPlan) -> tuple[str, F32]:
         """How often each pixel of the training views is an edge."""
         mean = np.mean([target["edges"] for target in targets], axis=0)
         return "mean edges", np.asarray(mean / max(float(mean.max()), 1e-6), np.float32)
@@ -379,7 +397,9 @@ def task_of(name: str, n_thresholds: int = 0) -> StudyTask:
     n_thresholds: at which boundaries are judged, 0 = the task's own number.
     """
     edges = EdgesTask(n_thresholds) if n_thresholds else EdgesTask()
-    tasks: dict[str, StudyTask] = {t.name: t for t in (NormalsTask(), ClassesTask(), edges)}
+    tasks: dict[str, StudyTask] = {
+        t.name: t for t in (NormalsTask(), ClassesTask(), edges, DepthTask())
+    }
     if name not in tasks:
         raise BadInput("task", name, "no such task", hint=f"of {', '.join(tasks)}")
     return tasks[name]

@@ -250,7 +250,7 @@ def _judge(
     seen = views.decoded(plan.final_views)
     # The baseline knows every training view that is in memory.
     known = views if isinstance(views, ViewArrays) else seen
-    name, baseline = task.baseline([known.target(k) for k in range(len(known))])
+    name, baseline = task.baseline([known.target(k) for k in range(len(known))], plan)
     np.save(folder.baseline, baseline)
     parts = {"train": seen}
     if held_out:

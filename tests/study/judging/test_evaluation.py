@@ -168,7 +168,7 @@ def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
 
 
 def test_depth_says_nothing_of_classes(pairs: Path) -> None:
-    with pytest.raises(BadInput, match="normals alone"):
+    with pytest.raises(BadInput, match="normals and depth alone"):
         judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
 
 
@@ -288,7 +288,7 @@ def test_predictions_of_others_are_judged_beside_the_runs_own(
     stored = np.rint((axes + 1) * 65535 / 2).astype(np.uint16)
     (said / "wall_normal.png").write_bytes(png_from_array(stored))
     views = judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
-    found = predictions_in(OthersPredictions("theirs", said), views, "normals")
+    found = predictions_in(OthersPredictions("theirs", said), views, small_plan())
     assert found is not None
     (normal,) = found
     assert normal.shape == (60, 75, 3)

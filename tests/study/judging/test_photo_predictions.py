@@ -11,9 +11,12 @@ import pytest
 from PIL import Image
 
 from pbrs_farm.cli import main
+from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.study.judging import evaluation
+from pbrs_farm.study.judging.evaluation import open_run
 from pbrs_farm.study.judging.photo_predictions import (
     network_size,
     photograph_files,
@@ -61,6 +64,24 @@ def test_each_photograph_gets_a_prediction_of_its_own_size(run: Path, tmp_path: 
     rows = json.loads((out / "predictions.json").read_text())
     assert [row["photograph"] for row in rows] == ["same", "tall", "wide"]
     assert (out / "index.html").read_text().count("data:image/jpeg") == 6
+
+
+def test_thirteen_classes_are_a_layer_and_names_of_their_own(tmp_path: Path) -> None:
+    fill(FolderStore(tmp_path / "root"), {"home-0-00000000": 2}, (40, 32))
+    words = ["train", "segmentation", str(tmp_path / "root"), "--out", str(tmp_path / "run")]
+    assert main([*words, "--hold-out", "none", *TINY, "--set", "n_classes=13"]) == 0
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    (tmp_path / "room.png").write_bytes(png_from_array(picture))
+    out = tmp_path / "out"
+    assert (
+        main(["predict", str(tmp_path / "run"), str(tmp_path / "room.png"), "--out", str(out)]) == 0
+    )
+    stored = array_from_png((out / "room_nyu13.png").read_bytes())
+    assert stored.shape == (48, 64)
+    assert 1 <= stored.min() <= stored.max() <= 13
+    (row,) = json.loads((out / "predictions.json").read_text())
+    assert set(row["classes"]) <= set(NYU13_NAMES)
+    assert "33." not in evaluation.table(open_run(tmp_path / "run"), [])  # the paper's 40 classes
 
 
 def test_the_same_picture_turned_by_exif_is_predicted_alike(run: Path, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def mat(tmp_path: Path) -> Path:
     return tmp_path / "nyu.mat"
 
 
-@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
+@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries", "depth"])
 def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -> None:
     plan = small_plan(task, width_px="160", height_px="120")
     views = judged_place(str(mat), plan, mode="mlt_il_ol")
@@ -52,11 +52,13 @@ def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -
         np.testing.assert_allclose(seen[200, 200], [0, 0, -1], atol=1e-3)
     elif task == "segmentation":
         assert (seen == 5).all()
+    elif task == "depth":
+        np.testing.assert_allclose(seen, 2.5)
     else:
         assert (np.nonzero(seen.any(0))[0] == 279).all()
 
 
-@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries"])
+@pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries", "depth"])
 def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: Path) -> None:
     plan, source = small_plan(task), TrainingSource((str(mat),))
     views, held_out = training_views(source, plan), held_out_views(source, plan)
@@ -69,6 +71,8 @@ def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: P
         assert (target["normal"][16, 20] == [0, 0, -32767]).all()
     elif task == "segmentation":
         assert (target["labels"] == 5).all()
+    elif task == "depth":
+        np.testing.assert_allclose(target["depth"], 2.5)
     else:
         # A line of one pixel stays whole at a fourteenth of the size.
         assert target["edges"].any(1).all()

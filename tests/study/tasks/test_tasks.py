@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.networks.network_choice import network_of
 from pbrs_farm.study.tasks.tasks import task_of
@@ -35,7 +36,7 @@ def test_the_mean_normal_has_unit_length_everywhere() -> None:
     task, plan = task_of("normals"), small_plan()
     arrays = views(5, plan)
     targets = [{k: v[n] for k, v in arrays.targets.items()} for n in range(5)]
-    name, baseline = task.baseline(targets)
+    name, baseline = task.baseline(targets, plan)
     assert name == "mean normal"
     np.testing.assert_allclose(np.linalg.norm(baseline, axis=-1), 1, atol=1e-6)
     # Floors are below, walls above.
@@ -46,20 +47,62 @@ def test_the_mean_normal_has_unit_length_everywhere() -> None:
 def test_the_most_frequent_class_is_named() -> None:
     task, plan = task_of("segmentation"), small_plan("segmentation")
     arrays = views(6, plan)
-    name, baseline = task.baseline([{"labels": row} for row in arrays.targets["labels"]])
+    name, baseline = task.baseline([{"labels": row} for row in arrays.targets["labels"]], plan)
     counts = np.bincount(arrays.targets["labels"].ravel())
     assert (baseline == counts.argmax()).all()
     assert name.startswith("always ")
 
 
+def test_thirteen_classes_are_nyu40_grouped() -> None:
+    task, plan = task_of("segmentation"), small_plan("segmentation", n_classes="13")
+    labels = np.full((32, 40), 22, np.uint8)
+    labels[:16], labels[0] = 14, 0
+    grouped = task.targets(replace(sample(3), class40=labels), plan)["labels"]
+    assert [NYU13_NAMES[k] for k in grouped[[0, 1, 16], 0]] == ["none", "table", "ceiling"]
+    name, baseline = task.baseline([{"labels": grouped}], plan)
+    assert name == "always ceiling"
+    assert (baseline == 3).all()
+
+
+def test_depth_is_judged_up_to_a_scale_and_trained_halfway_so() -> None:
+    task, plan = task_of("depth"), small_plan("depth")
+    depth = torch.tensor([[[1.0, 2.0], [4.0, 0.0]]])
+    twice = torch.log(2 * torch.where(depth > 0, depth, 7.0))[:, None]
+    scorer = task.scorer(plan)
+    own = scorer.add(task.predictions(twice)[0], {"depth": depth[0].numpy()})
+    figures = scorer.figures()
+    assert own == pytest.approx(0, abs=1e-6)
+    assert figures["abs_rel"] == pytest.approx(1)
+    assert figures["below_1_25"] == 0
+    assert figures["rms_m"] == pytest.approx(np.sqrt(7))  # of 1, 2 and 4 metres too far
+    loss = task.loss(twice, {"depth": depth}, plan)
+    torch.testing.assert_close(loss, torch.tensor([np.log(2) ** 2 / 2], dtype=torch.float32))
+    # One of two pixels at e times its depth: the logarithms spread by a half.
+    half = np.array([[1.0, 2.0]], np.float32)
+    assert scorer.add(half * [[1, np.e]], {"depth": half}) == pytest.approx(0.5)
+
+
+def test_the_mean_depth_is_one_of_logarithms_and_leaves_out_what_is_unknown() -> None:
+    task, plan = task_of("depth"), small_plan("depth")
+    depths = [np.array(row, np.float32) for row in ([[1, 0, 0]], [[4, 8, 0]])]
+    name, baseline = task.baseline([{"depth": depth} for depth in depths], plan)
+    assert name == "mean depth"
+    np.testing.assert_allclose(baseline, [[2, 8, 32 ** (1 / 3)]], rtol=1e-6)
+
+
+def test_a_plan_for_depth_turns_no_camera() -> None:
+    with pytest.raises(BadInput, match="turn_deg"):
+        small_plan("depth", turn_deg="6")
+
+
 def test_a_class_that_the_network_lacks_names_the_view() -> None:
-    plan = small_plan("segmentation", n_classes="13")
+    plan = small_plan("segmentation", n_classes="12")
     labels = np.full((32, 40), 22, np.uint8)
     with pytest.raises(BadInput, match=r"home-3-00000000/3: class40: holds class 22 \(ceiling\)"):
         task_of("segmentation").targets(replace(sample(3), class40=labels), plan)
 
 
-@pytest.mark.parametrize("name", ["normals", "segmentation", "boundaries"])
+@pytest.mark.parametrize("name", ["normals", "segmentation", "boundaries", "depth"])
 def test_the_truth_as_a_prediction_is_perfect(name: str) -> None:
     task, plan = task_of(name), small_plan(name)
     arrays = views(3, plan)
@@ -73,7 +116,7 @@ def test_the_truth_as_a_prediction_is_perfect(name: str) -> None:
 
 def test_a_task_that_is_none_is_refused() -> None:
     with pytest.raises(BadInput, match="no such task"):
-        task_of("depth")
+        task_of("albedo")
 
 
 def test_an_enlarged_picture_gives_a_map_of_its_own_size() -> None:

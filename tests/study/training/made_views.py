@@ -55,6 +55,7 @@ def sample(number: int, size: tuple[int, int] = (40, 32)) -> Sample:
         K=np.eye(3, dtype=np.float32), axes="opencv", colour=colour.astype(np.uint8),
         normal=np.where(valid[..., None], normal, 0), valid=valid,
         class40=(surface + 1).astype(np.uint8), boundary=edges,
+        depth=np.where(valid, 2 + 0.02 * rows + surface, 0).astype(np.float32),
     )  # fmt: skip
 
 
