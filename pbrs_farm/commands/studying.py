@@ -135,6 +135,7 @@ def _need_torch() -> None:
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.judged_places import judge_of_places, judged_place
+    from pbrs_farm.study.networks.initial_weights import credits_of_init
     from pbrs_farm.study.training.loggers import loggers
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
@@ -167,10 +168,11 @@ def _train(args: argparse.Namespace) -> int:
         )
         for word in args.on
     ]  # fmt: skip
+    credits = (*credits_of(source, views.homes), *credits_of_init(args.init))
     stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
     job = Job(
         plan, args.out, args.seed, source.light, source.name, args.init, stop_on=stop_on,
-        facts={"credits": list(credits_of(source, views.homes))},
+        facts={"credits": list(dict.fromkeys(credits))},
     )  # fmt: skip
     # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every

@@ -55,7 +55,9 @@ def pack_weights(root: Path, out: Path) -> RunFolder:
     # Where the views lay on this machine is nobody else's business.
     names = [PurePosixPath(place).name for place in str(run.record["source"]).split(" + ")]
     digest = hashlib.sha256(packed.weights.read_bytes()).hexdigest()
+    origin = {k: v for k, v in run.record["init_origin"].items() if k != "file"}
     record = run.record | {"source": " + ".join(names), "weights_sha256": digest}
+    record |= {"init": PurePosixPath(record["init"]).name, "init_origin": origin}
     packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
     evaluations = _evaluations(root)
     # Each view's own error is of no use without the views.
@@ -88,7 +90,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         f"{record['views']['train']} rendered views of {len(homes)} homes in light"
         f" `{record['mode']}`: {', '.join(homes[:_MOST_HOMES])}"
         f"{' and others' if len(homes) > _MOST_HOMES else ''}. No photograph was trained on."
-        f" First weights: {record['init']}. Weights of {chosen}; seed {record['seed']};"
+        f" First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
         f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}.",
         f"Truth: {record['truth']}.",
         "## Figures",

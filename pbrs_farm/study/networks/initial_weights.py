@@ -40,6 +40,15 @@ def start_from(network: nn.Module, init: str) -> dict[str, str]:
     return _from_run(network, path)
 
 
+def credits_of_init(init: str) -> tuple[str, ...]:
+    """Whose works the weights have seen that a training starts from: what their run's record names."""
+    from pbrs_farm.study.training.run_folder import RunFolder
+
+    run = Path(init)
+    is_run = (run / "run.json").is_file()
+    return tuple(RunFolder(run).record().get("credits", ())) if is_run else ()
+
+
 def has_hed() -> bool:
     """The package that holds HED's weights is installed."""
     return _hed_file() is not None

@@ -177,6 +177,21 @@ def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(
         open_run(packed.root)
 
 
+def test_weights_that_start_from_a_run_name_it_and_whose_works_it_saw(
+    run: Path, tmp_path: Path
+) -> None:
+    fill(FolderStore(tmp_path / "root"), {"home-7-00000000": 2}, (40, 32))
+    words = ["train", "segmentation", str(tmp_path / "root"), "--out", str(tmp_path / "run")]
+    words += ["--hold-out", "none", *TINY, "--init", str(run), "--export", "weights"]
+    assert main(words) == 0
+    packed = tmp_path / "run" / "packed"
+    card = (packed / "README.md").read_text()
+    assert "First weights: a run of normals" in card
+    for home in ("home-0-00000000", "home-7-00000000"):
+        assert f"home {home}: a person" in card
+    assert str(run.parent) not in (packed / "run.json").read_text()
+
+
 def test_predict_without_a_photograph_says_how(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
