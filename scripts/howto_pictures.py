@@ -1,0 +1,273 @@
+"""The pictures of docs/howto, drawn from what the pages' own commands leave in out/.
+
+    python scripts/howto_pictures.py [PAGE ...]
+
+Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
+left as it is. Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide and at most 60 kB.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+import pbrs_farm as pf
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.gallery import label_colours
+from pbrs_farm.images import array_from_png
+
+OUT, PICTURES = Path("out"), Path("docs/pictures/howto")
+WIDTH_PX, MAX_BYTES, GAP_PX = 640, 60_000, 4
+PALETTE: Final = np.array(
+    [[230, 75, 60], [70, 140, 220], [250, 190, 50], [90, 180, 100], [160, 100, 200], [240, 130, 180],
+     [60, 190, 190], [150, 110, 70]], np.uint8,
+)  # fmt: skip
+
+Pixels = NDArray[np.uint8]
+
+
+def row(*panels: Any) -> Image.Image:
+    """Panels side by side, each as high as the first, together WIDTH_PX wide."""
+    images = [p if isinstance(p, Image.Image) else Image.fromarray(np.asarray(p)) for p in panels]
+    shares = [i.width / i.height for i in images]
+    height = round((WIDTH_PX - GAP_PX * (len(images) - 1)) / sum(shares))
+    sheet, x = Image.new("RGB", (WIDTH_PX, height), "white"), 0
+    for n, (image, share) in enumerate(zip(images, shares, strict=True)):
+        last = n == len(images) - 1
+        width = WIDTH_PX - x if last else round(height * share)
+        kind = Image.Resampling.LANCZOS if image.width >= width else Image.Resampling.BICUBIC
+        sheet.paste(image.convert("RGB").resize((width, height), kind), (x, 0))
+        x += width + GAP_PX
+    return sheet
+
+
+def rows(*sheets: Image.Image) -> Image.Image:
+    """Rows under each other."""
+    height = sum(s.height for s in sheets) + GAP_PX * (len(sheets) - 1)
+    whole, y = Image.new("RGB", (WIDTH_PX, height), "white"), 0
+    for sheet in sheets:
+        whole.paste(sheet, (0, y))
+        y += sheet.height + GAP_PX
+    return whole
+
+
+def first(pattern: str, skip: int = 0) -> Path:
+    """The file or folder of out/ that a pattern finds, skip of them passed over."""
+    found = sorted(OUT.glob(pattern))
+    if len(found) <= skip:
+        raise FileNotFoundError(f"out/{pattern}")
+    return found[skip]
+
+
+def blended(picture: Pixels, colours: Pixels, where: NDArray[np.bool_]) -> Pixels:
+    """A picture under half transparent colours."""
+    mixed = (0.45 * picture + 0.55 * colours).astype(np.uint8)
+    return np.where(where[..., None], mixed, picture // 2 + 90)
+
+
+def own_camera() -> Image.Image:
+    return row(pf.open("out/mine")[0].colour)
+
+
+def sun_and_hour() -> Image.Image:
+    return row(*(pf.open(f"out/day/{hour}")[0].colour for hour in (7, 12, 18)))
+
+
+def night() -> Image.Image:
+    frames = pf.open("out/night")
+    return row(frames[0].colour, frames[1].colour)
+
+
+def class_map() -> Image.Image:
+    frame = max(
+        pf.open("out/studio"), key=lambda f: float((f.classes_by("out/mine.csv") > 0).mean())
+    )
+    mine = frame.classes_by("out/mine.csv")
+    return row(frame.colour, blended(frame.colour, PALETTE[mine % len(PALETTE)], mine > 0))
+
+
+def stereo() -> Image.Image:
+    left, right = pf.open("out/pairs")[:2]
+    pixels = left.layer("disparity") / 256
+    # Colours of 1 / disparity, which is proportional to depth.
+    depth_mm = np.where(pixels > 0, 32_000 / np.maximum(pixels, 1e-6), 0).astype(np.uint16)
+    return row(left.colour, right.colour, label_colours.depth_colours(depth_mm))
+
+
+def plugin() -> Image.Image:
+    frame = pf.open("out/studio")[1]
+    return row(frame.colour, label_colours.depth_colours(frame.layer("height"), 0.0, 2.5))
+
+
+def blenderproc() -> Image.Image:
+    import h5py
+
+    with h5py.File(first("hdf5/*.hdf5", 1)) as file:
+        depth = (1000 * file["depth"][:]).astype(np.uint16)
+        normals = np.rint(255 * file["normals"][:]).astype(np.uint8)
+        instances = label_colours.instance_colours(file["instance_segmaps"][:])
+        upper = row(file["colors"][:], label_colours.depth_colours(depth))
+        return rows(upper, row(normals, instances))
+
+
+def coco() -> Image.Image:
+    return row(*(_of_coco(n) for n in (0, 1)))
+
+
+def _of_coco(n: int) -> Image.Image:
+    from pycocotools import mask
+
+    document = json.loads(first("coco/*/annotations.json").read_text())
+    folder = first("coco/*/annotations.json").parent
+    names = {c["id"]: c for c in document["categories"]}
+    shown = document["images"][n]
+    picture = np.asarray(Image.open(folder / shown["file_name"]).convert("RGB"))
+    colours, where = picture.copy(), np.zeros(picture.shape[:2], bool)
+    boxes = []
+    for k, a in enumerate(a for a in document["annotations"] if a["image_id"] == shown["id"]):
+        if names[a["category_id"]]["supercategory"] == "structure":
+            continue
+        seen = mask.decode(a["segmentation"]).astype(bool)
+        colours[seen], where = PALETTE[k % len(PALETTE)], where | seen
+        boxes.append((a["area"], a["bbox"], names[a["category_id"]]["name"], k))
+    image = Image.fromarray(np.where(where[..., None], (picture // 2 + colours // 2), picture))
+    draw = ImageDraw.Draw(image)
+    for _area, (x, y, width, height), name, k in sorted(boxes, reverse=True)[:9]:
+        colour = tuple(int(c) for c in PALETTE[k % len(PALETTE)])
+        draw.rectangle((x, y, x + width, y + height), outline=colour)
+        draw.text((x + 2, y + 1), name, fill="white", stroke_width=1, stroke_fill="black")
+    return image
+
+
+def yolo() -> Image.Image:
+    return row(*(_of_yolo(path) for path in sorted(OUT.glob("yolo_seg/*/labels/*.txt"))[1:3]))
+
+
+def _of_yolo(labels: Path) -> Image.Image:
+    image = Image.open(labels.parents[1] / "images" / f"{labels.stem}.png").convert("RGB")
+    draw = ImageDraw.Draw(image, "RGBA")
+    for line in labels.read_text().splitlines():
+        number, *shares = line.split()
+        ring = np.array(shares, float).reshape(-1, 2) * image.size
+        colour = tuple(int(c) for c in PALETTE[int(number) % len(PALETTE)])
+        draw.polygon([tuple(p) for p in ring], fill=(*colour, 110), outline=(*colour, 255))
+    return image
+
+
+def hugging_face() -> Image.Image:
+    from datasets import load_dataset
+
+    views = load_dataset("out/parquet", split="train")
+    return rows(*(_of_row(views[k]) for k in (0, 1)))
+
+
+def _of_row(view: dict[str, Any]) -> Image.Image:
+    colour, depth, normal, classes = (
+        np.asarray(view[name]) for name in ("mlt_il_ol", "depth", "normal", "class40")
+    )
+    return row(
+        colour, label_colours.depth_colours(depth.astype(np.uint16)), (normal // 257).astype(np.uint8),
+        label_colours.semantic_colours(classes.astype(np.uint8)),
+    )  # fmt: skip
+
+
+def predict() -> Image.Image:
+    photo = first("photos/*.png")
+    return row(Image.open(photo), normals_of(first(f"seen/{photo.stem}_normal.png")))
+
+
+def train() -> Image.Image:
+    frame = pf.open("out/homes")[2]
+    seen = first(f"viewseen/{frame.id.replace('/', '_')}_normal.png")
+    truth = (frame.layer("normal") // 257).astype(np.uint8)
+    return row(frame.colour, truth, normals_of(seen))
+
+
+def normals_of(path: Path) -> Pixels:
+    """The colours of a 16-bit picture of normals."""
+    return (array_from_png(path.read_bytes()) // 257).astype(np.uint8)
+
+
+def gpu() -> Image.Image:
+    return row(*(pf.open(f"out/spp{n}")[0].colour for n in (4, 32, 256)))
+
+
+def simulators() -> Image.Image:
+    frames = pf.open("out/back")
+    return row(frames[0].colour, frames[2].colour)
+
+
+def own_furniture() -> Image.Image:
+    frames = pf.open("out/own")
+    return row(frames[0].colour, frames[1].colour)
+
+
+def cluster() -> Image.Image:
+    return Image.open(OUT / "farm.png")
+
+
+def estimate() -> Image.Image:
+    return Image.open(OUT / "job.png")
+
+
+def resume() -> Image.Image:
+    """What an interrupted view had kept, and the view when it is done."""
+    kept = np.load(OUT / "resume_sums.npz")
+    raise FileNotFoundError(str({k: kept[k].shape for k in kept.files}))
+
+
+def switches() -> None:
+    """docs/pictures/switches.webp: a view's lights one after another."""
+    frames = []
+    for path in sorted(OUT.glob("light/*.png")):
+        image = Image.open(path).convert("RGB")
+        text = path.stem.partition("_")[2].replace("_", " ")
+        draw = ImageDraw.Draw(image)
+        draw.text((12, 332), text, fill="white", stroke_width=2, stroke_fill="black", font_size=20)
+        frames.append(image)
+    frames[0].save(
+        PICTURES.parent / "switches.webp", save_all=True, append_images=frames[1:],
+        duration=1400, loop=0, quality=80, method=6,
+    )  # fmt: skip
+
+
+PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
+    f.__name__: f
+    for f in (
+        own_camera, sun_and_hour, night, class_map, stereo, plugin, blenderproc, coco, yolo, hugging_face,
+        predict, train, gpu, simulators, own_furniture, cluster, estimate, resume,
+    )
+}  # fmt: skip
+
+
+def main(names: Iterable[str]) -> None:
+    """Draw the pages that are named, else all."""
+    for name in names or PAGES:
+        try:
+            save(PAGES[name](), name)
+        except (OSError, PbrsError) as error:
+            print(f"{name}: {error}")
+
+
+def save(image: Image.Image, name: str) -> None:
+    """As a JPEG of at most MAX_BYTES."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    path = PICTURES / f"{name}.jpg"
+    for quality in range(90, 20, -5):
+        image.convert("RGB").save(path, quality=quality, optimize=True)
+        if path.stat().st_size <= MAX_BYTES:
+            break
+    print(
+        f"{path}: {image.width}x{image.height}, {path.stat().st_size // 1000} kB, quality {quality}"
+    )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
