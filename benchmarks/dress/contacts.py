@@ -18,13 +18,14 @@ from pbrs_farm.core.house import House, Item, ItemKind
 
 Floats = NDArray[np.float64]
 
-DEEP_M, GAP_M = 0.01, 0.002
+DEEP_M, GAP_M, RING_M = 0.01, 0.002, 0.003
 _NO_WALL_M = 0.05  # half a wall, where none is found beside a door
 N_POINTS = 250  # of a thing that are looked for inside another
 FLAT = 0.5  # cosine to a face's normal below which an edge only grazes it
 _STRUCTURE = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
 _OPENINGS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 _RUG, _CURTAIN, _BLINDS = 20, 16, 13  # NYU40
+_CLOTHS = ("#duvet", "#throw", "#crumpled_clothes", "#napkin")
 
 
 @dataclass(eq=False)
@@ -177,7 +178,9 @@ def floating(things: Sequence[Thing]) -> list[tuple[str, float]]:
     for k, thing in enumerate(things):
         if not thing.is_new or thing.item.kind in _STRUCTURE:
             continue
-        gap = min((scene.gap(k, ways) for ways in _ways_of(thing)), key=abs, default=np.inf)
+        # A cloth's hem hangs beside what it lies on.
+        ring_m = np.inf if thing.item.source_class.endswith(_CLOTHS) else RING_M
+        gap = min((scene.gap(k, ways, ring_m) for ways in _ways_of(thing)), key=abs, default=np.inf)
         if gap > GAP_M:
             found.append((thing.item.id, round(float(gap), 4)))
     return found
@@ -203,8 +206,11 @@ class _Scene:
         self._low = np.array([t.bounds[0] for t in things])
         self._high = np.array([t.bounds[1] for t in things])
 
-    def gap(self, k: int, ways: Floats) -> float:
-        """The least distance from a thing's outermost vertices, along any of ways, to another's face."""
+    def gap(self, k: int, ways: Floats, ring_m: float) -> float:
+        """The least distance from vertices to another thing's face, along any of ways.
+
+        ring_m: how far behind the outermost vertex that way the others may lie.
+        """
         others = self._others(k)
         if others is None:
             return float("inf")
@@ -212,8 +218,8 @@ class _Scene:
         best, back = np.inf, 0.03
         for way in ways:
             reach = vertices @ way
-            outer = vertices[reach > reach.max() - 0.003]
-            outer = outer[:: max(1, len(outer) // 40)]
+            outer = vertices[reach > reach.max() - ring_m]
+            outer = outer[:: max(1, len(outer) // (40 if np.isfinite(ring_m) else 400))]
             _face, ray, where = others.intersects_id(
                 outer - back * way, np.tile(way, (len(outer), 1)), multiple_hits=True,
                 return_locations=True,

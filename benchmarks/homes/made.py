@@ -1,8 +1,9 @@
 """Homes made by seed, measured -> out/bench/made.json.
 
 `python -m benchmarks.homes.made [PART...] [N]`: plans (1,000 seeds: plan + furnish), houses (50 read
-and repaired), views (24 dressed); all of them if none is named, N seeds instead of so many. A part's
-rows stay in out/bench/made/, and seeds that are there already are not measured again.
+and repaired), views (24 dressed), untouched (views of 40 seeds that nobody looks at: 60001 and on);
+all of them if none is named, N seeds instead of so many. A part's rows stay in out/bench/made/, and
+seeds that are there already are not measured again.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from benchmarks.views.view_content import share_distance
 from pbrs_farm.assets import furniture_package, homes_package
 
 FOLDER = Path("out/bench/made")
-N_SEEDS: Final = {"plans": 1000, "houses": 50, "views": 24}
+N_SEEDS: Final = {"plans": 1000, "houses": 50, "views": 24, "untouched": 40}
+_FIRST_SEED: Final = {"untouched": 60001}
 _CHUNK = 50  # seeds a process
 _AGAIN = 20  # homes made again by another process
 
@@ -50,8 +52,9 @@ def main(words: list[str] | None = None) -> None:
 
 
 def _measure(part: str, n: int) -> None:
-    """Add the rows of seeds 1..n that are not there; a few are made again by another process."""
-    _fill(FOLDER / f"{part}.jsonl", part, range(1, n + 1))
+    """Add the rows of n seeds that are not there; a few are made again by another process."""
+    first = _FIRST_SEED.get(part, 1)
+    _fill(FOLDER / f"{part}.jsonl", part, range(first, first + n))
     if part == "plans":
         _fill(FOLDER / f"{part}-again.jsonl", part, range(1, min(n, _AGAIN) + 1))
 
@@ -188,8 +191,14 @@ def _of_views(rows: Rows, _again: dict[int, str]) -> dict[str, Any]:
     }
 
 
+def _of_untouched(rows: Rows, again: dict[int, str]) -> dict[str, Any]:
+    figures = _of_views(rows, again)
+    return {f"{key}_untouched": figures[key] for key in ("views", "share_distance")}
+
+
 _FIGURES: Final[dict[str, Callable[[Rows, dict[int, str]], dict[str, Any]]]] = {
     "plans": _of_plans, "houses": _of_houses, "views": _of_views,
+    "untouched": _of_untouched,
 }  # fmt: skip
 
 UNITS = {
@@ -221,6 +230,8 @@ UNITS = {
     "made.objects_per_view": "objects of 0.05 % of the pixels or more, median of views",
     "made.classes_per_view": "NYU13 classes, median of views",
     "made.share_distance": "sum of differences of NYU13 pixel shares from NYUv2's",
+    "made.views_untouched": "views of homes by seeds that nobody looks at",
+    "made.share_distance_untouched": "the same sum over them",
 }
 
 if __name__ == "__main__":

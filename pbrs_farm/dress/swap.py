@@ -26,6 +26,7 @@ from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
+from pbrs_farm.home.room_use import is_outdoors
 
 # Where a piece of furniture of the source stands, which way it faces, what it is.
 
@@ -459,6 +460,7 @@ def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None
     Each side of the new one is 75 to 100 % of the old one's, its height within 15 %; its back and
     its axis stay. Things on it are set down on the new one; where one would find no place, where
     the new one would reach into its neighbours, or where things stand in it, the old one stays.
+    What stands on a balcony or a terrace stays, too.
     """
     around = PieceSurroundings(draft.items)
     for key, indices in _sets(draft, catalogue).items():
@@ -475,10 +477,12 @@ def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None
 def _sets(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
     # Items of one model in one room, by group, room, level and model.
     by_id = pieces_by_plain_id(catalogue)
+    # Catalogues furnish rooms: an upholstered armchair would stand in the rain.
+    outdoors = {r.id for r in draft.source.rooms if is_outdoors(r)}
     found: dict[tuple[str, ...], list[int]] = {}
     for index, item in enumerate(draft.items[: len(draft.source.items)]):
         group = "" if item.kind.is_structure else group_of_item(item, by_id)
-        if group in HELD:
+        if group in HELD and item.room_id not in outdoors:
             key = (group, item.level_id, item.room_id or "", item.source_class or item.name)
             found.setdefault(key, []).append(index)
     return found

@@ -97,6 +97,11 @@ def named_kind(name: str) -> RoomKind | None:
     return rule.use if rule else None
 
 
+def is_outdoors(room: Room) -> bool:
+    """Whether one of the room's types, or its name, is that of a balcony, a terrace or a garden."""
+    return RoomKind.OUTDOOR in [named_kind(text) for text in (*room.types, room.name)]
+
+
 def given_room_type(source: str, name: str) -> str | None:
     """What a vocabulary's word for a room means: a room type, "none" (no room), "by its fixtures".
 

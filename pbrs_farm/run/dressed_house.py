@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     Repaired = tuple[House, RepairReport]
 
-VERSION: Final = 18
+VERSION: Final = 19
 """Of the stage: part of a dressed house's digest. Raised when it makes another house."""
 
 

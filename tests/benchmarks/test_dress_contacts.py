@@ -26,6 +26,16 @@ def test_what_floats_or_sinks_is_found(y: float, n: int) -> None:
     assert len(floating(things_of(with_new(home, cup), home))) == n
 
 
+@pytest.mark.parametrize(("lift_m", "n"), [(0.0, 0), (0.01, 1)])
+def test_a_hem_hangs_beside_the_table_that_holds_its_cloth(lift_m: float, n: int) -> None:
+    home, y = house(TABLE), 0.75 + lift_m
+    top = solid("", [1.5, y, 1.2], [2.25, y + 0.01, 1.6])
+    hem = solid("", [2.24, y - 0.3, 1.2], [2.25, y, 1.6])
+    cloth = replace(top, id="dress-clutter-1", source_class="generated#throw")
+    cloth = replace(cloth, surfaces=(*top.surfaces, *hem.surfaces))
+    assert len(floating(things_of(with_new(home, cloth), home))) == n
+
+
 @pytest.mark.parametrize(
     ("low", "high", "n"),
     [

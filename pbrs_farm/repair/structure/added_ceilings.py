@@ -29,7 +29,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, level_or_sloped
-from pbrs_farm.home.room_use import RoomKind, named_kind
+from pbrs_farm.home.room_use import is_outdoors
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
@@ -78,7 +78,7 @@ def with_ceilings(house: House) -> House:
     closed: dict[str, Room] = {}
     # From the top storey down: what is under a ceiling that was just added is not open to the sky.
     for room in sorted(house.rooms, key=lambda r: -r.floor_y):
-        found = None if room.has_ceiling or _is_outdoors(room) else _closed(room, house, covers)
+        found = None if room.has_ceiling or is_outdoors(room) else _closed(room, house, covers)
         if found is None:
             continue
         surface, closed[room.id] = found
@@ -110,10 +110,6 @@ def _cover(item: Item) -> _Cover:
     low_y, high_y = item.bounds[:, 1].tolist()  # NaN of an item without vertices
     is_ceiling = item.kind is ItemKind.CEILING
     return _Cover(plan.union(shapes), low_y, is_ceiling, is_sheet=high_y - low_y < _APART_M)
-
-
-def _is_outdoors(room: Room) -> bool:
-    return RoomKind.OUTDOOR in [named_kind(text) for text in (*room.types, room.name)]
 
 
 def _closed(room: Room, house: House, covers: Sequence[_Cover]) -> tuple[Surface, Room] | None:

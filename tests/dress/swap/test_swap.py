@@ -155,6 +155,15 @@ def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind()
     assert_allclose(high, was, atol=0.02)
 
 
+@pytest.mark.parametrize(("name", "is_kept"), [("Balcony", True), ("Living room", False)])
+def test_a_chair_on_a_balcony_stays_and_one_in_a_room_is_swapped(name: str, is_kept: bool) -> None:
+    size = (0.5, 0.5, 0.9)
+    home = house(_item("chair", size, [1, 0, 1], 5, is_seat=True), name=name)
+    draft = Draft(home, 3)
+    swap(draft, _catalogue(("chair", "new", size)), style_for(draft.rng("style"), ""), 1.0)
+    assert (draft.items[0] is home.items[0]) == is_kept
+
+
 def test_chairs_of_one_room_get_one_model() -> None:
     size = (0.45, 0.45, 0.9)
     catalogue = _catalogue(*(("chair", f"n{k}", (0.45, 0.43, 0.88 + 0.01 * k)) for k in range(6)))
