@@ -239,8 +239,10 @@ def things_of(*names: str, **solids: object) -> Things:
 
 THINGS: Final = things_of(
     "decor", "vessels", "belongings", "tableware", "household", "desk", "bath", "floor_things", "soft",
+    "appliances",
     **{name: bodies.SOLIDS[name] for name in ("bevelled", "rounded", "loft", "hoop", "tube")},
     **{name: bodies.OUTLINES[name] for name in ("oval", "rect", "fluted", "bent", "ring_path")},
+    **{name: STUFFS[name] for name in ("chrome", "steel", "black_steel", "black_glass", "rubber")},
 )  # fmt: skip
 
 CASE_GOODS: Final = things_of(

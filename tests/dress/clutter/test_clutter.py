@@ -15,10 +15,11 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.placing import Row, is_known, receptacle_of, shares
+from pbrs_farm.dress.clutter.placing import Row, Stock, is_known, receptacle_of, shares
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.dress.things.books import book_covers
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 from tests.dress.furniture import bookcase, house, room, solid
@@ -154,6 +155,15 @@ def test_the_table_of_shares_names_kinds_that_exist() -> None:
         for row in rows:
             assert is_known(row.kind), f"{receptacle}: {row.kind}"
             assert 0 < row.share <= 1
+
+
+def test_what_tables_put_on_surfaces_is_there_without_a_library() -> None:
+    # A worktop was to have a coffee machine and cutlery, which no library has.
+    rng, style = np.random.default_rng(0), style_for(np.random.default_rng(1), "nordic")
+    stock = Stock(EMPTY, book_covers(rng, style), 1)
+    kinds = {row.kind for rows in shares().values() for row in rows}
+    missing = {k for k in sorted(kinds) if stock.take(rng, k, style) is None}
+    assert missing == {"jewel", "table_lamp"}
 
 
 def test_a_laid_table_has_a_plate_before_each_chair() -> None:
