@@ -21,6 +21,10 @@ from pbrs_farm.geometry.solids import Triple, boxes_surface
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
 _PANEL_M: Final = 0.006  # how far a panel stands out
+_GAP_M: Final = 0.003  # around a leaf
+_STOP_M: Final = 0.015  # how far the stop behind a leaf reaches into the opening
+_STOP_DEPTH_M: Final = 0.012
+_THRESHOLD_M: Final = 0.02
 _SASH_M: Final = 0.05  # breadth of a sash's bars
 _SASH_DEPTH_M: Final = 0.03  # from its middle to either face
 _BAR_M: Final = 0.022  # of the bars across a pane
@@ -82,6 +86,7 @@ def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape
         return Shape((boxes_surface("frame", frame, 0),), (paint,))
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
         kind = design.leaf if opening.kind is OpeningKind.DOOR else design.entrance
+        frame += _stops(w, h, d, has_threshold=opening.kind is OpeningKind.ENTRANCE)
         leaf = _leaf(w, h, d, kind)
         handles = _handles(w, d, opening.hinge_at_start, design.handle)
         surfaces = [boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1)]
@@ -105,10 +110,25 @@ def _frame(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
     return boxes
 
 
+def _stops(w: float, h: float, d: float, *, has_threshold: bool) -> list[_Box]:
+    """Strips that a leaf shuts against, so that no light comes round it; below, a threshold."""
+    x, top, s = w / 2 - _FRAME_M, h - _FRAME_M, _STOP_M
+    front = d / 2 - 0.005 - _LEAF_M - 0.0005
+    back = front - _STOP_DEPTH_M
+    boxes: list[_Box] = [
+        ((-x, 0.0, back), (-x + s, top, front)),
+        ((x - s, 0.0, back), (x, top, front)),
+        ((-x + s, top - s, back), (x - s, top, front)),
+    ]
+    if has_threshold:
+        boxes.append(((-x + s, 0.0, back), (x - s, _THRESHOLD_M, front)))
+    return boxes
+
+
 def _leaf(w: float, h: float, d: float, kind: str) -> list[_Box]:
     """A door's leaf, flush with the room it swings into; panels stand out on both sides."""
-    x, front = w / 2 - _FRAME_M - 0.003, d / 2 - 0.005
-    back, top = front - _LEAF_M, h - _FRAME_M - 0.003
+    x, front = w / 2 - _FRAME_M - _GAP_M, d / 2 - 0.005
+    back, top = front - _LEAF_M, h - _FRAME_M - _GAP_M
     boxes: list[_Box] = [((-x, 0.006, back), (x, top, front))]
     for left, low, right, high in _panels(x, top, kind):
         boxes.append(((left, low, front), (right, high, front + _PANEL_M)))

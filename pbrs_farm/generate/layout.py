@@ -314,6 +314,7 @@ def _easier(programme: Programme) -> list[tuple[str, Programme]]:
     steps = [("", programme)]
     for left_out, change in (
         ("these rooms adjacent", {"adjacent": ()}),
+        ("a court in a side", {"is_court": False}),
         ("a notch or a second arm", {"notch": 0.0, "is_court": False, "l_shaped": False}),
         ("sides without daylight", {"n_blind_sides": 0}),
     ):

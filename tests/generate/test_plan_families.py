@@ -8,6 +8,7 @@ import pytest
 from pbrs_farm.core.made_home import PLANS
 from pbrs_farm.generate.drawn_home import drawn_plan
 from pbrs_farm.generate.floor_plan import RoomType
+from pbrs_farm.generate.layout import _easier
 from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Programme, RoomWish, Wishes
 from pbrs_farm.generate.slicing import Brief, IntRect, Rules, SliceLeaf
@@ -30,6 +31,14 @@ def test_a_window_and_a_door_fit_below_the_lowest_ceiling_of_their_family() -> N
     for name, family in plan_families().items():
         tops = (family.window.sill + family.window.height, family.french_height, family.door_height)
         assert max(tops) + 0.1 < min(family.heights), name
+
+
+def test_a_home_without_place_for_its_court_is_tried_with_a_corner_left_out() -> None:
+    wishes = (RoomWish(RoomType.LIVING, 20.0), RoomWish(RoomType.HALL, 6.0))
+    steps = _easier(Programme(wishes, notch=8.0, is_court=True))
+    assert [(p.notch > 0, p.is_court) for _, p in steps[:3]] == [
+        (True, True), (True, False), (False, False),
+    ]  # fmt: skip
 
 
 @pytest.mark.slow

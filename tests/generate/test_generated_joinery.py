@@ -1,0 +1,28 @@
+"""Generated doors: what one sees through a shut one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
+from pbrs_farm.generate.joinery import LEAVES, JoineryDesign, joinery
+
+WIDTH, HEIGHT = 0.9, 2.1
+
+
+@pytest.mark.parametrize("leaf", LEAVES)
+@pytest.mark.parametrize(
+    ("kind", "gap_m"), [(OpeningKind.ENTRANCE, 0.0), (OpeningKind.DOOR, 0.006)]
+)
+def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: float) -> None:
+    door = PlanOpening(kind, 0, 1.0, WIDTH, HEIGHT, 0.0, 0)
+    shape = joinery(door, 0.26, JoineryDesign(leaf=leaf, entrance=leaf))
+    corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
+    # As seen along the wall's normal: rooms inside have a gap above the floor, nothing else.
+    covered = shapely.union_all(shapely.polygons(corners[:, :, :2].astype(np.float64)))
+    open_part = shapely.box(-WIDTH / 2, 0.0, WIDTH / 2, HEIGHT).difference(covered.buffer(1e-5))
+    assert open_part.area == pytest.approx(gap_m * WIDTH, rel=0.2, abs=1e-4)
+    assert open_part.is_empty or open_part.bounds[3] <= gap_m + 1e-4
