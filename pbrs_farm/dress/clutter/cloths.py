@@ -35,6 +35,8 @@ _SUNK_M, _MOST_GAP_M = 0.01, 0.04
 _BESIDE_M: Final = (
     0.15  # above the floor: what rises beside a bed keeps its duvet from hanging there
 )
+_SMALLER: Final = (1.0, 0.8, 0.6)  # sizes that clothes are tried at, by the first
+_MOST_RISE_M: Final = 0.1  # of what clothes fall on
 _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 
 
@@ -101,15 +103,23 @@ def drop_clothes(
     size = (float(rng.uniform(0.3, 0.42)), float(rng.uniform(0.24, 0.36)))
     size = (0.14, 0.12) if napkin else size
     factor = 0.35 if napkin else 1.0
-    net, threads = flat_net(size, factor * _THREADS_M["clothes"], (x, level + 0.15, z), 0.0)
-    # An outline that nobody laid out.
-    net[..., [0, 2]] += np.stack(
-        [
-            ndimage.gaussian_filter(rng.normal(0, 0.3 * factor, net.shape[:2]), 2.0)
-            for _ in range(2)
-        ],
-        -1,
-    )
+    for smaller in _SMALLER:
+        w, d = (side * smaller for side in size)
+        net, threads = flat_net((w, d), factor * _THREADS_M["clothes"], (x, level + 0.15, z), 0.0)
+        # An outline that nobody laid out.
+        net[..., [0, 2]] += np.stack(
+            [
+                ndimage.gaussian_filter(rng.normal(0, 0.3 * factor * smaller, net.shape[:2]), 2.0)
+                for _ in range(2)
+            ],
+            -1,
+        )
+        # Over the posts of a back rest a corner of it would stay up there, and the cloth with it.
+        if (ground.at(net[..., 0], net[..., 2]) < level + _MOST_RISE_M).all():
+            break
+    else:
+        placing.refuse("clothes would hang on what rises beside them")
+        return
     folds = Folds(16, 0.05 * factor, 0.028 * factor, (0.12 * factor, 0.4 * factor))
     net = folded(fallen(net, threads, ground, 0.006), ground, 0.006, folds, rng)
     r, g, b = (float(c) for c in rng.random(3))

@@ -14,7 +14,16 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.classes import BED, CHAIR, SOFA
+from pbrs_farm.core.classes import (
+    BED,
+    CABINET,
+    CHAIR,
+    COUNTER,
+    DRESSER,
+    OTHERFURNITURE,
+    REFRIGERATOR,
+    SOFA,
+)
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.walkable import CELL_M
@@ -168,6 +177,9 @@ _NEAR_WALLS_M = 0.5  # of a room: farther ones are not its own
 _AT_WALL_M = 0.12  # beyond its own radius, of what stands at walls
 _KEPT_M = 0.04  # between things
 _DOOR_M = 1.0  # kept free before doors
+_OPEN_M = 0.6  # the same before what has doors or drawers
+_OPENED = (CABINET, COUNTER, REFRIGERATOR, DRESSER, OTHERFURNITURE)
+_STANDS_M, _LEAST_FRONT_M = 0.15, 0.4  # above the floor, how low and how high it reaches
 _HEAD_M = 1.9
 _RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
 
@@ -233,8 +245,23 @@ def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor 
             continue
         zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
         kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
+    fronts = shapely.union_all([_before_front(scene.items[k], y) for k in room.items])
+    kept |= shapely.contains_xy(fronts, plan[..., 0], plan[..., 1])
     joined = doors_are_joined(bitmap, room)
     return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)
+
+
+def _before_front(item: Item, floor_y: float) -> BaseGeometry:
+    """Where one stands to open what has doors or drawers: a cupboard, a wardrobe, a cooker."""
+    low_y, high_y = item.bounds[:, 1]
+    is_closed = item.kind is ItemKind.OBJECT and item.nyu40 in _OPENED
+    if not is_closed or low_y > floor_y + _STANDS_M or high_y < floor_y + _LEAST_FRONT_M:
+        return shapely.Polygon()
+    box = item.oriented_box
+    out, across = box.axes[[0, 2], 2], box.axes[[0, 2], 0] * box.half[0]
+    near = box.centre[[0, 2]] + out * box.half[2]
+    far = near + out * _OPEN_M
+    return shapely.Polygon([near - across, near + across, far + across, far - across])
 
 
 def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:

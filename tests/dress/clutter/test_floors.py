@@ -68,6 +68,19 @@ def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() ->
     assert n > 3
 
 
+def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
+    # Its front is its box's third axis, +z: a strip as wide as it, 0.6 m deep.
+    wardrobe = solid("Wardrobe", [0.5, 0, 0], [3.5, 2.0, 0.6], 3)
+    low = solid("Bed", [0, 0, 1.8], [4, 0.5, 3], 4)
+    before = shapely.box(0.5, 0.6, 3.5, 1.2)
+    for seed in range(4):
+        draft = Draft(house(wardrobe, low, name="Bedroom"), seed)
+        clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        for item in _on_floor(draft):
+            footprint = shapely.box(*item.bounds[:, [0, 2]].ravel())
+            assert before.intersection(footprint).area < 1e-4, item.name
+
+
 def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
     full = solid("Block", [0, 0, 0], [4, 1.0, 3], 39)
     draft = Draft(house(full), 1)

@@ -14,13 +14,15 @@ from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import edges_are_paired, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
-from pbrs_farm.dress.clutter.placing import apart
+from pbrs_farm.dress.clutter.placing import Placing, Stock, apart
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.mess import chairs, pictures
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import PlanGrid
+from pbrs_farm.dress.supports import PlanGrid, SceneTriangles
+from pbrs_farm.dress.things.books import book_covers
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
@@ -113,6 +115,22 @@ def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: floa
         # The pillows lie at the head, the duvet below them over the rest.
         assert max(p.bounds[1, 0] for p in pillows) < duvets[0].bounds[0, 0]
         assert duvets[0].bounds[1, 0] > 1.95
+
+
+def test_clothes_on_a_seat_hang_on_no_post_behind_it() -> None:
+    posts = [([x, 0.0, 0.4], [x + 0.04, 0.95, 0.44]) for x in (0.0, 0.12, 0.24, 0.36)]
+    chair = boards("Chair", [([0.0, 0.0, 0.0], [0.4, 0.45, 0.4]), *posts], CHAIR)
+    found = []
+    for seed in range(6):
+        draft = Draft(house(chair, name="Bedroom"), seed, 1.0)
+        rng = draft.rng("test")
+        stock = Stock(EMPTY, book_covers(rng, STYLE), 1)
+        placing = Placing(draft, stock, draft.source.rooms[0], STYLE, rng, 1.0)
+        drop_clothes(placing, SceneTriangles(draft.items), np.array([0.2, 0.2]), 0.45)
+        found += draft.items[1:]
+    # What finds no place on the seat stays in the wardrobe.
+    assert len(found) >= 3
+    assert max(float(item.bounds[1, 1]) for item in found) < 0.65
 
 
 def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters_nothing() -> None:
