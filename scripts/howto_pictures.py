@@ -3,7 +3,8 @@
     python scripts/howto_pictures.py [PAGE ...]
 
 Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
-left as it is. Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide and at most 60 kB.
+left as it is. Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide and at most 60 kB, and
+the pictures of docs/switches.md and docs/photographs.md.
 """
 
 from __future__ import annotations
@@ -205,8 +206,8 @@ def simulators() -> Image.Image:
 
 
 def own_furniture() -> Image.Image:
-    frames = pf.open("out/own")
-    return row(frames[0].colour, frames[1].colour)
+    frames = pf.open("out/ownviews")
+    return row(frames[0].colour, frames[2].colour)
 
 
 def cluster() -> Image.Image:
@@ -219,8 +220,16 @@ def estimate() -> Image.Image:
 
 def resume() -> Image.Image:
     """What an interrupted view had kept, and the view when it is done."""
-    kept = np.load(OUT / "resume_sums.npz")
-    raise FileNotFoundError(str({k: kept[k].shape for k in kept.files}))
+    kept = Image.open(OUT / "resume_kept.png")
+    return row(kept, pf.open("out/resume")[0].colour)
+
+
+def photographs() -> None:
+    """docs/pictures/photographs.jpg: two photographs, each beside a rendered view."""
+    ours = [pf.open("out/desk/Desk")[1].colour, pf.open("out/desk/Laptop")[0].colour]
+    photos = [Image.open(path) for path in sorted(OUT.glob("photos/*.png"))]
+    pairs = [row(photo, view) for photo, view in zip(photos, ours, strict=True)]
+    rows(*pairs).save(PICTURES.parent / "photographs.jpg", quality=88, optimize=True)
 
 
 def switches() -> None:
@@ -247,11 +256,18 @@ PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
 }  # fmt: skip
 
 
+# Pictures of other pages, which save themselves.
+OTHERS: Final = {f.__name__: f for f in (switches, photographs)}
+
+
 def main(names: Iterable[str]) -> None:
-    """Draw the pages that are named, else all."""
-    for name in names or PAGES:
+    """Draw what is named, else all."""
+    for name in names or (*PAGES, *OTHERS):
         try:
-            save(PAGES[name](), name)
+            if name in OTHERS:
+                OTHERS[name]()
+            else:
+                save(PAGES[name](), name)
         except (OSError, PbrsError) as error:
             print(f"{name}: {error}")
 
