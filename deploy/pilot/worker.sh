@@ -60,7 +60,8 @@ echo "worker $PBRS_FARM_WORKER: ${PBRS_FARM_SLOTS:-1} slots, ${PBRS_FARM_GRACE_S
 
 words=()
 [ -n "${PBRS_WALL_S:-}" ] && words=(--until "$PBRS_WALL_S")
-"${PBRS_BIN:-pbrs-farm}" worker "${words[@]}" &
+# GridEngine warns the whole process group: what is ignored here stays so in all that the worker starts.
+(trap '' USR1 USR2 XCPU; exec "${PBRS_BIN:-pbrs-farm}" worker "${words[@]}") &
 worker=$!
 # Whatever the scheduler sends means: leave.
 leave() { kill -TERM "$worker" 2>/dev/null; }

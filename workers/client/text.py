@@ -101,15 +101,16 @@ def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
     """A worker a line, whether it lives, and how many do."""
     if not rows:
         return "no workers"
+    wide = 2 + max(len("version"), *(len(row.get("version", "?")) for row in rows))
     lines = [
-        f"{'worker':<32}{'state':<10}{'seen':>8}{'slots':>6}{'memory':>14}  {'version':<9}queues"
+        f"{'worker':<32}{'state':<10}{'seen':>8}{'slots':>6}{'memory':>14}  {'version':<{wide}}queues"
     ]
     for row in rows:
         refusal = f" refuses: {row['refuses']}" if row.get("refuses") else ""
         lines.append(
             f"{row['worker']:<32}{row['state']:<10}{duration_text(row['age_s']):>8}"
             f"{row.get('slots', '?'):>6}{memory_text(row):>14}  "
-            f"{row.get('version', '?'):<9}{row.get('queues', '')}{refusal}"
+            f"{row.get('version', '?'):<{wide}}{row.get('queues', '')}{refusal}"
         )
     counts = Counter(row["state"] for row in rows)
     return "\n".join([*lines, ", ".join(f"{n} {state}" for state, n in sorted(counts.items()))])

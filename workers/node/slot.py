@@ -83,6 +83,7 @@ def make_slot(config: FarmConfig) -> Slot:
     folder.mkdir(parents=True, exist_ok=True)
     start = partial(ChildProcess, HANDLER, folder / "log.txt")
     process = RenderProcess(start, config.limits.of_process(config.slots))
+    process.start()  # it loads its libraries before it has a task
     ledger = RedisLedger(config)
     return Slot(config, ledger, Registry(ledger), process)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+from celery.signals import worker_process_init
+
 from workers.config import config_from_environment
 from workers.ids import check_job_id, tasks_from_group
 from workers.node.slot import Slot, make_slot
@@ -14,8 +16,14 @@ RUN = "pbrs.run"
 
 @cache
 def _slot() -> Slot:
-    """This pool process's slot; made at its first task, never in Celery's parent."""
+    """This pool process's slot, never of Celery's parent."""
     return make_slot(config_from_environment())
+
+
+@worker_process_init.connect  # type: ignore[untyped-decorator]
+def _make_ready(**_: object) -> None:
+    """A pool process has its slot before its first task."""
+    _slot()
 
 
 @app.task(name=RUN)  # type: ignore[untyped-decorator]
