@@ -21,8 +21,10 @@ from PIL import Image, ImageDraw
 
 import pbrs_farm as pf
 from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.gallery import label_colours
 from pbrs_farm.images import array_from_png
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
 
 OUT, PICTURES = Path("out"), Path("docs/pictures/howto")
 WIDTH_PX, MAX_BYTES, GAP_PX = 640, 60_000, 4
@@ -219,9 +221,16 @@ def estimate() -> Image.Image:
 
 
 def resume() -> Image.Image:
-    """What an interrupted view had kept, and the view when it is done."""
-    kept = Image.open(OUT / "resume_kept.png")
-    return row(kept, pf.open("out/resume")[0].colour)
+    """What an interrupted view had kept (out/resume_sums.npz), and the view when it is done."""
+    kept, frame = np.load(OUT / "resume_sums.npz"), pf.open("out/resume")[0]
+    house, view = frame.id.split("/")
+    means = (
+        kept[f"path/{name}"].reshape(frame.colour.shape) / np.float32(kept["path/spp"])
+        for name in ("outdoor", "indoor", "albedo", "normal")
+    )
+    recipe = recipe_from_json((OUT / "resume/recipe.json").read_text(), "recipe.json")
+    shown = develop(LinearAovs(*means), recipe.tone_of(house, view), denoise=False)
+    return row(shown["mlt_il_ol"].rgb_srgb8, frame.colour)
 
 
 def photographs() -> None:
