@@ -116,12 +116,15 @@ def owner_of(node: ast.expr) -> Any:
 
 
 @pytest.mark.parametrize("page", HOWTO, ids=name_of)
-def test_a_howto_has_a_goal_a_command_or_python_and_what_one_gets(page: Path) -> None:
+def test_a_howto_has_a_goal_a_command_or_python_what_one_gets_and_a_picture(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert text.startswith("# ")
     assert re.search(r"^You (want|have) ", text, re.MULTILINE)
     assert re.search(r"\byou get\b", text, re.IGNORECASE)
     assert fences(page, "sh") or fences(page, "python") or "pbrs-farm " in text
+    pictures = re.findall(r"^!\[.+\]\((\S+)\)$", text, re.MULTILINE)
+    assert pictures
+    assert [p for p in pictures if not (page.parent / p).exists()] == []
     assert f"]({page.name})" in (REPO / "docs/howto/index.md").read_text(encoding="utf-8")
 
 
