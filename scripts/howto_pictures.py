@@ -3,8 +3,13 @@
     python scripts/howto_pictures.py [PAGE ...]
 
 Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
-left as it is. Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide and at most 60 kB, and
-the pictures of docs/switches.md and docs/photographs.md.
+left as it is. Some want more than their page: photos/*.png are photographs of yours (predict, train's views
+under viewseen/, photographs), farm.png and job.png are screenshots of the board, spp4 to spp256 are runs of
+gpu.md's last line, back is simulators.md's export rendered again, ownviews a run with own_furniture.md's
+catalogue, desk/Desk and desk/Laptop the two halves of photographs.md's block, light/NN_NAME.png the pictures
+of switches.md's table, resume_sums.npz the sums that a killed view leaves beside its outputs.
+Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide (screenshots as wide as they are) and
+at most 60 kB, and the pictures of docs/switches.md and docs/photographs.md.
 """
 
 from __future__ import annotations

@@ -196,7 +196,7 @@ def _fetch(package: str, tested_version: str, scratch: Path) -> None:
         try:
             download_pinned(PINS[package], scratch)
         except MachineFailed as failed:
-            raise MachineFailed(f"{refused}; {failed}", hint=_HINT) from None
+            raise MachineFailed(f"{refused}; {failed.message}", hint=failed.hint) from None
 
 
 def _deb(package: str, tested_version: str, path: Path) -> Deb:

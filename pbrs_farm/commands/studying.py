@@ -19,6 +19,7 @@ from pbrs_farm.commands.arguments import (
     fields_set,
 )
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.study.training_plan import TASKS
 
 if TYPE_CHECKING:
     from pbrs_farm.study.judging.evaluation import Evaluation, Trained
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from pbrs_farm.study.training.view_sources import TrainingSource
     from pbrs_farm.study.training_plan import TrainingPlan
 
-TASKS = ("normals", "segmentation", "boundaries", "depth")
 LOGGERS = ("tensorboard", "wandb")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
 
@@ -72,8 +72,8 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
     p = verb("predict", _predict, "what a run sees in photographs: files, and a page with a wipe")
-    photographs = "a run, then pictures, or folders of them, of any size; EXIF's orientation holds"
-    p.add_argument("places", type=Path, nargs="+", metavar="RUN PHOTO", help=photographs)
+    photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
+    p.add_argument("places", type=Path, nargs="+", metavar=("RUN", "PHOTO"), help=photographs)
     text = "no RUN: the weights that come with the package for this task"
     p.add_argument("--task", choices=TASKS, help=text)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
@@ -136,7 +136,7 @@ def _train(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.judged_places import judge_of_places, judged_place
     from pbrs_farm.study.networks.initial_weights import credits_of_init
-    from pbrs_farm.study.training.loggers import loggers
+    from pbrs_farm.study.training.loggers import check_installed, loggers
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.training_views import ViewArrays
@@ -149,7 +149,9 @@ def _train(args: argparse.Namespace) -> int:
     from pbrs_farm.study.training_plan import plan_as_json
 
     plan, source = _plan(args, args.task), _source(args)
-    device_of(plan)  # before views are read
+    # What is missing here is told before views are read.
+    device_of(plan)
+    check_installed(args.log)
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     n_held = len(held_out) if held_out else 0
     lacking = left_out(source, plan)

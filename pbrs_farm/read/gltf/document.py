@@ -78,8 +78,9 @@ def _check_extensions(gltf: Gltf) -> None:
 
 
 def _parsed(data: bytes, file: str) -> Gltf:
-    # Tell the two forms by their content, whatever the file is called.
-    if data[:4] == b"glTF":
+    # Tell the two forms by their content, whatever the file is called; by the name what is neither.
+    is_text = data.lstrip()[:1] == b"{"
+    if data[:4] == b"glTF" or (file.lower().endswith(".glb") and not is_text):
         return gltf_from_glb(data, file)
     document = json_from_bytes(data, file)
     return Gltf(document if isinstance(document, dict) else {}, (), file)

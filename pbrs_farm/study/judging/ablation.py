@@ -77,6 +77,7 @@ def compare(
     return {
         "task": plan.task,
         "plan": plan.name,
+        "n_classes": plan.n_classes,
         "steps": plan.steps,
         "judged_on": {
             views.name: {"truth": views.truth, "n_views": len(views.ids)} for views in judged_on
@@ -130,8 +131,8 @@ def ablation_table(result: dict[str, Any]) -> str:
             for part in ("train", "held_out")
         ]
         cells += [_cell(figure, [run["on"][other]["network"] for run in runs]) for other in others]
-        paper = paper_row(task.name, row["mode"])
-        known = paper.figures[0] if not paper.tuned else float("nan")
+        paper = paper_row(task.name, row["mode"], result["n_classes"])
+        known = paper.figures[0] if paper and not paper.tuned else float("nan")
         rows.append([name, str(row["views"]), *cells, spread_text(figure, [known])])
         if any(_is_underfit(task.name, run) for run in runs):
             underfit.append(name)

@@ -133,8 +133,13 @@ _NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "Ope
                  "opengl_dl": "OpenGL-DL"}  # fmt: skip
 
 
-def paper_row(task: str, mode: str) -> PaperRow:
-    """The paper's row for a lighting mode without fine-tuning; where it has none, MLT's best."""
+def paper_row(task: str, mode: str, n_classes: int = _PAPER_CLASSES) -> PaperRow | None:
+    """The paper's row for a lighting mode without fine-tuning; where it has none, MLT's best.
+
+    None where the paper says nothing: of depth, and of other classes than NYU40.
+    """
+    if task not in PAPER or n_classes != _PAPER_CLASSES:
+        return None
     name = _NAMES.get(mode, "MLT-IL/OL")
     rows = PAPER[task]
     same = [row for row in rows if row.pretrained == name and not row.tuned]
@@ -347,15 +352,11 @@ def table(run: Trained, evaluations: list[Evaluation]) -> str:
 
 
 def _paper(run: Trained) -> PaperRow | None:
-    """The paper's row beside this run: of its light, or of the light it was tuned from.
-
-    None where the paper says nothing: of depth, and of other classes than NYU40.
-    """
-    if run.task.name not in PAPER or run.plan.n_classes != _PAPER_CLASSES:
-        return None
+    """The paper's row beside this run: of its light, or of the light it was tuned from."""
     mode = str(run.record["mode"])
-    if mode != NYU_LIGHT:
-        return paper_row(run.task.name, mode)
+    row = paper_row(run.task.name, mode, run.plan.n_classes)
+    if row is None or mode != NYU_LIGHT:
+        return row
     return tuned_row(run.task.name, str(run.record["init_origin"].get("mode", "")))
 
 

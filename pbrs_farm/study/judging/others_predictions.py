@@ -1,8 +1,9 @@
 """What other programs say of the same pictures, as files: judged as a run's own predictions. Effects: reads them.
 
 A file a picture, named by the picture's id (`kitchen/0001`) or its last part: NAME_normal.png,
-NAME_semantic.png (NAME_nyu13.png of 13 classes) or NAME_edges.png as `predict` writes them, or NAME.npy: normals (H, W, 3) in
-OpenCV's axes (x right, y down, z forward), ids of classes, or edges 0..1.
+NAME_semantic.png (NAME_nyu13.png of 13 classes), NAME_edges.png or NAME_depth.png as `predict` writes
+them, or NAME.npy: normals (H, W, 3) in OpenCV's axes (x right, y down, z forward), ids of classes, edges
+0..1, or metres.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
@@ -19,6 +19,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.judging.evaluation import Trained, markdown, open_run, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
 from pbrs_farm.study.training.run_folder import RunFolder, made_folder
+from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import plan_as_json
 
 SHIPPED: Final = Path(__file__).parents[1] / "weights"
@@ -85,26 +86,37 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         f"# {task.name}, plan {plan.name}",
         f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room. Network `{plan.network}`,"
         f" {record['weights']:,} weights in half floats, trained at {size}.",
-        f"```\npbrs-farm predict --task {task.name} PHOTO... --out seen\n```",
+        "```\npbrs-farm predict FOLDER PHOTO... --out seen\n```",
+        "FOLDER is where this card lies; the package's own weights go by `--task`, too.",
         "## What it was trained on",
-        f"{record['views']['train']} rendered views of {len(homes)} homes in light"
-        f" `{record['mode']}`: {', '.join(homes[:_MOST_HOMES])}"
-        f"{' and others' if len(homes) > _MOST_HOMES else ''}. No photograph was trained on."
-        f" First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
+        _seen(record, homes),
+        f"First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
         f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}.",
         f"Truth: {record['truth']}.",
         "## Figures",
         _figures(run, evaluations),
         *(f"Truth of {one['on']}: {one['truth']}." for one in evaluations),
         "## Limits",
-        f"A small network of two cores and few homes, at {size}: nothing for measuring or for safety."
-        " It knows rooms of made homes by day and by lamplight; photographs of other places, people,"
-        " animals and close-ups are unlike anything it saw.",
+        f"A small network at {size}, trained on few pictures: nothing for measuring or for safety."
+        " It knows rooms of homes by day and by lamplight; other places, people, animals and close-ups"
+        " are unlike anything it saw.",
         "## Whose works it saw",
         "\n".join(f"- {line}" for line in _credits(record)) or "The run names none.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
     ]  # fmt: skip
     return "\n\n".join(said) + "\n"
+
+
+def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
+    """What the weights saw, their first ones included."""
+    n, first = record["views"]["train"], record["init_origin"].get("mode", "")
+    if record["mode"] == NYU_LIGHT:
+        return f"{n} photographs of NYU Depth v2 (Silberman et al., 2012), labelled there."
+    named = f"{', '.join(homes[:_MOST_HOMES])}{' and others' if len(homes) > _MOST_HOMES else ''}"
+    said = f"{n} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
+    if first == NYU_LIGHT:
+        return f"{said} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
+    return f"{said} No photograph was trained on."
 
 
 def _credits(record: Mapping[str, Any]) -> list[str]:

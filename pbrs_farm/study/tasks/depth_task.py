@@ -73,12 +73,14 @@ class DepthTask:
 
     def baseline(self, targets: list[Arrays], plan: TrainingPlan) -> tuple[str, F32]:
         """The mean logarithm of each pixel, as metres."""
-        depths = np.stack([target["depth"] for target in targets])
-        known = depths > 0
-        logs = np.log(np.where(known, depths, 1))
-        overall = logs.sum() / max(int(known.sum()), 1)
-        n = known.sum(0)
-        mean = np.where(n > 0, logs.sum(0) / np.maximum(n, 1), overall)
+        total = np.zeros(targets[0]["depth"].shape)
+        n = np.zeros(total.shape, np.int64)
+        for target in targets:
+            known = target["depth"] > 0
+            total += np.log(np.where(known, target["depth"], 1))
+            n += known
+        overall = total.sum() / max(int(n.sum()), 1)
+        mean = np.where(n > 0, total / np.maximum(n, 1), overall)
         return "mean depth", np.asarray(np.exp(mean), np.float32)
 
     def scorer(self, plan: TrainingPlan) -> DepthScorer:

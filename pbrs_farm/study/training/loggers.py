@@ -29,11 +29,7 @@ def loggers(names: Sequence[str], out: Path, config: dict[str, Any]) -> Iterator
     """
     # Of several processes of torchrun the first one tells.
     names = names if share_of_process().is_first else ()
-    for name in names:
-        if find_spec(name) is None:
-            raise MachineFailed(
-                f"--log {name}: not installed", hint=f'pip install "pbrs-farm[{name}]"'
-            )
+    check_installed(names)
     with ExitStack() as stack:
         heard = [stack.enter_context(_OPENED[name](out, config)) for name in names]
 
@@ -42,6 +38,15 @@ def loggers(names: Sequence[str], out: Path, config: dict[str, Any]) -> Iterator
                 one(row)
 
         yield observe
+
+
+def check_installed(names: Sequence[str]) -> None:
+    """Raise MachineFailed for the first of these programs whose package is missing."""
+    for name in names:
+        if find_spec(name) is None:
+            raise MachineFailed(
+                f"--log {name}: not installed", hint=f'pip install "pbrs-farm[{name}]"'
+            )
 
 
 @contextmanager

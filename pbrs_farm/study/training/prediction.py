@@ -106,8 +106,8 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     """Write the network as ONNX: input colour (1, 3, H, W) float 0..1 at the plan's size, output map.
 
     The colour's encoding is inside. The map is (1, C, H, W): a normal (x right, y down, z forward, of
-    no particular length), a score a class (channel 0 is class 1), or edges. Raises MachineFailed
-    without the packages that export.
+    no particular length), a score a class (channel 0 is class 1), edges, or the logarithm of metres.
+    Raises MachineFailed without the packages that export.
     """
     missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
     if missing:

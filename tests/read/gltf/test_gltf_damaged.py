@@ -49,6 +49,19 @@ def test_a_damaged_scene_is_refused_naming_the_place(edit: Any, place: str) -> N
     assert caught.value.file == "scene.glb"
 
 
+@pytest.mark.parametrize(
+    ("data", "name", "said"),
+    [
+        (b"a list of things", "list.glb", "is no GLB file"),
+        (b"a list of things", "list.gltf", "no valid JSON"),
+        (b' {"nodes": []}', "text.glb", "this is no glTF file"),
+    ],
+)
+def test_what_is_no_scene_is_called_so(data: bytes, name: str, said: str) -> None:
+    with pytest.raises(BadHouse, match=said):
+        read_gltf(data, name, fields=ReadFields())
+
+
 def test_a_signalling_nan_is_a_number_that_is_not_finite() -> None:
     scene = two_rooms()
     scene.node("Chair", mesh=scene.box([1.375, 0, 1], [2, 1, 2]))

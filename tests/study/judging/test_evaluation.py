@@ -12,7 +12,7 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.judging.ablation import hold_out_notes, training_sets
+from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import (
     PAPER,
     evaluate,
@@ -243,10 +243,27 @@ def test_of_several_seeds_mean_and_deviation_are_shown() -> None:
 
 
 def test_the_papers_rows_have_as_many_figures_as_ours() -> None:
-    assert paper_row("normals", "mlt_il_ol").figures[:2] == (27.90, 21.29)
-    assert paper_row("normals", "opengl_dl").figures[0] == 34.02
+    traced, opengl = paper_row("normals", "mlt_il_ol"), paper_row("normals", "opengl_dl")
+    assert traced is not None
+    assert traced.figures[:2] == (27.90, 21.29)
+    assert opengl is not None
+    assert opengl.figures[0] == 34.02
     for task, rows in PAPER.items():
         assert all(len(row.figures) <= len(task_of(task).figures) for row in rows)
+
+
+@pytest.mark.parametrize(("task", "n_classes"), [("depth", 40), ("segmentation", 13)])
+def test_a_table_of_what_the_paper_does_not_know_has_no_number_of_it(
+    task: str, n_classes: int
+) -> None:
+    figures = dict.fromkeys(task_of(task).figures, 0.5)
+    network = {"train": figures, "held_out": figures}
+    run = {"network": network, "baseline": network, "baseline_name": "nothing", "on": {}}
+    row = {"mode": "mlt_il_ol", "views": 3, "seeds": [run]}
+    result = {"task": task, "plan": "tiny", "n_classes": n_classes, "judged_on": {}}
+    lines = ablation_table(result | {"rows": {"traced": row}}).splitlines()
+    (told,) = (line for line in lines if line.startswith("| traced"))
+    assert told.rstrip(" |").endswith("-")
 
 
 def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
