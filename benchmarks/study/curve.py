@@ -33,7 +33,7 @@ from benchmarks.study.rendered import FOLDER
 CURVE: Final = FOLDER / "curve"
 DOCS: Final = Path("docs/lab")
 POINTS: Final = (
-    (10, 100), (20, 100), (20, 200), (40, 100), (40, 400), (80, 400), (80, 800), (160, 1600),
+    (10, 50), (10, 100), (20, 100), (20, 200), (40, 100), (40, 400), (80, 400), (80, 800), (160, 1600),
 )  # fmt: skip
 """Homes and views, in the order in which they are made: equal views of more homes among them."""
 VIEWS: Final = 10  # of a home
@@ -189,7 +189,7 @@ def draw(made: Path, out: Path) -> None:
     if not judged:
         print("nothing is judged yet")
         return
-    page = curve_page(judged, _facts(made))
+    page = curve_page(judged, [*_facts(made), *_to_come(points)])
     (out / "curve.svg").write_text(curve_picture(judged) + "\n")
     (out / "curve.md").write_text(page)
     print(page)
@@ -206,6 +206,17 @@ def _point(made: Path, n_homes: int, n_views: int) -> Point:
             figures = json.loads((run / "figures.json").read_text())
             errors.setdefault("training", []).append(figures["network"]["train"]["mean_deg"])
     return Point(n_homes, n_views, {name: tuple(values) for name, values in errors.items()})
+
+
+def _to_come(points: Sequence[Point]) -> list[str]:
+    """How far the curve goes, in a sentence; none where it is whole."""
+    lacking = [f"{p.views:,} views of {p.homes} homes" for p in points if not p.errors]
+    if not lacking:
+        return []
+    command = "`python -m benchmarks.study.curve`"
+    return [
+        f"Not made yet: {', '.join(lacking)}. {command} goes on with them, and with more seeds."
+    ]
 
 
 def _facts(made: Path) -> list[str]:
