@@ -200,9 +200,10 @@ def _point(made: Path, n_homes: int, n_views: int) -> Point:
     runs = sorted((made / "runs").glob(f"{n_homes}homes_{n_views}views_seed*"))
     errors: dict[str, list[float]] = {}
     for run in runs:
-        for name, row in _judged(run).items():
+        judged = _judged(run)  # nothing of a run that still trains
+        for name, row in judged.items():
             errors.setdefault(name, []).append(row["figures"]["network"]["mean_deg"])
-        if errors:
+        if judged:
             figures = json.loads((run / "figures.json").read_text())
             errors.setdefault("training", []).append(figures["network"]["train"]["mean_deg"])
     return Point(n_homes, n_views, {name: tuple(values) for name, values in errors.items()})
