@@ -87,7 +87,9 @@ def test_where_apt_has_no_lists_the_pinned_file_is_fetched(
 
     monkeypatch.setattr("shutil.which", lambda _: "/usr/bin/apt-get")
     monkeypatch.setattr("subprocess.run", refuse)
-    with pytest.raises(MachineFailed, match=r"Unable to locate.*apt-get update.*404.*PBRS_DEBIAN_MIRROR"):
+    with pytest.raises(
+        MachineFailed, match=r"Unable to locate.*apt-get update.*404.*PBRS_DEBIAN_MIRROR"
+    ):
         fetched_deb(PIN.package, "1.0", tmp_path)
     mirror[f"/debian/{PIN.path}"] = DATA
     assert fetched_deb(PIN.package, "1.0", tmp_path).sha256 == PIN.sha256
