@@ -97,21 +97,26 @@ def penetrations(things: Sequence[Thing]) -> list[tuple[str, str, float]]:
             if i == j or (b.is_new and j > i) or b.item.kind in _STRUCTURE or _allowed(a, b):
                 continue
             depth = max(_deep(a, b), _deep(b, a), _crossing(a, b), _crossing(b, a))
-            if depth > DEEP_M and _parts_meet(a, b):
-                found.append((a.item.id, b.item.id, round(depth, 4)))
+            if depth > DEEP_M and (met := _parts_that_meet(a, b)):
+                edges = (max(_crossing(p, q), _crossing(q, p)) for p, q in met)
+                depth = max(_deep(a, b), _deep(b, a), *edges)
+                if depth > DEEP_M:
+                    found.append((a.item.id, b.item.id, round(depth, 4)))
     return found
 
 
-def _parts_meet(a: Thing, b: Thing) -> bool:
-    """Whether connected parts of both must be moved by more than 1 cm along an axis to be apart.
+def _parts_that_meet(a: Thing, b: Thing) -> list[tuple[Thing, Thing]]:
+    """Pairs of connected parts that must be moved by more than 1 cm along an axis to be apart.
 
-    An edge that lies in another's face crosses it along its whole length, however shallow that is.
+    An edge that lies in another's face crosses it along its whole length, however shallow that is: a
+    cushion that sinks in a seat by half a centimetre crosses the seat's edges by half the seat.
     """
-    low, high = (np.array([p.bounds[k] for p in a.parts]) for k in (0, 1))
-    return any(
-        bool((np.minimum(high - p.bounds[0], p.bounds[1] - low).min(1) > DEEP_M).any())
-        for p in b.parts
-    )
+    return [
+        (Thing(a.item, p, a.is_new, p.bounds), Thing(b.item, q, b.is_new, q.bounds))
+        for p in a.parts
+        for q in b.parts
+        if np.minimum(p.bounds[1] - q.bounds[0], q.bounds[1] - p.bounds[0]).min() > DEEP_M
+    ]
 
 
 def _allowed(a: Thing, b: Thing) -> bool:

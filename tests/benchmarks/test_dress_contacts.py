@@ -50,6 +50,23 @@ def test_a_book_through_a_board_is_found(low: list[float], high: list[float], n:
     assert len(penetrations(things_of(with_new(home, book), home))) == n
 
 
+@pytest.mark.parametrize(("sunk_m", "n"), [(0.005, 0), (0.03, 1)])
+def test_how_deep_a_cushion_sinks_counts_and_not_how_long_the_seats_edges_are(
+    sunk_m: float, n: int
+) -> None:
+    # The back leans away: its box meets the cushion, it does not.
+    chair, (back,) = (
+        solid("chair", [1.0, 0.3, 1.0], [1.8, 0.4, 1.9]),
+        solid("", [1.0, 0.2, 1.5], [1.8, 0.9, 1.55]).surfaces,
+    )
+    lean = np.array([[0.0, 0.0, 0.5]]) * (back.positions[:, 1:2] - 0.2)
+    back = replace(back, positions=(back.positions + lean).astype(np.float32))
+    chair = replace(chair, surfaces=(*chair.surfaces, back))
+    cushion = solid("dress-clutter-1", [0.9, 0.4 - sunk_m, 1.3], [1.3, 0.6, 1.55])
+    found = penetrations(things_of(with_new(house(chair), cushion), house(chair)))
+    assert len(found) == n
+
+
 def test_a_thing_inside_another_is_found_and_what_came_with_the_home_is_not() -> None:
     home = house(TABLE, solid("twin", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8]))
     assert penetrations(things_of(home, home)) == []
