@@ -76,6 +76,7 @@ def test_a_layer_that_cannot_be_made_costs_none_that_is_there(tmp_path: Path) ->
     assert "albedo.png" in listed(tmp_path)
 
 
+@pytest.mark.slow
 def test_what_another_recipe_left_behind_goes(tmp_path: Path) -> None:
     made(tmp_path, HELD)
     made(tmp_path, ("albedo",), **{"image.height_px": "40"})

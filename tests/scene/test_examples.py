@@ -14,7 +14,7 @@ from tests.scene.homes import SMALL
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 # Run by `make test`; the others by `make test-slow`.
-QUICK = ("first_picture", "object_poses", "physics", "bop_dataset", "floor_plan")
+QUICK = ("first_picture", "object_poses", "bop_dataset", "floor_plan")
 
 
 @pytest.mark.filterwarnings("ignore:.*is in no room")

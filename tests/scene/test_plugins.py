@@ -93,6 +93,7 @@ def test_a_reader_of_a_plugin_reads_its_files(installed: dict[str, str], tmp_pat
     assert "bad.room: is no room: 'depth'" in bad.stdout + bad.stderr
 
 
+@pytest.mark.slow
 def test_layers_cameras_and_exports_of_plugins(installed: dict[str, str], tmp_path: Path) -> None:
     words = ["--layers", "height", "--set", "cameras.preset=corners", "--out", "o", *FEW]
     done(installed, tmp_path, "run", "builtin", *words)
