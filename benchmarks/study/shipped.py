@@ -1,6 +1,6 @@
 """The weights that come with the package: trained, judged and packed; and what they are worth.
 
-    python -m benchmarks.study.shipped                    homes, trainings, cards: an hour or two of a core
+    python -m benchmarks.study.shipped                    homes, trainings, cards: two hours of a core
     python -m benchmarks.study.shipped --tasks normals    one of them
 
 Effects: out/study/curve (homes of the learning curve, rendered where they are missing),
@@ -28,9 +28,10 @@ from benchmarks.study.kept_rows import Figures
 from benchmarks.study.rendered import FOLDER
 
 RUNS: Final = FOLDER / "shipped"
-HOMES: Final = 20
+HOMES: Final = {"normals": 80, "boundaries": 20}
+"""Task -> how many homes of the learning curve it trains on, ten views of each."""
 PLANS: Final = {
-    "normals": ("steps=1000", "judge_every=100", "final_views=100"),
+    "normals": ("steps=2400", "judge_every=1200", "final_views=100", "bf16=true"),
     # Lines are a pixel wide: at the views' own size.
     "boundaries": (
         "width_px=160",
@@ -45,7 +46,9 @@ PLANS: Final = {
 }
 """Task -> what its plan `tiny` is changed by. No classes: three tries taught none (docs/lab/study.md)."""
 _COMMON: Final = ("threads=1", "width_px=96", "height_px=72")
-_CHOOSES: Final = "drawn"  # the judge that chooses the step; the other one measures
+# The judge that chooses the step where a task has few views; the other one measures.
+_CHOOSES: Final = {"boundaries": "drawn"}
+_MEASURES: Final = "made"
 _N_PHOTOGRAPHS: Final = 4
 
 UNITS: Final = {
@@ -63,10 +66,10 @@ def main(words: Sequence[str] = ()) -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes that render")
     parser.add_argument("--install", action="store_true", help="into pbrs_farm/study/weights")
     args = parser.parse_args(words)
-    homes = [rendered(name, args.jobs) for name in roots_of_homes(HOMES)]
     judges = {name: rendered(name, args.jobs) for name in JUDGES}
     for task in args.tasks:
         run = RUNS / task
+        homes = [rendered(name, args.jobs) for name in roots_of_homes(HOMES[task])]
         for line in (_training(task, run, homes, judges), _judging(run, judges)):
             if pbrs_farm.cli.main(line):
                 raise RuntimeError(f"{' '.join(line[:2])} failed; what is done is kept")
@@ -79,7 +82,8 @@ def main(words: Sequence[str] = ()) -> None:
 
 def _training(task: str, run: Path, homes: Sequence[str], judges: dict[str, str]) -> list[str]:
     words = ["train", task, *homes, "--hold-out", "none", "--out", str(run)]
-    words += ["--on", f"{_CHOOSES}={judges[_CHOOSES]}", "--stop-on", _CHOOSES]
+    if judge := _CHOOSES.get(task):
+        words += ["--on", f"{judge}={judges[judge]}", "--stop-on", judge]
     return words + [word for field in (*_COMMON, *PLANS[task]) for word in ("--set", field)]
 
 
@@ -96,10 +100,9 @@ def shipped_figures() -> Figures:
     sizes = [path.stat().st_size / 1e6 for path in SHIPPED.glob("*/weights.safetensors")]
     run = open_run(shipped_run("normals"))
     judged = {row["on"]: row for row in json.loads((run.folder.root / "judged.json").read_text())}
-    measures = next(row for name, row in judged.items() if name != _CHOOSES)
     return {
         "study.weights_mb": round(max(sizes), 2),
-        "study.weights_deg": measures["figures"]["network"]["mean_deg"],
+        "study.weights_deg": judged[_MEASURES]["figures"]["network"]["mean_deg"],
         "study.predict_s": _seconds_a_photograph(run.folder.root),
         "study.onnx_equal": float(_is_equal_in_onnx(run.folder.root)),
     }
