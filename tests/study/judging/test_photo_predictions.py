@@ -204,7 +204,7 @@ def test_shipped_weights_are_small_whole_and_have_a_card() -> None:
     from pbrs_farm.study.judging.packed_weights import SHIPPED, shipped_run
 
     tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
-    assert tasks == ["boundaries", "normals"]
+    assert tasks == ["boundaries", "normals", "segmentation"]
     for task in tasks:
         run = open_run(shipped_run(task))  # checks the sha256
         assert run.task.name == task
