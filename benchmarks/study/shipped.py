@@ -91,7 +91,9 @@ def main(words: Sequence[str] = ()) -> None:
 def _training(task: str, run: Path, homes: Sequence[str], judges: dict[str, str]) -> list[str]:
     words = ["train", task, *homes, "--hold-out", "none", "--out", str(run)]
     if task == "segmentation":  # few views show enough of each class
-        words += ["--init", str(RUNS / "normals")]
+        from pbrs_farm.study.judging.packed_weights import shipped_run
+
+        words += ["--init", str(shipped_run("normals"))]
     if judge := _CHOOSES.get(task):
         words += ["--on", f"{judge}={judges[judge]}", "--stop-on", judge]
     return words + [word for field in (*_COMMON, *PLANS[task]) for word in ("--set", field)]
