@@ -16,7 +16,7 @@ import pbrs_farm as pf
 _RETURNED: Final = (
     "pbrs_farm.scene.home:Rooms", "pbrs_farm.scene.home:Items",
     "pbrs_farm.scene.viewpoints:Viewpoint", "pbrs_farm.scene.viewpoints:Viewpoints",
-    "pbrs_farm.study.reading.views:Views",
+    "pbrs_farm.views.views:Views",
 )  # fmt: skip
 _MEMBERS: Final = (property, functools.cached_property, staticmethod, classmethod)
 _OF_NO_HOME: Final = ("Camera", "Recipe")
@@ -79,7 +79,7 @@ def names_of_home(folder: Path) -> dict[str, Any]:
     import trimesh
     from PIL import Image
 
-    from pbrs_farm.study.reading.view_sample import SampleRequest
+    from pbrs_farm.views.view_sample import SampleRequest
 
     trimesh.creation.cylinder(radius=0.035, height=0.11).export(folder / "can.ply")
     Image.new("RGB", (64, 64), (130, 90, 60)).save(folder / "wood.png")

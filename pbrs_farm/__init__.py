@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.models import models as models
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
-    from pbrs_farm.study.reading.open_views import open_views as open
-    from pbrs_farm.study.reading.views import Frame as Frame
+    from pbrs_farm.views.open_views import open_views as open
+    from pbrs_farm.views.views import Frame as Frame
 
     __version__: str
 
 # Public name -> where it is defined.
 _PUBLIC: Final = {
     "Camera": "pbrs_farm.core.camera:Camera",
-    "Frame": "pbrs_farm.study.reading.views:Frame",
+    "Frame": "pbrs_farm.views.views:Frame",
     "Home": "pbrs_farm.scene.home:Home",
     "Model": "pbrs_farm.scene.models:Model",
     "Recipe": "pbrs_farm.core.recipe:Recipe",
@@ -42,7 +42,7 @@ _PUBLIC: Final = {
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
     "models": "pbrs_farm.scene.models:models",
-    "open": "pbrs_farm.study.reading.open_views:open_views",
+    "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",
 }

@@ -169,7 +169,7 @@ def _others(place: str, n_homes: int) -> list[str]:
     if not place:
         return []
     from pbrs_farm.core.house_split import home_of
-    from pbrs_farm.study.reading.open_views import open_views
+    from pbrs_farm.views.open_views import open_views
 
     ours = {f"made-{number}" for number in range(1, n_homes + 1)}
     return sorted({home_of(house) for house in open_views(place).homes} - ours)

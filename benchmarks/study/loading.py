@@ -17,8 +17,8 @@ from benchmarks.figures import write_report
 from benchmarks.study.rendered import FOLDER
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.view_sample import SampleRequest
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.views.view_sample import SampleRequest
+from pbrs_farm.views.views import Views
 
 N_READ, N_ROUNDS = 40, 5
 MODE = "mlt_il_ol"

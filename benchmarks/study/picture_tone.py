@@ -19,8 +19,8 @@ from scipy import ndimage
 import pbrs_farm.cli
 from benchmarks.figures import write_report
 from pbrs_farm.core.arrays import F64, Srgb8Image
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.views import Frame
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.views import Frame
 
 HOMES: Final = "made:60041..60046"
 N_VIEWS: Final = 5  # of each

@@ -132,8 +132,8 @@ def _pack(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.study.packing.pack_shards import pack
     from pbrs_farm.study.packing.packing_plan import Packing
-    from pbrs_farm.study.reading.open_views import open_views
-    from pbrs_farm.study.reading.view_sample import LAYERS
+    from pbrs_farm.views.open_views import open_views
+    from pbrs_farm.views.view_sample import LAYERS
 
     colour, _, quality = args.colour.partition(":")
     if quality and not quality.isdigit():

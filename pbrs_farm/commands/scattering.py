@@ -54,7 +54,7 @@ def _scatter(args: argparse.Namespace) -> int:
     from pbrs_farm.scene.models import models
     from pbrs_farm.scene.pictures import render
     from pbrs_farm.store import store_from_url
-    from pbrs_farm.study.reading.stored_root import finished_views
+    from pbrs_farm.views.stored_root import finished_views
 
     for name in ("count", "scenes", "views"):
         at_least(f"--{name}", getattr(args, name), 1)

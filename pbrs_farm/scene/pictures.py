@@ -21,8 +21,8 @@ from pbrs_farm.sample.stored_cameras import OUTSIDE
 from pbrs_farm.scene.home import Home, recipe_of
 from pbrs_farm.scene.rendering import RENDERER
 from pbrs_farm.scene.viewpoints import Viewpoint
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.views import Frame, Views
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.views import Frame, Views
 
 AnyCamera = Camera | Viewpoint
 

@@ -35,8 +35,8 @@ from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.run.steps import remember_house, run_step
 from pbrs_farm.scene.viewpoints import Viewpoint
 from pbrs_farm.store.object_store import MemoryStore, Store
-from pbrs_farm.study.reading.stored_root import StoredRoot
-from pbrs_farm.study.reading.views import ViewRef, Views
+from pbrs_farm.views.stored_root import StoredRoot
+from pbrs_farm.views.views import ViewRef, Views
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport

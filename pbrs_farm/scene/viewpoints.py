@@ -17,7 +17,7 @@ from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.core.table import Table
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
-from pbrs_farm.study.reading.views import MOST_SHOWN, figure_html
+from pbrs_farm.views.views import MOST_SHOWN, figure_html
 
 if TYPE_CHECKING:
     from pbrs_farm.scene.home import Home

@@ -12,7 +12,7 @@ from benchmarks.study import curve
 from benchmarks.study.curve import POINTS, run_words
 from benchmarks.study.curve_pictures import Point, curve_page, curve_picture
 from pbrs_farm.store.folder import FolderStore
-from tests.study.small_roots import fill
+from tests.views.small_roots import fill
 
 JUDGED = [
     Point(10, 100, {"made": (30.0, 32.0), "training": (9.0, 9.2)}),

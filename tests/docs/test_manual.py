@@ -18,7 +18,7 @@ from pbrs_farm.cli import MODULES, build_parser
 from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.core.recipe import Recipe, field_paths
 from pbrs_farm.scene.home import Home
-from pbrs_farm.study.reading.views import Frame
+from pbrs_farm.views.views import Frame
 
 REPO = Path(__file__).parents[2]
 HOWTO = sorted(p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index")

@@ -10,7 +10,7 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from tests.check.roots import make_root
-from tests.study.small_roots import fill
+from tests.views.small_roots import fill
 
 ARMCHAIR = {"id": 1, "name": "Armchair", "class": "sofa", "kind": "object", "source_class": "x#12"}
 LAMP = {"id": 2, "name": "Floor lamp", "class": "lamp", "kind": "lamp", "source_class": ""}

@@ -12,7 +12,7 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.scene.rendering import RENDERER
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.views.views import Views
 from tests.scene.homes import small_home
 
 SVG = "{http://www.w3.org/2000/svg}"

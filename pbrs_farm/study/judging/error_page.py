@@ -24,9 +24,9 @@ from pbrs_farm.study.judging.evaluation import (
     title_of,
 )
 from pbrs_farm.study.metrics.angular import angles_deg
-from pbrs_farm.study.reading.png_rows import png_of_rows
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.run_folder import made_folder
+from pbrs_farm.views.png_rows import png_of_rows
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
 _WORST_DEG: Final = 60.0  # what an error picture shows as white

@@ -27,7 +27,6 @@ from pbrs_farm.study.photographs import (
     nyu_pictures,
     photo_truth,
 )
-from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.prediction import predicted, scored
 from pbrs_farm.study.training.training_loop import Judge
@@ -39,6 +38,7 @@ from pbrs_farm.study.training.view_sources import (
     is_held_out,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.open_views import open_views
 
 _CURVE_THRESHOLDS: Final = 9  # of lines, while a run trains
 

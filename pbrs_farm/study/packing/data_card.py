@@ -20,9 +20,9 @@ from pbrs_farm.core.house_split import home_of
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.study.packing.packing_plan import Packing, shard_plans
-from pbrs_farm.study.reading.stored_layers import STORED, array_names
-from pbrs_farm.study.reading.stored_root import StoredRoot
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.views.stored_layers import STORED, array_names
+from pbrs_farm.views.stored_root import StoredRoot
+from pbrs_farm.views.views import Views
 
 AXES = "x right, y forward, z up (published); pbrs_farm gives opencv, opengl or published"
 SPLIT_RULE = (

@@ -23,13 +23,13 @@ from pbrs_farm.export.chosen_view import new_folder
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.study.packing.data_card import card, croissant_json, described, root_facts
 from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans
-from pbrs_farm.study.reading.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
-from pbrs_farm.study.reading.png_rows import png_of_rows
-from pbrs_farm.study.reading.shard_set import label_parts, tar_end, tar_member
-from pbrs_farm.study.reading.stored_layers import Stored, ViewFacts, resized_stored
-from pbrs_farm.study.reading.stored_root import StoredRoot
-from pbrs_farm.study.reading.view_sample import Size
-from pbrs_farm.study.reading.views import ViewRef, Views
+from pbrs_farm.views.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
+from pbrs_farm.views.png_rows import png_of_rows
+from pbrs_farm.views.shard_set import label_parts, tar_end, tar_member
+from pbrs_farm.views.stored_layers import Stored, ViewFacts, resized_stored
+from pbrs_farm.views.stored_root import StoredRoot
+from pbrs_farm.views.view_sample import Size
+from pbrs_farm.views.views import ViewRef, Views
 
 # The parts of a view as they are packed: JSON, colour of each mode, labels. Effects: reads the
 # view.

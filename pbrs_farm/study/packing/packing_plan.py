@@ -9,9 +9,9 @@ import numpy as np
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
-from pbrs_farm.study.reading.dataset_json import WHOLE
-from pbrs_farm.study.reading.view_sample import LAYERS, MODES, SampleRequest, Size
-from pbrs_farm.study.reading.views import ViewRef
+from pbrs_farm.views.dataset_json import WHOLE
+from pbrs_farm.views.view_sample import LAYERS, MODES, SampleRequest, Size
+from pbrs_farm.views.views import ViewRef
 
 COLOURS = ("png", "jpeg")
 FORMS = ("shards", "parquet")

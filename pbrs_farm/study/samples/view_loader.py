@@ -14,10 +14,10 @@ from torch.utils.data import DataLoader, Dataset, IterableDataset, get_worker_in
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.store import Store, store_from_url
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.shard_set import ShardSet
-from pbrs_farm.study.reading.view_sample import Sample, SampleRequest
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.shard_set import ShardSet
+from pbrs_farm.views.view_sample import Sample, SampleRequest
+from pbrs_farm.views.views import Views
 
 # A Sample's arrays as torch tensors.
 

@@ -13,9 +13,9 @@ from torch import Tensor
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.depth_errors import DepthErrors
-from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.study_task import Arrays, Batch
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.view_sample import Sample
 
 _SCALE_SHARE: Final = 0.5  # of the common error of a view that the loss forgives
 _FARTHEST_M: Final = 8.0  # of the pictures for eyes: from there on all is alike

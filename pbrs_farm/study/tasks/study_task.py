@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.view_sample import Sample
 
 Arrays = dict[str, NDArray[Any]]
 Batch = dict[str, Tensor]

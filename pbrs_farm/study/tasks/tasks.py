@@ -17,10 +17,10 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.angular import AngularErrors
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.networks.vgg import edges_of_sides
-from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.depth_task import DepthTask
 from pbrs_farm.study.tasks.study_task import Arrays, Batch, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.view_sample import Sample
 
 # The three losses, a number for each view whose mean is the loss; pure.
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.view_sample import Sample
 
 BatchRead = tuple[list[str], dict[str, NDArray[Any]]]  # ids, arrays (B, ...) by name
 _WINDOW: Final = 4  # shards whose views are mixed with one another

@@ -15,10 +15,6 @@ from torch.utils.data import DataLoader, Dataset
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import home_of
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.shard_set import ShardSet
-from pbrs_farm.study.reading.view_sample import SampleRequest
-from pbrs_farm.study.reading.views import Frame, Views
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_views import (
@@ -30,6 +26,10 @@ from pbrs_farm.study.training.training_views import (
     arrays_of_samples,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.shard_set import ShardSet
+from pbrs_farm.views.view_sample import SampleRequest
+from pbrs_farm.views.views import Frame, Views
 
 # Views that are read anew for each step, where all of them would not fit into memory. Effects:
 # reads views.

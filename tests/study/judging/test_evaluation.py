@@ -29,11 +29,11 @@ from pbrs_farm.study.judging.others_predictions import OthersPredictions, predic
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import framed
-from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
-from tests.study.small_roots import fill
+from pbrs_farm.views.open_views import open_views
 from tests.study.training.made_views import TINY, small_plan
+from tests.views.small_roots import fill
 
 pytestmark = pytest.mark.study
 SIZE = (40, 32)

@@ -23,8 +23,8 @@ from pbrs_farm.study.judging.photo_predictions import (
     read_photograph,
     upright,
 )
-from tests.study.small_roots import fill
 from tests.study.training.made_views import TINY
+from tests.views.small_roots import fill
 
 pytestmark = pytest.mark.study
 

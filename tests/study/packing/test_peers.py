@@ -16,9 +16,9 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.view_sample import LAYERS
-from tests.study.small_roots import MODES, arrays_of_view, fill
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.view_sample import LAYERS
+from tests.views.small_roots import MODES, arrays_of_view, fill
 
 pytestmark = pytest.mark.study
 

@@ -1,4 +1,4 @@
-"""Torch datasets of views; the tests of order and bits without torch are in tests/study/reading."""
+"""Torch datasets of views; tests of order without torch are in test_epoch_order.py."""
 
 import subprocess
 import sys
@@ -12,9 +12,9 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.open_views import open_views
-from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest, flipped
-from tests.study.small_roots import MODES, fill
+from pbrs_farm.views.open_views import open_views
+from pbrs_farm.views.view_sample import LAYERS, SampleRequest, flipped
+from tests.views.small_roots import MODES, fill
 
 pytestmark = pytest.mark.study
 HOUSES = {f"home-{k}-00000000": 4 for k in range(6)}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.study.reading.view_sample import Sample
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_views import ViewArrays, arrays_of_samples
 from pbrs_farm.study.training_plan import TrainingPlan, plan_of
+from pbrs_farm.views.view_sample import Sample
 
 SMALL = {
     "width_px": "40", "height_px": "32", "batch": "2", "steps": "6", "checkpoint_every": "2",

@@ -14,8 +14,8 @@ from pbrs_farm.study.networks.network_choice import network_of
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_loop import Share, train_network
-from tests.study.small_roots import fill
 from tests.study.training.made_views import small_plan, views
+from tests.views.small_roots import fill
 
 pytestmark = pytest.mark.study
 _FIELDS = "width_px=40 height_px=32 batch=2 steps=4 judge_every=2 threads=1 log_every=1"

@@ -10,7 +10,6 @@ import torch
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.open_views import open_views
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder
 from pbrs_farm.study.training.training_job import Job, train
@@ -21,8 +20,9 @@ from pbrs_farm.study.training.view_sources import (
     held_out_views,
     training_views,
 )
-from tests.study.small_roots import MODES, fill
+from pbrs_farm.views.open_views import open_views
 from tests.study.training.made_views import small_plan
+from tests.views.small_roots import MODES, fill
 
 pytestmark = pytest.mark.study
 HOMES = {f"home-{k}-00000000": 3 for k in range(4)}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
-from pbrs_farm.study.reading.view_sample import Sample, SampleRequest, Size, decoded_normal
+from pbrs_farm.views.view_sample import Sample, SampleRequest, Size, decoded_normal
 
 Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
 

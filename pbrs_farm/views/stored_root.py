@@ -23,8 +23,8 @@ from pbrs_farm.images import array_from_png
 from pbrs_farm.run.output_root import attribution, claim_root, finish_root
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.reading.png_rows import array_of_rows
-from pbrs_farm.study.reading.stored_layers import (
+from pbrs_farm.views.png_rows import array_of_rows
+from pbrs_farm.views.stored_layers import (
     STORED,
     ViewFacts,
     array_names,
@@ -32,8 +32,8 @@ from pbrs_farm.study.reading.stored_layers import (
     facts_from_json,
     sample_of_stored,
 )
-from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
-from pbrs_farm.study.reading.views import ViewRef, Views
+from pbrs_farm.views.view_sample import MODES, Sample, SampleRequest
+from pbrs_farm.views.views import ViewRef, Views
 
 _TABLE: Final = "view.json"  # written when all else of a view is there
 _CAMERAS: Final = "cameras.json"

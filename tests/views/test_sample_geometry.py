@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.reading.view_sample import (
+from pbrs_farm.views.view_sample import (
     AXES,
     Sample,
     axes_from_axes,

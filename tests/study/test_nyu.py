@@ -16,8 +16,8 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.judged_places import judged_place
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
-from tests.study.small_roots import fill
 from tests.study.training.made_views import TINY, small_plan
+from tests.views.small_roots import fill
 
 pytestmark = pytest.mark.study
 

@@ -5,8 +5,8 @@ import pytest
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, png_from_array
-from pbrs_farm.study.reading import png_rows
-from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
+from pbrs_farm.views import png_rows
+from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
 
 
 @pytest.fixture(

@@ -7,7 +7,7 @@ from pathlib import Path
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.reading.views import Views
+from pbrs_farm.views.views import Views
 
 
 def open_views(place: str | Path | Store) -> Views:
@@ -26,9 +26,9 @@ def open_views(place: str | Path | Store) -> Views:
         raise BadInput(place, "", "no such folder")
     # Imported where needed: shards are read without pydantic and OpenImageIO.
     if store.head("dataset.json") is not None:
-        from pbrs_farm.study.reading.shard_set import views_of_shards
+        from pbrs_farm.views.shard_set import views_of_shards
 
         return views_of_shards(store)
-    from pbrs_farm.study.reading.stored_root import views_of_root
+    from pbrs_farm.views.stored_root import views_of_root
 
     return views_of_root(store)

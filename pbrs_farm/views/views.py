@@ -16,8 +16,8 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.class_map import ClassMap, class_map
-from pbrs_farm.study.reading.stored_layers import ViewFacts
-from pbrs_farm.study.reading.view_sample import MODES, Sample, SampleRequest
+from pbrs_farm.views.stored_layers import ViewFacts
+from pbrs_farm.views.view_sample import MODES, Sample, SampleRequest
 
 _PICTURE_PX: Final = 320  # of a picture in a notebook
 _THUMB_PX: Final = 160  # of one among many

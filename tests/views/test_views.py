@@ -15,9 +15,9 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.s3 import S3Settings, S3Store
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.reading.view_sample import LAYERS, SampleRequest, encoded_as_stored
+from pbrs_farm.views.view_sample import LAYERS, SampleRequest, encoded_as_stored
 from tests.check.roots import make_root
-from tests.study.small_roots import MODES, SIZE, arrays_of_view, fill, remove
+from tests.views.small_roots import MODES, SIZE, arrays_of_view, fill, remove
 
 HOUSES = {"one-00000001": 3, "two-00000002-d4": 2}
 VIEW = "houses/one-00000001/views/0_0_1"

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares
-from pbrs_farm.study.reading.view_sample import LAYERS, MODES, Size
+from pbrs_farm.views.view_sample import LAYERS, MODES, Size
 
 DATASET_JSON: Final = "dataset.json"
 WHOLE: Final = "all"  # the split of shards that are not split

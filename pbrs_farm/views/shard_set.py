@@ -21,15 +21,9 @@ from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.reading.dataset_json import (
-    DATASET_JSON,
-    WHOLE,
-    Dataset,
-    Shard,
-    dataset_from_json,
-)
-from pbrs_farm.study.reading.png_rows import array_of_rows, png_of_rows
-from pbrs_farm.study.reading.stored_layers import (
+from pbrs_farm.views.dataset_json import DATASET_JSON, WHOLE, Dataset, Shard, dataset_from_json
+from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
+from pbrs_farm.views.stored_layers import (
     Stored,
     ViewFacts,
     array_names,
@@ -37,8 +31,8 @@ from pbrs_farm.study.reading.stored_layers import (
     facts_from_json,
     sample_of_stored,
 )
-from pbrs_farm.study.reading.view_sample import Sample, SampleRequest
-from pbrs_farm.study.reading.views import ViewRef, Views
+from pbrs_farm.views.view_sample import Sample, SampleRequest
+from pbrs_farm.views.views import ViewRef, Views
 
 # Arrays <-> deflated .npz bytes without a clock, as webdataset and numpy read them.
 
