@@ -26,7 +26,6 @@ _AIR: Final = 0.12
 _CLEARED: Final = 3  # times that threads are lifted off edges
 _MOST_LIFT_M: Final = 0.06
 _WALL_M: Final = 0.05  # what rises more under a corner of the net is a wall and no slope
-_GRIP: Final = 1.0  # of a step along what it lies on, that cloth does not slide
 _SLACK: Final = 0.2  # how stiff a thread is against being pushed together
 _BEND: Final = 0.25  # how stiff over two threads
 
@@ -130,11 +129,7 @@ def _lift(at: F64, before: F64, ground: Ground, above: float) -> None:
     low = ground.at(at[..., 0], at[..., 2]) + above - at[..., 1]
     held = low > 0
     at[..., 1] = np.where(held, at[..., 1] + low, at[..., 1])
-    for k in (0, 1, 2):
-        grip = 1.0 if k == 1 else _GRIP
-        before[..., k] = np.where(
-            held, before[..., k] + grip * (at[..., k] - before[..., k]), before[..., k]
-        )
+    before[held] = at[held]
 
 
 def _pull_threads(at: F64, axis: int, apart: int, length: float, stiff: float) -> None:
