@@ -8,7 +8,24 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo check test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-luxcore bench-farm dist image docs format clean
+.PHONY: help setup demo check check-fast test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+
+# $(call extra,MODULES,NAME): installs an extra of ours where one of its modules is missing. A command with commas
+# stands in a define or in a variable of its own: in $(if ...) and $(call ...) a comma ends the argument.
+define extra
+$(BIN)/python -c "import sys, importlib.util as u; sys.exit(not all(map(u.find_spec, sys.argv[1:])))" $(1) || $(BIN)/pip install -q --disable-pip-version-check --no-compile -e ".[$(2)]"
+endef
+
+define study-packages
+$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check --no-compile "torch==2.13.0"; \
+$(BIN)/pip install -q --disable-pip-version-check -e ".[study,study-peers]"
+endef
+
+# bpy wants numpy below 2 and so a Python of its own.
+define cycles-packages
+test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv; \
+out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
+endef
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*##/\t/' | expand -t 18
@@ -24,6 +41,13 @@ check: setup ## lint, types, import contracts: under a minute
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+check-fast: ## lint, import contracts and types of the files that differ from the last commit; sets nothing up
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+	@files=$$({ git diff --name-only --diff-filter=d HEAD -- '*.py'; git ls-files -o --exclude-standard -- '*.py'; } | grep -E '^(pbrs_farm|workers|tests|benchmarks)/'); \
+	test -z "$$files" || $(BIN)/mypy $$files
 
 test: check ## check, then the tests; fetches the example homes for those that need them
 	@$(BIN)/pbrs-farm homes --fetch >/dev/null || echo "test: no example homes: tests of them are skipped (with CI=true they fail)" >&2
@@ -52,11 +76,6 @@ test-sweethome3d: setup ## the real program opens ten made homes and saves them:
 	@$(BIN)/pbrs-farm homes --fetch --furniture >/dev/null
 	$(BIN)/pytest -m sweethome3d tests/sweethome3d
 
-define study-packages
-$(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check --no-compile "torch==2.13.0"; \
-$(BIN)/pip install -q --disable-pip-version-check -e ".[study,study-peers]"
-endef
-
 test-study: setup ## the study's tests that need torch; installs its CPU build (192 MB) the first time
 	@$(study-packages)
 	$(BIN)/pytest -n 2 --dist loadfile -m "study and not slow and not gpu"
@@ -66,43 +85,40 @@ test-manual: setup ## every how-to page, the docstrings' examples and the pages'
 	$(BIN)/pytest -m slow tests/docs
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
-	@$(BIN)/python -c "import nbclient, nbformat, ipykernel" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check -e ".[notebooks]"
+	@$(call extra,nbclient nbformat ipykernel,notebooks)
 	$(BIN)/pytest -m notebooks tests/docs/test_notebooks.py
 
 test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL
 	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl" tests/transport tests/workers
 
-bench: setup ## measure everything but house, dress, made, light and its tables, cycles, luxcore, farm, release and hostile (NAME=cameras for one), under 25 minutes
+bench: setup ## the short benches, under 25 minutes; NAME=hostile, or any of `python -m benchmarks --list`, for one
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
-	@$(if $(filter release,$(NAME)),$(BIN)/python -c "import build, twine" 2>/dev/null || $(BIN)/pip install -q -e ".[release]")
+	@$(if $(filter release,$(NAME)),$(call extra,build twine,release))
+	@$(if $(filter docs,$(NAME)),$(call extra,mkdocstrings material,docs))
+	@$(if $(filter denoised,$(NAME)),$(call extra,flip_evaluator,bench))
+	@$(if $(filter cycles,$(NAME)),$(cycles-packages))
 	$(BIN)/python -m benchmarks $(NAME)
 
 bench-light: setup ## path and Metropolis at equal CPU in ten scenes: 5 quiet minutes (python -m benchmarks light_pictures draws)
 	$(BIN)/python -m benchmarks light
 
 bench-light-tables: setup ## every bench of docs/lab/light.md, one after another, then its tables: under an hour
-	@$(BIN)/python -c "import flip_evaluator" 2>/dev/null || $(BIN)/pip install -q -e ".[bench]"
-	@failed=; for name in view demo light guided growth denoised presets lux; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
-	for name in cycles luxcore; do $(MAKE) --no-print-directory bench-$$name || failed="$$failed $$name"; done; \
+	@$(call extra,flip_evaluator,bench)
+	@$(cycles-packages)
+	@failed=; for name in view demo light guided growth denoised presets lux cycles; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
 	$(BIN)/python -m benchmarks light_tables; \
 	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
 
-bench-cycles: setup ## three homes against Blender's Cycles, in a Python of its own (bpy wants numpy below 2): under 20 quiet minutes
-	@test -x out/cycles-venv/bin/python || python3.11 -m venv out/cycles-venv
-	@out/cycles-venv/bin/python -c "import bpy" 2>/dev/null || out/cycles-venv/bin/pip install -q "bpy==5.0.1"
+bench-cycles: setup ## three homes against Blender's Cycles, in a Python of its own: under 20 quiet minutes
+	@$(cycles-packages)
 	$(BIN)/python -m benchmarks cycles
-
-bench-luxcore: setup ## against LuxCore's path and bidirectional Metropolis, in a Python of its own: under 15 quiet minutes
-	@test -x out/luxcore-venv/bin/python || $(BIN)/python -m venv out/luxcore-venv
-	@out/luxcore-venv/bin/pip show -q pyluxcore || out/luxcore-venv/bin/pip install -q "pyluxcore==2.11.2" numpy
-	$(BIN)/python -m benchmarks luxcore
 
 bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
 	$(BIN)/python -m benchmarks farm
 
 dist: setup ## sdist and wheel into dist/, dated as the last commit: a second build gives the same bytes
-	@$(BIN)/python -c "import build, twine" 2>/dev/null || $(BIN)/pip install -q -e ".[release]"
+	@$(call extra,build twine,release)
 	rm -rf dist
 	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build
 	$(BIN)/python -m twine check --strict dist/*
@@ -111,7 +127,7 @@ image: setup ## the Docker image (TARGET=gpu for the other): version from git, b
 	@bash scripts/image.sh
 
 docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
-	@$(BIN)/python -c "import mkdocstrings, material" 2>/dev/null || $(BIN)/pip install -q -e ".[docs]"
+	@$(call extra,mkdocstrings material,docs)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo out/site/index.html
 
@@ -120,4 +136,4 @@ format: setup ## format and fix what can be fixed
 	$(BIN)/ruff check --fix .
 
 clean: ## remove what was made, the virtual environment apart
-	rm -rf out build .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,4 +1,4 @@
-"""Run benches by name: `python -m benchmarks [NAME...]`; all but those with a target of their own if none is named.
+"""Run benches by name: `python -m benchmarks [NAME...]`; the short ones if none is named, --list prints all names.
 
 Each bench is a module with main(), whose folder says its subject; a bench that fails does not stop
 the others.
@@ -37,7 +37,6 @@ OWN_TARGET: Final = {
     "gpu": "light.gpu",
     "presets": "light.presets",
     "cycles": "renderers.cycles",
-    "luxcore": "renderers.luxcore",
     "farm": "farm.farm_cost",
     "hostile": "hostile",
     "loading": "study.loading",
@@ -57,6 +56,9 @@ OWN_TARGET: Final = {
 def main(names: list[str]) -> int:
     """Run the named benches; 1 if any failed, 2 for a name that is none."""
     modules = DEFAULT | OWN_TARGET
+    if names == ["--list"]:
+        print(*modules, sep="\n")
+        return 0
     unknown = [n for n in names if n not in modules]
     if unknown:
         print(f"no bench {unknown[0]!r}; of {', '.join(modules)}", file=sys.stderr)

@@ -17,7 +17,6 @@ from pbrs_farm.core.recipe import recipe_from_name
 
 Figures = Mapping[str, Any]
 
-LUXCORE_ROOMS: Final = {key: name for key, (name, _make) in ROOMS.items()}
 # Key of a home's figures -> its name: those that other renderers are compared in.
 RENDERED_HOMES: Final = {
     name.lower(): name for name in ("2BedroomApartment", "Studio", "3BedroomApartment")
@@ -28,8 +27,6 @@ CYCLES_WAYS: Final = {
     "guided": "guided",
     "guided_portals": "both",
 }
-LUXCORE_ENGINES: Final = ("lux_path", "lux_path_metropolis", "lux_bidir", "lux_bidir_metropolis")
-_LUXCORE_HEADS: Final = ("LuxCore path", "path, Metropolis", "bidirectional", "bidirectional, Metropolis")  # fmt: skip
 DENOISED_WAYS: Final = ("raw", "fast", "together", "demodulated", "prefiltered guides")
 DENOISED_COUNTS: Final = (8, 16, 28, 32, 64, 128)  # samples per pixel, those of `fast` among them
 PRESETS: Final = {"preview": "`preview`", "fast": "`fast`", "paper": "`paper`, reduced", "released": "`released`, reduced"}  # fmt: skip
@@ -66,9 +63,6 @@ def below(figures: Figures, prefix: str) -> dict[str, Any]:
     if not found:
         raise KeyError(f"{prefix}*")
     return found
-
-
-# Path and Metropolis at equal CPU.
 
 
 def light_head() -> list[str]:
@@ -122,81 +116,6 @@ def light_lines(f: Figures) -> list[str]:
     ]
 
 
-# Against other renderers.
-
-
-def luxcore_costs_head() -> list[str]:
-    """The head of the comparison with LuxCore: relMSE and the median pixel's error."""
-    return head(
-        "", "CPU", "our `path`", "our Metropolis", *_LUXCORE_HEADS,
-        "our Metropolis / LuxCore's bidirectional Metropolis", "our `path` / LuxCore's",
-    )  # fmt: skip
-
-
-def luxcore_costs_row(name: str, f: Figures) -> str:
-    """A scene's line of it."""
-    engines = ("path", "metropolis", *LUXCORE_ENGINES)
-    errors = [f"{f[f'{e}_relmse']:.2g}, {f[f'{e}_median']:.2g}" for e in engines]
-    ratios = [f"{f[f'{p}relmse_ratio']:.2g}, {f[f'{p}median_ratio']:.2g}" for p in ("", "path_")]
-    return row([name, f"{f['cpu_s']:.1f} s", *errors, *ratios])
-
-
-def luxcore_lights_head() -> list[str]:
-    """The head of the light of LuxCore over ours: mean and median of blocks."""
-    return head("", "our Metropolis", *_LUXCORE_HEADS)
-
-
-def luxcore_lights_row(name: str, f: Figures) -> str:
-    """A scene's line of it."""
-    engines = ("metropolis", *LUXCORE_ENGINES)
-    cells = [f"{f[f'{e}_mean_over_path']:.3f}, {f[f'{e}_blocks_over_path']:.3f}" for e in engines]
-    return row([name, *cells])
-
-
-def luxcore_lines(f: Figures) -> list[str]:
-    """Errors at equal CPU in rooms, a column a scene."""
-    return _luxcore_table(f, LUXCORE_ROOMS)
-
-
-def luxcore_homes_lines(f: Figures) -> list[str]:
-    """Errors at equal CPU in homes, a column a home, the light there, and the medians over them."""
-    return [
-        *_luxcore_table(f, RENDERED_HOMES),
-        "",
-        *_luxcore_lights(f, RENDERED_HOMES),
-        "",
-        f"The median over the homes: our Metropolis takes {f['light.vs_luxcore_metropolis']:.0f} times less CPU to the relMSE of LuxCore's "
-        f"bidirectional Metropolis, {f['light.vs_luxcore_metropolis_median']:.0f} times less to its median pixel; our `path` "
-        f"{f['light.vs_luxcore_path']:.0f} and {f['light.vs_luxcore_path_median']:.0f} times less than LuxCore's.",
-    ]
-
-
-def _luxcore_table(f: Figures, scenes: Mapping[str, str]) -> list[str]:
-    rows = [
-        luxcore_costs_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes.items()
-    ]
-    return _turned([*luxcore_costs_head(), *rows])
-
-
-def _turned(lines: list[str]) -> list[str]:
-    """A table with its rows for columns: one of many columns does not fit the page."""
-    cells = [[c.strip() for c in line.strip("|").split("|")] for line in (lines[0], *lines[2:])]
-    names, *rows = zip(*cells, strict=True)
-    return [*head(*names), *(row(list(r)) for r in rows)]
-
-
-def luxcore_lights_lines(f: Figures) -> list[str]:
-    """Mean pictures over those of our path, room by room."""
-    return _luxcore_lights(f, LUXCORE_ROOMS)
-
-
-def _luxcore_lights(f: Figures, scenes: Mapping[str, str]) -> list[str]:
-    rows = [
-        luxcore_lights_row(name, below(f, f"light.luxcore_{key}_")) for key, name in scenes.items()
-    ]
-    return [*luxcore_lights_head(), *rows]
-
-
 def cycles_lines(f: Figures) -> list[str]:
     """Ours and Cycles' errors, view by view, CPU to equal error, and the medians over views."""
     rows = []
@@ -241,16 +160,7 @@ def compare_lines(f: Figures) -> list[str]:
         row(["", "CPU to equal squared error of the median pixel", "1", f"{f['light.vs_cycles_median']:.1f}", ""]),
         row(["", "the same, of our Metropolis to equal relative squared error", "1", f"{f['light.vs_cycles_metropolis']:.0f}", ""]),
         row(["", "mean luminance of the long pictures", f"agrees to {shift:.1%}", "", ""]),
-        row(["LuxCore 2.11.2, path",
-             "CPU to equal relative squared error, and to that of the median pixel: median over three example homes",
-             "1", f"{f['light.vs_luxcore_path']:.0f}, {f['light.vs_luxcore_path_median']:.0f}",
-             "`make bench-luxcore`, [how](lab/light.md#against-luxcore)"]),
-        row(["LuxCore 2.11.2, bidirectional Metropolis", "the same, against our Metropolis", "1",
-             f"{f['light.vs_luxcore_metropolis']:.0f}, {f['light.vs_luxcore_metropolis_median']:.0f}", ""]),
     ]  # fmt: skip
-
-
-# What a view costs.
 
 
 def view_lines(f: Figures) -> list[str]:
@@ -379,9 +289,6 @@ TABLES: Final = {
     "presets": Table(("presets",), "python -m benchmarks presets", presets_lines),
     "lux": Table(("lux",), "python -m benchmarks lux", lux_lines),
     "cycles": Table(("cycles",), "make bench-cycles", cycles_lines),
-    "luxcore": Table(("luxcore",), "make bench-luxcore", luxcore_lines),
-    "luxcore_homes": Table(("luxcore",), "make bench-luxcore", luxcore_homes_lines),
-    "luxcore_light": Table(("luxcore",), "make bench-luxcore", luxcore_lights_lines),
-    "compare": Table(("cycles", "luxcore"), "make bench-cycles bench-luxcore", compare_lines),
+    "compare": Table(("cycles",), "make bench-cycles", compare_lines),
 }
 """Marker -> its table."""

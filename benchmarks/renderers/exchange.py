@@ -1,7 +1,6 @@
-"""What our kernels gather from, written as files for other renderers. Effects: writes them.
+"""Writes what our kernels gather from as files for another renderer: scene.npz and scene.json.
 
-benchmarks/renderers/cycles.py and benchmarks/renderers/luxcore.py write a scene with it; each renderer's own program
-reads scene.npz and scene.json, and pictures in a form of its own.
+benchmarks/renderers/cycles.py calls it; cycles_scene.py, in Blender's own Python, reads the files.
 """
 
 from __future__ import annotations

@@ -1,0 +1,49 @@
+"""The file that every bench leaves, out/bench/<name>.json, and the names by which benches are run."""
+
+from __future__ import annotations
+
+import json
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from benchmarks import figures
+from benchmarks.__main__ import DEFAULT, OWN_TARGET, main
+
+
+def test_a_report_holds_figures_units_machine_versions_and_commit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(figures, "FOLDER", tmp_path / "bench")
+    path = figures.write_report("some", {"some.s": 1.5, "some.n": 3}, {"some.s": "s", "some.n": ""})
+    report = json.loads(path.read_text(encoding="utf-8"))
+    assert path == tmp_path / "bench/some.json"
+    assert report["figures"] == {"some.s": 1.5, "some.n": 3}
+    assert report["units"] == {"some.s": "s", "some.n": ""}
+    assert report["machine"]["cores"] >= 1
+    assert {"cpu", "memory_gb", "system", "load_1min"} <= report["machine"].keys()
+    assert {"python", "numpy", "mitsuba"} <= report["versions"].keys()
+    assert report.keys() == {"figures", "units", "machine", "versions", "commit"}
+    assert "some.s  1.5 s" in capsys.readouterr().out
+
+
+def test_a_figure_without_a_unit_is_refused_and_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "FOLDER", tmp_path / "bench")
+    with pytest.raises(ValueError, match=r"figures without a unit: some\.n"):
+        figures.write_report("some", {"some.n": 3}, {})
+    assert not (tmp_path / "bench").exists()
+
+
+@pytest.mark.parametrize(("name", "module"), (DEFAULT | OWN_TARGET).items())
+def test_every_bench_has_its_module(name: str, module: str) -> None:
+    assert find_spec(f"benchmarks.{module}") is not None, name
+
+
+def test_an_unknown_bench_is_rejected_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["nothing"]) == 2
+    assert "no bench 'nothing'; of demo" in capsys.readouterr().err
+    assert main(["--list"]) == 0
+    assert capsys.readouterr().out.split() == [*DEFAULT, *OWN_TARGET]

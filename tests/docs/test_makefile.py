@@ -1,0 +1,83 @@
+"""Every target of the Makefile is commands that a shell can read, for every name that the pages give it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import DEFAULT, OWN_TARGET
+
+REPO = Path(__file__).parents[2]
+MAKEFILE = (REPO / "Makefile").read_text(encoding="utf-8")
+TARGETS = re.findall(r"^([a-z][a-z0-9-]*):.*##", MAKEFILE, re.MULTILINE)
+BENCHES = [*DEFAULT, *OWN_TARGET]
+PAGES = [
+    *sorted(REPO.glob("*.md")), *sorted((REPO / "docs").rglob("*.md")), *sorted((REPO / "deploy").rglob("*.md")),
+    REPO / "tests/infra/README.md",
+]  # fmt: skip
+
+
+def commands_of(target: str, *variables: str) -> list[str]:
+    """What make would run, a command an entry; it runs nothing."""
+    done = subprocess.run(
+        ["make", "-n", "--no-print-directory", target, *variables],
+        cwd=REPO, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.replace("\\\n", " ").splitlines()
+
+
+def named_in_pages() -> Iterator[tuple[str, str]]:
+    """(target, its NAME or "") of each `make ...` of the pages, in code alone."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for code in re.findall(r"^```.*?^```|`[^`\n]+`", text, re.MULTILINE | re.DOTALL):
+            for words in re.findall(r"(?:^|[`\s])make ([a-z][^`#\n]*)", code):
+                name = re.search(r"\bNAME=(\w+)", words)
+                for word in words.split():
+                    if "=" not in word:
+                        yield word, name[1] if name else ""
+
+
+@pytest.mark.parametrize(
+    ("target", "name"), [*((t, "") for t in TARGETS), *(("bench", n) for n in BENCHES)]
+)
+def test_a_target_is_commands_that_a_shell_can_read(target: str, name: str) -> None:
+    commands = commands_of(target, f"NAME={name}")
+    assert commands
+    for command in commands:
+        done = subprocess.run(["bash", "-n", "-c", command], capture_output=True, text=True)
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+
+
+def test_a_bench_installs_what_it_needs_and_nothing_else() -> None:
+    assert [c for c in commands_of("bench", "NAME=") if "pip" in c] == []
+    for name, extra in (("docs", "docs"), ("release", "release"), ("denoised", "bench")):
+        (install,) = [c for c in commands_of("bench", f"NAME={name}") if "pip install" in c]
+        assert install.endswith(f'-e ".[{extra}]"')
+
+
+def test_make_n_starts_nothing() -> None:
+    recipes = "\n".join(re.findall(r"^\t.*", MAKEFILE, re.MULTILINE))
+    assert "$(MAKE)" not in recipes
+    assert "${MAKE}" not in recipes
+    assert not re.search(r"^\t[@-]*\+", recipes, re.MULTILINE)
+    assert "$(shell" not in MAKEFILE
+
+
+def test_every_target_and_bench_that_a_page_names_exists() -> None:
+    found = {(t, n) for t, n in named_in_pages()}
+    assert len(found) > 30
+    assert {t for t, _n in found} - {*TARGETS} == set()
+    assert {n for t, n in found if t == "bench"} - {*BENCHES, ""} == set()
+
+
+def test_clean_leaves_nothing_that_was_made_but_the_environment() -> None:
+    (command,) = commands_of("clean")
+    ignored = (REPO / ".gitignore").read_text(encoding="utf-8").split()
+    folders = {name.strip("/") for name in ignored if name.endswith("/")}
+    kept = {"__pycache__", "*.egg-info", "homes"}
+    assert folders - kept <= {*command.split()}
