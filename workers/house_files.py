@@ -15,10 +15,10 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.made_home import made_homes
 from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.crash_notes import note_step
+from pbrs_farm.prepare.dress_catalogue import GENERATED, has_furniture
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
-from pbrs_farm.run.dress_catalogue import GENERATED, has_furniture
-from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
 
@@ -46,7 +46,7 @@ def entries_from_arguments(
     files = SourceFiles()
     for argument in arguments:
         for one in _expanded(argument):
-            doing(one, "read")
+            note_step(one, "read")
             for ref in variants(resolve(one, files, models=models), seeds):
                 entry = HouseEntry(
                     house_id=ref.house_id,
@@ -128,7 +128,7 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
     of models stays where it is: workers must see it at the same path. Raises BadInput for a
     library that is none.
     """
-    from pbrs_farm.run.dressed_house import catalogue_of
+    from pbrs_farm.prepare.dressed_house import catalogue_of
 
     catalogue_of(recipe.dress)
     if GENERATED not in recipe.dress.catalogue.split(":"):

@@ -21,7 +21,8 @@ def work_version() -> str:
     It follows the versions of the steps, not the package's: an upgrade that changes no stored byte
     changes nothing here, and a running job goes on.
     """
-    from pbrs_farm.run import dressed_house, plan
+    from pbrs_farm.prepare import dressed_house
+    from pbrs_farm.run import plan
 
     steps = {name: step.version for name, step in plan.STEPS.items()}
     houses = (dressed_house.VERSION, dressed_house.STAND_INS_VERSION, edits.VERSION)

@@ -42,7 +42,7 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     from benchmarks.dress.changed import looks_of
     from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
-    from pbrs_farm.run.dressed_house import catalogue_of
+    from pbrs_farm.prepare.dressed_house import catalogue_of
 
     recipe = recipe_from_name("fast")
     source = house_as_a_run_has_it(name)
@@ -83,13 +83,13 @@ def repaired_home(
     dressed: as dressed before; None dresses it in a run's own way, from its name.
     """
     from pbrs_farm.formats.house_bundle import bundle_from_house
+    from pbrs_farm.prepare.finished_house import finished_house
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import repair
-    from pbrs_farm.run.steps import made_house
 
     recipe = recipe_from_name("fast")
     if dressed is None:
-        house, repairs, _report = made_house(variants(resolve(name), [seed])[0], recipe)
+        house, repairs, _report = finished_house(variants(resolve(name), [seed])[0], recipe)
     else:
         house, repairs = repair(
             dressed, recipe.repair, occluder_from=lambda some: Caster(geometry_from_house(some))

@@ -32,7 +32,7 @@ _NUDGE_M = 3e-4
 def of_plan(seed: int) -> dict[str, Any]:
     """Plan and furniture of a seed: CPU seconds on one core, and what they are like."""
     from pbrs_farm.generate.drawn_home import drawn_home
-    from pbrs_farm.run.dress_catalogue import catalogue_of_words
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
 
     catalogue = catalogue_of_words("")
     word = MadeHome(seed).word
@@ -52,9 +52,9 @@ def of_house(seed: int) -> dict[str, Any]:
     """The home as the ordinary reader and repair see it: leaks, contacts of meshes, bits of its file."""
     from benchmarks.dress.contacts import blocked_doors, penetrations, things_of
     from pbrs_farm.generate.made import made
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, house_of_source
+    from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.dress_catalogue import catalogue_of_words, house_of_source
-    from pbrs_farm.run.steps import repaired_house
 
     recipe = recipe_from_name("fast")
     source = resolve(MadeHome(seed).word)

@@ -16,8 +16,8 @@ def measure(title: str) -> dict[str, Any]:
     """What became of the format's house, and how long it took."""
     from pbrs_farm.core.house import Enclosure
     from pbrs_farm.core.recipe import recipe_from_name
+    from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.steps import repaired_house
 
     sound = sound_files()[title]
     with tempfile.TemporaryDirectory() as folder:

@@ -80,7 +80,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _catalogue(args: argparse.Namespace) -> int:
-    from pbrs_farm.run.dress_catalogue import own_catalogue
+    from pbrs_farm.prepare.dress_catalogue import own_catalogue
 
     found = own_catalogue(args.libraries)
     groups = Counter(piece.group for piece in found.pieces)
@@ -106,14 +106,14 @@ def _catalogue(args: argparse.Namespace) -> int:
 
 def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.core import keys
+    from pbrs_farm.crash_notes import note_step
     from pbrs_farm.dress.report import summary_of_dressing
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
+    from pbrs_farm.prepare.dressed_house import fetch_catalogue
+    from pbrs_farm.prepare.finished_house import finished_house
     from pbrs_farm.read.source import resolve, variants
     from pbrs_farm.run.attributions import attribution_text
-    from pbrs_farm.run.dressed_house import fetch_catalogue
-    from pbrs_farm.run.processes.verb_process import doing
-    from pbrs_farm.run.steps import made_house
     from pbrs_farm.store.folder import FolderStore
 
     at_least("--views", args.views, 0)
@@ -123,9 +123,9 @@ def _dress(args: argparse.Namespace) -> int:
         raise BadInput("--seed", args.dress, "expected one seed")
     recipe = recipe_of(args)
     (source,) = variants(resolve(args.home, models=args.models), seeds)
-    doing(args.home, "catalogue")
+    note_step(args.home, "catalogue")
     fetch_catalogue(recipe.dress)
-    house, repairs, report = made_house(source, recipe)
+    house, repairs, report = finished_house(source, recipe)
     if report is None:
         raise BadInput(args.home, "", "an object without context is not dressed")
     # Write the dressed and repaired house and what was done to it.
@@ -149,16 +149,16 @@ def _dress(args: argparse.Namespace) -> int:
 
 def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dict[str, bytes]:
     """The pictures of the home as it was and as it is, by file name."""
+    from pbrs_farm.crash_notes import note_step
     from pbrs_farm.gallery.contact_sheet import before_after_png
+    from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.read.source import resolve
-    from pbrs_farm.run.processes.verb_process import doing
-    from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.run.view_pairs import pairs
 
     # The same recipe without dressing gives the home as it was drawn.
     undressed = recipe.model_copy(update={"dress": type(recipe.dress)()})
     bare, _report = repaired_house(resolve(args.home, models=args.models), undressed)
-    doing(args.home, "before and after")
+    note_step(args.home, "before and after")
     files = {}
     for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
         caption = f"{house.name}, view {pair.view.id}, bare and dressed"
@@ -174,10 +174,10 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
 def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
+    from pbrs_farm.prepare.dress_catalogue import house_of_source
+    from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.read.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
-    from pbrs_farm.run.dress_catalogue import house_of_source
-    from pbrs_farm.run.steps import repaired_house
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
@@ -202,20 +202,21 @@ def _repair(args: argparse.Namespace) -> int:
 
 def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house import geometry_from_house
+    from pbrs_farm.crash_notes import note_step
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
+    from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.read.source import resolve
     from pbrs_farm.run.chosen_cameras import chosen_cameras
-    from pbrs_farm.run.processes.verb_process import doing
-    from pbrs_farm.run.steps import camera_seed, repaired_house
+    from pbrs_farm.run.steps import camera_seed
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home, models=args.models), recipe)
     # Score candidates by the items that rays from them meet.
     caster = Caster(geometry_from_house(house))
-    doing(args.home, "cameras")
+    note_step(args.home, "cameras")
     seed = camera_seed(house.id, recipe)
     sampling = chosen_cameras(house, recipe.cameras, seed, caster)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))

@@ -121,8 +121,8 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.core.catalogue import EMPTY
     from pbrs_farm.gallery.made_homes import write_home
     from pbrs_farm.generate.plans.plan_files import Part, plan_from_file
+    from pbrs_farm.prepare.plan_house import made_of_file
     from pbrs_farm.read.formats import PLAN, kind_of_file
-    from pbrs_farm.run.plan_house import made_of_file
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
@@ -189,7 +189,7 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
 
 def catalogue_here() -> Catalogue:
     """The packages' furniture. Raises MachineFailed where it is not cached."""
-    from pbrs_farm.run.dress_catalogue import catalogue_of_words, has_furniture
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, has_furniture
 
     if not has_furniture():
         raise MachineFailed(

@@ -1,7 +1,7 @@
 """What can be changed of a finished home, as values that travel: frozen, no effects.
 
 An edit names items by their ids and files by path and sha256, so that a worker elsewhere makes the
-same house or says why it cannot. run/edited_house.py carries edits out, in their order.
+same house or says why it cannot. prepare/apply_edits.py carries edits out, in their order.
 """
 
 from __future__ import annotations

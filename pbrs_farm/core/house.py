@@ -193,7 +193,7 @@ LIT: Final = "lit"
 TOLD: Final = "told"
 """Tag of an item without surfaces of which the source tells class and box alone.
 
-box: its axes are right, up, front (columns). A piece of furniture stands in for it (run/stand_ins.py).
+box: its axes are right, up, front (columns). A piece of furniture stands in for it (prepare/stand_ins.py).
 """
 FRONT_TOLD: Final = "front-told"
 """Tag beside TOLD: the box's front is the source's own, else it is guessed from what is near."""

@@ -36,7 +36,7 @@ from pbrs_farm.generate.floor_plan import (
 from pbrs_farm.generate.made import Made, made, origin
 from pbrs_farm.generate.programme import Programme
 from pbrs_farm.generate.staircase import Stair
-from pbrs_farm.run.dress_catalogue import GENERATED, catalogue_of_words
+from pbrs_farm.prepare.dress_catalogue import GENERATED, catalogue_of_words
 
 # A furnished plan as an SVG picture, drawn as an architect would.
 

@@ -15,17 +15,17 @@ from typing import Any, Final, TypeAlias
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
+from pbrs_farm.crash_notes import note_step
+from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
-from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.output_root import claim_root, finish_root
 from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.early_start import end_untaken
 from pbrs_farm.run.processes.limits import ProcessLimits, is_room_for_two, memory_share_mb
 from pbrs_farm.run.processes.pool import FINISH, RENDER, Pool
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting
-from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.store import StoreSettings, store_from_url
 
 # Which task of a local run is done next, by which process, and what follows from how it ended.
@@ -350,7 +350,7 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
     sources = {s.house_id: s for given in run.sources for s in variants(given, seeds)}
     files = SourceFiles()
     for word in run.homes:
-        doing(word, "read")
+        note_step(word, "read")
         try:
             source = resolve(word, files, models=run.models)
         except PbrsError as error:

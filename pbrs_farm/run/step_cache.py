@@ -24,10 +24,10 @@ from pbrs_farm.core.plugins import plugin, plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
+from pbrs_farm.prepare.dressed_house import dressing_digest
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
-from pbrs_farm.run.dressed_house import dressing_digest
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.object_store import Store, get_or_none, put_done
 from pbrs_farm.transport.light_result import Arrays

@@ -9,10 +9,9 @@ import functools
 import platform
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -21,11 +20,11 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import House, Room, geometry_from_house
+from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
-from pbrs_farm.core.plugins import plugin_homes
-from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.crash_notes import note_step
 from pbrs_farm.formats.cameras_json import cameras_json, illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import Marker, read_marker
@@ -33,13 +32,10 @@ from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
-from pbrs_farm.read.source import SourceRef, check_unchanged
+from pbrs_farm.prepare.finished_house import finished_house
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
-from pbrs_farm.run.dress_catalogue import house_of_source
-from pbrs_farm.run.dressed_house import dressed_and_repaired, furnished, with_told_furnished
 from pbrs_farm.run.house_cache import CachedHouse
-from pbrs_farm.run.processes.verb_process import doing
 from pbrs_farm.run.step_cache import (
     LightCheckpoint,
     Outcome,
@@ -47,13 +43,10 @@ from pbrs_farm.run.step_cache import (
     Work,
     required_source,
     run_unless_done,
-    unheard,
 )
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 if TYPE_CHECKING:
-    from pbrs_farm.dress.report import DressReport
-    from pbrs_farm.repair import RepairReport
     from pbrs_farm.selection.quality import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
     from pbrs_farm.truth.optical_flow import Relation
@@ -84,7 +77,7 @@ def _house(work: Work) -> StepOutput:
 
     # The submitted id has the source's digest: another one means another file at that place.
     source = required_source(work)
-    repaired, report, dressing = made_house(source, work.recipe, work.tell_share)
+    repaired, report, dressing = finished_house(source, work.recipe, work.tell_share)
     if repaired.id != work.house_id:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)
@@ -100,91 +93,6 @@ def _house(work: Work) -> StepOutput:
     if lost := [f"{n.place}: {n.text}" for n in repaired.notes if n.kind == "wall-lost"]:
         facts["walls_lost"] = lost
     return StepOutput(files, facts)
-
-
-def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
-    """The house of a source, read, dressed where asked for, and repaired. Raises BadHouse."""
-    house, report, _dressing = made_house(source, recipe)
-    return house, report
-
-
-def made_house(
-    source: SourceRef, recipe: Recipe, tell: Callable[[float], None] = unheard
-) -> MadeHouse:
-    """As repaired_house, with what dressing did; None where the source is not dressed.
-
-    tell: called with the share that is done while it is dressed.
-    """
-    from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.repair import RepairReport, repair
-
-    if source.edits:
-        from pbrs_farm.run.edited_house import edited
-
-        key = _made_with(source.unedited, recipe)
-        if _BEFORE_EDITS[0] != key:
-            remember_house(source.unedited, recipe, made_house(source.unedited, recipe))
-        house, report, dressing = _BEFORE_EDITS[1]
-        return edited(house, source, recipe.read), report, dressing
-
-    if source.kind == "plugin":
-        return _house_of_plugin(source, recipe)
-    # An object without context has no walls to close.
-    doing(source.location, "read")
-    house = house_of_source(source, recipe.read)
-    if source.kind == "object":
-        return house, RepairReport(house_id=house.id, was_repaired=True), None
-
-    def occluder_from(some: House) -> Caster:
-        return Caster(geometry_from_house(some))
-
-    house = with_told_furnished(house, source, recipe)
-    house = furnished(house, source, recipe)
-    repaired = partial(repair, fields=recipe.repair, occluder_from=occluder_from)
-    house, report, dressing = dressed_and_repaired(house, source, recipe, repaired, tell)
-    return _before_windows(house, recipe), report, dressing
-
-
-def _before_windows(house: House, recipe: Recipe) -> House:
-    """The repaired house with what lies before its windows, where the recipe asks for it."""
-    if recipe.surroundings.kind == "none":
-        return house
-    from pbrs_farm.dress.surroundings import with_surroundings
-
-    return with_surroundings(house, recipe.surroundings.kind, recipe.seed)
-
-
-def _house_of_plugin(source: SourceRef, recipe: Recipe) -> MadeHouse:
-    """The finished house of the Home that a plugin gives for a seed, under the source's own id."""
-    doing(source.location, "plugin")
-    if source.dress_seed:
-        raise BadInput(source.location, "--dress", "a plugin dresses its homes itself")
-    check_unchanged(source)
-    (named,) = plugin_homes(source.location)
-    home = named.make()
-    groups = {path.partition(".")[0] for path, _value in home.settings}
-    if others := groups - {"read", "dress", "repair"}:
-        text = f"sets recipe fields of {', '.join(sorted(others))}, which belong to the run"
-        raise BadInput(source.location, "", text, hint="fields of read, dress and repair alone")
-    inner = with_settings(recipe, dict(home.settings))
-    house, report, dressing = made_house(home.source, inner)
-    return replace(house, id=source.house_id), report, dressing
-
-
-MadeHouse: TypeAlias = "tuple[House, RepairReport, DressReport | None]"
-
-# The last house before its edits: homes that differ in their edits alone are read once.
-_BEFORE_EDITS: tuple[str, MadeHouse] = ("", None)  # type: ignore[assignment]
-
-
-def remember_house(source: SourceRef, recipe: Recipe, made: MadeHouse) -> None:
-    """Keep what made_house gives of a source without edits for those with."""
-    global _BEFORE_EDITS
-    _BEFORE_EDITS = (_made_with(source, recipe), made)
-
-
-def _made_with(source: SourceRef, recipe: Recipe) -> str:
-    return keys.digest(source, recipe.digest("read", "dress", "repair", "surroundings"))
 
 
 def _cameras(work: Work) -> StepOutput:
@@ -440,7 +348,7 @@ def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     """Do one step unless its marker says it is done; see step_cache.run_unless_done."""
-    doing(work.source.location if work.source else work.house_id, name)
+    note_step(work.source.location if work.source else work.house_id, name)
     return run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
 
 

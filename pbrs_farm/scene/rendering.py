@@ -26,13 +26,14 @@ from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.prepare.apply_edits import edited
+from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
+from pbrs_farm.prepare.finished_house import remember_house
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
-from pbrs_farm.run.edited_house import edited
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
-from pbrs_farm.run.steps import remember_house, run_step
+from pbrs_farm.run.steps import run_step
 from pbrs_farm.scene.viewpoints import Viewpoint
 from pbrs_farm.store.object_store import MemoryStore, Store
 from pbrs_farm.views.stored_root import StoredRoot

@@ -11,9 +11,9 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.export.home_export import exported_home
 from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.source import resolve
-from pbrs_farm.run.steps import repaired_house
 
 
 @cache

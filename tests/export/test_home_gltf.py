@@ -17,9 +17,9 @@ from pbrs_farm.export.home_export import export_homes, exported_home, rooms_json
 from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hulls_of_parts
 from pbrs_farm.geometry.solids import box
+from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.read.gltf.scene import read_gltf
 from pbrs_farm.read.source import read_house, resolve
-from pbrs_farm.run.steps import repaired_house
 from tests.export.homes import differences, repaired_home, stored
 
 

@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from pbrs_farm.run.processes.verb_process import doing
+from pbrs_farm.crash_notes import note_step
 
 
 def main(words: Sequence[str]) -> int:
@@ -16,6 +16,6 @@ def main(words: Sequence[str]) -> int:
         sys.stdout.write("done\n")
         return int(words[1])
     for step in words[3:]:
-        doing(words[2], step)
+        note_step(words[2], step)
     os.kill(os.getpid(), signal.Signals[words[1]])
     raise AssertionError("alive after a signal")

@@ -12,7 +12,8 @@ import pytest
 
 from pbrs_farm.cli import MODULES
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.run.processes.verb_process import doing, run_watched
+from pbrs_farm.crash_notes import note_step
+from pbrs_farm.run.processes.verb_process import run_watched
 
 TARGET = "tests.run.dying_verbs:main"
 # Stands where the real library does, and dies as it did of open meshes.
@@ -65,7 +66,7 @@ def test_a_file_name_of_many_lines_stays_one_short_line() -> None:
 
 
 def test_nobody_is_told_where_nobody_watches() -> None:
-    doing("a.glb", "read")
+    note_step("a.glb", "read")
 
 
 def test_ctrl_c_means_afterwards_what_it_did_before() -> None:

@@ -20,10 +20,10 @@ from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.formats.marker import read_marker
+from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
-from pbrs_farm.run.dressed_house import fetch_catalogue, uses_catalogue
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import Wanted, view_steps, wanted

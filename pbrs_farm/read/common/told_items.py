@@ -1,4 +1,4 @@
-"""Things that a source tells by class and box alone; no effects. run/stand_ins.py furnishes them."""
+"""Things that a source tells by class and box alone; no effects. prepare/stand_ins.py furnishes them."""
 
 from __future__ import annotations
 

@@ -5,7 +5,6 @@ Effects: starts a process, reads what it tells of its work, writes to that pipe.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import pkgutil
@@ -13,17 +12,15 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from contextvars import ContextVar
 from typing import Final
 
+from pbrs_farm.crash_notes import send_notes_to
 from pbrs_farm.run.processes.child_process import PATH_FROM_PARENT, die_with_parent, ending
 
 _BOOT: Final = PATH_FROM_PARENT + (
     "from pbrs_farm.run.processes.verb_process import main; "
     "sys.exit(main(int(sys.argv[2]), sys.argv[3], sys.argv[4:]))"
 )
-_SEEN_BYTES: Final = 300  # of a file's name, in the line about a death
-_WATCHER: ContextVar[int | None] = ContextVar("watcher", default=None)  # pipe to the parent
 
 
 def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -> int:
@@ -53,18 +50,9 @@ def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -
     return 1
 
 
-def doing(file: str, step: str) -> None:
-    """Tell the process that watches this one, if one does, which file is at which step."""
-    watcher = _WATCHER.get()
-    if watcher is not None:
-        line = "".join(c if c.isprintable() else "?" for c in file)[:_SEEN_BYTES]
-        with contextlib.suppress(OSError):
-            os.write(watcher, f"{line}: {step}\n".encode("utf-8", "replace"))
-
-
 def main(telling: int, target: str, words: Sequence[str]) -> int:
     """The child: run the function that target names; its notices leave through `telling`."""
     die_with_parent()
     os.set_inheritable(telling, False)
-    _WATCHER.set(telling)
+    send_notes_to(telling)
     return int(pkgutil.resolve_name(target)(words))

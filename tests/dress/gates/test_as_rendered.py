@@ -23,9 +23,9 @@ from pbrs_farm.dress.things.assembly import hung
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
+from pbrs_farm.prepare.dressed_house import dressed_and_repaired
 from pbrs_farm.read.source import resolve
 from pbrs_farm.repair import repair
-from pbrs_farm.run.dressed_house import dressed_and_repaired
 from tests.repair.wall_rooms import Rect, covers, house, room, walls_around
 
 LEFT: Rect = (0.0, 0.0, 4.0, 3.0)

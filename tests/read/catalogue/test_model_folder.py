@@ -216,7 +216,7 @@ def test_a_glb_whose_nodes_go_round_is_refused(tmp_path: Path) -> None:
 def test_the_verb_says_what_is_used_and_writes_what_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pbrs_farm.run.dress_catalogue._store", lambda: tmp_path / "store")
+    monkeypatch.setattr("pbrs_farm.prepare.dress_catalogue._store", lambda: tmp_path / "store")
     put(tmp_path / "own" / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
     put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
     refused = tmp_path / "refused.csv"

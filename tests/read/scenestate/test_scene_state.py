@@ -15,8 +15,8 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import TOLD, House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.read.source import read_house, resolve
-from pbrs_farm.run.steps import repaired_house
 
 
 def written(folder: Path, scene: dict[str, Any]) -> Path:

@@ -121,7 +121,7 @@ def house_of_source(source: SourceRef, fields: ReadFields) -> House:
     if source.kind == "made":
         return _made_house(source, fields)
     if source.kind == "plan":
-        from pbrs_farm.run.plan_house import house_of_plan
+        from pbrs_farm.prepare.plan_house import house_of_plan
 
         return house_of_plan(source, fields)
     return read_house(source, fields)

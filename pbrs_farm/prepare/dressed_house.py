@@ -14,9 +14,9 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as MADE_VERSION
 from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields, Recipe
+from pbrs_farm.crash_notes import note_step
+from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, fetch_packages
 from pbrs_farm.read.source import SourceRef
-from pbrs_farm.run.dress_catalogue import catalogue_of_words, fetch_packages
-from pbrs_farm.run.processes.verb_process import doing
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
@@ -60,9 +60,9 @@ def furnished(house: House, source: SourceRef, recipe: Recipe) -> House:
     """The house with its empty rooms furnished, where the recipe asks for it, by the dressing's seed."""
     if not _is_furnished(source, recipe):
         return house
-    from pbrs_farm.run.furnished_rooms import with_rooms_furnished
+    from pbrs_farm.prepare.furnish_rooms import with_rooms_furnished
 
-    doing(source.location, "furnish")
+    note_step(source.location, "furnish")
     return with_rooms_furnished(house, catalogue_of(recipe.dress), seed_of(source, recipe))
 
 
@@ -82,12 +82,12 @@ def dressed_and_repaired(
     """
     seed = seed_of(source, recipe)
     if not seed:
-        doing(source.location, "repair")
+        note_step(source.location, "repair")
         return *repaired(house), None
     from pbrs_farm.dress.dressing import dressed_house, kept_in
     from pbrs_farm.repair.repair_house import with_rooms_closed, without_persons_and_plants
 
-    doing(source.location, "dress")
+    note_step(source.location, "dress")
     # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.
     bare, _removed = without_persons_and_plants(house, recipe.repair)
     bare = with_rooms_closed(bare, recipe.repair)
@@ -95,7 +95,7 @@ def dressed_and_repaired(
     made = dressed_house(bare, catalogue, recipe.dress, seed, lambda share: tell(_DRESSING * share))
     for k in range(_ROUNDS):
         tell(_DRESSING + (1 - _DRESSING) * k / _ROUNDS)
-        doing(source.location, "repair")
+        note_step(source.location, "repair")
         finished, report = repaired(made.house)
         kept = kept_in(finished, made, catalogue)
         if kept is made:
@@ -110,11 +110,11 @@ def with_told_furnished(house: House, source: SourceRef, recipe: Recipe) -> Hous
     """The house with furniture for what its source tells by class and box alone."""
     if source.kind not in TELLS_BOXES:
         return house
-    from pbrs_farm.run.stand_ins import has_told, with_stand_ins
+    from pbrs_farm.prepare.stand_ins import has_told, with_stand_ins
 
     if not has_told(house):
         return house
-    doing(source.location, "stand-ins")
+    note_step(source.location, "stand-ins")
     how = recipe.read.stand_ins
     catalogue = catalogue_of(recipe.dress) if how == "pieces" else EMPTY
     return with_stand_ins(house, catalogue, how)

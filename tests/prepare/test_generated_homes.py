@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.prepare.dress_catalogue import house_of_source
+from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.read.source import resolve, variants
-from pbrs_farm.run.dress_catalogue import house_of_source
-from pbrs_farm.run.steps import repaired_house
 
 BARE = ",furniture=none"  # the package need not be there
 

@@ -1,6 +1,6 @@
 """A file of a floor plan becomes a House: its walls built, its things told; and a home to be furnished.
 
-Effects: reads the file. Told things are items without surfaces until run/stand_ins.py furnishes them.
+Effects: reads the file. Told things are items without surfaces until prepare/stand_ins.py furnishes them.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from pbrs_farm.generate.plans.plan_files import (
     plan_from_file,
     upright,
 )
+from pbrs_farm.prepare.stand_ins import with_stand_ins
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.source import SourceRef, check_unchanged, home_id
 from pbrs_farm.read.sweethome3d import read_home
-from pbrs_farm.run.stand_ins import with_stand_ins
 
 LEFT_OUT = "plan-left-out"
 """The kind of the notes of what a machine's plan holds and does not fit."""

@@ -14,9 +14,9 @@ from pbrs_farm.core.house import House, Item, ItemKind, Material
 from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
 from pbrs_farm.generate.made import made_of_plan
 from pbrs_farm.geometry.solids import box_quads, quads_surface
+from pbrs_farm.prepare.stand_ins import STAND_IN, has_told, with_stand_ins
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.sweethome3d import read_home
-from pbrs_farm.run.stand_ins import STAND_IN, has_told, with_stand_ins
 
 BED, CHAIR, TABLE = 4, 5, 7
 

@@ -16,10 +16,10 @@ from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.generate.made import made
 from pbrs_farm.geometry.solids import box_quads, quads_surface
+from pbrs_farm.prepare.dressed_house import dressing_digest, uses_catalogue
+from pbrs_farm.prepare.furnish_rooms import with_rooms_furnished
 from pbrs_farm.read.source import resolve
 from pbrs_farm.read.sweethome3d import read_home
-from pbrs_farm.run.dressed_house import dressing_digest, uses_catalogue
-from pbrs_farm.run.furnished_rooms import with_rooms_furnished
 from tests.generate.furnish.shelves import plain_catalogue
 
 HOME = MadeHome(2, furniture=False)

@@ -1,0 +1,1 @@
+"""SourceRef -> finished House: the passes that read, furnish, dress, repair and edit a home."""
