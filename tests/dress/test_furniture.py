@@ -16,9 +16,10 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.furniture import KINDS, Boards, furniture
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.dress.supports import supports_of_item
 from pbrs_farm.dress.things.assembly import Made, plain
 from pbrs_farm.dress.things.things import CASE_GOODS
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from tests.builders import builtin_home
 from tests.dress.furniture import solid
 

@@ -16,14 +16,16 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
-from pbrs_farm.dress.clutter.placing import Placing, Stock, apart
+from pbrs_farm.dress.clutter.placing import Placing, apart
+from pbrs_farm.dress.clutter.stock import Stock
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.mess import chairs, pictures
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import PlanGrid, SceneTriangles
 from pbrs_farm.dress.things.books import book_covers
 from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.plan_grid import PlanGrid
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
 from tests.dress.furniture import boards, house, solid

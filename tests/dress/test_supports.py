@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.supports import (
-    PlanGrid,
-    SceneTriangles,
-    Support,
-    cells_over,
-    covered,
-    covered_by_each,
-    supports_of_item,
-)
+from pbrs_farm.dress.supports import Support, supports_of_item
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from tests.dress.furniture import boards, bookcase, room, solid, thin_table
 
 
@@ -84,23 +77,6 @@ def test_a_turned_table_has_its_own_axes() -> None:
 
 def test_a_support_outside_the_room_is_left_out() -> None:
     assert not _supports(solid("box", [5, 0, 1], [6, 0.7, 1.5]))
-
-
-def test_touched_cells_include_those_of_upright_faces() -> None:
-    grid = PlanGrid(np.zeros(2), 0.0, 0.1, (10, 10))
-    upright = np.array([[[0.05, 0, 0.55], [0.95, 0, 0.55], [0.05, 1, 0.55]]])
-    assert covered(grid, upright, touched=True)[5].all()
-    assert not covered(grid, upright).any()
-    hits = cells_over(grid, upright, touched=True)
-    assert hits.low.min() == 0
-    assert hits.high.max() == 1
-
-
-def test_groups_of_faces_cover_what_each_covers_alone() -> None:
-    grid = PlanGrid(np.zeros(2), 0.3, 0.1, (20, 20))
-    groups = list(np.random.default_rng(4).uniform(0, 2, (3, 5, 3, 3)))
-    alone = [covered(grid, group) for group in groups]
-    np.testing.assert_array_equal(covered_by_each(grid, groups), alone)
 
 
 def _basin(depth_m: float) -> Item:

@@ -23,9 +23,10 @@ from pbrs_farm.dress.clutter.drapes import (
 )
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.style import Rgb, mix
-from pbrs_farm.dress.supports import PlanGrid, SceneTriangles
 from pbrs_farm.dress.things.assembly import made, plain
 from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.plan_grid import PlanGrid
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 _AROUND_M: Final = 0.2  # of cloth, that its ground is known
 _OVER_M: Final = 0.5  # above what it is laid on, where other things begin to hang over it

@@ -29,18 +29,9 @@ from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.walkable import CELL_M
 from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_throw
 from pbrs_farm.dress.clutter.cushions import dress_bed, dress_seat, find_seat
-from pbrs_farm.dress.clutter.placing import (
-    LIFT_M,
-    Placing,
-    Stock,
-    TopSpot,
-    Worktop,
-    apart,
-    can_hold,
-    is_round,
-    receptacle_of,
-    shares,
-)
+from pbrs_farm.dress.clutter.placing import Placing, apart
+from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of, shares
+from pbrs_farm.dress.clutter.stock import Stock, is_round
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space.floor_bitmaps import (
     FloorBitmap,
@@ -51,9 +42,12 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 )
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, supports_of_item, surroundings
+from pbrs_farm.dress.supports import supports_of_item, surroundings
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import book_covers, leaning_book, run_of_books, stack_of_books
+from pbrs_farm.dress.worktop import LIFT_M, TopSpot, Worktop
+from pbrs_farm.geometry.plan_grid import PlanGrid
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 

@@ -13,10 +13,12 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_duvet
 from pbrs_farm.dress.clutter.placing import Placing
-from pbrs_farm.dress.supports import PlanGrid, SceneTriangles, cells_over, plan_turn, top_heights
+from pbrs_farm.dress.supports import plan_turn
 from pbrs_farm.dress.things.assembly import Made, smooth
 from pbrs_farm.dress.things.things import THINGS
 from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over, top_heights
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 # Pillows, cushions and a folded blanket on beds; they take the shape of what they lie on.
 

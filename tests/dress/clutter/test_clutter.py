@@ -15,11 +15,13 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.placing import Row, Stock, is_known, receptacle_of, shares
+from pbrs_farm.dress.clutter.receptacles import Row, receptacle_of, shares
+from pbrs_farm.dress.clutter.stock import Stock, is_known
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import SceneTriangles, supports_of_item
+from pbrs_farm.dress.supports import supports_of_item
 from pbrs_farm.dress.things.books import book_covers
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 from tests.dress.furniture import bookcase, house, room, solid

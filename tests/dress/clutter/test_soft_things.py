@@ -13,8 +13,8 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.clutter.cushions import find_seat, lying_place
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.supports import SceneTriangles
 from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from tests.dress.furniture import boards, house, room, solid
 
 _PILLOW = 18

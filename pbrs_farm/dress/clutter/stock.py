@@ -1,0 +1,120 @@
+"""Kinds of small things and what a home takes them from: the catalogue's groups, or generators; state: what was taken."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.catalogue import Catalogue, Place, Shape
+from pbrs_farm.core.house import ItemKind
+from pbrs_farm.core.record import Record, Several, read_csv
+from pbrs_farm.dress.style import Style
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_books
+from pbrs_farm.dress.things.things import THINGS
+
+_MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
+_MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
+_GENERATED_SHARE: Final = 0.5  # where there are both
+_DESIGNS: Final = 1  # of a kind in one home
+_MOST_TRIES: Final = 2  # models that are loaded to find them
+
+
+class ThingKind(Record):
+    """Where a kind's pieces come from: a row of kinds.csv."""
+
+    kind: str
+    groups: Several[str] = ()  # of the catalogue
+    made: str = ""  # generator's name
+    most_m: float = 0.6  # the longest side
+    is_round: bool = False  # it may face anywhere
+    place: Place = Place.SURFACE  # of the catalogue's pieces
+    most_faces: int = _MOST_FACES
+
+
+# Of the generated things, those that a catalogue has, too, or that may face anywhere.
+_KINDS: Final = {
+    row.kind: row for row in read_csv(Path(__file__).with_name("kinds.csv"), ThingKind)
+}
+
+
+class Stock:
+    """What a home's small things are taken from: one model of each kind, as people own sets."""
+
+    def __init__(self, catalogue: Catalogue, covers: Covers, seed: int) -> None:
+        self.covers = covers
+        self._catalogue = catalogue
+        self._seed = seed
+        self._designs: dict[str, list[Made]] = {}
+        self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
+
+    def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
+        """A thing of that kind; None where there is none that can be used."""
+        if kind == "book":
+            # One or a pile; now and then one lies open.
+            n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))
+            return stack_of_books(rng, self.covers, n) if n else open_book(rng, self.covers)
+        if kind == "magazines":
+            return magazines(rng, self.covers, int(rng.integers(1, 6)))
+        # Draw for all alike, so that what the catalogue holds moves no later draw.
+        found = _kind(kind)
+        is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
+        designs = [] if found.made and is_made else self._owned(kind)
+        # Of one detailed model there are few in a home.
+        designs = [d for d in designs if self._faces[d[0].id] + _n_faces(d[1]) <= _MOST_OF_MODEL]
+        if designs:
+            piece, shape = designs[number % len(designs)]
+            self._faces[piece.id] += _n_faces(shape)
+            return piece, shape
+        own = np.random.default_rng(number)
+        return THINGS.make(found.made, own, style) if found.made else None
+
+    def _owned(self, kind: str) -> list[Made]:
+        """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
+        if kind not in self._designs:
+            found = _kind(kind)
+            fitting = [
+                p
+                for p in self._catalogue.of(*found.groups)
+                if p.place is found.place
+                and max(p.size) <= found.most_m
+                and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
+            ]
+            order = np.random.default_rng([self._seed, *kind.encode()]).permutation(len(fitting))
+            owned: list[Made] = []
+            for k in order[:_MOST_TRIES]:
+                if len(owned) == _DESIGNS:
+                    break
+                shape = self._catalogue.shape(fitting[k])
+                if shape is not None and _is_usable(shape, found):
+                    owned.append((fitting[k], shape))
+            self._designs[kind] = owned
+        return self._designs[kind]
+
+
+def is_round(kind: str) -> bool:
+    """Whether things of that kind may face anywhere."""
+    return kind in _KINDS and _KINDS[kind].is_round
+
+
+def is_known(kind: str) -> bool:
+    """Whether there is such a kind."""
+    return kind in (*_KINDS, *THINGS.names, "book", "magazines")
+
+
+def _kind(name: str) -> ThingKind:
+    return _KINDS.get(name) or ThingKind(kind=name, made=name)
+
+
+def _n_faces(shape: Shape) -> int:
+    return sum(len(s.faces) for s in shape.surfaces)
+
+
+def _is_usable(shape: Shape, kind: ThingKind) -> bool:
+    if not 0 < _n_faces(shape) <= kind.most_faces:
+        return False
+    low, high = shape.bounds
+    return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)

@@ -1,0 +1,58 @@
+"""The triangles of a house by item, found again by place; state: what was asked for is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.house import Item
+from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
+from pbrs_farm.geometry.surface_points import item_triangles
+
+
+class SceneTriangles:
+    """Corners of the items' faces in double precision, and which items meet a box.
+
+    Items are named by their place in the sequence it was made from, which must not change meanwhile.
+    Faces are gathered when an item is first asked for, so that a room costs what stands near it.
+
+        scene = SceneTriangles(house.items)
+        corners, owner = scene.in_box(low, high)  # (T, 3, 3) metres, (T,) places in house.items
+    """
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self.items = tuple(items)
+        bounds = [item.bounds for item in self.items]
+        self.bounds: F64 = np.array(bounds) if bounds else np.zeros((0, 2, 3))
+        self._corners: dict[int, F64] = {}
+        self._of_faces: dict[int, tuple[F64, F64]] = {}
+
+    def of_item(self, index: int) -> F64:
+        """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres."""
+        if index not in self._corners:
+            self._corners[index] = item_triangles(self.items[index])
+        return self._corners[index]
+
+    def _bounds_of(self, index: int) -> tuple[F64, F64]:
+        # (F, 3) lowest and highest corners of the boxes around the item's faces.
+        if index not in self._of_faces:
+            self._of_faces[index] = triangle_bounds(self.of_item(index))
+        return self._of_faces[index]
+
+    def items_in(self, low: F64, high: F64) -> list[int]:
+        """Indices of the items whose bounds meet the box low..high (3,)."""
+        meets = boxes_meeting(self.bounds[:, 0], self.bounds[:, 1], low, high)
+        return [int(i) for i in np.flatnonzero(meets)]
+
+    def in_box(self, low: F64, high: F64) -> tuple[F64, I32]:
+        """(T, 3, 3) faces whose bounds meet the box low..high, and (T,) the item of each."""
+        parts, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int32)]
+        for index in self.items_in(low, high):
+            corners = self.of_item(index)
+            least, most = self._bounds_of(index)
+            meets = boxes_meeting(least, most, low, high)
+            parts.append(corners[meets])
+            owners.append(np.full(int(meets.sum()), index, np.int32))
+        return np.concatenate(parts), np.concatenate(owners)
