@@ -25,9 +25,11 @@ JOB: Final = "job"  # the root's manifest, the report
 STAGES: Final = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
 LIGHT_GPU: Final = "light.gpu"  # the queue of light on a GPU, and its leases
 QUEUES: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU, REDUCE)
-LEASES: Final = (*STAGES, LIGHT_GPU)
+POOLS: Final = (*STAGES, LIGHT_GPU)  # each has a window of messages and a list of leases
 WHOLE: Final = "-"
 MOST_IN_GROUP: Final = 64  # tasks of one house that a message names
+DEFAULT_PRIORITY: Final = 5  # of a job: a number from 0, which goes first, to 9
+LEAST_URGENT: Final = 9
 
 _JOB_ID: Final = re.compile(r"[0-9a-f]{12}")
 _TASK: Final = re.compile(r"([A-Za-z0-9_.\-]{1,120})/(-|[0-9]{1,4}|s[0-9]{1,5})/([a-z]+)")
@@ -80,9 +82,17 @@ def queue_of(stage: str, *, gpu: bool) -> str:
     return LIGHT_GPU if gpu and stage == LIGHT else stage
 
 
-def lane_of(stage: str, *, gpu: bool) -> str:
-    """The lease a stage's tasks hold, and the window they are sent in: light on a GPU has its own."""
+def pool_of(stage: str, *, gpu: bool) -> str:
+    """The pool of a stage's tasks, whose window they are sent in and whose leases they hold.
+
+    A pool is a stage, but light on a GPU has one of its own: messages that no worker takes hold up no others.
+    """
     return LIGHT_GPU if gpu and stage == LIGHT else stage
+
+
+def stage_of_pool(pool: str) -> str:
+    """The stage whose tasks a pool has."""
+    return LIGHT if pool == LIGHT_GPU else pool
 
 
 def stages_of_queue(queue: str) -> tuple[str, ...]:
@@ -124,13 +134,6 @@ def shard_key(job: str, shard: int) -> str:
 
 def _flat(task: str) -> str:
     return task.replace("-/", "whole/", 1) if task.startswith("-/") else task
-
-
-# A job's priority: a number from 0, which goes first, to 9; pure.
-
-
-DEFAULT_PRIORITY: Final = 5
-LEAST_URGENT: Final = 9
 
 
 def priority_from_text(text: str) -> int:

@@ -155,8 +155,8 @@ class MemoryLedger:
         counts |= {f"seconds:{stage}": n for stage, n in self.seconds.items()}
         return JobView(job, self.fields, counts, {}, 0)
 
-    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None:
-        self.fields |= {"barred": ",".join(queues), "barred_why": why}
+    def set_blocked(self, job: str, queues: Sequence[str], why: str) -> None:
+        self.fields |= {"blocked": ",".join(queues), "blocked_why": why}
 
     def holds(self, job: str) -> list[Hold]:
         return []
@@ -164,8 +164,8 @@ class MemoryLedger:
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
         raise NotImplementedError
 
-    def set_told(self, job: str, outcome: str) -> None:
-        self.fields["told"] = outcome
+    def set_notified(self, job: str, outcome: str) -> None:
+        self.fields["notified"] = outcome
 
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         self.fields["rates"] = ",".join(rates)

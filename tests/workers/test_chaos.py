@@ -149,7 +149,8 @@ def test_redis_flushed_then_recovered(farm: SmallFarm) -> None:
 
 
 def test_every_message_delivered_twice(farm: SmallFarm) -> None:
-    from workers.coordinator.leader import Coordinator, celery_sender
+    from workers.coordinator.dispatcher import celery_sender
+    from workers.coordinator.leader import Coordinator
 
     (farm.control / "slow").write_text("0.05")
     farm.worker("w1")

@@ -25,7 +25,6 @@ from pbrs_farm.store import Store, store_from_url
 from workers.client.rights import Rights
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
-from workers.coordinator.shares import priority_of
 from workers.ids import (
     LIGHT,
     LIGHT_GPU,
@@ -146,8 +145,8 @@ def _holder(
 
 def _obstacle(registry: Registry, view: JobView, task: str) -> str:
     """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
-    if view.state == "running" and view.barred:
-        return f"others go first: {view.fields.get('barred_why', '')}"
+    if view.state == "running" and view.blocked_queues:
+        return f"others go first: {view.blocked_why}"
     if view.state != "running":
         return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
     if reason := registry.breaker():
@@ -348,9 +347,9 @@ class Farm:
             "reason": view.fields.get("reason", ""),
             "recipe": view.fields.get("recipe_name", ""),
             "user": view.user,
-            "priority": priority_of(view),
+            "priority": view.priority,
             "is_urgent": view.is_urgent,
-            "held_back": view.fields.get("barred_why", "") if view.state == "running" else "",
+            "held_back": view.blocked_why if view.state == "running" else "",
             "waits_for": [j for j in view.after if not self._is_done(j)],
             "houses": {
                 "total": int(view.fields.get("n_houses", 0)),

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from workers.coordinator.progress_rates import StageView, stage_views
-from workers.coordinator.shares import priority_of
 from workers.ids import GL, LIGHT
 from workers.ledger.task_ledger import JobView
 
@@ -33,7 +32,7 @@ def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
         "reason": view.fields.get("reason", ""),
         "recipe": view.fields.get("recipe_name", ""),
         "user": view.user,
-        "priority": priority_of(view),
+        "priority": view.priority,
         "houses": int(view.fields.get("n_houses", 0)),
         "houses_done": int(view.counts.get("houses:done", 0)),
         "views": int(view.counts.get("views", 0)),

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.core.errors import BadInput
-from workers.coordinator.teams import n_running
 from workers.ledger.task_ledger import User
 from workers.ledger.user_table import known_user, new_user
 
@@ -76,7 +75,7 @@ def user_rows(farm: Farm) -> list[dict[str, Any]]:
         {
             "user": user.name,
             "share": user.share,
-            "running": int(sum(n_running(v) for v in views if v is not None and v.user == name)),
+            "running": int(sum(v.n_running for v in views if v is not None and v.user == name)),
             "max_slots": user.max_slots,
             "slot_hours": user.slot_hours,
             "slot_hours_used": round(spent.get(name, 0.0), 4),

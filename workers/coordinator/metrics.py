@@ -18,7 +18,6 @@ from prometheus_client.core import (
 
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import durations, stage_views, views_per_hour
-from workers.coordinator.teams import n_running
 from workers.ids import QUEUES, STAGES
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import (
@@ -101,7 +100,7 @@ class FarmCollector:
             if etas:
                 left.add_metric([view.job_id], max(etas))
             paused.add_metric([view.job_id], view.state == "paused")
-            held.add_metric([view.job_id], view.barred == (EVERYWHERE,))
+            held.add_metric([view.job_id], view.blocked_queues == (EVERYWHERE,))
         yield from (rate, left, paused, held)
 
     def _users(self, views: list[JobView]) -> Iterator[Metric]:
@@ -112,7 +111,7 @@ class FarmCollector:
             "pbrs_user_slot_hours", f"used in {SPENT_DAYS} days", labels=["user"]
         )
         for name in users:
-            running.add_metric([name], sum(n_running(v) for v in views if v.user == name))
+            running.add_metric([name], sum(v.n_running for v in views if v.user == name))
             hours.add_metric([name], spent.get(name, 0.0))
         yield from (running, hours)
 

@@ -19,7 +19,7 @@ from redis.backoff import ExponentialWithJitterBackoff
 from redis.retry import Retry
 
 from workers.config import FarmConfig, shown_url
-from workers.ids import LEASES, LIGHT_GPU, STAGES
+from workers.ids import LIGHT_GPU, POOLS, STAGES
 from workers.ledger.task_ledger import (
     ALIVE_S,
     EVERYWHERE,
@@ -203,7 +203,7 @@ class RedisLedger:
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
             # The farm's leases of this job, then every key of its own.
-            for name in LEASES:
+            for name in POOLS:
                 key = f"{self._g}lease:{name}"
                 members = self.client.zscan_iter(key, match=f"{job}|*")
                 for member, _score in members:
@@ -291,7 +291,7 @@ class RedisLedger:
 
     def reap(self, token: str) -> int:
         """End leases that ran out; how many, -1 when not leading."""
-        return int(self._run("reap", "", token, _REAP_MOST, *LEASES))
+        return int(self._run("reap", "", token, _REAP_MOST, *POOLS))
 
     def dispatch(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
@@ -304,15 +304,15 @@ class RedisLedger:
         """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
         return _tasks(self._run("resend", job, token, stage, age_s, _RESEND_MOST))
 
-    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None:
-        """Let no worker that takes one of these queues claim of the job, until it is called again."""
+    def set_blocked(self, job: str, queues: Sequence[str], why: str) -> None:
+        """Let no worker that takes one of these queues claim the job's tasks, until the next call."""
         with self.errors():
             if self.client.exists(f"{self._p(job)}job"):
-                fields = {"barred": ",".join(queues), "barred_why": why}
+                fields = {"blocked": ",".join(queues), "blocked_why": why}
                 self.client.hset(f"{self._p(job)}job", mapping=fields)
 
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
-        """Let these tasks end at their next heartbeat; how many were told so now, -1: not leading."""
+        """Let these tasks end at their next heartbeat; how many shall that did not before, -1: not leading."""
         pairs = [x for hold in holds for x in (hold.task, hold.token)]
         return int(self._run("preempt", job, token, *pairs))
 
@@ -322,12 +322,12 @@ class RedisLedger:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
 
-    def set_told(self, job: str, outcome: str) -> None:
-        """Keep which end or pause of the job the webhook was told, "" for none."""
+    def set_notified(self, job: str, outcome: str) -> None:
+        """Keep which end or pause of the job was posted to the webhook last, "" for none."""
         with self.errors():
             # A job that was forgotten meanwhile stays so.
             if self.client.exists(f"{self._p(job)}job"):
-                self.client.hset(f"{self._p(job)}job", "told", outcome)
+                self.client.hset(f"{self._p(job)}job", "notified", outcome)
 
     def wait(self, seconds: float) -> None:
         """Wait so long at most, less when a task becomes ready meanwhile."""

@@ -12,25 +12,23 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Final, Literal, Protocol
 
 from pbrs_farm.core.errors import PbrsError, Transient
-from workers.ids import MOST_IN_GROUP, STAGES
+from workers.ids import DEFAULT_PRIORITY, MOST_IN_GROUP, STAGES
 
 if TYPE_CHECKING:
     from workers.job import HouseEntry, JobSpec
 
 ClaimAnswer = Literal[
     "run", "done", "failed", "leased", "early", "cancelled", "paused", "held", "version", "recipe",
-    "store", "barred", "draining", "blocked", "elsewhere", "alone", "unknown",
+    "store", "blocked", "draining", "cooling", "elsewhere", "alone", "unknown",
 ]  # fmt: skip
 FaultClass = Literal[
     "data", "bug", "crash", "resource", "machine", "timeout", "silent", "lost",
     "storage", "preempted", "drained", "version", "cancelled",
 ]  # fmt: skip
 
-TOGETHER_S: Final = (
-    30.0  # of work that a slot claims at once: above a claim's cost, below what is lost
-)
+TOGETHER_S: Final = 30.0  # of work that a slot claims at once: long beside a claim, short to lose
 MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
-EVERYWHERE: Final = "*"  # stands for every queue where a job is barred
+EVERYWHERE: Final = "*"  # stands for every queue where a job is blocked
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
 # Classes of fault that are nobody's: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
@@ -116,7 +114,7 @@ class Hold:
     token: str  # of the slot's hold; tasks that were claimed together have one
     worker: str
     since: float  # by Redis' clock
-    is_preempted: bool = False  # it was told to end
+    is_preempted: bool = False  # it shall end
 
 
 def hold_from_text(job: str, task: str, text: str) -> Hold:
@@ -206,9 +204,32 @@ class JobView:
         return self.fields.get("preempt") == "1"
 
     @property
-    def barred(self) -> tuple[str, ...]:
-        """Queues of which whoever takes one claims nothing of it now; (EVERYWHERE,) for nobody does."""
-        return tuple(filter(None, self.fields.get("barred", "").split(",")))
+    def blocked_queues(self) -> tuple[str, ...]:
+        """Queues on which it may not be claimed now, (EVERYWHERE,) for all."""
+        return tuple(filter(None, self.fields.get("blocked", "").split(",")))
+
+    @property
+    def blocked_why(self) -> str:
+        """Why it may not be claimed there, "" where it may."""
+        return self.fields.get("blocked_why", "")
+
+    @property
+    def priority(self) -> int:
+        """0 goes first, 9 last."""
+        return int(self.fields.get("priority", DEFAULT_PRIORITY))
+
+    @property
+    def n_running(self) -> float:
+        """Tasks that slots hold."""
+        return self._n_in("RUNNING")
+
+    @property
+    def n_in_flight(self) -> float:
+        """Tasks that are queued or run."""
+        return self.n_running + self._n_in("QUEUED")
+
+    def _n_in(self, state: str) -> float:
+        return sum(self.counts.get(f"{stage}:{STATES[state]}", 0.0) for stage in STAGES)
 
     @property
     def n_failed(self) -> int:
@@ -264,7 +285,7 @@ class Ledger(Protocol):
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
     ) -> list[str] | None: ...
     def wait(self, seconds: float) -> None: ...
-    def set_barred(self, job: str, queues: Sequence[str], why: str) -> None: ...
+    def set_blocked(self, job: str, queues: Sequence[str], why: str) -> None: ...
     def holds(self, job: str) -> list[Hold]: ...
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int: ...
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None: ...
@@ -273,7 +294,7 @@ class Ledger(Protocol):
     def steer(self, job: str, what: str, reason: str = "") -> str: ...
     def retry(self, job: str, task: str) -> bool: ...
     def view(self, job: str) -> JobView | None: ...
-    def set_told(self, job: str, outcome: str) -> None: ...
+    def set_notified(self, job: str, outcome: str) -> None: ...
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None: ...
     def queue_length(self, queue: str) -> int: ...
     def active_jobs(self) -> list[str]: ...

@@ -1,6 +1,6 @@
 """Who works on the farm: registration, heartbeats, draining, and the storage breaker.
 
-Effects: Redis. The ledger's scripts read what stands here (drain, blocked_until, breaker).
+Effects: Redis. The ledger's scripts read what stands here (drain, cooling_until, breaker).
 """
 
 from __future__ import annotations

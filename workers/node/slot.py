@@ -44,7 +44,7 @@ _log = logging.getLogger("pbrs.slot")
 # Classes that say nothing of the task: no log of them is stored.
 _NO_LOG: Final = {*UNCOUNTED, "cancelled", "lost"}
 # Refusals that another worker may not meet: wait, so that it comes first.
-_WAIT_AFTER_REJECTION: Final = {"version", "recipe", "store", "draining", "blocked", "elsewhere"}
+_WAIT_AFTER_REJECTION: Final = {"version", "recipe", "store", "draining", "cooling", "elsewhere"}
 # Ends of a task after which the others that were claimed with it are not begun.
 _ENDS_ALL: Final = {"preempted", "cancelled"}
 _POLL_S: Final = 1.0
@@ -263,7 +263,7 @@ class Slot:
     def _rejected(self, job: str, task: TaskId, claim: Claim, *, waits: bool) -> None:
         """Say why a task is not run. waits: so that another worker comes first, where it may."""
         _log.log(
-            logging.DEBUG if claim.verdict in ("done", "early", "alone", "barred") else logging.INFO,
+            logging.DEBUG if claim.verdict in ("done", "early", "alone", "blocked") else logging.INFO,
             "%s/%s not run: %s %s", job, task, claim.verdict, claim.detail,
         )  # fmt: skip
         # A message came twice, or its holder died with the Celery child that took it.

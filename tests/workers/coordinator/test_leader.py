@@ -127,7 +127,7 @@ def test_short_tasks_of_one_house_go_in_one_message_as_long_as_each_slot_gets_so
 ) -> None:
     seconds = {"gl": 0.5, "light": 20.0}
     monkeypatch.setattr(
-        "workers.coordinator.teams.mean_s", lambda _views, stage: seconds.get(stage)
+        "workers.coordinator.job_counts.mean_s", lambda _views, stage: seconds.get(stage)
     )
     bench.registry.n_slots = {"gl": 2, "light": 2, "geometry": 2}
     units = [f"h{house}/{unit}" for house in (0, 1) for unit in range(3)]

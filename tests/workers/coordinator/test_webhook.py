@@ -12,7 +12,7 @@ import pytest
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.secret import Secret
 from tests.workers.memory_ledger import MemoryLedger
-from workers.coordinator.leader import Webhook, notice, poster
+from workers.coordinator.webhook import Webhook, notice, poster
 from workers.ledger.task_ledger import JobView
 
 JOB = "0" * 12

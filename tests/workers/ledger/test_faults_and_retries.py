@@ -102,7 +102,7 @@ def test_three_crashes_on_different_houses_cool_the_worker_down(ledger: RedisLed
     tasks = d.dispatch()
     for task in tasks[:3]:
         d.fail(task, d.claim(task, "w1"), worker="w1")
-    assert d.claim(tasks[3], "w1").verdict == "blocked"
+    assert d.claim(tasks[3], "w1").verdict == "cooling"
 
 
 def test_a_failed_task_can_be_tried_again_and_the_job_ends_again(ledger: RedisLedger) -> None:

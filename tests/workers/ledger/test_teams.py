@@ -28,18 +28,18 @@ def test_a_worker_leaves_a_job_to_lie_where_it_could_do_what_others_wait_for(
     (task,) = d.dispatch()
     for name, queues in (("w1", ("geometry", "light")), ("w2", ("geometry",))):
         Registry(with_config(ledger, worker=name, queues=queues)).heartbeat()
-    ledger.set_barred(JOB_ID, ("light",), "it is the turn of bob")
+    ledger.set_blocked(JOB_ID, ("light",), "it is the turn of bob")
     claim = d.claim(task, "w1")
-    assert (claim.verdict, claim.detail) == ("barred", "it is the turn of bob")
+    assert (claim.verdict, claim.detail) == ("blocked", "it is the turn of bob")
     # It is ready again after a second, without an attempt, and another worker takes it.
     assert d.dispatch() == []
     ledger.client.zadd(f"{ledger.config.prefix}{{{JOB_ID}}}:later", {task: 0})
     assert d.dispatch() == [task]
     assert d.claim(task, "w2").detail == "1"
-    ledger.set_barred(JOB_ID, (), "")
+    ledger.set_blocked(JOB_ID, (), "")
     view = ledger.view(JOB_ID)
     assert view is not None
-    assert view.barred == ()
+    assert view.blocked_queues == ()
 
 
 def test_a_job_that_stands_still_everywhere_goes_on_with_no_batch_of_its_house(
@@ -49,7 +49,7 @@ def test_a_job_that_stands_still_everywhere_goes_on_with_no_batch_of_its_house(
     d.run(d.dispatch()[0])
     first, _second = d.dispatch()
     claim = d.claim(first)
-    ledger.set_barred(JOB_ID, (EVERYWHERE,), "spent")
+    ledger.set_blocked(JOB_ID, (EVERYWHERE,), "spent")
     go_on = GoOn(d.job.recipe.digest(), ("gl", "light"), is_long=True)
     assert ledger.finish_many(JOB_ID, {first: Finished(9.0)}, claim.token, go_on) == {}
 

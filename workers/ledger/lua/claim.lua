@@ -1,4 +1,4 @@
--- May this worker run these tasks now? Of several, those that never failed; each with an answer of its own.
+-- May this worker run these tasks now? Of several, only those that never failed; each has its own answer.
 -- ARGV: token, worker, version, recipe digest, lease seconds, direct ("1": without a message), id of the
 -- worker's store ("" = not known), then tasks -> {{verdict, detail, inputs}, ...}
 local c = {
@@ -13,7 +13,7 @@ for i, task in ipairs(tasks) do
   -- One that failed before lets nobody run beside it, either.
   if answers[i][1] == 'run' then
     c.alone = false
-    if answers[i][2] ~= '1' then c.shut = true end
+    if answers[i][2] ~= '1' then c.no_more = true end
   end
 end
 return answers

@@ -1,12 +1,13 @@
--- Shared by every script, after the constants that Python tells: the letters LOADED, READY, QUEUED,
--- RUNNING, DONE, FAILED, CANCELLED, the stages, ALIVE_S, the classes of fault (redis_ledger.py).
+-- Shared by every script, after the constants that Python writes before it: the letters LOADED, READY,
+-- QUEUED, RUNNING, DONE, FAILED, CANCELLED, the stages, ALIVE_S, the classes of fault (redis_ledger.py).
 -- P: prefix of one job's keys, G: prefix of all keys. Time is Redis' own, so that no worker's clock
 -- matters. A unit's state is "<stage>:<letter>" in its house's hash.
 -- Unit "-" is the house as a whole, "0", "1", ... its batches of views. House "-" is the job.
 --
 -- Keys of a job (P ..):
---   job     hash: state, reason, user, barred (queues of which whoever takes one claims nothing of
---           the job now, EVERYWHERE for nobody does; barred_why), version, recipe, stages, rules of failure, shard_size, shards_left
+--   job     hash: state, reason, user, version, recipe, stages, rules of failure, shard_size, shards_left,
+--           blocked (queues on which its tasks may not be claimed now, EVERYWHERE = all), blocked_why,
+--           notified (its end or pause that was posted to the webhook)
 --   n       hash of counters: "<stage>:<letter>", "done:<stage>", "houses:<how>", "batches", "views",
 --           "failures:<class>" (attempts), "failed:<class>" (tasks, for good)
 --   order   list: "<index>|<house>" not yet admitted       sources  hash: house -> source
@@ -14,10 +15,10 @@
 --   views   hash: house -> batches       shards  hash: shard -> houses still open
 --   out:<stage>  list: the outbox        later   sorted set: task by the time it becomes ready
 --   queued  sorted set: task by the time its message was sent
---   claims  hash: task -> "<token>|<worker>|<since>", and "|p" behind it where it shall end for an urgent
---           job                                            attempts, tried, rejected, failed: by task
+--   claims  hash: task -> "<token>|<worker>|<since>", with "|p" after it where it shall end for an urgent job
+--   attempts, tried, rejected, failed  hashes by task
 --   prints  hash: fingerprint of a fault -> how often
--- Keys of the farm (G ..): leader, jobs, known, notify, breaker, lease:<queue> (sorted set: task by the
+-- Keys of the farm (G ..): leader, jobs, known, notify, breaker, lease:<pool> (sorted set: task by the
 -- end of its lease), spent:<day> (hash: user -> seconds), worker:<name> (hash), workers and workers:<stage> (sorted sets: worker by heartbeat).
 local P, G = KEYS[1], KEYS[2]
 
@@ -208,7 +209,7 @@ local function count(field)
 end
 local function job_of(prefix) return string.match(prefix, '{(.-)}:$') end
 
--- Leases are kept by queue, so that each class of workers can be scaled by its own.
+-- Leases are kept by pool (workers/ids.py), so that each class of workers can be scaled by its own.
 local function lease_key(stage)
   if stage == LIGHT_STAGE and job_field('gpu') == '1' then stage = GPU_LEASE end
   return G .. 'lease:' .. stage
@@ -452,7 +453,7 @@ local function ended_badly(task, f)
   return 'retry'
 end
 
--- Only the leading coordinator may move work; a deposed one is told so.
+-- Whether a coordinator leads: only the leader may move work.
 local function leads(token) return redis.call('GET', G .. 'leader') == token end
 
 -- What a task works on: the house's source before geometry, its batches of views afterwards.
@@ -461,13 +462,13 @@ local function inputs_of(house, stage)
   return hget(P .. (stage == GEOMETRY_STAGE and 'sources' or 'views'), house) or ''
 end
 
--- Whether a worker that takes these queues leaves the job's tasks to lie: it could do what others wait
--- for. What merges is short, and helps everybody.
-local function goes_after_others(stage, queues)
-  local barred = job_field('barred') or ''
-  if barred == '' or stage == REDUCE_STAGE or stage == SHARD_STAGE or stage == JOB_STAGE then return false end
-  if barred == EVERYWHERE then return true end
-  for queue in string.gmatch(barred, '[^,]+') do
+-- Whether the job is blocked for a worker that takes these queues: others wait for what it could do.
+-- Merges are never blocked: they are short, and help everybody.
+local function is_blocked(stage, queues)
+  local blocked = job_field('blocked') or ''
+  if blocked == '' or stage == REDUCE_STAGE or stage == SHARD_STAGE or stage == JOB_STAGE then return false end
+  if blocked == EVERYWHERE then return true end
+  for queue in string.gmatch(blocked, '[^,]+') do
     if string.find(',' .. queues .. ',', ',' .. queue .. ',', 1, true) then return true end
   end
   return false
@@ -475,7 +476,7 @@ end
 
 -- May this worker run this task now? The attempt is counted before any work is done.
 -- c: token, worker, version, recipe, lease_s, direct (without a message), store ("" = not known),
--- alone (nothing else was claimed in this call), shut (nothing more is claimed in it)
+-- alone (nothing else was claimed in this call), no_more (nothing else may be claimed in it)
 -- -> {verdict, detail, inputs}; verdict "run" carries the attempt as detail
 local function claim(task, c)
   local house, unit, stage = split(task)
@@ -523,17 +524,17 @@ local function claim(task, c)
   local store = job_field('store_id') or ''
   if store ~= '' and c.store ~= '' and store ~= c.store then return reject('store', store, 15) end
   local self = G .. 'worker:' .. c.worker
-  hmany(self, { 'drain', 'blocked_until', 'streak', 'queues' })
+  hmany(self, { 'drain', 'cooling_until', 'streak', 'queues' })
   if hget(self, 'drain') == '1' then return reject('draining', '', 0) end
-  if goes_after_others(stage, hget(self, 'queues') or '') then
-    return reject('barred', job_field('barred_why') or '', 1)
+  if is_blocked(stage, hget(self, 'queues') or '') then
+    return reject('blocked', job_field('blocked_why') or '', 1)
   end
-  local blocked = hget(self, 'blocked_until')
-  if blocked and tonumber(blocked) > t then return reject('blocked', blocked, 2) end
+  local cooling = hget(self, 'cooling_until')
+  if cooling and tonumber(cooling) > t then return reject('cooling', cooling, 2) end
 
   -- What failed once runs by itself: it may take others with it.
   local n_before = tonumber(hget(P .. 'attempts', task) or '0')
-  if c.shut or (n_before > 0 and not c.alone) then return reject('alone', '', 0) end
+  if c.no_more or (n_before > 0 and not c.alone) then return reject('alone', '', 0) end
   -- A failed attempt is repeated elsewhere as long as anybody else could do it.
   local tried = n_before > 0 and hget(P .. 'tried', task)
   if tried and string.find(',' .. tried .. ',', ',' .. c.worker .. ',', 1, true) then

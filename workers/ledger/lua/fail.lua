@@ -12,7 +12,7 @@ if SUSPECT[ARGV[3]] and redis.call('ZCOUNT', G .. 'workers:' .. stage, now() - A
   if hget(key, 'streak_house') ~= house then
     hset(key, 'streak_house', house)
     if hadd(key, 'streak', 1) >= 3 then
-      hset(key, 'blocked_until', now() + tonumber(ARGV[8]))
+      hset(key, 'cooling_until', now() + tonumber(ARGV[8]))
       hset(key, 'streak', 0)
     end
   end

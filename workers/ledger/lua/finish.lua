@@ -38,7 +38,7 @@ if user ~= '' and spent > 0 then
 end
 if last then
   local self = G .. 'worker:' .. worker
-  hmany(self, { 'drain', 'blocked_until', 'streak', 'queues' })
+  hmany(self, { 'drain', 'cooling_until', 'streak', 'queues' })
   if hget(self, 'streak') ~= '0' then hset(self, 'streak', 0) end
 end
 local at = 4 * n + 4

@@ -1,5 +1,5 @@
 -- Tasks that shall end at their next heartbeat, for an urgent job. ARGV: leader token, then pairs of task
--- and the token that holds it -> how many were told so now, -1 when not leading
+-- and the token that holds it -> how many shall that did not before, -1 when not leading
 if not leads(ARGV[1]) then return -1 end
 local n = 0
 for i = 2, #ARGV, 2 do
