@@ -11,16 +11,24 @@ from PIL import Image, UnidentifiedImageError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.notes import Notes
-
-# Encoded pictures of a source -> Texture, tried before they are believed.
-
 
 MAX_EDGE_PX: Final = 16384
 MAX_TEXTURE_PIXELS: Final = 64_000_000
 _KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
 _TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
 _HOLE_BELOW: Final = 128
+PANE_OPACITY: Final = 0.2  # of panes and glass whose source says opaque
+# Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
+GLASS_WORDS: Final = frozenset(
+    ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",
+     "fensterglas", "verre", "vitre", "vitrage", "vidrio", "cristal", "vetro", "ruit")
+)  # fmt: skip
+FRAME_WORDS: Final = frozenset(
+    ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
+     "metal", "rahmen", "griff", "cadre", "marco", "telaio")
+)  # fmt: skip
 
 
 def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
@@ -66,12 +74,6 @@ def _has_holes(picture: Image.Image) -> bool:
         return False
     lowest, _ = picture.convert("RGBA").getchannel("A").getextrema()
     return isinstance(lowest, (int, float)) and lowest < _HOLE_BELOW
-
-
-# The materials and textures of a house while it is read, each once.
-
-
-PANE_OPACITY: Final = 0.2  # of panes and glass whose source says opaque
 
 
 class LoadedTexture(NamedTuple):
@@ -141,3 +143,9 @@ class MaterialLibrary:
         except ValueError as error:
             self._notes.add("unreadable-texture", place, f"{shown}: {error}")
             return None
+
+
+def names_glass(name: str) -> bool:
+    """Whether the name of a part of a window or door says that the part is glass."""
+    words = words_of(name)
+    return bool(words & GLASS_WORDS) and not words & FRAME_WORDS

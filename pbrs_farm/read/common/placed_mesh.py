@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.arrays import F32, F64, triple
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import Box, Surface
+from pbrs_farm.core.house import Box, Item, LightPart, Surface
+from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.read.mesh.obj import Mesh
 
 _MIN_AREA_M2 = 0.5e-12  # below it float32 cannot tell a triangle from a line
+# Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's.
+ASSUMED_LM: Final = 800.0
 
 
 def placed(mesh: Mesh, world_from_model: F64, *, name: str, material: int) -> Surface | None:
@@ -62,3 +66,23 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
         axes = axes * np.array([-1.0, 1.0, 1.0])
     centre = world_from_model[:3, :3] @ ((low + high) / 2) + world_from_model[:3, 3]
     return Box(centre, scale * (high - low) / 2, axes)
+
+
+def assumed_light(item: Item) -> LightPart:
+    """A light in the middle of a lamp about which the scene tells nothing."""
+    centre = item.bounds.mean(0)
+    return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
+
+
+def across_last(box: Box) -> Box:
+    """The box with its thinnest level axis last, so that a door's or window's front is +z."""
+    level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
+    if len(level) != 2:
+        return box
+    wide, thin = sorted(level, key=lambda k: (-box.half[k], k))
+    order = np.array([wide, 3 - wide - thin, thin])
+    axes = box.axes[:, order]
+    if np.linalg.det(axes) < 0:
+        # Keep the axes right-handed.
+        axes = axes * np.array([-1.0, 1.0, 1.0])
+    return Box(box.centre, box.half[order], axes)

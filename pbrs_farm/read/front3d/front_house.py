@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +15,6 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import CEILING, FLOOR, OTHERPROP, WALL
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import (
-    MAX_INSTANCES,
     House,
     Item,
     ItemKind,
@@ -35,15 +34,11 @@ from pbrs_farm.home.names import parted
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
-from pbrs_farm.read.common.joinery import joinery_of, opening_of
+from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.json_values import NAME
+from pbrs_farm.read.common.model_materials import MAX_TEXTURE_BYTES, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_floors import (
-    check_number,
-    check_rooms,
-    check_unit,
-    floor_height,
-    floor_polygon,
-)
+from pbrs_farm.read.common.room_floors import check_number, check_unit, floor_height, floor_polygon
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
 from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, told_holes
@@ -62,9 +57,6 @@ from pbrs_farm.read.front3d.front_walls import (
     sheets_of,
     solid_of,
 )
-from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at
-from pbrs_farm.read.suncg.house_json import NAME
-from pbrs_farm.read.suncg.models import MAX_TEXTURE_BYTES, ModelMaterials
 
 _TEXTURES: Final = (
     "3D-FRONT-texture", "../3D-FRONT-texture", "../../3D-FRONT-texture", "texture",
@@ -118,9 +110,8 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     paints = _Paints(house, materials, _texture_folder(path, models), notes)
     structure = _Structure(house, paints, notes)
     rooms, parts = structure.rooms(path.name)
-    levels, numbered = levels_of(rooms)
-    check_rooms(numbered, path.name)
-    renamed = dict(zip(structure.names, (r.id for r in numbered), strict=True))
+    builder = HouseBuilder(path.name, fields, notes, materials.library)
+    id_of_room = builder.set_rooms(rooms)
     holes, walls = structure.walls(path.name)
     pieces = FrontModels(model_root, materials, notes, fields)
     furniture = [
@@ -136,32 +127,21 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     items = [*walls, *parts, *structure.trim(), *furniture]
     areas = {r.id: float(shapely.Polygon(r.polygon).area) for r in rooms}
     items += light_items(house.lights, items, areas, {r.id: r.ceiling_y for r in rooms})
-    items = [replace(i, room_id=renamed.get(i.room_id or "")) for i in items]
-    items = [
-        replace(
-            i, level_id=level_of(levels, _foot(i)),
-            tags=tuple(f"boundary_of:{renamed.get(t[12:], t[12:])}" if t.startswith("boundary_of:") else t for t in i.tags),
-        )
-        for i in items
-    ]  # fmt: skip
+    builder.items += [_in_room(i, builder, id_of_room) for i in items]
     for hole in holes:
-        level = level_of(levels, hole.centre[1] - hole.size[1] / 2)
-        made = joinery_of(hole, materials.library, level, room_at(numbered, hole.centre))
-        items += [made] if made is not None else []
-    _check_limits(items, path.name, fields)
-    sha = keys.sha256(data)
-    return House(
-        id=keys.house_id(path.stem, sha),
-        name=house.uid or path.stem,
-        source=Source("front3d", path.name, sha, licence="research only"),
-        levels=levels,
-        rooms=numbered,
-        items=tuple(items),
-        materials=materials.library.materials,
-        textures=materials.library.textures,
-        openings=tuple(opening_of(h, level_of(levels, h.centre[1] - h.size[1] / 2)) for h in holes),
-        notes=notes.all(),
-    )
+        builder.add_hole(hole)
+    source = Source("front3d", path.name, keys.sha256(data), licence="research only")
+    return builder.house(path.stem, source, name=house.uid)
+
+
+def _in_room(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
+    """The item with its level and its room, both of which it knows by the file's names alone."""
+    tags = []
+    for tag in item.tags:
+        word, _, name = tag.partition(":")
+        tags.append(f"{word}:{id_of_room.get(name, name)}" if word == "boundary_of" else tag)
+    room_id = id_of_room.get(item.room_id or "")
+    return replace(item, level_id=builder.level_of(_foot(item)), room_id=room_id, tags=tuple(tags))
 
 
 def _foot(item: Item) -> float:
@@ -170,17 +150,6 @@ def _foot(item: Item) -> float:
     if item.lights:
         return item.lights[0].position[1] - 1.0
     return 0.0 if item.box is None else float(item.box.corners[:, 1].min())
-
-
-def _check_limits(items: Sequence[Item], file: str, fields: ReadFields) -> None:
-    n_faces = sum(i.n_faces for i in items)
-    if len(items) > MAX_INSTANCES or n_faces > fields.max_triangles:
-        text = f"more than {fields.max_triangles} triangles or {MAX_INSTANCES} items"
-        raise BadHouse(file, "", text, hint="limit: read.max_triangles")
-    for item in items:
-        if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
-            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
-            raise BadHouse(file, item.id, text, hint="limit: read.max_extent_m")
 
 
 def _texture_folder(path: Path, models: str) -> RootFolder | None:
@@ -254,7 +223,6 @@ class _Structure:
 
     def __init__(self, house: FrontFile, paints: _Paints, notes: Notes) -> None:
         self._house, self._paints, self._notes = house, paints, notes
-        self.names: list[str] = []
         by_room: dict[str, dict[str, list[FrontMesh]]] = {}
         for mesh in house.meshes:
             by_room.setdefault(mesh.room, {}).setdefault(mesh.kind, []).append(mesh)
@@ -297,7 +265,6 @@ class _Structure:
                     types=(word or told.kind,) if told.kind else (),
                 )
             )  # fmt: skip
-            self.names.append(told.id)
             self._areas[told.id] = shapely.Polygon(polygon)
         if not rooms:
             raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")

@@ -20,16 +20,16 @@ from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.home.lamps import flux_for_floor
 from pbrs_farm.read.common.given_classes import GivenClass, class_by_words, given_class
+from pbrs_farm.read.common.json_values import NAME
+from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
+from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
 from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.front3d.front_file import FrontLight, FrontPiece
 from pbrs_farm.read.front3d.front_openings import is_opening
-from pbrs_farm.read.gltf.scene_items import assumed_light
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.suncg.house_json import NAME
-from pbrs_farm.read.suncg.models import DamagedModel, ModelCache, ModelMaterials, ParsedModel
 
 _MAX_INFO_BYTES: Final = 64_000_000
 _BESIDE: Final = ("3D-FUTURE-model", "../3D-FUTURE-model", "../../3D-FUTURE-model", ".")

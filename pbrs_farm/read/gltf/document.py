@@ -19,6 +19,7 @@ from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, view_bytes
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import draco_arrays
 from pbrs_farm.read.mesh.obj import Mesh
 
@@ -36,6 +37,18 @@ UNDERSTOOD: Final = frozenset({
     "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
     "KHR_draco_mesh_compression", "KHR_texture_basisu",
 })  # fmt: skip
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
+UNREAD: Final = "unread-part"
+
+# Extensions without which nothing that is seen is missing: what a reader without them shows is
+# there as well (compressed meshes, pictures), or they say nothing of the picture.
+_UNSEEN: Final = frozenset({
+    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu",
+    "EXT_texture_avif", "MSFT_texture_dds", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld",
+    "KHR_animation_pointer", "FB_geometry_metadata",
+})  # fmt: skip
+
+_Row = dict[str, Any]
 
 
 class MissingFile(BadHouse):
@@ -235,12 +248,6 @@ def texture_layout(info: dict[str, Any]) -> tuple[Any, Any]:
     return info.get("texCoord", 0), turn
 
 
-# Primitives of a glTF mesh -> triangle meshes in its own frame.
-
-
-_TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
-
-
 def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
     """(material number or None, mesh) of every primitive of meshes[index] that has triangles.
 
@@ -356,3 +363,30 @@ def _transformed(gltf: Gltf, uvs: F64, info: dict[str, Any], place: str) -> F64:
     # Rotate about uv (0, 0), where the picture is top left.
     rotation = np.array([[c, s], [-s, c]])
     return np.asarray((uvs * scale) @ rotation.T + offset)
+
+
+_PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
+    "points or lines": lambda row: not has_surface(row),
+    "vertex colours": lambda row: "COLOR_0" in object_at(row, "attributes"),
+    "morph targets": lambda row: bool(row.get("targets")),
+}
+
+
+def note_unread(gltf: Gltf, notes: Notes) -> None:
+    """A note for every extension that is not read, and for what meshes and nodes have of such."""
+    used = gltf.document.get("extensionsUsed")
+    for name in used if isinstance(used, list) else []:
+        if name not in UNDERSTOOD and name not in _UNSEEN:
+            notes.add(UNREAD, "extensionsUsed", f"{name} is not read: what it adds is not shown")
+    primitives = [_rows(mesh.get("primitives")) for mesh in _rows(gltf.document.get("meshes"))]
+    for what, has in _PRIMITIVES.items():
+        n = sum(any(map(has, rows)) for rows in primitives)
+        if n:
+            notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {what}, which are not read")
+    n = sum("skin" in node for node in _rows(gltf.document.get("nodes")))
+    if n:
+        notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")
+
+
+def _rows(value: Any) -> list[_Row]:
+    return [row for row in value if isinstance(row, dict)] if isinstance(value, list) else []

@@ -13,7 +13,12 @@ from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import words_of
-from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
+from pbrs_farm.read.common.material_library import (
+    FRAME_WORDS,
+    GLASS_WORDS,
+    LoadedTexture,
+    MaterialLibrary,
+)
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import BASISU, decoded_picture
 from pbrs_farm.read.gltf.document import (
@@ -30,6 +35,9 @@ from pbrs_farm.read.gltf.document import (
 F0: Final = 0.04
 
 MAX_SHININESS: Final = 10_000.0  # Phong exponent; above it a lobe is a mirror's
+_WINDOW: Final = frozenset(
+    ("window", "fenster", "fenetre", "ventana", "finestra", "raam", "fonster", "vindu")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,23 +214,6 @@ def _encoded(linear: Any) -> tuple[float, float, float]:
     return (r, g, b)
 
 
-# Which materials of a window or door are its glass though they say opaque.
-
-
-# Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
-_GLASS: Final = frozenset(
-    ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",
-     "fensterglas", "verre", "vitre", "vitrage", "vidrio", "cristal", "vetro", "ruit")
-)  # fmt: skip
-_WINDOW: Final = frozenset(
-    ("window", "fenster", "fenetre", "ventana", "finestra", "raam", "fonster", "vindu")
-)
-_FRAME: Final = frozenset(
-    ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
-     "metal", "rahmen", "griff", "cadre", "marco", "telaio")
-)  # fmt: skip
-
-
 def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]:
     """Those of a window's or door's materials that are its glass by their names.
 
@@ -231,16 +222,10 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
     """
     rows = {n: entry(gltf, "materials", n) for n in numbers if n is not None}
     words = {n: words_of(str(row.get("name", ""))) for n, row in rows.items()}
-    glass = frozenset(n for n, w in words.items() if w & _GLASS and not w & _FRAME)
+    glass = frozenset(n for n, w in words.items() if w & GLASS_WORDS and not w & FRAME_WORDS)
     if glass or any(_lets_light_through(row) for row in rows.values()):
         return glass
-    return frozenset(n for n, w in words.items() if w & _WINDOW and not w & _FRAME)
-
-
-def names_glass(name: str) -> bool:
-    """Whether the name of a part of a window or door says that the part is glass."""
-    words = words_of(name)
-    return bool(words & _GLASS) and not words & _FRAME
+    return frozenset(n for n, w in words.items() if w & _WINDOW and not w & FRAME_WORDS)
 
 
 def _lets_light_through(row: dict[str, Any]) -> bool:

@@ -21,8 +21,8 @@ from pbrs_farm.core.classes import DOOR, OTHERSTRUCTURE, WALL, WINDOW
 from pbrs_farm.core.house import Box, Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import closed_edge_share
 from pbrs_farm.home.names import words_of
+from pbrs_farm.read.common.material_library import names_glass
 from pbrs_farm.read.common.room_shells import bounds_of_shells, components, picked
-from pbrs_farm.read.gltf.materials import names_glass
 
 _WELD_M: Final = 1e-4  # corners this near are one
 _NARROW_M: Final = 0.12  # a part whose second side is shorter is a strip

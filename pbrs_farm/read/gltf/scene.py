@@ -1,269 +1,36 @@
-"""A furnished scene as glTF 2.0 (.glb, .gltf) -> House.
+"""A furnished scene as glTF 2.0 (.glb, .gltf) -> House. Effect: read_gltf_file reads files.
 
-Items are nodes whose extras, mapping row or name tell their class. Effect: read_gltf_file reads
-the file and what may lie beside it: `<stem>.classes.json` and `<stem>.rooms.json`.
+An item is a node whose extras, mapping row or name say its class. Beside the scene may lie
+`<stem>.classes.json`, which maps names to classes, and `<stem>.rooms.json`, which has the rooms:
+
+    {"rooms": [{"polygon": [[x, z], ...], "floor_y": 0.0, "ceiling_y": 2.5, "name": "Kitchen"}]}
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any
 
 import numpy as np
-import shapely
-from pydantic import BaseModel, Field
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item, ItemKind, Level, Room, Source, Surface
+from pbrs_farm.core.house import House, Item, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_floors import (
-    MAX_ROOMS,
-    ceiling_height,
-    check_number,
-    check_rooms,
-    coverage,
-    floor_height,
-    floor_polygons,
-    polygon_of,
-)
+from pbrs_farm.read.common.openings import openings
+from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_json, rooms_from_value
 from pbrs_farm.read.common.source_files import RootFolder
-from pbrs_farm.read.gltf.document import UNDERSTOOD, Fetch, gltf_document, has_surface, object_at
+from pbrs_farm.read.gltf.document import Fetch, gltf_document, note_unread, object_at
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene_items import items_of_scene
-from pbrs_farm.read.suncg.wall_holes import openings
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
-
-# Rooms and levels of a glTF scene: from the user's polygon file, else from its floors.
-# No effects. The file is JSON: {"rooms": [{"polygon": [[x, z], ...], "floor_y": 0.0, "ceiling_y":
-# 2.5, "name": "Kitchen"}]}, metres, plan coordinates of the scene's own axes.
-
-
-MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
-MIN_ROOM_WIDTH_M: Final = 0.5
-_STOREY_M: Final = 2.5  # height of a room that nothing tells the height of
-_SAME_LEVEL_M: Final = 0.5  # floors nearer in height than this are one level
-_SLACK_M: Final = 0.3  # a thing may stand so far outside its room's polygon or height
-_EDGE_M: Final = 0.1  # walls may stand so far beside the floor
-# A ceiling that covers less of a room than this share is the next room's.
-_NEXT_ROOM: Final = 0.05
-
-
-def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:
-    """The rooms of a polygon file; heights it leaves out are taken from floors and ceilings.
-
-    Raises BadHouse naming the room that is wrong.
-    """
-    return told_rooms(json_from_bytes(data, file), file, items)
-
-
-def told_rooms(value: Any, file: str, items: Sequence[Item]) -> list[Room]:
-    """The rooms of the JSON value of a polygon file, or of a scene's extras; as rooms_from_json."""
-    hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
-    rows = checked(_RoomFile, value, file, error=BadHouse, hint=hint).rooms
-    check_number(len(rows), file)
-    return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
-
-
-_Metres = Annotated[Finite, Field(gt=-1e6, lt=1e6)]
-
-
-class _GivenRoom(BaseModel):
-    polygon: list[Annotated[tuple[_Metres, _Metres], exactly(2)]] = Field(
-        min_length=3, max_length=10_000, fail_fast=True
-    )
-    floor_y: _Metres | None = None
-    ceiling_y: _Metres | None = None
-    name: Any = ""
-    types: Any = None
-
-
-class _RoomFile(BaseModel):
-    rooms: list[_GivenRoom] = Field(min_length=1, fail_fast=True)
-
-
-def _room(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room:
-    area = shapely.Polygon(row.polygon)
-    polygon = polygon_of(area) if area.is_valid else None
-    if polygon is None:
-        raise BadHouse(file, f"{place}.polygon", "crosses itself or has no area")
-    given = {"floor_y": row.floor_y, "ceiling_y": row.ceiling_y}
-    words = tuple(str(t)[:60] for t in row.types) if isinstance(row.types, list) else ()
-    return _with_heights(polygon, str(row.name)[:60], words, given, items)
-
-
-def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
-    """A room for every piece of floor that walls part from the others."""
-    walls = _surfaces(items, ItemKind.WALL)
-    found: list[Room] = []
-    for item in items:
-        height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
-        if height is None or len(found) > MAX_ROOMS:  # refused by room_bounds
-            continue
-        # Let walls part the floor where they stand 1 m above it.
-        standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
-        standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
-        low, high = item.bounds[:, [0, 2]]
-        standing = _within(standing, low - _EDGE_M, high + _EDGE_M)
-        pieces = floor_polygons(
-            item.surfaces, standing, min_area_m2=MIN_ROOM_M2, min_width_m=MIN_ROOM_WIDTH_M
-        )
-        given = {"floor_y": height, "ceiling_y": None}
-        found += [_with_heights(p, "", (), given, items) for p in pieces]
-    return found
-
-
-def _with_heights(
-    polygon: F64,
-    name: str,
-    types: tuple[str, ...],
-    given: dict[str, float | None],
-    items: Sequence[Item],
-) -> Room:
-    """The room with heights of the floor and ceiling that lie over its polygon."""
-    # Take the floor's height as given, as the floor below has it, or 0.
-    floors = _over(items, ItemKind.FLOOR, polygon)
-    floor_y = given["floor_y"]
-    low = floor_height(floors) if floor_y is None else floor_y
-    low = 0.0 if low is None else low
-    # Leave out ceilings that belong to the next room.
-    above = [s for s in _over(items, ItemKind.CEILING, polygon) if s.positions[:, 1].min() > low]
-    shares = [coverage(s, polygon) for s in above]
-    above = [s for s, share in zip(above, shares, strict=True) if share > _NEXT_ROOM]
-    ceiling = ceiling_height(above)
-    if ceiling is None and above:
-        ceiling = min(float(s.positions[:, 1].min()) for s in above)  # planar, looking up
-    # Without a ceiling the room is as high as its walls, or a storey.
-    walls = [float(s.positions[:, 1].max()) for s in _over(items, ItemKind.WALL, polygon, _EDGE_M)]
-    nominal = max((y for y in walls if low + 1.0 < y < low + 10.0), default=low + _STOREY_M)
-    high = given["ceiling_y"] or ceiling or nominal
-    return Room(
-        id="",
-        name=name,
-        level_id="",
-        polygon=polygon,
-        floor_y=low,
-        ceiling_y=high if high > low + 0.5 else low + _STOREY_M,
-        types=types,
-        has_floor=bool(floors),
-        has_ceiling=sum(shares) > 0.5,
-    )
-
-
-def _surfaces(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
-    return [s for item in items if item.kind is kind for s in item.surfaces]
-
-
-def _over(
-    items: Sequence[Item], kind: ItemKind, polygon: F64, slack_m: float = 0.0
-) -> list[Surface]:
-    """The surfaces of a kind whose bounds meet the polygon's in plan."""
-    low, high = polygon.min(0) - slack_m, polygon.max(0) + slack_m
-    return _within(_surfaces(items, kind), low, high)
-
-
-def _within(surfaces: Sequence[Surface], low: F64, high: F64) -> list[Surface]:
-    """The surfaces whose plan bounds meet low..high."""
-    plans = [(s, s.positions[:, [0, 2]]) for s in surfaces]
-    return [s for s, p in plans if (p.max(0) > low).all() and (p.min(0) < high).all()]
-
-
-def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...]]:
-    """(levels by floor height, from below; the rooms with their ids `<level>_<room>`)."""
-    # Floors within half a metre are one level.
-    heights: list[float] = []
-    for y in sorted(r.floor_y for r in rooms):
-        if not heights or y > heights[-1] + _SAME_LEVEL_M:
-            heights.append(y)
-    # Number the rooms of each level from 0.
-    numbered: list[Room] = []
-    count = [0] * len(heights)
-    for room in rooms:
-        level = int(np.searchsorted(heights, room.floor_y, "right")) - 1
-        room_id = f"{level}_{count[level]}"
-        count[level] += 1
-        name = room.name or f"Room {room_id}"
-        numbered.append(replace(room, id=room_id, name=name, level_id=str(level)))
-    # A level is as high as its rooms are in the middle.
-    levels = []
-    for k, height in enumerate(heights):
-        here = [r.ceiling_y - r.floor_y for r in numbered if r.level_id == str(k)]
-        levels.append(Level(str(k), f"Level {k}", height, float(np.median(here))))
-    return tuple(levels), tuple(numbered)
-
-
-def level_of(levels: Sequence[Level], y: float) -> str:
-    """The highest level at or below a height, half a metre of slack; else the lowest."""
-    below = [x.id for x in levels if x.elevation <= y + _SAME_LEVEL_M]
-    return below[-1] if below else levels[0].id
-
-
-def room_at(rooms: Sequence[Room], point: F64) -> str | None:
-    """The room whose polygon and height hold a point (3,) of the world, or None.
-
-    A point in a wall (of a door, a window) belongs to the nearest room on the other side of it.
-    """
-    x, y, z = point
-    here = [r for r in rooms if r.floor_y - _SLACK_M <= y <= r.ceiling_y + _SLACK_M]
-    if not here:
-        return None
-    place: Any = shapely.Point(x, z)
-    # Measure to each room's polygon: 0 inside it.
-    distance = [float(shapely.Polygon(r.polygon).distance(place)) for r in here]
-    nearest = int(np.argmin(distance))
-    return here[nearest].id if distance[nearest] <= _SLACK_M else None
-
-
-# Notes of what a scene holds and no reader here looks at.
-
-
-UNREAD: Final = "unread-part"
-
-# Extensions without which nothing that is seen is missing: what a reader without them shows is
-# there as well (compressed meshes, pictures), or they say nothing of the picture.
-_UNSEEN: Final = frozenset({
-    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu",
-    "EXT_texture_avif", "MSFT_texture_dds", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld",
-    "KHR_animation_pointer", "FB_geometry_metadata",
-})  # fmt: skip
-
-_Row = dict[str, Any]
-_PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
-    "points or lines": lambda row: not has_surface(row),
-    "vertex colours": lambda row: "COLOR_0" in object_at(row, "attributes"),
-    "morph targets": lambda row: bool(row.get("targets")),
-}
-
-
-def note_unread(gltf: Gltf, notes: Notes) -> None:
-    """A note for every extension that is not read, and for what meshes and nodes have of such."""
-    used = gltf.document.get("extensionsUsed")
-    for name in used if isinstance(used, list) else []:
-        if name not in UNDERSTOOD and name not in _UNSEEN:
-            notes.add(UNREAD, "extensionsUsed", f"{name} is not read: what it adds is not shown")
-    primitives = [_rows(mesh.get("primitives")) for mesh in _rows(gltf.document.get("meshes"))]
-    for what, has in _PRIMITIVES.items():
-        n = sum(any(map(has, rows)) for rows in primitives)
-        if n:
-            notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {what}, which are not read")
-    n = sum("skin" in node for node in _rows(gltf.document.get("nodes")))
-    if n:
-        notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")
-
-
-def _rows(value: Any) -> list[_Row]:
-    return [row for row in value if isinstance(row, dict)] if isinstance(value, list) else []
-
-
-# A furnished scene as glTF 2.0 (.glb, .gltf) -> House.
-
 
 _SMALL_M, _LARGE_M = 0.3, 150.0  # a scene beyond is in other units than metres
 
@@ -345,7 +112,7 @@ def house_of_gltf(
     if told is not None:
         found = rooms_from_json(told, f"{stem}.rooms.json", items)
     elif own := _rooms_of_scene(gltf):
-        found = told_rooms({"rooms": own}, name, items)
+        found = rooms_from_value({"rooms": own}, name, items)
     else:
         found = rooms_from_floors(items)
     if not found:
@@ -355,21 +122,10 @@ def house_of_gltf(
         )
         raise BadHouse(name, "scene", "has no floor", hint=hint)
     # Sort rooms into levels and items into rooms.
-    levels, numbered = levels_of(found)
-    check_rooms(numbered, name)
-    items = [_placed(item, levels, numbered) for item in items]
-    return House(
-        id=keys.house_id(stem, source.sha256),
-        name=stem,
-        source=source,
-        levels=levels,
-        rooms=numbered,
-        items=tuple(items),
-        materials=materials.library.materials,
-        textures=materials.library.textures,
-        openings=openings(items),
-        notes=notes.all(),
-    )
+    builder = HouseBuilder(name, fields, notes, materials.library)
+    builder.set_rooms(found)
+    builder.items += [_in_room(item, builder) for item in items]
+    return builder.house(stem, source, openings=openings(items))
 
 
 def _rooms_of_scene(gltf: Gltf) -> Any:
@@ -389,11 +145,11 @@ def _of_its_size(items: Sequence[Item], kind: str) -> str:
     return "" if is_usual else f"it is {wide:.3g} m large, {unit}; or "
 
 
-def _placed(item: Item, levels: tuple[Level, ...], rooms: tuple[Room, ...]) -> Item:
+def _in_room(item: Item, builder: HouseBuilder) -> Item:
     """The item with its level, and its room unless it is a wall."""
     extent = _extent(item)
-    room_id = None if item.kind is ItemKind.WALL else room_at(rooms, extent.mean(0))
-    return replace(item, level_id=level_of(levels, float(extent[0, 1])), room_id=room_id)
+    room_id = None if item.kind is ItemKind.WALL else builder.room_at(extent.mean(0))
+    return replace(item, level_id=builder.level_of(float(extent[0, 1])), room_id=room_id)
 
 
 def _extent(item: Item) -> F64:

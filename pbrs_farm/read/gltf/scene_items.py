@@ -27,28 +27,24 @@ from pbrs_farm.core.lighting import BULB_RADIUS_M, LightForm, PowerUnit
 from pbrs_farm.core.mesh import face_areas, outside_area
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
-from pbrs_farm.read.common.material_library import PANE_OPACITY
+from pbrs_farm.read.common.material_library import PANE_OPACITY, names_glass
+from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.placed_mesh import (
+    ASSUMED_LM,
+    across_last,
+    assumed_light,
+    oriented_box,
+    placed,
+)
 from pbrs_farm.read.common.room_shells import planar_parts
 from pbrs_farm.read.gltf.document import Placed, meshes_of, numbers, object_at, placed_nodes
-from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials, names_glass
-from pbrs_farm.read.gltf.node_classes import (
-    UNMAPPED,
-    Mapping,
-    NodeClass,
-    centres_of,
-    class_of_node,
-    collection_of,
-    structure_parts,
-)
+from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials
+from pbrs_farm.read.gltf.node_classes import Mapping, class_of_node, collection_of
+from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
 from pbrs_farm.read.mesh.obj import Mesh
 
 # Lights of a glTF scene: KHR_lights_punctual and emissive surfaces -> LightPart.
-
-
-# Flux of a lamp whose strength the scene does not tell: a 60 W incandescent bulb's.
-ASSUMED_LM: Final = 800.0
 
 
 def punctual_light(
@@ -120,12 +116,6 @@ def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[
             )
         )
     return tuple(found)
-
-
-def assumed_light(item: Item) -> LightPart:
-    """A light in the middle of a lamp about which the scene tells nothing."""
-    centre = item.bounds.mean(0)
-    return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
 
 
 # Nodes of a glTF scene -> items placed in the world.
@@ -401,17 +391,3 @@ def _finished(
     if seen.kind is ItemKind.LAMP and not lights:
         return replace(item, lights=(assumed_light(item),), tags=(*item.tags, "assumed_light"))
     return item
-
-
-def across_last(box: Box) -> Box:
-    """The box with its thinnest level axis last, so that a door's or window's front is +z."""
-    level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
-    if len(level) != 2:
-        return box
-    wide, thin = sorted(level, key=lambda k: (-box.half[k], k))
-    order = np.array([wide, 3 - wide - thin, thin])
-    axes = box.axes[:, order]
-    if np.linalg.det(axes) < 0:
-        # Keep the axes right-handed.
-        axes = axes * np.array([-1.0, 1.0, 1.0])
-    return Box(box.centre, box.half[order], axes)

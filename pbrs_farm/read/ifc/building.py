@@ -18,7 +18,6 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import CEILING, FLOOR, LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import (
-    MAX_INSTANCES,
     Box,
     House,
     Item,
@@ -35,19 +34,18 @@ from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
-from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
+from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary, names_glass
+from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.placed_mesh import oriented_box, placed
-from pbrs_farm.read.common.room_floors import check_rooms, coverage, floor_polygon
+from pbrs_farm.read.common.openings import openings
+from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
+from pbrs_farm.read.common.room_floors import coverage, floor_polygon
+from pbrs_farm.read.common.rooms import rooms_from_floors
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.gltf.materials import names_glass
-from pbrs_farm.read.gltf.node_classes import UNMAPPED, class_of_node_name
-from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at, rooms_from_floors
-from pbrs_farm.read.gltf.scene_items import across_last, assumed_light
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.suncg.wall_holes import openings
 
 Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """(x, y, z) with z up -> (x, z, -y) with y up."""
@@ -93,7 +91,6 @@ class _Building:
         self._model = model_of(path)
         self._meshes: dict[int, ProductMesh] = {}
         self._world = Y_UP.copy()
-        self._rooms_of_spaces: dict[int, str] = {}
 
     def house(self) -> House:
         """The House of the whole building."""
@@ -109,26 +106,13 @@ class _Building:
             raise BadHouse(
                 self._path.name, "", "has no space and no floor between walls", hint=hint
             )
-        check_rooms(rooms, self._path.name)
-        levels = self._levels(rooms)
-        items += self._covers(rooms, items)
-        items = [self._standing(item, levels, rooms) for item in items]
-        if len(items) > MAX_INSTANCES:
-            raise BadHouse(self._path.name, "", f"more than {MAX_INSTANCES} products")
-        sha256 = keys.sha256(self._path.read_bytes())
-        stem = self._path.stem
-        return House(
-            id=keys.house_id(stem, sha256),
-            name=stem,
-            source=Source("ifc", self._path.name, sha256),
-            levels=levels,
-            rooms=tuple(rooms),
-            items=tuple(items),
-            materials=self._library.materials,
-            textures={},
-            openings=openings(items),
-            notes=self._notes.all(),
-        )
+        builder = HouseBuilder(self._path.name, self._fields, self._notes, self._library)
+        builder.set_rooms(rooms)
+        builder.levels = self._named(builder.levels)
+        items += self._covers(builder.rooms, items)
+        builder.items += [_in_room(item, builder) for item in items]
+        source = Source("ifc", self._path.name, keys.sha256(self._path.read_bytes()))
+        return builder.house(self._path.stem, source, openings=openings(builder.items))
 
     def _note_failed(self, products: Sequence[Any]) -> None:
         for product in products:
@@ -291,15 +275,8 @@ class _Building:
             for row in self._model.by_type("IfcSpace")
             if row.id() in self._meshes
         ]
-        found = [(s, room) for s in spaces if (room := self._room(s)) is not None]
-        if not found:
-            inside = rooms_from_floors(items)
-            return list(levels_of([r for r in inside if _is_walled(r, items)])[1])
-        _, numbered = levels_of([room for _, room in found])
-        # Numbered in the order they were given.
-        for (space, _), room in zip(found, numbered, strict=True):
-            self._rooms_of_spaces[space.row.id()] = room.id
-        return list(numbered)
+        found = [room for space in spaces if (room := self._room(space)) is not None]
+        return found or [r for r in rooms_from_floors(items) if _is_walled(r, items)]
 
     def _room(self, space: _Space) -> Room | None:
         row, mesh = space.row, space.mesh
@@ -324,8 +301,8 @@ class _Building:
             types=(str(row.ObjectType)[:60],) if row.ObjectType else (),
         )  # fmt: skip
 
-    def _levels(self, rooms: Sequence[Room]) -> tuple[Level, ...]:
-        """Levels by the rooms' floors, with the names of the storeys that are nearest."""
+    def _named(self, levels: Sequence[Level]) -> tuple[Level, ...]:
+        """The levels of the rooms' floors, each named as the storey that is nearest."""
         import ifcopenshell.util.unit
 
         scale = float(ifcopenshell.util.unit.calculate_unit_scale(self._model))
@@ -334,7 +311,6 @@ class _Building:
             if row.Elevation is not None and np.isfinite(row.Elevation):
                 y = float(row.Elevation) * scale + float(self._world[1, 3])
                 storeys.append((y, str(row.LongName or row.Name or "")[:60]))
-        levels, _ = levels_of(rooms)
         found = []
         for level in levels:
             near = min(storeys, key=lambda s: abs(s[0] - level.elevation), default=(np.inf, ""))
@@ -364,11 +340,12 @@ class _Building:
             found.append(_cover(room, ItemKind.CEILING, surface))
         return found
 
-    def _standing(self, item: Item, levels: tuple[Level, ...], rooms: Sequence[Room]) -> Item:
-        """The item with its level, and its room unless it is a wall."""
-        level_id = level_of(levels, float(item.bounds[0, 1]))
-        room_id = None if item.kind is ItemKind.WALL else room_at(rooms, item.bounds.mean(0))
-        return replace(item, level_id=level_id, room_id=item.room_id or room_id)
+
+def _in_room(item: Item, builder: HouseBuilder) -> Item:
+    """The item with its level, and its room unless it is a wall."""
+    level_id = builder.level_of(float(item.bounds[0, 1]))
+    room_id = None if item.kind is ItemKind.WALL else builder.room_at(item.bounds.mean(0))
+    return replace(item, level_id=level_id, room_id=item.room_id or room_id)
 
 
 def _is_nothing(product: Any) -> bool:

@@ -21,6 +21,8 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.model_cache import ModelCache
+from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
@@ -29,7 +31,6 @@ from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.objects.model_folders import ObjectModel
-from pbrs_farm.read.suncg.models import ModelCache, ModelMaterials
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular
 
 _MAX_UNPACKED_BYTES: Final = 500_000_000

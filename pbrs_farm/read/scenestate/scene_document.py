@@ -19,13 +19,14 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
+from pbrs_farm.read.common.arch_elements import Element, element_of
 from pbrs_farm.read.common.bounded_json import bounded_json
+from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affine, numbers
 from pbrs_farm.read.common.material_library import LoadedTexture
+from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder
-from pbrs_farm.read.suncg.arch_json import MAX_ELEMENTS, Element, element_of
-from pbrs_farm.read.suncg.house_json import Axes, Given, Label, Lenient, affine, numbers
-from pbrs_farm.read.suncg.models import ModelMaterials
+from pbrs_farm.read.suncg.arch_json import MAX_ELEMENTS
 
 MAX_OBJECTS: Final = 20_000
 _LEVEL_M: Final = 1e-6  # walls whose points differ less in z are drawn in a plan of x and y

@@ -22,18 +22,18 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.given_classes import GivenClass, class_by_words
+from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
-from pbrs_farm.read.common.placed_mesh import oriented_box, placed
+from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
 from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping
-from pbrs_farm.read.gltf.scene_items import assumed_light, items_of_scene
+from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.scenestate.scene_document import PlacedModel
-from pbrs_farm.read.suncg.house_json import NAME
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
 _TABLES: Final = (

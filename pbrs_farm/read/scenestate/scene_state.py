@@ -18,21 +18,29 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
+from pbrs_farm.core.house import House, Item, ItemKind, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.arch_elements import (
+    SLAB_DEPTH_M,
+    Arch,
+    Element,
+    slab_surfaces,
+    wall_surfaces,
+)
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
-from pbrs_farm.read.common.joinery import Hole, joinery_of, merged, opening_of
+from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.joinery import Hole, merged
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.openings import LEAST_HOLE_M
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
     check_number,
-    check_rooms,
     check_unit,
     floor_height,
     floor_polygon,
 )
+from pbrs_farm.read.common.rooms import room_at
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.gltf.scene import level_of, levels_of, room_at
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,
@@ -46,8 +54,6 @@ from pbrs_farm.read.scenestate.scene_models import (
     table_names,
 )
 from pbrs_farm.read.scenestate.scene_walls import StandingWall, standing_walls
-from pbrs_farm.read.suncg.arch_json import SLAB_DEPTH_M, Arch, Element, slab_surfaces, wall_surfaces
-from pbrs_farm.read.suncg.wall_holes import LEAST_HOLE_M
 
 MAX_WALLS, MAX_SLABS, MAX_HOLES = 3_000, 1_500, 2_000
 _AS_IT_STANDS: Final = Arch(np.eye(4), {})
@@ -85,34 +91,19 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     materials = ArchMaterials(document.pictures, folder, notes)
     shell = _Shell(document, materials, notes)
     rooms, parts = shell.rooms(path.name)
-    levels, numbered = levels_of(rooms)
-    check_rooms(numbered, path.name)
-    items = [*shell.walls(), *parts]
-    holes = shell.holes(numbered)
+    builder = HouseBuilder(path.name, fields, notes, materials.library)
+    id_of_room = builder.set_rooms(rooms)
+    structure = [*shell.walls(), *parts]
+    holes = shell.holes(builder.rooms)
     objects, missing = _objects(document, path, models, shell, notes, fields)
-    items = [_in_room(i, levels, numbered, shell.room_ids(numbered)) for i in (*items, *objects)]
+    builder.items += [_in_room(i, builder, id_of_room) for i in (*structure, *objects)]
     for hole in holes:
-        at = hole.centre + np.array([0.0, 0.1 - hole.size[1] / 2, 0.0])
-        made = joinery_of(
-            hole, materials.library, level_of(levels, at[1]), room_at(numbered, hole.centre)
-        )
-        items += [made] if made is not None else []
+        low = hole.centre[1] - hole.size[1] / 2
+        builder.add_hole(hole, foot_y=low + 0.1, cut_y=hole.centre[1])
     if missing:
         notes.add("missing-model", "scene.object", missing)
-    _check_limits(items, path.name, fields)
-    sha = keys.sha256(data)
-    return House(
-        id=keys.house_id(path.stem, sha),
-        name=document.id or path.stem,
-        source=Source("scenestate", path.name, sha),
-        levels=levels,
-        rooms=numbered,
-        items=tuple(items),
-        materials=materials.library.materials,
-        textures=materials.library.textures,
-        openings=tuple(opening_of(h, level_of(levels, h.centre[1])) for h in holes),
-        notes=notes.all(),
-    )
+    source = Source("scenestate", path.name, keys.sha256(data))
+    return builder.house(path.stem, source, name=document.id)
 
 
 def _objects(
@@ -155,27 +146,16 @@ def _check_number(document: SceneDocument, file: str) -> None:
             raise BadHouse(file, "scene.arch.elements", f"{n} {what}, at most {most} are read")
 
 
-def _check_limits(items: Sequence[Item], file: str, fields: ReadFields) -> None:
-    if len(items) > MAX_INSTANCES:
-        raise BadHouse(file, "", f"more than {MAX_INSTANCES} items")
-    for item in items:
-        if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
-            text = f"stands farther than {fields.max_extent_m:g} m from the origin"
-            raise BadHouse(file, item.id, text, hint="limit: read.max_extent_m")
-
-
-def _in_room(
-    item: Item, levels: Sequence[Level], rooms: Sequence[Room], renamed: Mapping[str, str]
-) -> Item:
-    """The item with its level, and its room by its told one, else by where it stands."""
+def _in_room(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
+    """The item with its level, and its room by the one it names, else by where it stands."""
     box = item.oriented_box if item.surfaces or item.box else None
     at = np.zeros(3) if box is None else box.centre
     low = at[1] if box is None else float(box.corners[:, 1].min())
-    level = level_of(levels, low + (0.1 if item.kind is not ItemKind.CEILING else -1.0))
-    room_id = renamed.get(item.room_id) if item.room_id is not None else None
+    level = builder.level_of(low + (0.1 if item.kind is not ItemKind.CEILING else -1.0))
+    room_id = id_of_room.get(item.room_id) if item.room_id is not None else None
     if item.room_id is None and not item.kind.is_structure:
-        room_id = room_at(rooms, at)
-    tags = tuple(_renamed(tag, renamed) for tag in item.tags)
+        room_id = builder.room_at(at)
+    tags = tuple(_renamed(tag, id_of_room) for tag in item.tags)
     return replace(item, level_id=level, room_id=room_id, tags=tags)
 
 
@@ -202,7 +182,6 @@ class _Shell:
         areas = {name: _plan(some) for name, some in self._floors.items()}
         told = [e for e in elements if e.element.kind == "Wall"]
         self._drawn, self._standing = standing_walls(told, areas)
-        self._keys: list[str] = []
 
     def _sunk(self, told: ToldElement) -> ToldElement:
         """The slab as it is told, upwards; a floor on whose told height things stand goes down."""
@@ -252,7 +231,6 @@ class _Shell:
             if found is not None:
                 rooms.append(found[0])
                 parts += found[1]
-                self._keys.append(name)
         if not rooms:
             hint = "rooms follow from elements of the type Floor"
             raise BadHouse(file, "scene.arch.elements", "has no floor", hint=hint)
@@ -315,10 +293,6 @@ class _Shell:
             floor_y=low, ceiling_y=high if high > low + 0.5 else low + _STOREY_M, types=types,
         )  # fmt: skip
         return room, parts
-
-    def room_ids(self, numbered: Sequence[Room]) -> dict[str, str]:
-        """The file's name of a room -> its id here."""
-        return {key: room.id for key, room in zip(self._keys, numbered, strict=True)}
 
     def holes(self, rooms: Sequence[Room]) -> list[Hole]:
         """The holes of all walls, clipped to them, each once."""

@@ -16,8 +16,8 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.read.common.arch_elements import WALL_DEPTH_M, Element, WallFrame
 from pbrs_farm.read.scenestate.scene_document import ToldElement
-from pbrs_farm.read.suncg.arch_json import WALL_DEPTH_M, Element, WallFrame
 
 _BESIDE_M: Final = 0.06  # from a wall's line to the floor beside it
 _SAME_M: Final = 0.02  # lines and ends nearer than this are one

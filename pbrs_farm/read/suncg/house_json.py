@@ -3,70 +3,37 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    FailFast,
-    Field,
-    PlainValidator,
-    StrictInt,
-    TypeAdapter,
-)
+from pydantic import BeforeValidator, FailFast, Field, StrictInt
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_bytes
+from pbrs_farm.core.checked_json import checked, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.shown_text import shown
+from pbrs_farm.read.common.json_values import (
+    Axes,
+    FileName,
+    Given,
+    Label,
+    Lenient,
+    Number,
+    Overrides,
+    Vector,
+    affine,
+    numbers,
+)
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
-# What a model or a texture may be called; a file name that stays in its folder.
-NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
 
-_COLOUR: Final = re.compile(r"#[0-9a-fA-F]{6}")
-_LAST_ROW: Final = np.array([0.0, 0.0, 0.0, 1.0])
 MAX_NODES: Final = 100_000
-
-
-Number = Annotated[Finite, Field(gt=-1e12, lt=1e12)]
-
-
-def numbers(n: int, then: Callable[[F64], F64] = np.asarray) -> PlainValidator:
-    """In Annotated[F64, ...]: (n,) of a list of n numbers, as `then` makes it."""
-    lists = TypeAdapter(Annotated[list[Number], exactly(n)])
-    return PlainValidator(lambda value: then(np.array(lists.validate_python(value), np.float64)))
 
 
 def _flag(value: Any) -> bool:
     """Accept 0/1, "0"/"1", true/false; anything else counts as set."""
     return value not in (0, "0", False, None, "")
-
-
-def _file_name(value: str) -> str:
-    if not NAME.fullmatch(value):
-        raise ValueError(f"{value[:60]!r} is no name of a model or a texture")
-    return value
-
-
-def _rgb(value: Any) -> Any:
-    if not isinstance(value, str) or not _COLOUR.fullmatch(value):
-        raise ValueError(f"{str(value)[:40]!r} is no #rrggbb")
-    return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
-
-
-def affine(column_major: F64) -> F64:
-    m = column_major.reshape(4, 4).T
-    if (np.abs(m[3] - _LAST_ROW) > 1e-6 + 1e-5 * _LAST_ROW).any():
-        raise ValueError("is not affine (column-major)")
-    if abs(np.linalg.det(m[:3, :3])) < 1e-12:
-        raise ValueError("flattens the model (determinant 0)")
-    return m
 
 
 def _state(value: Any) -> int:
@@ -80,28 +47,7 @@ def _bounds(value: Any) -> Any:
     return value if isinstance(value, dict) and {"min", "max"} <= value.keys() else None
 
 
-FileName = Annotated[str, AfterValidator(_file_name)]
-Label = Annotated[str, BeforeValidator(lambda value: str(value)[:60])]
-Vector = Annotated[F64, numbers(3)]
-Lenient: Final = BeforeValidator(lambda value: value if isinstance(value, list) else [])
 _Size = Annotated[Number, Field(ge=0)]
-
-
-class Given(BaseModel):
-    """What an object of SUNCG's JSON says; what else it holds is passed over."""
-
-    model_config = ConfigDict(frozen=True)
-
-
-class Override(Given):
-    """What a node says of the model's material at the same position; None = keep the model's."""
-
-    name: Label = ""
-    texture: FileName | None = None
-    diffuse: Annotated[tuple[float, float, float], BeforeValidator(_rgb)] | None = None
-
-
-Overrides = Annotated[tuple[Override, ...], FailFast(), Lenient]
 
 
 class Bounds(Given):
@@ -140,25 +86,6 @@ _NEEDED: Final = {k: {"dimensions" if k == "Box" else "modelId": None} for k in 
 _UNREAD: Final = {"Object": ("dimensions",), "Box": ("modelId",)} | dict.fromkeys(
     ("Room", "Ground"), ("transform", "dimensions")
 )
-
-
-class Axes(Given):
-    """The scale and the directions of a file, whose lengths do not matter."""
-
-    scale: Annotated[Finite, Field(gt=1e-6, lt=1e6)] = Field(1.0, alias="scaleToMeters")
-    up: Vector = np.array([0.0, 1.0, 0.0])
-    front: Vector = np.array([0.0, 0.0, 1.0])
-
-    def world_from_house(self, file: str) -> F64:
-        """(4, 4) metres, y up, z front <- the file's."""
-        norms = np.linalg.norm(self.up) * np.linalg.norm(self.front)
-        if not 1e-9 < norms < 1e9 or abs(self.up @ self.front) > 1e-6 * norms:
-            raise BadHouse(file, "up, front", "are not two directions at right angles")
-        up, front = self.up / np.linalg.norm(self.up), self.front / np.linalg.norm(self.front)
-        # Make the third axis of the two, so that the frame is right-handed.
-        world_from_house = np.eye(4)
-        world_from_house[:3, :3] = self.scale * np.array([np.cross(up, front), up, front])
-        return world_from_house
 
 
 class _House(Axes):

@@ -15,18 +15,17 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import MIRROR, NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.read.common.arch_elements import Arch
+from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
+from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
 from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.mesh.obj import ObjMaterial
-from pbrs_farm.read.suncg.arch_json import Arch, arch_items
+from pbrs_farm.read.suncg.arch_json import arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
 from pbrs_farm.read.suncg.models import (
-    DamagedModel,
-    ModelCache,
-    ModelMaterials,
-    ParsedModel,
     as_mirror,
     mirror_slot,
     placed_light,

@@ -17,7 +17,12 @@ from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.arch_elements import Arch
+from pbrs_farm.read.common.json_values import NAME
+from pbrs_farm.read.common.model_cache import ModelCache
+from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
     check_rooms,
@@ -26,8 +31,8 @@ from pbrs_farm.read.common.room_floors import (
     floor_polygon,
 )
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.suncg.arch_json import Arch, arch_from_json, arch_openings
-from pbrs_farm.read.suncg.house_json import NAME, HouseRecord, Node, house_record
+from pbrs_farm.read.suncg.arch_json import arch_from_json, arch_openings
+from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import (
     CLASS_TABLES,
     LAMP_TABLE,
@@ -36,7 +41,6 @@ from pbrs_farm.read.suncg.metadata import (
     read_tables,
     table_places,
 )
-from pbrs_farm.read.suncg.models import ModelCache, ModelMaterials
 from pbrs_farm.read.suncg.node_items import (
     ReaderContext,
     box_item,
@@ -44,7 +48,6 @@ from pbrs_farm.read.suncg.node_items import (
     object_item,
     room_items,
 )
-from pbrs_farm.read.suncg.wall_holes import openings
 
 # Which files below a SUNCG root a house is made of. Effect: reads its JSON and MTL files.
 

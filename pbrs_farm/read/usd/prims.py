@@ -20,10 +20,9 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter, Gltf
 from pbrs_farm.formats.house_glb import V_DOWN
 from pbrs_farm.home.room_use import named_kind
+from pbrs_farm.read.common.name_classes import NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.gltf.document import MAX_DEPTH, MAX_NODES
-from pbrs_farm.read.gltf.node_classes import NodeClass, class_of_node_name
-from pbrs_farm.read.gltf.scene import UNREAD
+from pbrs_farm.read.gltf.document import MAX_DEPTH, MAX_NODES, UNREAD
 from pbrs_farm.read.usd.shaders import Shaders
 from pbrs_farm.read.usd.shapes import NOT_READ, Shape, light_shape, mesh_shape, solid_shape
 

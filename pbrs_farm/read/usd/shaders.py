@@ -15,7 +15,7 @@ from pxr import Sdf, UsdShade
 
 from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.gltf.scene import UNREAD
+from pbrs_farm.read.gltf.document import UNREAD
 
 KIND_ATTRIBUTE: Final = "pbrs:kind"
 """Of a material: how light meets it, as our own exports say."""

@@ -1,7 +1,7 @@
-"""Holes that doors and windows have in released walls, found in the walls' meshes; no effects.
+"""Openings of doors and windows, found in the meshes of the walls they stand in; no effects.
 
-Released walls are cut already (docs/spec/suncg.md section 1.5): there the quad is the hole itself and the cutter
-its plug, of the wall's thickness. In a wall without a hole they are the door's or window's own size.
+Where the wall is cut already, as SUNCG's are (docs/spec/suncg.md section 1.5), the quad is the hole itself and
+the cutter its plug, of the wall's thickness. In a wall without a hole they have the door's or window's size.
 """
 
 from __future__ import annotations

@@ -1,0 +1,109 @@
+"""A house while a reader puts it together: rooms into levels, items, what stands in holes, limits. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Room, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.joinery import Hole, joinery_of, opening_of
+from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.room_floors import check_rooms
+from pbrs_farm.read.common.rooms import level_of, levels_of, room_at
+
+
+@dataclass(slots=True)
+class HouseBuilder:
+    """Collects a house's rooms, items and openings; `house` checks the limits and closes it.
+
+    A reader calls `set_rooms` first: items and holes are sorted into the levels and rooms that it
+    numbers. State: what was added so far.
+
+        builder = HouseBuilder(path.name, fields, notes, library)
+        id_of_room = builder.set_rooms(rooms)
+        builder.items += (replace(i, level_id=builder.level_of(foot(i))) for i in items)
+        for hole in holes:
+            builder.add_hole(hole)
+        return builder.house(path.stem, Source("front3d", path.name, sha256))
+
+    Not for formats whose file numbers levels and rooms itself (Sweet Home 3D, SUNCG).
+    """
+
+    file: str  # name, for messages
+    fields: ReadFields
+    notes: Notes
+    library: MaterialLibrary
+    levels: tuple[Level, ...] = ()
+    rooms: tuple[Room, ...] = ()
+    items: list[Item] = field(default_factory=list)
+    openings: list[Opening] = field(default_factory=list)
+
+    def set_rooms(self, rooms: Sequence[Room]) -> dict[str, str]:
+        """Sort the rooms into levels by their floors and number them; their own ids -> the new ones.
+
+        Raises BadHouse for more rooms, or more overlapping ones, than are taken apart.
+        """
+        self.levels, self.rooms = levels_of(rooms)
+        check_rooms(self.rooms, self.file)
+        return {old.id: new.id for old, new in zip(rooms, self.rooms, strict=True)}
+
+    def level_of(self, y: float) -> str:
+        """The id of the level that holds a height of the world, metres."""
+        return level_of(self.levels, y)
+
+    def room_at(self, point: F64) -> str | None:
+        """The id of the room that holds a point (3,) of the world, metres; None where none does."""
+        return room_at(self.rooms, point)
+
+    def add_hole(
+        self, hole: Hole, *, foot_y: float | None = None, cut_y: float | None = None
+    ) -> None:
+        """Add the door or window that fills a hole, and the opening that repair cuts.
+
+        foot_y: a height on the level of the door or window; cut_y: on that of the opening; each by
+        default the hole's lower edge.
+        """
+        low = float(hole.centre[1] - hole.size[1] / 2)
+        level = self.level_of(low if foot_y is None else foot_y)
+        item = joinery_of(hole, self.library, level, self.room_at(hole.centre))
+        self.items += [item] if item is not None else []
+        self.openings.append(opening_of(hole, self.level_of(low if cut_y is None else cut_y)))
+
+    def house(
+        self, stem: str, source: Source, *, name: str = "", openings: Iterable[Opening] = ()
+    ) -> House:
+        """The House of what was added. stem: of its file's name, which begins its id.
+
+        Raises BadHouse for more triangles or items than are read, and for what lies too far away.
+        """
+        self._check_limits()
+        return House(
+            id=keys.house_id(stem, source.sha256),
+            name=name or stem,
+            source=source,
+            levels=self.levels,
+            rooms=self.rooms,
+            items=tuple(self.items),
+            materials=self.library.materials,
+            textures=self.library.textures,
+            openings=(*self.openings, *openings),
+            notes=self.notes.all(),
+        )
+
+    def _check_limits(self) -> None:
+        n_faces = sum(item.n_faces for item in self.items)
+        if len(self.items) > MAX_INSTANCES or n_faces > self.fields.max_triangles:
+            text = f"more than {self.fields.max_triangles} triangles or {MAX_INSTANCES} items"
+            raise BadHouse(self.file, "", text, hint="limit: read.max_triangles")
+        for item in self.items:
+            # Refuse numbers that are not finite, too: the comparison is false for them.
+            if item.surfaces and not float(np.abs(item.bounds).max()) <= self.fields.max_extent_m:
+                text = f"stands farther than {self.fields.max_extent_m:g} m from the origin"
+                raise BadHouse(self.file, item.id, text, hint="limit: read.max_extent_m")

@@ -1,0 +1,91 @@
+"""Materials of models in OBJ: what their MTL says, under the overrides of whoever places them.
+
+Effect: reads pictures of the models' folder.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import replace
+from typing import Final
+
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.read.common.json_values import Override
+from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.mesh.obj import ObjMaterial
+
+MAX_TEXTURE_BYTES: Final = 64_000_000
+GREY: Final = (0.8, 0.8, 0.8)
+WHITE: Final = (1.0, 1.0, 1.0)
+DEFAULT_WALLS: Final = ("wallp_0", "wallp_1_1", "wallp_1_2")
+"""Papers that the published pictures show white, whatever colour they have (docs/spec/suncg.md section 6)."""
+
+
+class ModelMaterials:
+    """Resolves the materials of one house's models, walls and slabs into its material library."""
+
+    def __init__(self, folder: RootFolder, notes: Notes) -> None:
+        self._folder = folder
+        self.library = MaterialLibrary(notes)
+
+    def material(
+        self, mtl: ObjMaterial | None, override: Override | None, *, place: str, clear: MaterialKind
+    ) -> Material:
+        """A model's material as a node overrides it.
+
+        mtl: the model's, its texture a name below the root; None = grey. clear: the kind of
+        what lets light through (d < 1).
+        """
+        base = mtl or ObjMaterial("")
+        diffuse, reference = base.kd, base.map_kd
+        if override is not None and override.texture is not None:
+            reference = self._override_texture(override.texture)
+            diffuse = override.diffuse or WHITE
+        elif override is not None and override.diffuse is not None:
+            diffuse = override.diffuse
+        elif reference and base.kd == GREY:  # what parse_mtl gives where there is no Kd
+            diffuse = WHITE
+        found = self._texture(reference, place) if reference else None
+        if reference and found is None and diffuse == WHITE:
+            diffuse = GREY
+        return Material(
+            name=(override.name if override is not None else "") or base.name,
+            kind=clear if base.d < 1 else MaterialKind.OPAQUE,
+            diffuse=diffuse,
+            specular=base.ks,
+            shininess=base.ns,
+            opacity=base.d,
+            texture_id=found.texture.id if found else None,
+            alpha_cutout=bool(found and found.has_holes),
+        )
+
+    def wall_material(
+        self, mtl: ObjMaterial | None, override: Override | None, *, place: str
+    ) -> Material:
+        """A wall's material; one that nobody chose is white and marked as default.
+
+        That is no colour at all, or a default paper, whose colour the published pictures ignore.
+        """
+        material = self.material(mtl, override, place=place, clear=MaterialKind.GLASS)
+        picture = mtl.map_kd if mtl is not None else ""
+        is_unpainted = mtl is None or (not picture and mtl.kd == GREY)
+        if override is not None:
+            picture = override.texture or picture
+            is_unpainted &= override.texture is None and override.diffuse is None
+        if posixpath.splitext(posixpath.basename(picture))[0] in DEFAULT_WALLS:
+            return replace(material, diffuse=WHITE, texture_id=None, is_default=True)
+        return replace(material, is_default=is_unpainted)
+
+    def _override_texture(self, name: str) -> str:
+        png = f"texture/{name}.png"
+        return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
+
+    def _texture(self, name: str, place: str) -> LoadedTexture | None:
+        return self.library.texture(
+            name,
+            name=posixpath.basename(name),
+            place=place,
+            load=lambda: self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+        )

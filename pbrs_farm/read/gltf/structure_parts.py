@@ -1,0 +1,91 @@
+"""What one node shows of a room, parted into walls, floors and ceilings, or named by its materials. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
+from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts
+from pbrs_farm.read.gltf.room_fittings import parted_fittings
+
+_STRUCTURE: Final[tuple[ItemKind, ...]] = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
+_THICKEST_OPENING_M: Final = 1.5  # a porch of glass has less
+
+
+def centres_of(items: Sequence[Item]) -> F64:
+    """(N, 3) centres of items that are no part of a room."""
+    found = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
+    return np.array(found, np.float64).reshape(-1, 3)
+
+
+def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
+    """The items that a node's item is, where it is a wall, floor or ceiling, or is not known.
+
+    others: centres_of all items. A room seen from inside is parted by how its faces look, after
+    what is fitted into it (room_fittings); what is no room by the names of its materials; open walls are parted plane by plane. A node whose name
+    holds the word window or door ("Room with windows") may be a room, too, where it is as large,
+    and so may one called "Ground" or "Ground floor".
+    """
+    is_unknown = UNMAPPED in item.tags
+    may_be_room = item.kind in (*_STRUCTURE, ItemKind.GROUND) or is_unknown
+    if not (may_be_room or _is_too_large_for_an_opening(item)):
+        return (item,)
+    # What names and connected parts tell apart is no room's side, whichever way its faces look.
+    own, fittings = parted_fittings(item, by_shape=True)
+    parts = room_parts(own, others)
+    if fittings and parts[0] is own:
+        own, fittings = item, ()
+        if item.kind is ItemKind.WALL:
+            own, fittings = parted_fittings(item, by_shape=False)
+        parts = room_parts(own, others)
+    if parts[0] is own and (is_unknown or item.kind is ItemKind.WALL):
+        parts = _by_materials(own)
+    return (*(p for part in parts for p in planar_parts(part)), *fittings)
+
+
+def _is_too_large_for_an_opening(item: Item) -> bool:
+    if item.kind not in (ItemKind.DOOR, ItemKind.WINDOW) or not item.n_faces:
+        return False
+    low, high = item.bounds
+    return bool((high - low)[[0, 2]].min() > _THICKEST_OPENING_M)
+
+
+def _by_materials(item: Item) -> tuple[Item, ...]:
+    kinds = [class_of_node_name(s.name) for s in item.surfaces]
+    # Part what is wall, floor and ceiling; surfaces that say nothing stay with the item.
+    groups: dict[ItemKind | None, list[Surface]] = {}
+    for surface, seen in zip(item.surfaces, kinds, strict=True):
+        kind = seen.kind if seen and seen.kind in _STRUCTURE else None
+        groups.setdefault(None if kind is item.kind else kind, []).append(surface)
+    if set(groups) == {None}:
+        return (_named(item, kinds),)
+    found = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
+    for kind, surfaces in groups.items():
+        assert kind is not None
+        part = replace(
+            item, id=f"{item.id}.{kind}" if found else item.id, kind=kind,
+            nyu40=CLASS_OF_STRUCTURE[kind], surfaces=tuple(surfaces), box=None,
+            lights=() if found else item.lights, tags=_known(item),
+        )  # fmt: skip
+        found.append(part)
+    return tuple(found)
+
+
+def _named(item: Item, classes: Sequence[object]) -> Item:
+    # An unknown thing is what all of its materials say.
+    one = class_of_node_name(item.surfaces[0].name) if item.surfaces else None
+    if UNMAPPED not in item.tags or one is None or any(c != one for c in classes):
+        return item
+    if one.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
+        return item  # needs more than a class: light, a place in a wall
+    return replace(item, nyu40=one.nyu40, kind=one.kind, tags=_known(item))
+
+
+def _known(item: Item) -> tuple[str, ...]:
+    return tuple(t for t in item.tags if t != UNMAPPED)
