@@ -25,6 +25,8 @@ from pbrs_farm.installation import (
 
 State = Literal["ok", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
+GL: Final = "GL"
+"""The part whose lack leaves path tracing and takes the two OpenGL modes."""
 _EXCEPTION: Final = re.compile(r"^(pbrs_farm\.[\w.]+|\w+Error): ")  # before a traceback's last text
 
 _PACKAGES: Final = (
@@ -54,7 +56,7 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
         _packages(),
         _llvm(),
         *_variants(),
-        _probe("GL", check_gl, _gl_remedy(), needed=True),
+        _probe(GL, check_gl, _gl_remedy(), state="degraded"),
         _probe("denoiser", check_denoiser, again, needed=True),
         _probe("pictures", check_pictures, again, needed=True),
         _redis(redis_url),

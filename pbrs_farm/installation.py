@@ -6,6 +6,7 @@ A wheel takes its extras by name, a checkout from its own folder; each system ha
 from __future__ import annotations
 
 import ctypes
+import shutil
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +18,8 @@ EXTRA_OF: Final = {
     "moderngl": "", "glcontext": "", "mitsuba": "", "drjit": "", "pyoidn": "", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
     "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video", "pxr": "usd",
-    "ifcopenshell": "ifc",
+    "ifcopenshell": "ifc", "DracoPy": "gltf", "opengl_basisu": "gltf", "mujoco": "physics", "coacd": "physics",
+    "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
 }  # fmt: skip
 """Module -> the extra of pyproject.toml that installs it; "" where every installation has it."""
 
@@ -67,8 +69,15 @@ def install_command(*extras: str) -> str:
     names = f"[{','.join(wanted)}]" if wanted else ""
     checkout = checkout_folder()
     if checkout is not None:
-        return f"pip install -e '{checkout}{names}'"
-    return f"pip install {'--force-reinstall ' * (not wanted)}'pbrs-farm{names}'"
+        return f"{pip_command()} install -e '{checkout}{names}'"
+    return f"{pip_command()} install {'--force-reinstall ' * (not wanted)}'pbrs-farm{names}'"
+
+
+def pip_command() -> str:
+    """How this Python's own pip is called: "pip" only where that word starts it, as in an active environment."""
+    found = shutil.which("pip")
+    is_ours = found is not None and Path(found).parent == Path(sys.executable).parent
+    return "pip" if is_ours else f"{sys.executable} -m pip"
 
 
 def checkout_folder(package: Path | None = None) -> Path | None:

@@ -11,16 +11,31 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, Protocol, TypeAlias
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 from pbrs_farm.core.shown_text import printable
 from pbrs_farm.run.processes.render_task import Event
 
+ShareTeller: TypeAlias = "Callable[[str, float], None]"
 _SHARE_EVERY_S: Final = 30.0  # of a view
 _HOME_SHARE_EVERY_S: Final = 10.0
+
+
+class CountTeller(Protocol):
+    """Hears how many things are done, of how many where that is known."""
+
+    def __call__(self, n: int, of: int | None = None, /) -> None: ...
 
 
 class ProgressReporter(ABC):
@@ -271,37 +286,51 @@ class _Bars(ProgressReporter):
         return rate if left_s is None else f"{rate} {seconds_text(left_s)} left"
 
 
-def _bars() -> Progress:
-    """Bars on standard error: what, bar, n of n, time, a note."""
+def _bars(done: ProgressColumn | None = None) -> Progress:
+    """Bars on standard error: what, bar, how much is done (n of n), time, a note."""
     return Progress(
         TextColumn("{task.description:<7}"),
         BarColumn(),
-        MofNCompleteColumn(),
+        done or MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("{task.fields[note]}"),
         console=Console(stderr=True),
+        # Lines that go to a file or a pipe still go there while a bar is shown.
+        redirect_stdout=sys.stdout.isatty(),
     )
 
 
 @contextmanager
-def counting_bar(noun: str) -> Iterator[Callable[[int, int], None]]:
+def counting_bar(noun: str) -> Iterator[CountTeller]:
     """A bar on standard error of things of one kind; nothing where that is no terminal.
 
-    What it gives is called with how many are done, of how many.
+    What it gives is called with how many are done, of how many where that is known.
     """
     if not sys.stderr.isatty():
-        yield lambda _n, _of: None
+        yield lambda _n, _of=None: None
         return
     with _bars() as bar:
         task, began_s = bar.add_task(noun, total=None, note=""), time.monotonic()
 
-        def tell(n: int, of: int) -> None:
+        def tell(n: int, of: int | None = None) -> None:
             seconds = time.monotonic() - began_s
-            note = (
-                f"{60 * n / seconds:.1f}/min {seconds_text((of - n) * seconds / n)} left"
-                if n
-                else ""
-            )
-            bar.update(task, completed=n, total=of, note=note if n < of else "")
+            note = f"{60 * n / seconds:.1f}/min" if n and n != of else ""
+            if note and of is not None:
+                note += f" {seconds_text((of - n) * seconds / n)} left"
+            bar.update(task, completed=n, total=of, note=note)
 
         yield tell
+
+
+@contextmanager
+def share_bar(noun: str) -> Iterator[ShareTeller]:
+    """A bar on standard error of one long piece of work; nothing where that is no terminal.
+
+    What it gives is called with what is being done and the share (0..1) of all of it that is done.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _doing, _share: None
+        return
+    with _bars(TaskProgressColumn()) as bar:
+        task = bar.add_task(noun, total=1.0, note="")
+        yield lambda doing, share: bar.update(task, completed=share, note=doing)

@@ -7,7 +7,7 @@ import csv
 import io
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import (
     Verb,
@@ -31,9 +31,15 @@ from pbrs_farm.installation import need
 if TYPE_CHECKING:
     from pbrs_farm.core.house import House
     from pbrs_farm.core.recipe import Recipe
+    from pbrs_farm.progress import ShareTeller
     from pbrs_farm.sample import CameraReport
     from pbrs_farm.sample.camera_report import SectorReport
     from pbrs_farm.sample.house_sampler import Sampling
+
+
+# Parts of the time that `dress` takes, roughly; its pictures take the rest.
+_SHARE_OF_CATALOGUE: Final = 0.05
+_SHARE_OF_HOUSE: Final = 0.65
 
 
 def add_verbs(verb: Verb) -> None:
@@ -85,6 +91,7 @@ def _catalogue(args: argparse.Namespace) -> int:
     found = own_catalogue(args.libraries)
     groups = Counter(piece.group for piece in found.pieces)
     kinds = Counter(note.kind for note in found.notes)
+    is_usable = bool(found.pieces or found.pictures)
     if args.refused is not None:
         rows = [(note.kind, note.place, note.text) for note in found.notes]
         text = io.StringIO(newline="")
@@ -94,14 +101,16 @@ def _catalogue(args: argparse.Namespace) -> int:
         echo_json(
             {"pieces": len(found.pieces), "groups": groups, "notes": kinds, "digest": found.digest}
         )
-        return 0
+        return 0 if is_usable else 1
     echo(f"{counted(len(found.pieces), 'piece')}, {counted(len(found.pictures), 'picture')}")
     for group, n in sorted(groups.items(), key=lambda pair: (-pair[1], pair[0])):
         echo(f"  {n:6} {group.replace('_', ' ')}")
     for kind, n in kinds.most_common():
         first = next(note for note in found.notes if note.kind == kind)
         echo(f"{n} {kind}: {first.place}: {first.text}{' ...' if n > 1 else ''}")
-    return 0
+    if not is_usable:
+        warn(f"{', '.join(map(str, args.libraries))}: holds nothing that can be used")
+    return 0 if is_usable else 1
 
 
 def _dress(args: argparse.Namespace) -> int:
@@ -112,6 +121,7 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.prepare.dressed_house import fetch_catalogue
     from pbrs_farm.prepare.finished_house import finished_house
+    from pbrs_farm.progress import share_bar
     from pbrs_farm.read.source import resolve, variants
     from pbrs_farm.run.attributions import attribution_text
     from pbrs_farm.store.folder import FolderStore
@@ -123,11 +133,18 @@ def _dress(args: argparse.Namespace) -> int:
         raise BadInput("--seed", args.dress, "expected one seed")
     recipe = recipe_of(args)
     (source,) = variants(resolve(args.home, models=args.models), seeds)
-    note_step(args.home, "catalogue")
-    fetch_catalogue(recipe.dress)
-    house, repairs, report = finished_house(source, recipe)
-    if report is None:
-        raise BadInput(args.home, "", "an object without context is not dressed")
+    with share_bar("dress") as tell:
+        note_step(args.home, "catalogue")
+        tell("furniture", 0.0)
+        fetch_catalogue(recipe.dress)
+        tell(args.home, _SHARE_OF_CATALOGUE)
+        of_house = _SHARE_OF_HOUSE if args.views else 1.0 - _SHARE_OF_CATALOGUE
+        house, repairs, report = finished_house(
+            source, recipe, lambda share: tell(args.home, _SHARE_OF_CATALOGUE + of_house * share)
+        )
+        if report is None:
+            raise BadInput(args.home, "", "an object without context is not dressed")
+        pictures = _before_after(args, house, recipe, tell) if args.views else {}
     # Write the dressed and repaired house and what was done to it.
     store = FolderStore(args.out)
     glb, description = bundle_from_house(house)
@@ -137,8 +154,7 @@ def _dress(args: argparse.Namespace) -> int:
         "repair.json": json_bytes(repairs), keys.ATTRIBUTION: text.encode(),
     }  # fmt: skip
     files = {name: data for name, data in files.items() if data}
-    if args.views:
-        files |= _before_after(args, house, recipe)
+    files |= pictures
     for name, data in files.items():
         store.put(name, data)
     store.tidy()
@@ -147,7 +163,9 @@ def _dress(args: argparse.Namespace) -> int:
     return 0 if report.is_sound else 1
 
 
-def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dict[str, bytes]:
+def _before_after(
+    args: argparse.Namespace, house: House, recipe: Recipe, tell: ShareTeller
+) -> dict[str, bytes]:
     """The pictures of the home as it was and as it is, by file name."""
     from pbrs_farm.crash_notes import note_step
     from pbrs_farm.gallery.contact_sheet import before_after_png
@@ -160,12 +178,15 @@ def _before_after(args: argparse.Namespace, house: House, recipe: Recipe) -> dic
     bare, _report = repaired_house(resolve(args.home, models=args.models), undressed)
     note_step(args.home, "before and after")
     files = {}
+    done = _SHARE_OF_CATALOGUE + _SHARE_OF_HOUSE
+    tell("before and after", done)
     for n, pair in enumerate(pairs(bare, house, recipe, args.views)):
         caption = f"{house.name}, view {pair.view.id}, bare and dressed"
         # Licences of homes ask for credit wherever a picture is shown.
         caption = "; ".join(t for t in (caption, house.source.attribution) if t)
         name = f"before_after{f'_{n + 1}' if n else ''}.png"
         files[name] = before_after_png(pair.before, pair.after, caption)
+        tell("before and after", done + (1 - done) * (n + 1) / args.views)
     if not files:
         warn("no room has a view: no picture of before and after")
     return files

@@ -5,117 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import shlex
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Final
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, echo, echo_json
+from pbrs_farm.commands.completion_scripts import SHELLS, completion_script
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 
-# Scripts by which bash, zsh and fish complete verbs, options and their choices; pure.
-
-
-SHELLS: Final = ("bash", "zsh", "fish")
-
-# Words that argparse does not know as choices: example homes where homes are named, recipes.
-_HOME_VERBS: Final = ("run", "dress", "repair", "cameras", "submit")
-
-_BASH: Final = """\
-_pbrs_farm() {{
-  local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} verb= w
-  for w in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
-    case $w in {verbs_pattern}) verb=$w; break ;; esac
-  done
-  COMPREPLY=()
-  case $verb:$before in
-{choices}
-  esac
-  case $verb in
-{words}
-  esac
-}}
-complete -o default -F _pbrs_farm pbrs-farm"""
-
-
-def completion_script(shell: str, verbs: Mapping[str, argparse.ArgumentParser]) -> str:
-    """What the shell reads to complete the command's words; verbs: each with its parser."""
-    if shell == "fish":
-        return "\n".join(_fish_lines(verbs))
-    script = _bash_script(verbs)
-    if shell == "bash":
-        return script
-    return "autoload -U +X bashcompinit && bashcompinit\n" + script
-
-
-def _bash_script(verbs: Mapping[str, argparse.ArgumentParser]) -> str:
-    choices, words = [], [_bash_case("''", list(verbs))]
-    for verb, parser in verbs.items():
-        for option, values in _option_choices(parser):
-            choices.append(_bash_case(f"{verb}:{option}", values, "return"))
-        words.append(_bash_case(verb, [*_options(parser), *_arguments(verb, parser)]))
-    return _BASH.format(
-        verbs_pattern="|".join(verbs), choices="\n".join(choices), words="\n".join(words)
-    )
-
-
-def _bash_case(pattern: str, words: list[str], then: str = "") -> str:
-    # compgen keeps the words that begin with what is typed.
-    reply = f'COMPREPLY=($(compgen -W {shlex.quote(" ".join(words))} -- "$word"))'
-    return f"    {pattern}) {reply}{f'; {then}' if then else ''} ;;"
-
-
-def _fish_lines(verbs: Mapping[str, argparse.ArgumentParser]) -> Iterator[str]:
-    start = "complete -c pbrs-farm"
-    for verb, parser in verbs.items():
-        text = shlex.quote((parser.description or "").split(";")[0])
-        yield f"{start} -f -n __fish_use_subcommand -a {verb} -d {text}"
-        of_verb = f"{start} -n '__fish_seen_subcommand_from {verb}'"
-        values = dict(_option_choices(parser))
-        for option in _options(parser):
-            # -x: nothing but these words may follow the option, no file names.
-            known = f" -x -a {shlex.quote(' '.join(values[option]))}" if option in values else ""
-            yield f"{of_verb} -l {option.removeprefix('--')}{known}"
-        if arguments := _arguments(verb, parser):
-            yield f"{of_verb} -a {shlex.quote(' '.join(arguments))}"
-
-
-def _options(parser: argparse.ArgumentParser) -> list[str]:
-    return sorted(name for name in parser._option_string_actions if name.startswith("--"))
-
-
-def _option_choices(parser: argparse.ArgumentParser) -> Iterator[tuple[str, list[str]]]:
-    """Each option that takes one of some words, with those words."""
-    from pbrs_farm.core.layers import OPTIONAL
-    from pbrs_farm.core.lighting import ALL_MODES
-    from pbrs_farm.core.recipe import RECIPE_NAMES
-
-    # Options that take lists declare no choices of their own.
-    known = {
-        "--recipe": list(RECIPE_NAMES),
-        "--modes": [mode.value for mode in ALL_MODES],
-        "--layers": list(OPTIONAL),
-    }
-    for name, action in parser._option_string_actions.items():
-        if action.choices and name.startswith("--"):
-            yield name, [str(choice) for choice in action.choices]
-        elif name in known:
-            yield name, known[name]
-
-
-def _arguments(verb: str, parser: argparse.ArgumentParser) -> list[str]:
-    """The words a verb's arguments may be: its parts, a list's, homes."""
-    from pbrs_farm.assets.homes_package import example_homes
-
-    words = [str(c) for a in parser._actions if not a.option_strings for c in a.choices or ()]
-    if verb in _HOME_VERBS:
-        words += ["builtin", *(home.name for home in example_homes())]
-    return words
-
-
-# Verbs that tell.
+if TYPE_CHECKING:
+    from pbrs_farm.doctor import Finding
 
 
 def add_verbs(verb: Verb) -> None:
@@ -129,12 +30,12 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--json", action="store_true", help="for machines")
     p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
     p = verb("recipes", _recipes, "every field of a recipe and its value")
-    p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES)
+    p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES, help="default fast")
     p.add_argument("--toml", action="store_true", help="as a file for --recipe FILE.toml")
     p = verb("layers", _layers, "the table of the files of a view")
     text = 'what makes the shell complete words: eval "$(pbrs-farm completion bash)"'
     p = verb("completion", _completion, text)
-    p.add_argument("shell", choices=SHELLS)
+    p.add_argument("shell", choices=SHELLS, help="the shell that reads it")
 
 
 def _doctor(args: argparse.Namespace) -> int:
@@ -152,9 +53,20 @@ def _doctor(args: argparse.Namespace) -> int:
         if f.state != "ok" and f.remedy:
             echo(f"{'':<32}-> {f.remedy}")
     echo()
-    missing = "This machine cannot render yet: see MISSING above."
-    echo("This machine can render." if fine else missing)
+    echo(_verdict(findings, is_fine=fine))
     return 0 if fine else 1
+
+
+def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
+    """What a machine with these findings can do, in a sentence."""
+    from pbrs_farm.doctor import GL
+
+    if not is_fine:
+        return "This machine cannot render yet: see MISSING above."
+    if any(f.part == GL and f.state != "ok" for f in findings):
+        modes = "--modes mlt_ol mlt_il_ol"
+        return f"This machine can render by path tracing alone: {modes}. See {GL} above."
+    return "This machine can render."
 
 
 def _inputs(args: argparse.Namespace) -> int:

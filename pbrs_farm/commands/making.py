@@ -88,11 +88,12 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("step", _step, "one step in this process: reproduces a failure")
     add = p.add_argument
-    add("step")
-    add("home")
-    add("--out", required=True)
-    add("--view")
-    add("--layers", nargs="+", default=[])
+    add("step", help="as a failure names it, e.g. light")
+    add("home", help=HOME)
+    add("--out", required=True, help="output folder or store URL of the run")
+    add("--view", metavar="VIEW", help="of a step of views: the view's id")
+    text = "optional layers that the step truth writes"
+    add("--layers", nargs="+", default=[], metavar="LAYER", help=text)
     add("--dress", type=int, default=0, metavar="SEED", help="of a dressed variant")
     add_models(p)
 
@@ -290,13 +291,21 @@ def _demo(args: argparse.Namespace) -> int:
     args.set = ["sky.time=day", *args.set]
     from pbrs_farm.gallery.sheet_parts import SheetParts
 
+    failed: set[str | None] = set()
+    whole: set[str | None] = set()
     with closing(SheetParts(Path(args.out))) as parts:
 
         def observe(event: Event) -> None:
+            if event.kind == "failed":
+                failed.add(event.view_id)
             if event.kind == "end" and event.view_id is not None:
+                whole.add(event.view_id)
                 parts.make(event.house_id, event.view_id)
 
         code = _run_homes(args, [home], observe=observe)
+        # A demo that made nothing says why; what lies in its folder is an older one's.
+        if not whole - failed:
+            return code or 1
         write_sheets(Path(args.out), 24, parts)
     if not args.json:
         echo(_NEXT.format(out=args.out))

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
     HOME,
@@ -16,6 +18,10 @@ from pbrs_farm.commands.arguments import (
     recipe_of,
 )
 from pbrs_farm.core.errors import BadInput
+
+if TYPE_CHECKING:
+    from pbrs_farm.core.recipe import Recipe
+    from pbrs_farm.scene.home import Home
 
 
 def add_verbs(verb: Verb) -> None:
@@ -50,7 +56,7 @@ def add_verbs(verb: Verb) -> None:
 
 def _scatter(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.bop_camera import camera_of_bop
-    from pbrs_farm.scene.home import load
+    from pbrs_farm.progress import counting_bar
     from pbrs_farm.scene.models import models
     from pbrs_farm.scene.pictures import render
     from pbrs_farm.store import store_from_url
@@ -74,9 +80,10 @@ def _scatter(args: argparse.Namespace) -> int:
     seeds = dress_seeds(args.dress)
     there = finished_views(store_from_url(args.out))
     n_made = n_kept = 0
-    for word in args.homes:
-        bare = load(word, recipe)
-        for home in [bare.dress(seed) for seed in seeds] or [bare]:
+    n_scenes = len(args.homes) * max(1, len(seeds)) * args.scenes
+    with counting_bar("views") as tell:
+        tell(0, n_scenes * args.views)
+        for home in _homes_of(args.homes, recipe, seeds):
             for seed in range(recipe.seed, recipe.seed + args.scenes):
                 scene = home.scatter(
                     found, args.count, on=args.on or None, in_=args.room, seed=seed,
@@ -93,12 +100,21 @@ def _scatter(args: argparse.Namespace) -> int:
                     frame = render(scene, camera, modes=args.modes, layers=args.layers)
                     frame.save(args.out)
                     n_made += 1
-                    echo(
-                        f"{frame.id}: {sum('model' in row for row in frame.instances)} models seen"
-                    )
+                    n_seen = sum("model" in row for row in frame.instances)
+                    echo(f"{frame.id}: {n_seen} models seen")
+                    tell(n_made + n_kept, n_scenes * args.views)
     total = counted(n_made + n_kept, "view")
     echo(f"{args.out}: {total}, {n_kept} already there; `pbrs-farm export {args.out} --to bop`")
     return 0
+
+
+def _homes_of(words: Sequence[str], recipe: Recipe, seeds: Sequence[int]) -> Iterator[Home]:
+    """Each home, dressed by each seed where there are some; one is loaded when the last is done."""
+    from pbrs_farm.scene.home import load
+
+    for word in words:
+        bare = load(word, recipe)
+        yield from (bare.dress(seed) for seed in seeds) if seeds else [bare]
 
 
 def _metres(text: str) -> float:

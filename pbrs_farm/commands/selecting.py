@@ -26,7 +26,7 @@ def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
     p = verb("reference", _reference, "photographs -> a small reference file of histograms")
     add = p.add_argument
-    add("action", choices=("build",))
+    add("action", choices=("build",), help="the one thing to do")
     add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
     add("--out", type=Path, required=True, help="the reference file to write")
     add_set(p, "FIELD=VALUE", "histogram.FIELD or selection.FIELD")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, echo, warn
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.store.secret import Secret
 
 if TYPE_CHECKING:
@@ -42,8 +43,7 @@ def add_verbs(verb: Verb) -> None:
 def _board(args: argparse.Namespace) -> int:
     missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
     if missing:
-        hint = "pip install 'pbrs-farm[board]'"
-        raise MachineFailed(f"board needs {' and '.join(missing)}", hint=hint)
+        raise MachineFailed(f"board needs {' and '.join(missing)}", hint=install_command("board"))
     from pbrs_farm.board.board_state import new_board
     from pbrs_farm.board.options import BoardOptions
     from pbrs_farm.board.serve import bound_socket, default_cache, server_of
@@ -82,7 +82,7 @@ def _farm(store_url: str) -> LiveFarm | None:
     if not (os.environ.get("PBRS_REDIS_URL") or os.environ.get("PBRS_REDIS_URL_FILE")):
         return None
     if find_spec("redis") is None:
-        raise MachineFailed("PBRS_REDIS_URL needs redis", hint="pip install 'pbrs-farm[workers]'")
+        raise MachineFailed("PBRS_REDIS_URL needs redis", hint=install_command("workers"))
     from pbrs_farm.board.live_farm import LiveFarm
     from workers.client.farm_client import Farm
     from workers.config import config_from_environment

@@ -58,11 +58,11 @@ def add_verbs(verb: Verb) -> None:
     _add_job(p, flag=True)
     p = farm_verb("logs", _logs, "the log of a failed or long task")
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
-    p.add_argument("--attempt", type=int)
+    p.add_argument("--attempt", type=int, metavar="N", help="which one (default the last)")
     _add_job(p, flag=True)
     _add_job(farm_verb("failures", _failures, "what failed for good, alike together"))
     p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
-    p.add_argument("tasks", nargs="*", metavar="TASK")
+    p.add_argument("tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default all)")
     _add_job(p, flag=True)
     p = farm_verb("rerun", _rerun, "a task once more, in this process: reproduces a failure")
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
@@ -73,13 +73,16 @@ def add_verbs(verb: Verb) -> None:
         p.set_defaults(what=name)
         _add_job(p)
     p = farm_verb("priority", _priority, "how urgent a job is, while it runs: 0 goes first, 9 last")
-    p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER")
+    text = f"0 to {LEAST_URGENT}"
+    p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER", help=text)
     _add_job(p)
     p = farm_verb(
         "limit", _limit, "another ceiling of a job: tasks in flight, slot-hours; 0 = none"
     )
-    p.add_argument("--max-slots", type=int, metavar="N")
-    p.add_argument("--budget", type=float, metavar="HOURS")
+    text = "tasks of the job in flight at once; 0 = any"
+    p.add_argument("--max-slots", type=int, metavar="N", help=text)
+    text = "slot-hours after which it pauses itself; 0 = none"
+    p.add_argument("--budget", type=float, metavar="HOURS", help=text)
     _add_job(p)
     p = farm_verb("gc", _gc, "what the store holds and nobody needs: told, and removed with --yes")
     p.add_argument(
@@ -87,17 +90,17 @@ def add_verbs(verb: Verb) -> None:
     )
     p.add_argument("--yes", action="store_true", help="remove it")
     p = farm_verb("drain", _drain, "a worker finishes what it runs and leaves")
-    p.add_argument("worker")
+    p.add_argument("worker", help="its name, as `workers` lists it")
     p.add_argument("--undo", action="store_true", help="let it stay")
     farm_verb("workers", _workers, "the farm's workers")
     _add_users(farm_verb)
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
     p.set_defaults(what="recover")
-    p.add_argument("job")
+    p.add_argument("job", help="job id")
     text = "go on with a job of another version: what this one would make alike stays"
     p = farm_verb("adopt", _recover, text)
     p.set_defaults(what="adopt")
-    p.add_argument("job")
+    p.add_argument("job", help="job id")
     # The two services of the farm.
     verb("coordinator", _coordinator, "lead the farm, or stand by")
     p = verb("worker", _worker, "work for the farm until asked to leave")
@@ -106,8 +109,9 @@ def add_verbs(verb: Verb) -> None:
 
 def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]) -> None:
     p = farm_verb("users", _users, "who may ask for work, and how much; users add NAME makes one")
-    p.add_argument("what", nargs="?", default="list", choices=("list", "add", "limit", "remove"))
-    p.add_argument("name", nargs="?", default="", metavar="NAME")
+    verbs = ("list", "add", "limit", "remove")
+    p.add_argument("what", nargs="?", default="list", choices=verbs, help="default list")
+    p.add_argument("name", nargs="?", default="", metavar="NAME", help="the user's")
     text = "of the slots, in proportion to the others who want some (1)"
     p.add_argument("--share", type=float, metavar="X", help=text)
     text = "tasks of all jobs of the user in flight at once; 0 = any"
@@ -270,7 +274,11 @@ def _gc(args: argparse.Namespace) -> int:
 
 def _drain(args: argparse.Namespace) -> int:
     farm_of(args).drain(args.worker, undo=args.undo)
-    _show(args, {"worker": args.worker, "drain": not args.undo}, lambda: f"{args.worker} told")
+    _show(
+        args,
+        {"worker": args.worker, "drain": not args.undo},
+        lambda: f"{args.worker} is asked to {'stay' if args.undo else 'leave'}",
+    )
     return 0
 
 

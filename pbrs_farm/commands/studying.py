@@ -19,6 +19,7 @@ from pbrs_farm.commands.arguments import (
     fields_set,
 )
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.study.training_plan import TASKS
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict and ablation."""
     p = verb("train", _train, "train a network on finished views; twice goes on where it stopped")
-    p.add_argument("task", choices=TASKS)
+    p.add_argument("task", choices=TASKS, help="what the network learns to see")
     roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
     p.add_argument("--out", type=Path, required=True, metavar="RUN", help="the run's folder")
@@ -58,7 +59,7 @@ def add_verbs(verb: Verb) -> None:
         _evaluate,
         "judge a run: a table beside baseline and paper, worst and best views",
     )
-    p.add_argument("run", type=Path, metavar="RUN")
+    p.add_argument("run", type=Path, metavar="RUN", help="the folder of `train --out`")
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
     p.add_argument(
         "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
@@ -73,7 +74,11 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("predict", _predict, "what a run sees in photographs: files, and a page with a wipe")
     photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
-    p.add_argument("places", type=Path, nargs="+", metavar=("RUN", "PHOTO"), help=photographs)
+    p.usage = (
+        "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--json]\n"
+        "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--json]"
+    )
+    p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=photographs)
     text = "no RUN: the weights that come with the package for this task"
     p.add_argument("--task", choices=TASKS, help=text)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
@@ -83,7 +88,8 @@ def add_verbs(verb: Verb) -> None:
     p = verb("ablation", _ablation, text)
     rows = "[NAME=]ROOT[+ROOT][@MODE]: a row a mode, or one where a mode is named"
     p.add_argument("root", metavar="ROOT", nargs="+", help=rows)
-    p.add_argument("--task", choices=TASKS, default="normals")
+    text = "what the network learns to see (default normals)"
+    p.add_argument("--task", choices=TASKS, default="normals", help=text)
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
     p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="of all its runs")
     _add_plan(p)
@@ -129,7 +135,7 @@ def _source(args: argparse.Namespace) -> TrainingSource:
 
 def _need_torch() -> None:
     if find_spec("torch") is None:
-        raise MachineFailed("the study needs torch", hint='pip install "pbrs-farm[study]"')
+        raise MachineFailed("the study needs torch", hint=install_command("study"))
 
 
 def _train(args: argparse.Namespace) -> int:

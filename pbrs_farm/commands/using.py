@@ -22,7 +22,7 @@ def add_verbs(verb: Verb) -> None:
     """Add sheet, verify, relight and pull."""
     text = "contact sheet (sheet.png) and gallery (index.html) of an output folder"
     p = verb("sheet", _sheet, text)
-    p.add_argument("folder", type=Path)
+    p.add_argument("folder", type=Path, help="the folder of --out")
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
     text = "films of the sequences too: <house>.mp4, and <house>_labels.mp4 with labels beside it"
     p.add_argument("--video", action="store_true", help=text)
@@ -62,6 +62,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _pull(args: argparse.Namespace) -> int:
+    from pbrs_farm.progress import counting_bar
     from pbrs_farm.run.output_root import pull
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
@@ -70,7 +71,9 @@ def _pull(args: argparse.Namespace) -> int:
         raise BadInput(
             args.root, "", "no such folder", hint="the folder of --out, or a store's URL"
         )
-    n_copied, n_there = pull(store_from_url(args.root, settings_from_environment().store), args.out)
+    store = store_from_url(args.root, settings_from_environment().store)
+    with counting_bar("files") as tell:
+        n_copied, n_there = pull(store, args.out, tell)
     echo(f"{args.out}: {n_copied} files copied, {n_there} were there")
     return 0
 

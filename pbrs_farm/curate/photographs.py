@@ -21,6 +21,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.installation import install_command
 from pbrs_farm.regular_files import (
     MAX_DIGEST_BYTES,
     digest_of_regular,
@@ -194,7 +195,9 @@ class NyuMat:
         try:
             import h5py
         except ImportError:
-            raise MachineFailed("h5py is needed for .mat files", hint="pip install h5py") from None
+            raise MachineFailed(
+                "h5py is needed for .mat files", hint=install_command("selection")
+            ) from None
         self.path = path
         try:
             # Refuse a pipe or a device before a library waits for it.

@@ -40,6 +40,7 @@ from pbrs_farm.export.coco import write_coco
 from pbrs_farm.export.point_clouds import write_ply
 from pbrs_farm.export.sequences import write_colmap, write_kitti, write_nerfstudio, write_tum
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
+from pbrs_farm.installation import install_command
 from pbrs_farm.regular_files import fault_of, read_regular
 
 # WebDataset: tar shards of samples, equal bytes for equal views.
@@ -109,7 +110,7 @@ def _h5py() -> Any:
     try:
         import h5py
     except ImportError:
-        hint = "pip install 'pbrs-farm[selection]'"
+        hint = install_command("selection")
         raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
     return h5py
 

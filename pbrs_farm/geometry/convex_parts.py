@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.mesh import signed_volume
+from pbrs_farm.installation import install_command
 
 _NEARLY_CONVEX = 0.95  # share of its hull that a mesh fills which needs no decomposition
 _FLAT_M = 5e-4  # half the thickness of a flat thing
@@ -41,8 +42,7 @@ def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> 
     try:
         import coacd
     except ImportError:
-        hint = 'pip install "pbrs-farm[physics]"'
-        raise MachineFailed("physics needs coacd", hint=hint) from None
+        raise MachineFailed("physics needs coacd", hint=install_command("physics")) from None
     points = triangles.reshape(-1, 3)
     whole = hull_of(points)
     # What is nearly its hull needs no decomposition.

@@ -54,10 +54,13 @@ def catalogue_of_words(words: str) -> Catalogue:
 
 
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
-    """What libraries and folders of the user's own give by themselves, indexed once; BadInput as above."""
+    """What libraries and folders of the user's own give by themselves, indexed once; maybe nothing but notes.
+
+    Raises BadInput for what is no library.
+    """
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
-    return catalogue_from((), given=paths, store=_store())
+    return catalogue_from((), given=paths, store=_store(), may_be_empty=True)
 
 
 def has_furniture() -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -86,13 +86,15 @@ def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
         store.put(keys.RECIPE, data)
 
 
-def pull(of: Store, folder: Path) -> tuple[int, int]:
+def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None) -> tuple[int, int]:
     """Copy an output root, however it lies, into a folder of files; how many were copied, how many were there.
 
     A file that is there with its size is not read again, but for manifests and the like of the root.
+    tell: called with how many files are done, after each.
     """
     to, n_copied, n_there = FolderStore(folder), 0, 0
     for key in of.list():
+        tell(n_copied + n_there)
         if key == LAYOUT or key.startswith("jobs/"):
             continue  # of the store, not of the root
         here = to.head(key) if key.startswith(tuple(f"{top}/" for top in keys.FOLDERS)) else None

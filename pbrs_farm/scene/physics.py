@@ -20,6 +20,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.geometry.convex_parts import convex_parts, hull_of
+from pbrs_farm.installation import install_command
 from pbrs_farm.scene.models import Model
 from pbrs_farm.scene.placing import Support, caster_of, level_area, level_triangles
 
@@ -293,4 +294,4 @@ def _mujoco() -> Any:
 
 
 def _missing(package: str) -> MachineFailed:
-    return MachineFailed(f"physics needs {package}", hint='pip install "pbrs-farm[physics]"')
+    return MachineFailed(f"physics needs {package}", hint=install_command("physics"))

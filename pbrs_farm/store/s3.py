@@ -19,6 +19,7 @@ from pbrs_farm.core.errors import (
     StoreRefused,
     StoreUnavailable,
 )
+from pbrs_farm.installation import install_command
 from pbrs_farm.store.object_store import Head, check_key, check_prefix, content_type
 from pbrs_farm.store.retrying import retried
 from pbrs_farm.store.secret import Secret
@@ -78,7 +79,7 @@ class S3Store:
             import obstore
             from obstore.store import S3Store as Client
         except ImportError:
-            hint = 'pip install "pbrs-farm[s3]"'
+            hint = install_command("s3")
             raise MachineFailed("s3:// needs the package obstore", hint=hint) from None
         self._bucket = bucket
         self._prefix = prefix.strip("/")

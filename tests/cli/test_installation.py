@@ -16,6 +16,7 @@ from pbrs_farm.installation import (
     checkout_folder,
     install_command,
     need,
+    pip_command,
     system_command,
     this_system,
 )
@@ -40,10 +41,31 @@ def test_a_checkout_and_a_wheel_are_told_apart(
 ) -> None:
     assert checkout_folder() == REPO
     assert checkout_folder(tmp_path / "site-packages" / "pbrs_farm") is None
+    monkeypatch.setattr(installation, "pip_command", lambda: "pip")
     assert install_command("s3", "board") == f"pip install -e '{REPO}[s3,board]'"
     monkeypatch.setattr(installation, "checkout_folder", lambda: None)
     assert install_command("s3") == "pip install 'pbrs-farm[s3]'"
     assert install_command() == "pip install --force-reinstall 'pbrs-farm'"
+
+
+def test_the_word_pip_is_said_only_where_it_is_this_pythons(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside = str(Path(sys.executable).parent)
+    pip = tmp_path / "pip"
+    pip.write_text("#!/bin/sh\n")
+    pip.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert pip_command() == f"{sys.executable} -m pip"
+    monkeypatch.setattr("shutil.which", lambda _name: f"{beside}/pip")
+    assert pip_command() == "pip"
+
+
+def test_every_hint_to_install_something_is_made_in_one_place() -> None:
+    for folder in ("pbrs_farm", "workers"):
+        for path in (REPO / folder).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            assert path.name == "installation.py" or "pip install" not in text, path
 
 
 @pytest.mark.parametrize(
@@ -71,7 +93,7 @@ def test_what_is_needed_and_missing_is_named_with_its_extra(
 ) -> None:
     need("numpy")
     monkeypatch.setattr(installation, "is_installed", lambda name: name == "drjit")
-    with pytest.raises(MachineFailed, match=r"this needs mitsuba, av \(pip install.*\[video\]"):
+    with pytest.raises(MachineFailed, match=r"this needs mitsuba, av \(.*pip install.*\[video\]"):
         need("mitsuba", "drjit", "av")
 
 

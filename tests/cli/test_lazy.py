@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import subprocess
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -51,3 +53,37 @@ print(code, sorted(set({HEAVY.split()!r}) & set(sys.modules)))
     )
     assert "no Redis at" in done.stderr
     assert done.stdout.strip() == "1 []"
+
+
+def parsers(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, Any]]:
+    """A parser and all below it, by the words that lead to them."""
+    yield name, parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for word, below in action.choices.items():
+                yield from parsers(below, f"{name} {word}")
+
+
+EVERY = dict(parsers(build_parser(), "pbrs-farm"))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_verb_has_a_help_and_a_usage_and_a_word_for_every_option(name: str) -> None:
+    parser = EVERY[name]
+    assert parser.format_help().startswith(f"usage: {name}")
+    assert parser.format_usage().startswith(f"usage: {name}")
+    for action in parser._actions:
+        if not isinstance(action, argparse._SubParsersAction):
+            assert action.help, f"{name} {action.option_strings or action.dest}"
+
+
+@pytest.mark.parametrize(
+    "name", [n for n, p in EVERY.items() if any(a.required and a.nargs != "*" for a in p._actions)]
+)
+def test_a_verb_without_its_words_says_what_it_wants(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        EVERY[name].parse_args([])
+    assert ended.value.code == 2
+    assert "the following arguments are required" in capsys.readouterr().err

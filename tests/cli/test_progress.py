@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from pbrs_farm.progress import TimeLeft, counting_bar, progress_reporter, seconds_text
+from pbrs_farm.progress import TimeLeft, counting_bar, progress_reporter, seconds_text, share_bar
 from pbrs_farm.run.processes.render_task import Event
 
 
@@ -175,3 +175,34 @@ def test_what_is_counted_has_a_bar_on_a_terminal_and_nothing_elsewhere(
         for n in range(3):
             tell(n, 2)
     assert "2/2" in terminal.getvalue()
+
+
+def test_things_whose_number_is_unknown_are_counted_all_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("TERM", "xterm")
+    with counting_bar("files") as tell:
+        for n in range(8):
+            tell(n)
+    assert "7/?" in terminal.getvalue()
+
+
+def test_long_work_shows_what_is_done_and_its_share_and_lines_go_where_they_went(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with share_bar("dress") as tell:
+        tell("furniture", 0.5)
+    assert capsys.readouterr() == ("", "")
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("TERM", "xterm")
+    with share_bar("dress") as tell:
+        tell("before and after", 0.25)
+        print("a line for a pipe")  # noqa: T201
+    assert "25%" in terminal.getvalue()
+    assert "before and after" in terminal.getvalue()
+    assert capsys.readouterr().out == "a line for a pipe\n"

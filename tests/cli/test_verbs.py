@@ -13,7 +13,7 @@ import pytest
 from pbrs_farm import doctor, images
 from pbrs_farm.assets import homes_package
 from pbrs_farm.cli import main
-from pbrs_farm.commands import explaining
+from pbrs_farm.commands import explaining, making
 from pbrs_farm.commands.making import _folder_of
 from pbrs_farm.core import keys
 from pbrs_farm.core.layers import LAYERS, text_table
@@ -54,18 +54,30 @@ def test_doctor_finds_what_every_other_test_uses(tmp_path, capsys):
 
 def test_doctor_says_what_to_do_about_what_is_missing(monkeypatch, capsys):
     findings = [
-        doctor.Finding("GL", "missing", "no EGL", "install it", needed=True),
+        doctor.Finding("denoiser", "missing", "no library", "install it", needed=True),
         doctor.Finding("LLVM", "degraded", "too old", "take 19"),
         doctor.Finding("python", "ok", "3.11", "nothing"),
     ]
     monkeypatch.setattr(doctor, "examine", lambda *_: findings)
     assert main(["doctor"]) == 1
     text = capsys.readouterr().out
-    assert "MISSING   GL" in text
+    assert "MISSING   denoiser" in text
     assert "-> install it" in text
     assert "-> take 19" in text
     assert "-> nothing" not in text
     assert "cannot render yet" in text
+
+
+def test_a_machine_without_opengl_alone_can_render_by_path_tracing(monkeypatch, capsys):
+    findings = [
+        doctor.Finding("python", "ok", "3.11", needed=True),
+        doctor.Finding(doctor.GL, "degraded", "no EGL", "install it"),
+    ]
+    monkeypatch.setattr(doctor, "examine", lambda *_: findings)
+    assert main(["doctor"]) == 0
+    text = capsys.readouterr().out
+    assert "can render by path tracing alone: --modes mlt_ol mlt_il_ol" in text
+    assert "cannot render" not in text
 
 
 def test_a_check_that_crashes_or_exits_is_a_finding():
@@ -332,3 +344,11 @@ def test_the_layers_on_a_terminal_are_columns_that_fit_it() -> None:
     assert max(map(len, lines)) <= 100
     assert len(lines) == len(LAYERS) + 1
     assert any(line.startswith("depth_z") for line in lines)
+
+
+def test_a_demo_that_made_nothing_does_not_show_an_older_one(tmp_path, monkeypatch, capsys):
+    (tmp_path / "sheet.png").write_bytes(b"older")
+    monkeypatch.setattr(making, "_run_homes", lambda *_, **__: 1)
+    assert main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().out == ""
+    assert (tmp_path / "sheet.png").read_bytes() == b"older"

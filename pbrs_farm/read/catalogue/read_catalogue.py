@@ -52,14 +52,14 @@ class Found:
 
 def catalogue_from(
     libraries: Sequence[Path], *, jar: Path | None = None, given: Sequence[Path] = (),
-    store: Path | None = None,
+    store: Path | None = None, may_be_empty: bool = False,
 ) -> Catalogue:  # fmt: skip
     """The catalogue of all libraries; an id that comes again goes to the later library.
 
     libraries: .sh3f files of the packages. jar: the program's, with its own models. given: the
     user's .sh3f and .sh3t libraries and folders of models. store: a folder to keep shapes in once
     they are read. What is damaged becomes a note; BadInput for a path that does not exist or is
-    nothing of the kind.
+    nothing of the kind, and for one of which nothing can be used, unless it may_be_empty.
     """
     notes = LibraryNotes()
     found = []
@@ -67,7 +67,7 @@ def catalogue_from(
         found.append(_furniture(jar, notes, JAR_FURNITURE))
         found.append(_textures(jar, notes, JAR_TEXTURES))
     found += [_furniture(path, notes, FURNITURE) for path in libraries]
-    found += [_given(path, notes, store) for path in given]
+    found += [_given(path, notes, store, may_be_empty=may_be_empty) for path in given]
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
     shapes = ShapeStore(store) if store is not None else None
@@ -93,7 +93,9 @@ def _stored(shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader) 
     return lambda: shapes.shape(key, load)
 
 
-def _given(path: Path, notes: LibraryNotes, store: Path | None) -> Found | None:
+def _given(
+    path: Path, notes: LibraryNotes, store: Path | None, *, may_be_empty: bool
+) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
     found: Found | None
@@ -107,7 +109,7 @@ def _given(path: Path, notes: LibraryNotes, store: Path | None) -> Found | None:
     else:
         hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
         raise BadInput(path, "", "is no catalogue", hint=hint)
-    if found is None or not (found.pieces or found.pictures):
+    if not may_be_empty and (found is None or not (found.pieces or found.pictures)):
         why = next((n.text for n in [*notes.found][n_before:]), "")
         raise BadInput(path, "", "holds nothing that can be used", hint=why)
     return found

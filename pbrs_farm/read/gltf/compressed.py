@@ -17,6 +17,7 @@ from PIL import Image
 from pbrs_farm.core.arrays import I64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf, entry, view_bytes
+from pbrs_farm.installation import install_command
 
 DRACO: Final = "KHR_draco_mesh_compression"
 BASISU: Final = "KHR_texture_basisu"
@@ -38,7 +39,7 @@ def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh
     try:
         import DracoPy
     except ImportError:
-        hint = "pip install 'pbrs-farm[gltf]', or gltf-transform copy IN.glb OUT.glb"
+        hint = f"{install_command('gltf')}, or gltf-transform copy IN.glb OUT.glb"
         raise BadHouse(gltf.file, place, f"{DRACO} needs DracoPy", hint=hint) from None
     # Bound what is decoded by what the file says of it.
     told = entry(gltf, "accessors", (primitive.get("attributes") or {}).get("POSITION"))
@@ -88,7 +89,7 @@ def decoded_picture(data: bytes) -> bytes:
     try:
         import opengl_basisu
     except ImportError:
-        hint = "pip install 'pbrs-farm[gltf]', or gltf-transform ktxdecompress IN.glb OUT.glb"
+        hint = f"{install_command('gltf')}, or gltf-transform ktxdecompress IN.glb OUT.glb"
         raise ValueError(f"{BASISU} needs opengl-basisu: {hint}") from None
     try:
         texture = opengl_basisu.open(data)

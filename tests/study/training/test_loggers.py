@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import install_command
 from pbrs_farm.study.training.loggers import loggers
 from pbrs_farm.study.training.run_folder import RunFolder
 from pbrs_farm.study.training.training_job import Job, train
@@ -55,4 +56,4 @@ def test_a_package_that_is_missing_names_its_extra(
     monkeypatch.setattr("pbrs_farm.study.training.loggers.find_spec", lambda _name: None)
     with pytest.raises(MachineFailed) as told, loggers(["tensorboard"], tmp_path, {}):
         pass
-    assert told.value.hint == 'pip install "pbrs-farm[tensorboard]"'
+    assert told.value.hint == install_command("tensorboard")
