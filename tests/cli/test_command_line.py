@@ -13,7 +13,7 @@ import pytest
 from pbrs_farm.cli import MODULES, build_parser, main
 from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.commands.command_line import GROUPS, verb_first
-from pbrs_farm.commands.looking import SHELLS, completion_script
+from pbrs_farm.commands.completion_scripts import SHELLS, completion_script
 from pbrs_farm.core.recipe import RECIPE_NAMES, recipe_from_name
 from pbrs_farm.formats.recipe_toml import recipe_from_toml, toml_from_recipe
 
