@@ -231,7 +231,7 @@ def test_the_verb_says_what_is_used_and_writes_what_is_refused(
 def test_the_verb_writes_what_is_refused_where_nothing_can_be_used(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pbrs_farm.run.dress_catalogue._store", lambda: tmp_path / "store")
+    monkeypatch.setattr("pbrs_farm.prepare.dress_catalogue._store", lambda: tmp_path / "store")
     put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
     refused = tmp_path / "refused.csv"
     assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 1
