@@ -1,6 +1,6 @@
 """A house while it is dressed: what was added, changed and refused; state: the draft itself.
 
-Effects: a thread paints materials (draft_materials.py).
+Effects: a thread paints materials.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Views as a person would photograph a home: the preset `photo`; no effects of its own.
 
 Candidates are the paper's (one a grid cell and sector), held as people hold cameras. Each gets
-the score of photo_score.py from a small picture; photo_choice.py chooses among those of all rooms.
+the score of photo_score.py from a small picture; PhotoChoice chooses among those of all rooms.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def share_distance(shares: F64) -> F64:
 # Which candidates of a home become its views: good ones, no twins, together like photographs.
 # No effects of its own. The views of a home maximise the sum of their scores, less what their
 # framing costs, less likeness x their number x the distance of their mean class shares to those
-# of photographs (likeness.py): first sector by sector, the best first, then by exchange.
+# of photographs (share_distance): first sector by sector, the best first, then by exchange.
 
 
 MOST_OVERLAP: Final = 0.8

@@ -1,7 +1,7 @@
 """Light that comes straight from an emitter to a vertex, by shadow rays; kernels, no effects.
 
 Next-event estimation: one shadow ray goes to the sky, one to a lamp and in `path` one to a sunlit point
-(sunlit_points.py), weighted against the scattered ray by the balance heuristic (Veach 1997, section 9.2).
+(sunlight.py), weighted against the scattered ray by the balance heuristic (Veach 1997, section 9.2).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pbrs_farm.transport.kernels.sunlight import SunlitSample
 
 # Russian roulette of shadow rays: one that can bring little is cast by chance; kernels.
 # A shadow ray costs the same whatever it can bring. What it would bring if nothing stood in its
-# way is known before it is cast, and how often one like it arrives is, too (arrival_rates.py).
+# way is known before it is cast, and how often one like it arrives is, too (outdoor_choice.py).
 # Where the product of both lies below a threshold it is cast with a chance in proportion to that,
 # and what it brings is divided by the chance, so that the mean stays (Arvo and Kirk 1990). The
 # chance has a least value: without it dark corners of a bright view had spots as bright as the

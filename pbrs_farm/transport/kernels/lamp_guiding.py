@@ -3,7 +3,7 @@
 A home has a dozen lamps. The pilot's weights (pilot.py) tell which of them matter to a view, not
 where in the view. Here the strongest few are weighted again at every vertex: by distance, by
 whether they stand in front of the surface and, in views with a trial, by flux and by how often rays
-to them arrive (arrival_rates.py). Inside a shade its own bulb is nearly always taken.
+to them arrive (outdoor_choice.py). Inside a shade its own bulb is nearly always taken.
 """
 
 from __future__ import annotations

@@ -174,7 +174,7 @@ def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) 
 # What a shadow ray would bring if nothing stood in its way is known before it is cast, whether
 # something stands there is not. So the trial of a view (pilot.py) counts in voxels of the home
 # the shadow rays of each kind and those that arrived. A kind is an outdoor technique, one of the
-# strongest lamps of the view, any other lamp, or a group of sunlit points (sunlit_points.py).
+# strongest lamps of the view, any other lamp, or a group of sunlit points (sunlight.py).
 # Effects: holds buffers on the device.
 
 

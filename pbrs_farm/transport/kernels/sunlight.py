@@ -268,7 +268,7 @@ def _behind_glass(scene: DeviceScene, o: Any, d: Any) -> Any:
 
 # The cells of a plane that sunlight worth having comes through, and the points that it lights;
 # kernels.
-# A ray from the sun through each cell of a plane that faces it (sun_plane.py) tells what the
+# A ray from the sun through each cell of a plane that faces it (SunPlane) tells what the
 # cell's light is worth to a view: what it brings, by a few rays more, to the voxels that the
 # pilot's paths have been to. Cells are worth as many rays. The places that they light are put
 # into groups, near ones together.

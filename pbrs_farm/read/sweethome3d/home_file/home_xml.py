@@ -202,7 +202,7 @@ def as_points(points: list[tuple[float, float]]) -> Points2:
 
 # A home file's bytes -> its XML tree and the contents it names.
 # Nothing in the file is trusted: entity definitions and external entities are rejected
-# unexpanded, zip entries are bounded (resources.py), and no class of a Java stream is loaded
+# unexpanded, zip entries are bounded, and no class of a Java stream is loaded
 # (java_stream).
 
 

@@ -1,6 +1,6 @@
 """The serialised entry `Home` of old .sh3d files -> the tree of the Home.xml that says the same.
 
-No effects. The elements are those that parse_home.py and parse_pieces.py read; fields that a
+No effects. The elements are those that parse_home.py reads; fields that a
 version of the program did not have yet are left out, so that the same defaults hold.
 """
 
