@@ -128,7 +128,7 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
     of models stays where it is: workers must see it at the same path. Raises BadInput for a
     library that is none.
     """
-    from pbrs_farm.prepare.dressed_house import catalogue_of
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of
 
     catalogue_of(recipe.dress)
     if GENERATED not in recipe.dress.catalogue.split(":"):

@@ -7,7 +7,7 @@ from functools import cache
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from pbrs_farm.core import edits, keys, made_home
+from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from pbrs_farm.store import laid_out
@@ -18,16 +18,15 @@ from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 def work_version() -> str:
     """What a worker of this installation makes of a task: workers of one such version make the same.
 
-    It follows the versions of the steps, not the package's: an upgrade that changes no stored byte
+    It follows the versions of the steps and of the passes of a house, not the package's: an upgrade that changes no stored byte
     changes nothing here, and a running job goes on.
     """
-    from pbrs_farm.prepare import dressed_house
+    from pbrs_farm.prepare.passes import versions_of_passes
     from pbrs_farm.run import plan
 
     steps = {name: step.version for name, step in plan.STEPS.items()}
-    houses = (dressed_house.VERSION, dressed_house.STAND_INS_VERSION, edits.VERSION)
     # Workers that do not know how a root lies would not find what others made.
-    return keys.digest(steps, houses, made_home.VERSION, laid_out.FORMAT)[:12]
+    return keys.digest(steps, versions_of_passes(), laid_out.FORMAT)[:12]
 
 
 # What a job is and where its own objects are stored.

@@ -42,7 +42,7 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     from benchmarks.dress.changed import looks_of
     from benchmarks.dress.contacts import blocked_doors, floating, penetrations, things_of
-    from pbrs_farm.prepare.dressed_house import catalogue_of
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of
 
     recipe = recipe_from_name("fast")
     source = house_as_a_run_has_it(name)

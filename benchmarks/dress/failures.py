@@ -12,7 +12,7 @@ import time
 from benchmarks.dress.dressed_home import house_as_a_run_has_it
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.dressing import dress
-from pbrs_farm.prepare.dressed_house import catalogue_of
+from pbrs_farm.prepare.dress_catalogue import catalogue_of
 
 
 def failures(name: str, seeds: range) -> dict[str, object]:

@@ -19,7 +19,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Opening, Room, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.surroundings import with_surroundings
-from pbrs_farm.prepare.dress_catalogue import house_of_source
+from pbrs_farm.prepare.read_source import house_of_source
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.source import resolve
 from pbrs_farm.repair import repair

@@ -52,8 +52,9 @@ def of_house(seed: int) -> dict[str, Any]:
     """The home as the ordinary reader and repair see it: leaks, contacts of meshes, bits of its file."""
     from benchmarks.dress.contacts import blocked_doors, penetrations, things_of
     from pbrs_farm.generate.made import made
-    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, house_of_source
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
     from pbrs_farm.prepare.finished_house import repaired_house
+    from pbrs_farm.prepare.read_source import house_of_source
     from pbrs_farm.read.source import resolve
 
     recipe = recipe_from_name("fast")

@@ -64,8 +64,8 @@ def _things(seed: int) -> Iterator[Row]:
     """Every thing of a made home, dressed: its class, its model and whether dressing added it."""
     from pbrs_farm.dress.dressing import dress
     from pbrs_farm.dress.swap import pieces_by_plain_id, plain_id
-    from pbrs_farm.prepare.dress_catalogue import house_of_source
-    from pbrs_farm.prepare.dressed_house import catalogue_of
+    from pbrs_farm.prepare.dress_catalogue import catalogue_of
+    from pbrs_farm.prepare.read_source import house_of_source
     from pbrs_farm.read.source import resolve
 
     recipe = recipe_from_name("fast")

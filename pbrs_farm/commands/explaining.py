@@ -119,7 +119,7 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.dress.report import summary_of_dressing
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
-    from pbrs_farm.prepare.dressed_house import fetch_catalogue
+    from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
     from pbrs_farm.prepare.finished_house import finished_house
     from pbrs_farm.progress import share_bar
     from pbrs_farm.read.source import resolve, variants
@@ -195,8 +195,8 @@ def _before_after(
 def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
-    from pbrs_farm.prepare.dress_catalogue import house_of_source
     from pbrs_farm.prepare.finished_house import repaired_house
+    from pbrs_farm.prepare.read_source import house_of_source
     from pbrs_farm.read.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
     from pbrs_farm.store.folder import FolderStore

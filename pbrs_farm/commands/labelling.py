@@ -183,7 +183,7 @@ def _home_classes(args: argparse.Namespace) -> int:
     """What a home's pieces are and why, without rendering it."""
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.gallery.class_statistics import class_decisions, decisions_text
-    from pbrs_farm.prepare.dress_catalogue import house_of_source
+    from pbrs_farm.prepare.read_source import house_of_source
     from pbrs_farm.read.source import resolve
 
     house = house_of_source(resolve(args.folder, models=args.models), ReadFields())

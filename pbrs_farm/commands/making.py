@@ -321,7 +321,7 @@ Open {out}/index.html in a browser. What to do next:
 
 def _demo_dressing(args: argparse.Namespace) -> str | None:
     """The seeds that the demo dresses its home by; None where there is nothing to dress it with."""
-    from pbrs_farm.prepare.dressed_house import fetch_catalogue
+    from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 
     if args.bare:
         return None

@@ -84,7 +84,7 @@ def _submit(args: argparse.Namespace) -> int:
 
 def _submitted(args: argparse.Namespace) -> str:
     """Put the houses on the farm; the job's id, "" after a dry run."""
-    from pbrs_farm.prepare.dressed_house import uses_catalogue
+    from pbrs_farm.prepare.passes import uses_catalogue
     from workers.client.estimate import estimate
     from workers.client.farm_client import completed
     from workers.house_files import (

@@ -104,9 +104,6 @@ Edit = Annotated[
     Field(discriminator="do"),
 ]
 
-VERSION: Final = 1
-"""Part of an edited house's digest. Raised when an edit makes another house."""
-
 SUFFIX: Final = "-e"
 """Before the digest of the edits in an edited house's id."""
 

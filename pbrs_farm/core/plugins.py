@@ -7,7 +7,7 @@ first used. Its package and version are part of the digest of the steps that use
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -79,6 +79,17 @@ def plugin(group: str, name: str) -> Plugin:
         hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"
         raise MachineFailed(f"no plugin {name!r} for {group} is installed here", hint=hint)
     return known[name]
+
+
+def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
+    """The marks of plugins in the order of their names: what they add to a digest.
+
+    The one way in which a plugin becomes part of a digest, so that its next version makes anew what
+    it made: of `homes` and `readers` in the source (read/source.py), of `passes` in the house
+    (prepare/passes.py), of `cameras`, `layers` and `pictures` in their steps (run/step_cache.py).
+    Raises MachineFailed for a name that no installed plugin has.
+    """
+    return [plugin(group, name).mark for name in names]
 
 
 def checked_names(group: str, names: str) -> str:

@@ -1,4 +1,4 @@
-"""A repaired house with its edits carried out, in their order. Effects: reads the files they name."""
+"""A finished house with its edits carried out, in their order. Effects: reads the files they name."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 
 
-def edited(house: House, source: SourceRef, fields: ReadFields) -> House:
+def apply_edits(house: House, source: SourceRef, fields: ReadFields) -> House:
     """The house of a source's `unedited`, with the source's edits and its id.
 
     Raises BadInput for an item that the house has not, and for a file that is missing or changed.

@@ -13,11 +13,9 @@ from pathlib import Path
 
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
-from pbrs_farm.core.catalogue import EMPTY, Catalogue
-from pbrs_farm.core.house import House, Note
-from pbrs_farm.core.made_home import made_homes
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.source import SourceRef, check_unchanged, home_id, read_house
+from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.house import Note
+from pbrs_farm.core.recipe import DressFields
 
 NO_FURNITURE = "no-furniture"
 """The kind of the note that says that the packages' furniture is not there."""
@@ -112,35 +110,15 @@ def _of_libraries(given: tuple[tuple[Path, int], ...], has_package: bool | None)
     )
 
 
-# A source becomes a House: read by its reader, or generated and then read; the one way in.
-# Effects: those of read/source.py; a made home takes its furniture from the cached package.
+def catalogue_of(fields: DressFields) -> Catalogue:
+    """The catalogue that a recipe names, read once a process."""
+    return catalogue_of_words(fields.catalogue)
 
 
-_MADE_BY = "home: made by pbrs_farm, CC0"
+def fetch_catalogue(fields: DressFields) -> None:
+    """Download the packages of the catalogue that a recipe names where they are not cached.
 
-
-def house_of_source(source: SourceRef, fields: ReadFields) -> House:
-    """The house as its source gives it, unrepaired. Raises BadHouse, BadInput, MachineFailed."""
-    if source.kind == "made":
-        return _made_house(source, fields)
-    if source.kind == "plan":
-        from pbrs_farm.prepare.plan_house import house_of_plan
-
-        return house_of_plan(source, fields)
-    return read_house(source, fields)
-
-
-def _made_house(source: SourceRef, fields: ReadFields) -> House:
-    from pbrs_farm.generate.made import made
-    from pbrs_farm.read.sweethome3d import read_home
-
-    # The package must be the one that the home was named with: other models, another home.
-    check_unchanged(source)
-    (home,) = made_homes(source.location)
-    # An empty home needs no package, so that it is made where none can be read.
-    catalogue = catalogue_of_words("") if home.furniture else EMPTY
-    data = made(home, catalogue).data
-    house = read_home(data, f"{home.name}.sh3d", fields=fields)
-    credit = house.source.attribution.replace("pbrs_farm", _MADE_BY, 1)
-    its_source = replace(house.source, kind="made", file=source.location, attribution=credit)
-    return replace(house, id=home_id(source), source=its_source)
+    Raises MachineFailed, with the command to type, where apt cannot give them, and BadInput for a
+    library of the user's that is none.
+    """
+    fetch_packages(fields.catalogue)

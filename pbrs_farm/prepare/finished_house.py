@@ -1,115 +1,94 @@
-"""A source becomes a finished House: read, furnished, dressed, repaired, edited.
+"""A source becomes a finished House: the passes of prepare/passes.py, in their order.
 
-Effects: reads the files of the source, the cached packages and the user's libraries. Keeps the last
-house before its edits. Writes nothing.
+Effects: those of the passes. Nothing is written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.core.plugins import plugin_homes
-from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.crash_notes import note_step
-from pbrs_farm.prepare.dress_catalogue import house_of_source
-from pbrs_farm.prepare.dressed_house import dressed_and_repaired, furnished, with_told_furnished
-from pbrs_farm.read.source import SourceRef, check_unchanged
+from pbrs_farm.prepare.passes import PASSES, FinishedHouse, Pass, Preparation, cache_key
+from pbrs_farm.read.source import SourceRef
 
 if TYPE_CHECKING:
-    from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
 
 
+class HouseBeforeEdits:
+    """The last finished house before its edits: homes that differ in edits alone are prepared once.
+
+    A process has one beside its HouseCache, and gives it to finished_house.
+    """
+
+    def __init__(self) -> None:
+        self._key = ""
+        self._finished: FinishedHouse | None = None
+
+    def get(self, source: SourceRef, recipe: Recipe) -> FinishedHouse | None:
+        """The finished house of a source without edits, where it is the one that is kept."""
+        return self._finished if self._key == cache_key(source, recipe) else None
+
+    def keep(self, source: SourceRef, recipe: Recipe, finished: FinishedHouse) -> None:
+        """Keep the finished house of a source without edits, and let the one before go."""
+        self._key, self._finished = cache_key(source, recipe), finished
+
+    def clear(self) -> None:
+        """Let go of the house."""
+        self._key, self._finished = "", None
+
+
 def _ignore_share(_share: float) -> None:
-    """Nobody hears how far dressing is."""
-
-
-def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
-    """The house of a source, read, dressed where asked for, and repaired. Raises BadHouse."""
-    house, report, _dressing = finished_house(source, recipe)
-    return house, report
+    """Nobody asks how far dressing is."""
 
 
 def finished_house(
-    source: SourceRef, recipe: Recipe, tell: Callable[[float], None] = _ignore_share
+    source: SourceRef,
+    recipe: Recipe,
+    tell_share: Callable[[float], None] = _ignore_share,
+    before_edits: HouseBeforeEdits | None = None,
 ) -> FinishedHouse:
-    """As repaired_house, with what dressing did; None where the source is not dressed.
+    """The finished house of a source: read, furnished, dressed, repaired and edited, as the recipe says.
 
-    tell: called with the share that is done while it is dressed.
+    Equal arguments give equal bits. tell_share: called with the share that is done while it is
+    dressed and repaired. before_edits: where the house of a source with edits is kept before them.
+    Raises BadHouse for a file that is no house or has changed, BadInput, BadRecipe, MachineFailed.
+
+        >>> house, report, dressing = finished_house(resolve("builtin"), Recipe())
+        >>> dressing is None
+        True
     """
-    from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.repair import RepairReport, repair
+    kept = before_edits or HouseBeforeEdits()
 
-    if source.edits:
-        from pbrs_farm.prepare.apply_edits import edited
+    def finish(other: SourceRef, fields: Recipe) -> FinishedHouse:
+        return finished_house(other, fields, before_edits=kept)
 
-        key = _made_with(source.unedited, recipe)
-        if _BEFORE_EDITS[0] != key:
-            remember_house(source.unedited, recipe, finished_house(source.unedited, recipe))
-        house, report, dressing = _BEFORE_EDITS[1]
-        return edited(house, source, recipe.read), report, dressing
-
-    if source.kind == "plugin":
-        return _house_of_plugin(source, recipe)
-    # An object without context has no walls to close.
-    note_step(source.location, "read")
-    house = house_of_source(source, recipe.read)
-    if source.kind == "object":
-        return house, RepairReport(house_id=house.id, was_repaired=True), None
-
-    def occluder_from(some: House) -> Caster:
-        return Caster(geometry_from_house(some))
-
-    house = with_told_furnished(house, source, recipe)
-    house = furnished(house, source, recipe)
-    repaired = partial(repair, fields=recipe.repair, occluder_from=occluder_from)
-    house, report, dressing = dressed_and_repaired(house, source, recipe, repaired, tell)
-    return _before_windows(house, recipe), report, dressing
+    work = Preparation(source, recipe, tell_share, finish)
+    passes = [p for p in PASSES if p.is_needed(source, recipe)]
+    if not source.edits:
+        return _through(passes, work)
+    # Begin from the house before its edits, and do what these add.
+    bare = source.unedited
+    before = kept.get(bare, recipe)
+    if before is None:
+        before = finished_house(bare, recipe, tell_share, kept)
+        kept.keep(bare, recipe, before)
+    work = replace(work, current=before.house, report=before.report, dressing=before.dressing)
+    return _through([p for p in passes if not p.is_needed(bare, recipe)], work)
 
 
-def _before_windows(house: House, recipe: Recipe) -> House:
-    """The repaired house with what lies before its windows, where the recipe asks for it."""
-    if recipe.surroundings.kind == "none":
-        return house
-    from pbrs_farm.dress.surroundings import with_surroundings
-
-    return with_surroundings(house, recipe.surroundings.kind, recipe.seed)
+def _through(passes: Sequence[Pass], work: Preparation) -> FinishedHouse:
+    for one in passes:
+        note_step(work.source.location, one.name)
+        work = one.run(work)
+    return work.finished
 
 
-def _house_of_plugin(source: SourceRef, recipe: Recipe) -> FinishedHouse:
-    """The finished house of the Home that a plugin gives for a seed, under the source's own id."""
-    note_step(source.location, "plugin")
-    if source.dress_seed:
-        raise BadInput(source.location, "--dress", "a plugin dresses its homes itself")
-    check_unchanged(source)
-    (named,) = plugin_homes(source.location)
-    home = named.make()
-    groups = {path.partition(".")[0] for path, _value in home.settings}
-    if others := groups - {"read", "dress", "repair"}:
-        text = f"sets recipe fields of {', '.join(sorted(others))}, which belong to the run"
-        raise BadInput(source.location, "", text, hint="fields of read, dress and repair alone")
-    inner = with_settings(recipe, dict(home.settings))
-    house, report, dressing = finished_house(home.source, inner)
-    return replace(house, id=source.house_id), report, dressing
-
-
-FinishedHouse: TypeAlias = "tuple[House, RepairReport, DressReport | None]"
-
-# The last house before its edits: homes that differ in their edits alone are read once.
-_BEFORE_EDITS: tuple[str, FinishedHouse] = ("", None)  # type: ignore[assignment]
-
-
-def remember_house(source: SourceRef, recipe: Recipe, made: FinishedHouse) -> None:
-    """Keep what finished_house gives of a source without edits for those with."""
-    global _BEFORE_EDITS
-    _BEFORE_EDITS = (_made_with(source, recipe), made)
-
-
-def _made_with(source: SourceRef, recipe: Recipe) -> str:
-    return keys.digest(source, recipe.digest("read", "dress", "repair", "surroundings"))
+def repaired_house(source: SourceRef, recipe: Recipe) -> tuple[House, RepairReport]:
+    """As finished_house, without what dressing did."""
+    house, report, _dressing = finished_house(source, recipe)
+    return house, report

@@ -58,7 +58,7 @@ class _Storey:
     empty: tuple[int, ...]
 
 
-def with_rooms_furnished(house: House, catalogue: Catalogue, seed: int, style: str = "") -> House:
+def furnish_rooms(house: House, catalogue: Catalogue, seed: int, style: str = "") -> House:
     """The house with furniture in its empty rooms, the same for the same seed.
 
     Raises BadInput for a style that there is none of.

@@ -63,7 +63,7 @@ class _Fit(NamedTuple):
     misfit: float  # 0 = as it is modelled
 
 
-def has_told(house: House) -> bool:
+def has_box_only_items(house: House) -> bool:
     """Whether the source tells things by class and box alone."""
     return any(TOLD in item.tags for item in house.items)
 

@@ -20,7 +20,7 @@ from pbrs_farm.core.edits import Edit, edited_id, edits_digest
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import is_made, made_homes
-from pbrs_farm.core.plugins import is_plugin, plugin, plugin_homes, plugins
+from pbrs_farm.core.plugins import is_plugin, marks_in_digest, plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.record import Record
 from pbrs_farm.read.common.notes import Notes
@@ -308,7 +308,7 @@ def _of_plugin(word: str) -> SourceRef:
     if len(homes) != 1:
         raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
     (home,) = homes
-    sha = keys.digest(plugin("homes", home.name).mark, home.word)
+    sha = keys.digest(*marks_in_digest("homes", [home.name]), home.word)
     house_id = keys.house_id(f"{home.name}-{home.seed}", sha)
     return SourceRef(
         kind="plugin", location=home.word, house_id=house_id, sha256=sha, companions=""
@@ -325,7 +325,7 @@ def _reader_of(path: Path) -> str | None:
 def _of_reader(location: str, files: SourceFiles) -> SourceRef:
     """The source of a file that a plugin reads."""
     name, _, path = location.partition(":")
-    mark = plugin("readers", name).mark
+    (mark,) = marks_in_digest("readers", [name])
     house_id = keys.house_id(Path(path).stem, sha := _sha256(Path(path), files))
     return SourceRef(
         kind="reader", location=location, house_id=house_id, sha256=sha,

@@ -21,6 +21,7 @@ from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.prepare.finished_house import HouseBeforeEdits
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.store.object_store import Store
 
@@ -141,9 +142,13 @@ def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[s
 
 
 class HouseCache:
-    """The house this process worked on last; asking for another one lets it go."""
+    """The house this process worked on last; asking for another one lets it go.
+
+    before_edits: the last house before its edits, which outlasts the houses that are made of it.
+    """
 
     def __init__(self) -> None:
+        self.before_edits = HouseBeforeEdits()
         self._held: tuple[tuple[str, str, str, str], CachedHouse] | None = None
 
     def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:

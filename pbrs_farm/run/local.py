@@ -16,7 +16,8 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.crash_notes import note_step
-from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
+from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
+from pbrs_farm.prepare.passes import uses_catalogue
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan

@@ -18,6 +18,7 @@ from pbrs_farm.core.layers import LAYER, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.shown_text import hint_of_choice
+from pbrs_farm.prepare import passes
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "de
 STEPS: Final = {
     step.name: step
     for step in (
-        Step("house", 10, ("read", "repair", "surroundings"), per_view=False),
+        Step("house", passes.STEP_VERSION, passes.STEP_GROUPS, per_view=False),
         Step("cameras", 2, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
@@ -56,8 +57,9 @@ STEPS: Final = {
 
 
 # Every recipe group that something stored depends on (selection judges, it makes nothing).
-# A house is dressed by the group `dress` and by its own seed: both are part of its step's digest.
-PICTURE_GROUPS: Final = tuple(sorted({"dress", *(g for s in STEPS.values() for g in s.groups)}))
+PICTURE_GROUPS: Final = tuple(
+    sorted({*passes.GROUPS, *(g for s in STEPS.values() for g in s.groups)})
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,14 +17,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.edits import VERSION as EDITS_VERSION
 from pbrs_farm.core.errors import BadInput, StoreFailed
 from pbrs_farm.core.layers import LAYER, LAYERS, OPTIONAL
-from pbrs_farm.core.plugins import plugin, plugins
+from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
-from pbrs_farm.prepare.dressed_house import dressing_digest
+from pbrs_farm.prepare import passes
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
@@ -166,22 +165,19 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
 def _extra(name: str, work: Work) -> object:
     """What a step depends on beside recipe fields and other steps."""
     if name == "house":
-        source = required_source(work)
-        more = [dressing_digest(source, work.recipe), EDITS_VERSION if source.edits else ""]
-        known = [source.fingerprint, *(part for part in more if part)]
-        return known if len(known) > 1 else source.fingerprint
+        return passes.step_depends(required_source(work), work.recipe)
     if name == "truth":
-        marks = {layer: p.mark for layer, p in plugins("layers").items()}
-        known = [*work.layers, *(marks[layer] for layer in work.layers if layer in marks)]
+        others = [layer for layer in work.layers if layer in plugins("layers")]
+        known = [*work.layers, *marks_in_digest("layers", others)]
         # The albedo is that of the light, whose preset holds it to its own limit.
         # Layers whose pixels changed are made anew where a view has them.
         changed = {"albedo": f"albedo {max_albedo(work.recipe)}", "depth_sensor": "patchy noise"}
         return [*known, *(what for name, what in changed.items() if name in work.layers)]
     if name == "develop" and work.recipe.tone.pictures:
-        names = work.recipe.tone.pictures.split(":")
-        return [plugin("pictures", picture).mark for picture in names if picture]
-    if name == "cameras" and work.recipe.cameras.preset in plugins("cameras"):
-        return plugins("cameras")[work.recipe.cameras.preset].mark
+        return marks_in_digest("pictures", filter(None, work.recipe.tone.pictures.split(":")))
+    preset = work.recipe.cameras.preset
+    if name == "cameras" and preset in plugins("cameras"):
+        return marks_in_digest("cameras", [preset])[0]
     if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):
         return keys.sha256(camera_file_text(work.recipe.cameras).encode())
     return None

@@ -77,7 +77,9 @@ def _house(work: Work) -> StepOutput:
 
     # The submitted id has the source's digest: another one means another file at that place.
     source = required_source(work)
-    repaired, report, dressing = finished_house(source, work.recipe, work.tell_share)
+    repaired, report, dressing = finished_house(
+        source, work.recipe, work.tell_share, work.house_cache.before_edits
+    )
     if repaired.id != work.house_id:
         raise BadInput(source.location, repaired.id, f"expected house {work.house_id}")
     glb, description = bundle_from_house(repaired)

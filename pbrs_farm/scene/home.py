@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.scene.models import Model
-from pbrs_farm.scene.rendering import RENDERER
+from pbrs_farm.scene.rendering import Renderer
 from pbrs_farm.scene.viewpoints import Viewpoint, Viewpoints, viewpoint_of
 from pbrs_farm.transport.scene_tables.scene_tables import rgb_from_kelvin
 
@@ -75,6 +75,9 @@ class Home:
     base: Recipe
     settings: tuple[tuple[str, Any], ...] = ()  # recipe fields that this home overrides
 
+    renderer: ClassVar[Renderer] = Renderer()
+    """Of this process, for all homes: Mitsuba, Dr.Jit and OpenGL keep state a process."""
+
     @property
     def id(self) -> str:
         """Names the home in folders, tables and seeds.
@@ -102,7 +105,7 @@ class Home:
             >>> len(home.house.rooms) == len(home.rooms)
             True
         """
-        return RENDERER.house(self.source, self.recipe).house
+        return self.renderer.house(self.source, self.recipe).house
 
     @property
     def report(self) -> RepairReport:
@@ -111,7 +114,7 @@ class Home:
         >>> type(home.report).__name__
         'RepairReport'
         """
-        return RENDERER.house(self.source, self.recipe).report
+        return self.renderer.house(self.source, self.recipe).report
 
     @property
     def rooms(self) -> Rooms:
@@ -255,7 +258,7 @@ class Home:
             matrix = upright_at(model, np.asarray(at, np.float64), 0.0)
         else:
             house, supports = self.house, self._supports_named(on)
-            matrix = RENDERER.call(lambda: free_pose(house, model, supports, seed))
+            matrix = self.renderer.call(lambda: free_pose(house, model, supports, seed))
         return self._edited(self._placing(model, matrix, name))
 
     def scatter(
@@ -290,7 +293,7 @@ class Home:
         supports = self._supports(in_) if on is None else self._supports_named(on)
         house = self.house
         edits: list[PlaceModel] = []
-        for model, matrix in RENDERER.call(lambda: poses(house, models, n, supports, seed)):
+        for model, matrix in self.renderer.call(lambda: poses(house, models, n, supports, seed)):
             edits.append(self._placing(model, matrix, "", taken=[edit.item for edit in edits]))
         return self._edited(*edits)
 
@@ -447,7 +450,7 @@ class Home:
             scale = edge_px / max(width, height)
             size = max(1, round(scale * width)), max(1, round(scale * height))
             small.append(camera.with_size(*size))
-        return RENDERER.sketches(self.source, self.recipe, small)
+        return self.renderer.sketches(self.source, self.recipe, small)
 
     def cameras(
         self, preset: Literal["photo", "paper", "released"] | None = None, n: int = 0, **fields: Any
@@ -461,7 +464,7 @@ class Home:
         """
         told = {"preset": preset, **fields} if preset is not None else fields
         home = self.set(**{f"cameras.{name}": value for name, value in told.items()})
-        data = RENDERER.sampled(self.source, home.recipe)
+        data = self.renderer.sampled(self.source, home.recipe)
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
         chosen = plan.chosen_views(rows, n, home.recipe)
@@ -502,7 +505,7 @@ class Home:
         if not found:
             raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
         house, intrinsics = self.house, intrinsics_from_k(size, K, hfov_deg)
-        cameras = RENDERER.call(
+        cameras = self.renderer.call(
             lambda: cameras_around(
                 house, found, n, distance_m=distance_m, elevation_deg=elevation_deg,
                 min_visible=min_visible, intrinsics=intrinsics, seed=seed,

@@ -19,7 +19,6 @@ from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.sample.stored_cameras import OUTSIDE
 from pbrs_farm.scene.home import Home, recipe_of
-from pbrs_farm.scene.rendering import RENDERER
 from pbrs_farm.scene.viewpoints import Viewpoint
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame, Views
@@ -81,7 +80,7 @@ def render(
     recipe = _recipe_of_view(home, found, size)
     want = _wanted(modes, layers)
     with _told(home, found, observe, progress) as tell:
-        frames = RENDERER.frames(home.source, recipe, found, want, tell)
+        frames = home.renderer.frames(home.source, recipe, found, want, tell)
     return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
 
 

@@ -12,7 +12,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
@@ -21,14 +21,13 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.prepare.apply_edits import edited
-from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
-from pbrs_farm.prepare.finished_house import remember_house
+from pbrs_farm.prepare.apply_edits import apply_edits
+from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
+from pbrs_farm.prepare.passes import FinishedHouse, cache_key, uses_catalogue
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
@@ -40,18 +39,10 @@ from pbrs_farm.views.stored_root import StoredRoot
 from pbrs_farm.views.views import ViewRef, Views
 
 if TYPE_CHECKING:
-    from pbrs_farm.repair import RepairReport
+    pass
 
 _N_HOMES: Final = 4  # whose houses and steps are kept
 _T = TypeVar("_T")
-
-
-@dataclass(frozen=True, slots=True)
-class FinishedHouse:
-    """A home's finished house, as the step `house` made it."""
-
-    house: House
-    report: RepairReport
 
 
 class Renderer:
@@ -59,26 +50,27 @@ class Renderer:
 
     def __init__(self) -> None:
         self._pid = os.getpid()
+        os.register_at_fork(after_in_child=self._begin_in_child)
         self._lock = threading.Lock()
         self._thread: ThreadPoolExecutor | None = None
         self._ident = 0  # of that thread
         self._stop = threading.Event()
         self._stores: OrderedDict[tuple[str, str], MemoryStore] = OrderedDict()
-        self._made: OrderedDict[str, FinishedHouse] = OrderedDict()
+        self._finished: OrderedDict[str, FinishedHouse] = OrderedDict()
         self._houses = HouseCache()
 
     def house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
         """The house of a source, read, dressed, repaired and edited; those of the last homes are kept."""
-        key = keys.digest(source, recipe.digest("read", "dress", "repair", "surroundings"))
+        key = cache_key(source, recipe)
         with self._lock:
-            made = self._made.get(key)
+            made = self._finished.get(key)
         if made is None:
             made = self.call(lambda: self._house(source, recipe))
         with self._lock:
-            self._made[key] = made
-            self._made.move_to_end(key)
-            while len(self._made) > _N_HOMES:
-                self._made.popitem(last=False)
+            self._finished[key] = made
+            self._finished.move_to_end(key)
+            while len(self._finished) > _N_HOMES:
+                self._finished.popitem(last=False)
         return made
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
@@ -103,7 +95,8 @@ class Renderer:
         if self._thread is not None:
             self.call(self._houses.clear)
         self._stores.clear()
-        self._made.clear()
+        self._finished.clear()
+        self._houses.before_edits.clear()
 
     def call(self, task: Callable[[], _T]) -> _T:
         """What a task gives, done in the thread that works: rays and pictures have their state there."""
@@ -124,6 +117,11 @@ class Renderer:
             # Ctrl-C: the step under way ends, no other begins.
             stop.set()
             raise
+
+    def _begin_in_child(self) -> None:
+        # A forked child has no thread of its parent's; before one is begun it may begin its own.
+        if self._thread is None:
+            self._pid = os.getpid()
 
     def _begin_task(self, task: Callable[[], _T], stop: threading.Event) -> _T:
         self._stop = stop
@@ -154,7 +152,7 @@ class Renderer:
         if source.edits:
             # On the house before them, without a step: that is done when it is rendered.
             before = self.house(source.unedited, recipe)
-            return FinishedHouse(edited(before.house, source, recipe.read), before.report)
+            return before._replace(house=apply_edits(before.house, source, recipe.read))
         return self._unedited(source, recipe)
 
     def _unedited(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
@@ -169,8 +167,9 @@ class Renderer:
         dress_key = key(source.house_id, keys.DRESS)
         is_dressed = work.store.head(dress_key) is not None
         dressing = DressReport.model_validate_json(get(dress_key)) if is_dressed else None
-        remember_house(source, recipe, (house, report, dressing))
-        return FinishedHouse(house, report)
+        finished = FinishedHouse(house, report, dressing)
+        self._houses.before_edits.keep(source, recipe, finished)
+        return finished
 
     def _cached(self, work: Work) -> CachedHouse:
         digest = run_step("house", work).marker.digest
@@ -242,16 +241,3 @@ def _copy_steps(of: Store, to: Store, house: str, view: str, steps: Iterable[str
     """Copy what steps of a view have made, those that are done."""
     for step in steps:
         copy_done(of, to, keys.marker_key(house, step, view))
-
-
-RENDERER: Final = Renderer()
-"""This process's."""
-
-
-def _forget_in_child() -> None:
-    # A forked child has no thread of it; one that has not rendered yet may begin anew.
-    if RENDERER._thread is None:
-        RENDERER._pid = os.getpid()
-
-
-os.register_at_fork(after_in_child=_forget_in_child)

@@ -16,8 +16,8 @@ from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.generate.made import made
 from pbrs_farm.geometry.solids import box_quads, quads_surface
-from pbrs_farm.prepare.dressed_house import dressing_digest, uses_catalogue
-from pbrs_farm.prepare.furnish_rooms import with_rooms_furnished
+from pbrs_farm.prepare.furnish_rooms import furnish_rooms
+from pbrs_farm.prepare.passes import step_depends, uses_catalogue
 from pbrs_farm.read.source import resolve
 from pbrs_farm.read.sweethome3d import read_home
 from tests.generate.furnish.shelves import plain_catalogue
@@ -65,7 +65,7 @@ def turned(house: House, angle: float) -> House:
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_every_room_gets_what_it_must_have_inside_its_outline(angle: float) -> None:
     house = turned(empty_house(), angle)
-    furnished = with_rooms_furnished(house, boxes(), 1)
+    furnished = furnish_rooms(house, boxes(), 1)
     added = furnished.items[len(house.items) :]
     has = {room.name: {i.name for i in added if i.room_id == room.id} for room in house.rooms}
     assert {"sink", "fridge", "cooker"} <= has["Kitchen"]
@@ -78,8 +78,8 @@ def test_every_room_gets_what_it_must_have_inside_its_outline(angle: float) -> N
 
 
 def test_a_room_that_has_furniture_keeps_it_and_gets_none() -> None:
-    once = with_rooms_furnished(empty_house(), boxes(), 1)
-    again = with_rooms_furnished(once, boxes(), 2)
+    once = furnish_rooms(empty_house(), boxes(), 1)
+    again = furnish_rooms(once, boxes(), 2)
     rooms = [r for r in once.rooms if {"bed", "sofa", "sink"} & names_in(once, r.id)]
     assert rooms
     assert all(names_in(again, r.id) == names_in(once, r.id) for r in rooms)
@@ -95,7 +95,7 @@ def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
         replace(r, name="Office", types=("Office",)) if r.name == "Kitchen" else r
         for r in house.rooms
     )
-    furnished = with_rooms_furnished(replace(house, rooms=rooms), boxes(), 1)
+    furnished = furnish_rooms(replace(house, rooms=rooms), boxes(), 1)
     notes = [n for n in furnished.notes[len(house.notes) :] if "Office" in n.text]
     assert [n.kind for n in notes] == ["not-furnished"]
     assert not any("sink" in i.name for i in furnished.items)
@@ -103,7 +103,7 @@ def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
 
 def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:
     bounds = [
-        np.concatenate([i.bounds for i in with_rooms_furnished(empty_house(), boxes(), s).items])
+        np.concatenate([i.bounds for i in furnish_rooms(empty_house(), boxes(), s).items])
         for s in (1, 1, 2)
     ]
     assert np.array_equal(bounds[0], bounds[1])
@@ -114,8 +114,8 @@ def test_furnishing_is_part_of_the_house_steps_digest() -> None:
     source = resolve(HOME.word)
     plain = recipe_from_name("fast", {"dress.catalogue": '"generated"'})
     asked = recipe_from_name("fast", {"dress.catalogue": '"generated"', "dress.furnish": "empty"})
-    assert dressing_digest(source, plain) == ""
-    assert dressing_digest(source, asked) != ""
+    assert step_depends(source, plain) == source.fingerprint
+    assert step_depends(source, asked) != source.fingerprint
     assert (uses_catalogue(source, plain), uses_catalogue(source, asked)) == (False, True)
     assert plain.digest("dress") == recipe_from_name(
         "preview", {"dress.catalogue": '"generated"'}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.prepare.dress_catalogue import house_of_source
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.read_source import house_of_source
 from pbrs_farm.read.source import resolve, variants
 
 BARE = ",furniture=none"  # the package need not be there

@@ -12,8 +12,8 @@ from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.generate.plans.plan_files import plan_from_file
-from pbrs_farm.prepare.dress_catalogue import house_of_source
 from pbrs_farm.prepare.plan_house import made_of_file
+from pbrs_farm.prepare.read_source import house_of_source
 from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.source import SourceRef, home_id, read_house, resolve

@@ -14,7 +14,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Material
 from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
 from pbrs_farm.generate.made import made_of_plan
 from pbrs_farm.geometry.solids import box_quads, quads_surface
-from pbrs_farm.prepare.stand_ins import STAND_IN, has_told, with_stand_ins
+from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.sweethome3d import read_home
 
@@ -169,7 +169,7 @@ def test_nothing_reaches_through_the_ceiling() -> None:
 def test_the_recipe_may_ask_for_boxes_or_for_nothing(how: str, expected: int) -> None:
     house = stood(told("bed", (2.5, 0.4, 2.0), (1.6, 0.8, 2.1)), how=how)
     assert sum("piece:box" in i.tags for i in house.items) == expected
-    assert not has_told(house)
+    assert not has_box_only_items(house)
     assert [n.kind for n in house.notes] == ["told-left-out"] * (how == "none")
 
 

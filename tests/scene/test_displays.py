@@ -11,7 +11,6 @@ import pytest
 
 import pbrs_farm as pf
 from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.scene.rendering import RENDERER
 from pbrs_farm.views.views import Views
 from tests.scene.homes import small_home
 
@@ -69,7 +68,7 @@ def test_viewpoints_show_where_they_are_without_opengl(
         raise MachineFailed("no OpenGL <here>")
 
     cameras = home.cameras(n=2)
-    monkeypatch.setattr(RENDERER, "sketches", fail)
+    monkeypatch.setattr(home.renderer, "sketches", fail)
     page = cameras._repr_html_()
     assert "no OpenGL &lt;here&gt;" in page
     assert "Living room" in page

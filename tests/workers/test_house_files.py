@@ -114,7 +114,7 @@ def test_made_homes_put_no_file_into_the_store(cache: Path):
 
 def test_a_worker_makes_the_home_that_was_submitted(cache: Path, tmp_path: Path):
     from pbrs_farm.core.recipe import Recipe
-    from pbrs_farm.prepare.dress_catalogue import house_of_source
+    from pbrs_farm.prepare.read_source import house_of_source
 
     ((entry, ref),) = entries_from_arguments(["made:2,furniture=none"])
     here = house_of_source(ref, Recipe().read)

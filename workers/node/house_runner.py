@@ -20,7 +20,8 @@ from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
 from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.formats.marker import read_marker
-from pbrs_farm.prepare.dressed_house import fetch_catalogue, uses_catalogue
+from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
+from pbrs_farm.prepare.passes import uses_catalogue
 from pbrs_farm.read.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import dressing_rows, write_attribution_of

@@ -13,7 +13,7 @@ from pbrs_farm.core.catalogue import EMPTY, Place
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import House, Item, ItemKind, Material, Surface
 from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
-from pbrs_farm.core.recipe import RepairFields, recipe_from_name
+from pbrs_farm.core.recipe import Recipe, RepairFields, with_settings
 from pbrs_farm.dress import dressing
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.dressing import Dressed, kept_in
@@ -23,7 +23,8 @@ from pbrs_farm.dress.things.assembly import hung
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
-from pbrs_farm.prepare.dressed_house import dressed_and_repaired
+from pbrs_farm.prepare.finished_house import finished_house
+from pbrs_farm.prepare.passes import PASS, Preparation
 from pbrs_farm.read.source import resolve
 from pbrs_farm.repair import repair
 from tests.repair.wall_rooms import Rect, covers, house, room, walls_around
@@ -118,10 +119,11 @@ def test_a_run_measures_the_gates_on_the_repaired_house(monkeypatch: pytest.Monk
     made = _with_sockets(_overlapping_walls())
     monkeypatch.setattr(dressing, "dressed_house", lambda *_: made)
     source = resolve("builtin").model_copy(update={"dress_seed": 1})
-    recipe = recipe_from_name("fast", {"dress.catalogue": "generated"})
-    finished, _repairs, report = dressed_and_repaired(
-        made.house, source, recipe, lambda some: repair(some, RepairFields(fallback_light=False))
+    recipe = with_settings(
+        Recipe(), {"dress.catalogue": "generated", "repair.fallback_light": False}
     )
+    work = Preparation(source, recipe, lambda _share: None, finished_house, made.house)
+    finished, _repairs, report = PASS["repair"].run(PASS["dress"].run(work)).finished
     assert report is not None
     assert report.moved_after_repair == 2
     assert (

@@ -1,0 +1,298 @@
+"""The passes that make a finished house of a source: a table of what each does, when and by what.
+
+    read -> stand-ins -> furnish -> dress -> repair -> surroundings -> edits
+
+The table is the only list of passes: finished_house.py calls them in its order; the digest of the step
+`house`, the versions by which workers know each other and the keys of caches are made from it.
+Effects: those of the passes, which read files and the cached packages and write nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
+from pbrs_farm.core.plugins import marks_in_digest
+from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.prepare.dress_catalogue import catalogue_of
+from pbrs_farm.read.source import SourceRef
+
+if TYPE_CHECKING:
+    from pbrs_farm.dress.dressing import Dressed
+    from pbrs_farm.dress.report import DressReport
+    from pbrs_farm.repair import RepairReport
+
+_MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
+_DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
+
+FORMATS_WITH_BOX_ONLY_ITEMS: Final = frozenset({"plan", "scenestate", "front3d", "habitat"})
+"""Kinds of sources that may describe a thing by its class and box alone."""
+
+
+class FinishedHouse(NamedTuple):
+    """What comes of a source: the house, what repair did, and what dressing did, None: not dressed."""
+
+    house: House
+    report: RepairReport
+    dressing: DressReport | None
+
+
+@dataclass(frozen=True, slots=True)
+class Preparation:
+    """A source on its way through the passes; each pass gives it on with what it has made."""
+
+    source: SourceRef
+    recipe: Recipe
+    tell_share: Callable[[float], None]  # called with the share done of dressing and repair
+    finish: Callable[[SourceRef, Recipe], FinishedHouse]  # the house of another source
+    current: House | None = None
+    report: RepairReport | None = None
+    dressed: Dressed | None = None
+    dressing: DressReport | None = None
+
+    @property
+    def house(self) -> House:
+        """The house as the last pass gave it; the first pass has none yet."""
+        assert self.current is not None
+        return self.current
+
+    @property
+    def finished(self) -> FinishedHouse:
+        """What the last pass leaves."""
+        assert self.report is not None
+        return FinishedHouse(self.house, self.report, self.dressing)
+
+
+_IsNeeded: TypeAlias = Callable[[SourceRef, Recipe], bool]
+_Depends: TypeAlias = Callable[[SourceRef, Recipe], Sequence[object]]
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """One pass of a house.
+
+    version: raised when the pass makes another house of the same input; all that was made with the
+    former one is made anew. groups: the recipe groups it reads. depends: what else its result
+    follows from, as JSON knows it; None for a pass that depends on its groups alone.
+    """
+
+    name: str
+    version: int
+    groups: tuple[str, ...]
+    run: Callable[[Preparation], Preparation]
+    is_needed: _IsNeeded
+    depends: _Depends | None = None
+
+
+def dress_seed(source: SourceRef, recipe: Recipe) -> int:
+    """The seed a source is dressed by: its own, else the recipe's; 0 = it is not dressed."""
+    if source.kind == "object":
+        return 0
+    return source.dress_seed or recipe.dress.seed
+
+
+def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
+    """Whether a source's house takes anything from the catalogue of furniture."""
+    stands_in = _has_stand_ins(source, recipe) and recipe.read.stand_ins == "pieces"
+    return stands_in or _is_furnished(source, recipe) or bool(dress_seed(source, recipe))
+
+
+def _is_home(source: SourceRef, _recipe: Recipe) -> bool:
+    # An object without context has no walls to close; a plugin gives its homes finished.
+    return source.kind not in ("object", "plugin")
+
+
+def _has_stand_ins(source: SourceRef, _recipe: Recipe) -> bool:
+    return source.kind in FORMATS_WITH_BOX_ONLY_ITEMS
+
+
+def _is_furnished(source: SourceRef, recipe: Recipe) -> bool:
+    return _is_home(source, recipe) and recipe.dress.furnish != "none"
+
+
+def _is_dressed(source: SourceRef, recipe: Recipe) -> bool:
+    return _is_home(source, recipe) and bool(dress_seed(source, recipe))
+
+
+def _stand_ins_depend(_source: SourceRef, recipe: Recipe) -> list[object]:
+    how = recipe.read.stand_ins
+    return [catalogue_of(recipe.dress).digest if how == "pieces" else ""]
+
+
+def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    # Where the libraries lie is no matter: their content is.
+    fields = recipe.dress.model_dump(
+        mode="json", exclude={"seed", "catalogue", "furnish", "passes"}
+    )
+    return [dress_seed(source, recipe), fields, catalogue_of(recipe.dress).digest]
+
+
+def _read(work: Preparation) -> Preparation:
+    """The house as its source gives it; of an object and of a plugin's home that is all there is."""
+    from pbrs_farm.prepare.read_source import house_of_plugin, house_of_source
+    from pbrs_farm.repair import RepairReport
+
+    source, recipe = work.source, work.recipe
+    if source.kind == "plugin":
+        plugins_own = house_of_plugin(source, recipe, work.finish)
+        return replace(
+            work,
+            current=plugins_own.house,
+            report=plugins_own.report,
+            dressing=plugins_own.dressing,
+        )
+    house = house_of_source(source, recipe.read)
+    # An object without context has no walls to close.
+    is_whole = source.kind == "object"
+    report = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None
+    return replace(work, current=house, report=report)
+
+
+def _stand_in(work: Preparation) -> Preparation:
+    """Furniture for the things that the source describes by class and box alone."""
+    from pbrs_farm.prepare.stand_ins import has_box_only_items, with_stand_ins
+
+    if not has_box_only_items(work.house):
+        return work
+    how = work.recipe.read.stand_ins
+    catalogue = catalogue_of(work.recipe.dress) if how == "pieces" else EMPTY
+    return replace(work, current=with_stand_ins(work.house, catalogue, how))
+
+
+def _furnish(work: Preparation) -> Preparation:
+    """Furniture in rooms that are empty, drawn by the seed of dressing."""
+    from pbrs_farm.prepare.furnish_rooms import furnish_rooms
+
+    catalogue, seed = catalogue_of(work.recipe.dress), dress_seed(work.source, work.recipe)
+    return replace(work, current=furnish_rooms(work.house, catalogue, seed))
+
+
+def _dress(work: Preparation) -> Preparation:
+    """Surfaces, parts, lamps, textiles and small things, drawn by the source's seed.
+
+    Raises BadRecipe for an unknown style, BadInput for a library that is none, MachineFailed where
+    the furniture package cannot be had.
+    """
+    from pbrs_farm.dress.dressing import dressed_house
+    from pbrs_farm.repair.repair_house import with_rooms_closed, without_persons_and_plants
+
+    fields = work.recipe.repair
+    # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.
+    bare, _removed = without_persons_and_plants(work.house, fields)
+    bare = with_rooms_closed(bare, fields)
+    dressed = dressed_house(
+        bare, catalogue_of(work.recipe.dress), work.recipe.dress,
+        dress_seed(work.source, work.recipe), lambda share: work.tell_share(_DRESS_SHARE * share),
+    )  # fmt: skip
+    return replace(work, current=dressed.house, dressed=dressed)
+
+
+def _repair(work: Preparation) -> Preparation:
+    """Walls closed, openings cut, lamps found; what dressing hung on a wall that is lost, hung anew.
+
+    The gates of dressing hold for the house as it is rendered: what loses its wall to repair is
+    hung on the wall that is left or taken out, and the house is repaired again without it.
+    """
+    from pbrs_farm.dress.dressing import kept_in
+    from pbrs_farm.raycast.caster import Caster
+    from pbrs_farm.repair import repair
+
+    def occluder_from(some: House) -> Caster:
+        return Caster(geometry_from_house(some))
+
+    repaired = partial(repair, fields=work.recipe.repair, occluder_from=occluder_from)
+    dressed = work.dressed
+    if dressed is None:
+        house, report = repaired(work.house)
+        return replace(work, current=house, report=report)
+    for k in range(_MAX_ROUNDS):
+        work.tell_share(_DRESS_SHARE + (1 - _DRESS_SHARE) * k / _MAX_ROUNDS)
+        house, report = repaired(dressed.house)
+        kept = kept_in(house, dressed, catalogue_of(work.recipe.dress))
+        if kept is dressed:
+            break
+        dressed = kept
+    else:
+        house, report = repaired(dressed.house)
+    return replace(work, current=house, report=report, dressing=dressed.report)
+
+
+def _surround(work: Preparation) -> Preparation:
+    """Streets, gardens and courts before the windows, seen by camera and mirrors alone."""
+    from pbrs_farm.dress.surroundings import with_surroundings
+
+    recipe = work.recipe
+    return replace(
+        work, current=with_surroundings(work.house, recipe.surroundings.kind, recipe.seed)
+    )
+
+
+def _edit(work: Preparation) -> Preparation:
+    """The source's edits, in their order."""
+    from pbrs_farm.prepare.apply_edits import apply_edits
+
+    return replace(work, current=apply_edits(work.house, work.source, work.recipe.read))
+
+
+PASSES: Final = (
+    Pass("read", 5, ("read",), _read, lambda _source, _recipe: True),
+    Pass("stand-ins", 1, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
+    Pass(
+        "furnish", GENERATE_VERSION, ("dress",), _furnish,
+        _is_furnished, _dress_depends,
+    ),
+    Pass("dress", 19, ("dress",), _dress, _is_dressed, _dress_depends),
+    Pass("repair", 4, ("repair",), _repair, _is_home),
+    Pass(
+        "surroundings", 1, ("surroundings",), _surround,
+        lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
+    ),
+    Pass("edits", 1, (), _edit, lambda source, _recipe: bool(source.edits), lambda _source, _recipe: []),
+)  # fmt: skip
+
+PASS: Final = {p.name: p for p in PASSES}
+_OF_EVERY_HOUSE: Final = tuple(p for p in PASSES if p.depends is None)
+
+STEP_VERSION: Final = sum(p.version for p in _OF_EVERY_HOUSE)
+"""Of the step `house`: raised with the version of any pass that every house goes through."""
+
+STEP_GROUPS: Final = tuple(group for p in _OF_EVERY_HOUSE for group in p.groups)
+"""The recipe groups of the step `house`; those of other passes are in step_depends where they are used."""
+
+GROUPS: Final = tuple(dict.fromkeys(group for p in PASSES for group in p.groups))
+"""Every recipe group that a finished house may depend on."""
+
+
+def versions_of_passes() -> dict[str, int]:
+    """Pass -> version: installations of equal versions make the same house of the same source."""
+    return {p.name: p.version for p in PASSES}
+
+
+def cache_key(source: SourceRef, recipe: Recipe) -> str:
+    """Equal for equal finished houses: of a source, with its edits, and the fields that passes read."""
+    return keys.digest(source, recipe.digest(*GROUPS))
+
+
+def step_depends(source: SourceRef, recipe: Recipe) -> object:
+    """What the step `house` depends on beside STEP_GROUPS, for its digest: files, dressing, edits."""
+    known: list[Any] = [source.fingerprint]
+    # Dressing and furnishing share fields and catalogue.
+    parts: list[object] = []
+    is_furnished = recipe.dress.furnish != "none" and source.kind != "object"
+    if dress_seed(source, recipe) or is_furnished:
+        parts += [PASS["dress"].version, *_dress_depends(source, recipe)]
+        parts += ["furnish", GENERATE_VERSION] if is_furnished else []
+    if _has_stand_ins(source, recipe):
+        stand_ins = PASS["stand-ins"]
+        parts += [stand_ins.name, stand_ins.version, *_stand_ins_depend(source, recipe)]
+    if dress_seed(source, recipe) or is_furnished:
+        parts += marks_in_digest("passes", filter(None, recipe.dress.passes.split(":")))
+    known += [keys.digest(*parts)] if parts else []
+    known += [PASS["edits"].version] if source.edits else []
+    return known if len(known) > 1 else source.fingerprint

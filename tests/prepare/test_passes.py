@@ -1,0 +1,82 @@
+"""The table of passes: what it says of order, groups and versions is what is done."""
+
+from __future__ import annotations
+
+import pytest
+
+from pbrs_farm.core.edits import RemoveItems
+from pbrs_farm.core.recipe import Recipe, field_paths, with_settings
+from pbrs_farm.prepare import finished_house as finishing
+from pbrs_farm.prepare.finished_house import HouseBeforeEdits, finished_house
+from pbrs_farm.prepare.passes import GROUPS, PASS, PASSES, cache_key
+from pbrs_farm.read.source import SourceRef, resolve, variants
+from pbrs_farm.run import plan
+from workers.job import work_version
+
+
+def names_of(source: SourceRef, recipe: Recipe) -> list[str]:
+    return [p.name for p in PASSES if p.is_needed(source, recipe)]
+
+
+def test_a_home_goes_through_the_passes_that_it_needs() -> None:
+    source, recipe = resolve("builtin"), Recipe()
+    assert names_of(source, recipe) == ["read", "repair"]
+    edited = variants(source, [3])[0].edited(RemoveItems(items=("sofa",)))
+    full = with_settings(recipe, {"dress.furnish": "empty", "surroundings.kind": "drawn"})
+    every = ["read", "furnish", "dress", "repair", "surroundings", "edits"]
+    assert names_of(edited, full) == every
+    plan_of_others = source.model_copy(update={"kind": "plan"})
+    assert names_of(plan_of_others, recipe) == ["read", "stand-ins", "repair"]
+
+
+@pytest.mark.parametrize("kind", ["object", "plugin"])
+def test_an_object_and_a_home_of_a_plugin_are_only_read(kind: str) -> None:
+    source = resolve("builtin").model_copy(update={"kind": kind})
+    full = with_settings(Recipe(), {"dress.seed": 2, "dress.furnish": "empty"})
+    assert names_of(source, full) == ["read"]
+
+
+def test_the_key_of_a_cache_differs_with_every_field_that_a_pass_reads() -> None:
+    source, recipe = resolve("builtin"), Recipe()
+    held = cache_key(source, recipe)
+    assert cache_key(source, with_settings(recipe, {"light.spp": 7})) == held
+    changes = {"read.strict": True, "dress.mess": 0.9, "repair.add_ceilings": True}
+    changes |= {"surroundings.kind": "drawn"}
+    assert {path.partition(".")[0] for path in changes} == set(GROUPS)
+    assert set(changes) <= set(field_paths())
+    for path, value in changes.items():
+        assert cache_key(source, with_settings(recipe, {path: value})) != held, path
+
+
+def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:
+    assert set(GROUPS) <= set(plan.PICTURE_GROUPS)
+    assert set(plan.STEPS["house"].groups) <= set(GROUPS)
+
+
+def test_workers_of_other_passes_are_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    held = work_version.__wrapped__()
+    assert work_version.__wrapped__() == held
+    versions = {name: one.version for name, one in PASS.items()}
+    for name in versions:
+        raised = versions | {name: versions[name] + 1}
+        monkeypatch.setattr("pbrs_farm.prepare.passes.versions_of_passes", lambda r=raised: r)
+        assert work_version.__wrapped__() != held, name
+
+
+def test_homes_that_differ_in_edits_alone_are_prepared_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun: list[str] = []
+    monkeypatch.setattr(finishing, "note_step", lambda _file, step: begun.append(step))
+    source, recipe, kept = resolve("builtin"), Recipe(), HouseBeforeEdits()
+    house = finished_house(source, recipe).house
+    removed = [item.id for item in house.items][:2]
+    edited = [source.edited(RemoveItems(items=(item,))) for item in removed]
+    begun.clear()
+    for one in edited:
+        made = finished_house(one, recipe, before_edits=kept).house
+        assert made.id == one.house_id
+        assert len(made.items) == len(house.items) - 1
+    assert begun == ["read", "repair", "edits", "edits"]
+    kept.clear()
+    assert kept.get(source, recipe) is None
