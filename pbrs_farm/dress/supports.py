@@ -1,11 +1,13 @@
-"""The surfaces of a piece of furniture that things can stand on, and how much is free above them.
+"""Where things can stand: the level tops of furniture and the floors of rooms, and what is free above them.
 
 Works on raw meshes: open, thin, wound either way. Nothing is decided by boxes; no effects.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +22,32 @@ from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 CELL_M = 0.01
 LEAST_AREA_M2 = 0.02
-LEAST_FREE_M = 0.12
-MOST_FREE_M = 3.0  # what is higher above a support is nobody's business
+LEAST_FREE_M = 0.12  # lower spaces hold nothing
+MOST_FREE_M = 3.0  # clearance is capped at this height
 _LEAST_NORMAL_Y = 0.95
 _FLAT_M = 0.0006  # heights of one support differ by less
-_BORDER = 5  # cells of the grid around a support
-_NEAR_M = 0.003  # a face of another thing this near to the support's height lies on it
-_LEVEL_M = 0.0002  # its own face this near belongs to it; a higher one is a board beside it
-_OPEN_SHARE = 0.5  # of a side's length
+_BORDER_M = 0.05  # of the grid around a support
+_NEAR_M = 0.003  # a face of another thing less than this below a support lies on it
+_LEVEL_M = (
+    0.0002  # furniture's own face counts as the support up to here; a higher one is an obstacle
+)
+_OPEN_SHARE = 0.5  # a side is open where this share of its length is
 _OUT_OF_REACH_M = 2.35  # above the floor
-_RIM_M = 0.03  # that a bowl's rim rises above its bottom
-_RIM_WITHIN_M = 0.16  # beyond the edge of the bottom
+_RIM_M = 0.03  # a bowl's rim rises at least this much above its bottom
+_RIM_WITHIN_M = 0.16  # a rim is looked for this far beyond the edge of the bottom
+_FLOOR_CELL_M = 0.02
+_FLOOR_M = 0.004  # a floor's faces are within this of the room's floor_y
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Support:
-    """A flat surface that things can stand on. Its grid's +z points to the side it is used from."""
+    """A flat surface that things can stand on. Its grid's +z points to the side it is used from.
 
-    item: int  # index of the furniture
+    One level of a piece of furniture may give several supports: a worktop with a sink in it has two.
+    `dress.worktop.Worktop` says where on a support a thing of a size fits.
+    """
+
+    item: int  # index of the furniture; FLOOR: the room's floor
     room_id: str
     height: float  # world y of its highest point
     above_floor: float  # metres
@@ -53,25 +63,66 @@ class Support:
         return float(self.mask.sum()) * self.grid.cell_m**2
 
 
-def supports_of_item(scene: SceneTriangles, index: int, room: Room) -> list[Support]:
-    """The supports of items[index] that lie in the room, from low to high."""
+FLOOR = -1
+
+
+def supports_of_item(
+    scene: SceneTriangles, index: int, room: Room, *, border_m: float = _BORDER_M
+) -> list[Support]:
+    """The level tops and inner shelves of scene.items[index] that lie in the room, from low to high.
+
+    A support is level, has LEAST_AREA_M2 in one piece with LEAST_FREE_M above it, and lies between
+    4 cm above the floor and 2.35 m. The insides of closed bodies and the bottoms of bowls and sinks
+    are left out. border_m: how far around a support its grid says what is free, too. Empty where
+    nothing of the item is level.
+
+        scene = SceneTriangles(house.items)
+        heights = [s.height for s in supports_of_item(scene, 3, room)]  # world y, metres
+    """
     item, corners = scene.items[index], scene.of_item(index)
     level = np.abs(unit_normals(corners)[:, 1]) > _LEAST_NORMAL_Y
     groups = _levels(corners[level], room)
     if not groups:
         return []
     plan = corners.reshape(-1, 3)[:, [0, 2]]
-    grid = PlanGrid.around(plan, plan_turn(item, corners.reshape(-1, 3)), CELL_M, _BORDER * CELL_M)
+    grid = PlanGrid.around(plan, plan_turn(item, corners.reshape(-1, 3)), CELL_M, border_m)
     # See everything around from above once, for all its levels.
-    around = surroundings(scene, index, grid, float(groups[0][..., 1].max()))
+    around = faces_around(scene, [index], grid, float(groups[0][..., 1].max()))
     centres = grid.centres()
     indoors = contains_xy(Polygon(room.polygon), centres[..., 0], centres[..., 1])
     found = []
-    free = indoors & ~around.solid
+    free, border = indoors & ~around.solid, round(border_m / CELL_M)
     for group, cover in zip(groups, covered_by_each(grid, groups), strict=True):
-        mask = cover & free
-        found += _supports_at(around, mask, float(group[..., 1].max()), room, item.box is not None)
+        found_level = _Level(index, cover & free, float(group[..., 1].max()), item.box is not None)
+        found += _supports_of_level(around, found_level, room, border)
     return found
+
+
+def floor_support(
+    scene: SceneTriangles, room: Room, *, border_m: float = _BORDER_M
+) -> Support | None:
+    """What is free of a room's floor, as one support; None where no face lies at its floor_y.
+
+    Rugs and whatever else lies on it are obstacles. border_m: as of supports_of_item.
+    """
+    corners = np.insert(np.asarray(room.polygon, np.float64), 1, room.floor_y, axis=1)
+    grid = PlanGrid.around(room.polygon, _turn_of_outline(corners), _FLOOR_CELL_M, border_m)
+    off, kinds = np.array([0.0, _FLOOR_M, 0.0]), (ItemKind.FLOOR, ItemKind.GROUND)
+    near = scene.items_in(corners.min(0) - off, corners.max(0) + off)
+    floors = [k for k in near if scene.items[k].kind in kinds]
+    faces = np.concatenate([np.zeros((0, 3, 3)), *(scene.of_item(k) for k in floors)])
+    is_level = (np.abs(faces[..., 1] - room.floor_y) <= _FLOOR_M).all(1)
+    mask = covered(grid, faces[is_level])
+    centres = grid.centres()
+    mask &= contains_xy(Polygon(room.polygon), centres[..., 0], centres[..., 1])
+    if not mask.any():
+        return None
+    height = float(faces[is_level][..., 1].max())
+    around = faces_around(scene, floors, grid, height)
+    clear = np.minimum(around.clearance(height), max(room.ceiling_y - height, 0.0))
+    mask &= clear >= LEAST_FREE_M
+    sides = (True, True, True, True)
+    return Support(FLOOR, room.id, height, height - room.floor_y, grid, mask, clear, sides, False)
 
 
 def plan_turn(item: Item, points: F64) -> float:
@@ -82,6 +133,10 @@ def plan_turn(item: Item, points: F64) -> float:
     if item.box is not None:
         axes = item.box.axes
         return float(np.arctan2(-axes[2, 0], axes[0, 0]))
+    return _turn_of_outline(points)
+
+
+def _turn_of_outline(points: F64) -> float:
     outline = minimum_rotated_rectangle(MultiPoint(points[:, [0, 2]]))
     if not isinstance(outline, Polygon):
         return 0.0
@@ -108,10 +163,9 @@ def _levels(faces: F64, room: Room) -> list[F64]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Surroundings:
+class FacesAround:
     """All faces over a grid, as heights in its cells, and where walls are."""
 
-    index: int  # of the furniture itself
     grid: PlanGrid
     hits: CellHits
     is_own: Bools  # (N,) of the hits: a face of the furniture itself
@@ -133,8 +187,10 @@ class Surroundings:
         return clear
 
 
-def surroundings(scene: SceneTriangles, index: int, grid: PlanGrid, low_y: float) -> Surroundings:
-    """What stands over a grid from low_y upwards; index: the furniture itself, -1 = none."""
+def faces_around(
+    scene: SceneTriangles, own: Collection[int], grid: PlanGrid, low_y: float
+) -> FacesAround:
+    """What stands over a grid from low_y upwards; own: indices of what bears the support itself."""
     ends = grid.plan_of(np.array([0, grid.shape[1]] * 2), np.repeat([0, grid.shape[0]], 2))
     low = np.array([ends[:, 0].min(), low_y - _NEAR_M, ends[:, 1].min()])
     high = np.array([ends[:, 0].max(), low_y + MOST_FREE_M, ends[:, 1].max()])
@@ -147,17 +203,24 @@ def surroundings(scene: SceneTriangles, index: int, grid: PlanGrid, low_y: float
             corners = scene.of_item(wall)
             level = np.abs(unit_normals(corners)[:, 1]) > 0.5
             solid |= covered(grid, corners[level])
-    return Surroundings(index, grid, hits, owner[hits.triangle] == index, solid)
+    return FacesAround(grid, hits, np.isin(owner, list(own))[hits.triangle], solid)
 
 
-def _supports_at(
-    around: Surroundings, mask: Bools, height: float, room: Room, has_front: bool
+class _Level(NamedTuple):
+    item: int  # index of the furniture
+    mask: Bools  # (rows, columns) it is there, indoors and outside walls
+    height: float  # world y
+    has_front: bool  # the furniture's grid points to its front
+
+
+def _supports_of_level(
+    around: FacesAround, level: _Level, room: Room, border: int
 ) -> list[Support]:
-    least = LEAST_AREA_M2 / CELL_M**2
-    if mask.sum() < least:
+    least, height = LEAST_AREA_M2 / CELL_M**2, level.height
+    if level.mask.sum() < least:
         return []
     clear = np.minimum(around.clearance(height), max(room.ceiling_y - height, 0.0))
-    free = mask & (clear >= LEAST_FREE_M)
+    free = level.mask & (clear >= LEAST_FREE_M)
 
     # Take each connected part that can be reached from a side.
     parts, n = ndimage.label(free)
@@ -167,7 +230,7 @@ def _supports_at(
         if np.count_nonzero(np.equal(parts[at], k)) < least:
             continue
         around_it = tuple(
-            slice(max(s.start - _BORDER, 0), min(s.stop + _BORDER, size))
+            slice(max(s.start - border, 0), min(s.stop + border, size))
             for s, size in zip(at, parts.shape, strict=True)
         )
         part, air = np.asarray(parts[around_it] == k), clear[around_it]
@@ -180,11 +243,11 @@ def _supports_at(
         found.append(
             turned_to_front(
                 Support(
-                    around.index, room.id, height, height - room.floor_y,
+                    level.item, room.id, height, height - room.floor_y,
                     around.grid.cropped(around_it), part, air, sides,
                     bool(np.mean(air[part] < 0.6) > 0.5),
                 ),
-                room, has_front=has_front,
+                room, has_front=level.has_front,
             )
         )  # fmt: skip
     return found
@@ -208,7 +271,7 @@ def _open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
     return (sides[0], sides[1], sides[2], sides[3])
 
 
-def _is_in_a_bowl(around: Surroundings, part: Bools, height: float) -> bool:
+def _is_in_a_bowl(around: FacesAround, part: Bools, height: float) -> bool:
     """Whether a rim rises around a part of the grid on each of its four sides, as of a sink."""
     hits = around.hits
     # A rim begins at the bottom's height or below, unlike what hangs above it.

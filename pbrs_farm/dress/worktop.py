@@ -27,7 +27,17 @@ class TopSpot:
 
 
 class Worktop:
-    """A support and what is still free on it. Rows run from the back to the front."""
+    """A support and what is still free on it. Rows run from the back to the front.
+
+    `spots` lists every place where a thing of a size fits, `take` occupies one:
+
+        top = Worktop(support)
+        rows, columns, n = top.spots((0.3, 0.25, 0.2))  # width, height, depth in metres
+        if len(rows):
+            spot = TopSpot(int(rows[0]), int(columns[0]), *n)
+            top.take(spot)
+            place = top.middle(spot)  # (3,) world, where the middle of its base stands
+    """
 
     def __init__(self, support: Support) -> None:
         self.support = support
@@ -67,8 +77,9 @@ class Worktop:
     ) -> tuple[I32, I32, tuple[int, int]]:
         """Rows and columns of the first cells of all places for a (width, height, depth), metres.
 
-        And the rows and columns such a place has. margin_m: to what stands there; inset_m: to the
-        support's edge.
+        And the number of rows and columns of such a place. The size is along the grid's axes: of a
+        turned thing give `turned_size`. margin_m: to what stands there; inset_m: to the support's
+        edge. Empty arrays where it fits nowhere.
         """
         cell = self.grid.cell_m
         n = (int(np.ceil(size[2] / cell)) + 1, int(np.ceil(size[0] / cell)) + 1)
@@ -96,6 +107,17 @@ class Worktop:
             return False
         part[:] = 0.0
         return True
+
+    def free_height_around(self, at: F64, radius_m: float) -> float:
+        """The least free height above the cells within radius_m of a plan place (2,), metres.
+
+        Cells beside the support count too, as far as its grid's border goes.
+        """
+        column, _y, row = self.grid.local(np.array([at[0], 0.0, at[1]]))
+        rows, columns = np.indices(self.grid.shape)
+        reach = radius_m / self.grid.cell_m + 0.75  # a cell touches the circle up to its corner
+        near = (rows + 0.5 - row) ** 2 + (columns + 0.5 - column) ** 2 <= reach**2
+        return float(self.clear[near].min(initial=np.inf))
 
     def keep_free(self, zone: BaseGeometry) -> None:
         """Nothing can stand over a plan area."""

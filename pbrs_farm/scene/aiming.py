@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -12,9 +13,9 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import House, Item, Room
+from pbrs_farm.core.house import House, Item, Room, geometry_from_house
 from pbrs_farm.core.shown_text import shown
-from pbrs_farm.scene.placing import caster_of
+from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.truth.coverage import coverage
 
 _TRIES: Final = 200  # of a camera
@@ -77,7 +78,7 @@ def _is_clear(house: House, eye: F64) -> bool:
     if not any(_is_in(room, eye) for room in house.rooms):
         return False
     axes = np.concatenate([np.eye(3), -np.eye(3), _DIAGONALS])
-    t, _face = caster_of(house).first_hit(np.broadcast_to(eye, axes.shape), axes)
+    t, _face = _caster_of(house).first_hit(np.broadcast_to(eye, axes.shape), axes)
     return bool((t > _CLEAR_M).all())
 
 
@@ -99,5 +100,27 @@ def _visible(house: House, item: Item, camera: Camera) -> float:
     if alone < _LEAST_PX:
         return 0.0
     number = next(k for k, other in enumerate(house.items, 1) if other is item)
-    seen = int((caster_of(house).item_buffer(small) == number).sum())
+    seen = int((_caster_of(house).item_buffer(small) == number).sum())
     return seen / alone
+
+
+def _caster_of(house: House) -> Caster:
+    """The rays of a finished home, panes included; those of the last homes are kept."""
+    return _caster(_Identity(house))
+
+
+class _Identity:
+    # A house by its identity: it is frozen, and kept alive by the cache.
+    def __init__(self, house: House) -> None:
+        self.house = house
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and other.house is self.house
+
+    def __hash__(self) -> int:
+        return id(self.house)
+
+
+@lru_cache(maxsize=2)
+def _caster(key: _Identity) -> Caster:
+    return Caster(geometry_from_house(key.house))

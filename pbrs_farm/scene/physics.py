@@ -1,8 +1,8 @@
-"""Things dropped into a home and come to rest: rigid bodies by MuJoCo, convex parts by CoACD.
+"""Drops things into a home until they come to rest: rigid bodies by MuJoCo, convex parts by CoACD.
 
-No effects. The home stands still: its surfaces near the supports are prisms a triangle, what else
-stands there its convex hull. Things fall a hand's breadth, tumble, and lie where they stop; what
-falls off its support is dropped again.
+No effects. The home stands still. Furniture that things are dropped on is met triangle by triangle
+(a thin prism each), other furniture near it as its convex hull. Things start a few centimetres above
+free places of `dress.supports`, tumble, and lie where they stop; what falls off is dropped again.
 """
 
 from __future__ import annotations
@@ -19,62 +19,59 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.dress.supports import Support
+from pbrs_farm.dress.worktop import Worktop
 from pbrs_farm.geometry.convex_parts import convex_parts, hull_of
 from pbrs_farm.installation import install_command
 from pbrs_farm.scene.models import Model
-from pbrs_farm.scene.placing import Support, caster_of, level_area, level_triangles
+from pbrs_farm.scene.placing import Target, TargetTops, level_tops_of
 
 _STEP_S: Final = 0.002
 _LONGEST_S: Final = 8.0  # of simulated time until all lie still
-_STILL: Final = 0.004  # m/s and rad/s a tenth: slower than that for _STILL_S is at rest
+_STILL: Final = 0.004  # m/s, and tenths of rad/s: what is slower for _STILL_S is at rest
 _STILL_S: Final = 0.2
-_ROUNDS: Final = 4  # of dropping again what fell off
-_TRIES: Final = 60  # of a place above a support
-_APART_M: Final = 0.01  # of what falls at the same time
-_DROP_M: Final = 0.03  # above the support, or what lies there
-_REACH_M: Final = 0.6  # around supports: what stands farther away is not met
-_DEEP_M: Final = 0.03  # of a level triangle's prism, so that nothing falls through
-_THIN_M: Final = 0.002  # of the others'
-_LEAST_M2: Final = 1e-6  # of a triangle that is met
+_ROUNDS: Final = 4  # things that fell off are dropped again so often
+_TRIES: Final = 60  # places above a target that are tried for one thing
+_APART_M: Final = 0.01  # between things that fall at the same time
+_DROP_M: Final = 0.03  # above the surface, or what lies there
+_REACH_M: Final = 0.6  # around the surfaces: what stands farther away is left out
+_PRISM_M: Final = 0.03  # depth of a level triangle's prism, so that nothing falls through
+_THIN_M: Final = 0.002  # depth of the others'
+_LEAST_M2: Final = 1e-6  # smaller triangles are left out
 _MOST_PRISMS: Final = 6_000
 _DENSITY: Final = 500.0  # kg/m3
-_FALLEN_M: Final = 0.05  # below its support
+_FALLEN_M: Final = 0.05  # what lies so far below its surface fell off
 
 
 @dataclass(slots=True, eq=False)
 class _Body:
     model: Model
-    support: Support
+    onto: TargetTops | None  # where it was dropped
     pose: F64  # (4, 4) world_from_model
 
 
 def settled_poses(
-    house: House, models: Sequence[Model], n: int, supports: Sequence[Support], seed: int
+    house: House, models: Sequence[Model], n: int, targets: Sequence[Target], seed: int
 ) -> list[tuple[Model, F64]]:
     """n models at rest, (model, world_from_model (4, 4)) each; equal seeds give equal poses.
 
-    Raises MachineFailed without mujoco and coacd, BadInput where no support has a level surface or
-    the things do not come to rest, naming those that move.
+    Models are drawn alike, targets by their free area; a target that has no room above it for one
+    model still takes others. Raises MachineFailed without mujoco and coacd. Raises BadInput where no
+    target has a level top, where a thing has room above none, or where things do not come to rest,
+    naming those that move.
     """
     mujoco = _mujoco()
     rng = np.random.default_rng([seed, 3])
-    weights = np.array([level_area(house, one) for one in supports])
-    if not len(weights) or not weights.sum() > 0:
-        raise BadInput(house.id, "scatter", "no support has a level surface")
-    things = []
-    for _ in range(n):
-        model = models[int(rng.integers(len(models)))]
-        support = supports[int(rng.choice(len(supports), p=weights / weights.sum()))]
-        things.append(_Body(model, support, np.eye(4)))
+    things = [_Body(models[int(rng.integers(len(models)))], None, np.eye(4)) for _ in range(n)]
+    size = max(float(np.linalg.norm(t.model.size_m)) for t in things)
+    surfaces = level_tops_of(house, targets, border_m=size)
     parts = {thing.model: _parts_of(thing.model) for thing in things}
-    statics = _static_solids(
-        house, supports, max(float(np.linalg.norm(t.model.size_m)) for t in things)
-    )
+    statics = _static_solids(house, surfaces, size)
     waiting = list(things)
     for _ in range(_ROUNDS):
-        _lift(house, things, waiting, rng)
+        _lift(house, things, waiting, surfaces, rng)
         moving = _simulate(mujoco, things, parts, statics)
-        waiting = [t for k, t in enumerate(things) if k in moving or _has_fallen(house, t)]
+        waiting = [t for k, t in enumerate(things) if k in moving or _has_fallen(t)]
         if not waiting:
             break
     if moving:
@@ -84,16 +81,15 @@ def settled_poses(
 
 
 def penetration_m(
-    house: House, placed: Sequence[tuple[Model, F64]], supports: Sequence[Support]
+    house: House, placed: Sequence[tuple[Model, F64]], targets: Sequence[Target]
 ) -> float:
     """How deep the deepest contact is of models (model, world_from_model) at rest, metres."""
     mujoco = _mujoco()
-    things = [_Body(model, supports[0], pose) for model, pose in placed]
+    things = [_Body(model, None, pose) for model, pose in placed]
     parts = {thing.model: _parts_of(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
-    world = mujoco.MjModel.from_xml_string(
-        _mjcf(things, parts, _static_solids(house, supports, size))
-    )
+    statics = _static_solids(house, level_tops_of(house, targets), size)
+    world = mujoco.MjModel.from_xml_string(_mjcf(things, parts, statics))
     state = mujoco.MjData(world)
     _set_poses(state, things)
     mujoco.mj_forward(world, state)
@@ -106,25 +102,35 @@ def _parts_of(model: Model) -> tuple[F64, ...]:
     return convex_parts(model.shape.triangles)
 
 
-def _static_solids(house: House, supports: Sequence[Support], size_m: float) -> list[F64]:
-    """Convex solids of the home around the supports, (V, 3) each."""
-    points = np.concatenate([level_triangles(house, one).reshape(-1, 3) for one in supports])
+def _static_solids(house: House, surfaces: Sequence[TargetTops], size_m: float) -> list[F64]:
+    """Convex solids of the home around the surfaces, (V, 3) each."""
+    points = np.concatenate([_points_of(top.support) for one in surfaces for top in one.tops])
     reach = np.array([_REACH_M + size_m, 0.0, _REACH_M + size_m])
     low, high = points.min(0) - reach - [0, 2, 0], points.max(0) + reach + [0, 1, 0]
     exact: list[F64] = []
     solids: list[F64] = []
-    held = {id(s) for s in supports}
+    bearing = {id(one.target) for one in surfaces}
     for item in house.items:
         a, b = item.bounds
         if not ((a <= high) & (b >= low)).all():
             continue
         triangles = corners_of_surfaces(item.surfaces)
-        if id(item) in held or _is_hollow(item, triangles):
+        if id(item) in bearing or _is_hollow(item, triangles):
             near = triangles[((triangles.min(1) <= high) & (triangles.max(1) >= low)).all(1)]
             exact.append(near)
         elif (hull := hull_of(triangles.reshape(-1, 3))) is not None:
             solids.append(hull)
     return solids + _prisms(np.concatenate([np.zeros((0, 3, 3)), *exact]))
+
+
+def _points_of(support: Support) -> F64:
+    """(4, 3) corners of the box of cells around what is free of a support."""
+    rows, columns = np.nonzero(support.mask)
+    ends = (
+        np.array([columns.min(), columns.max() + 1] * 2),
+        np.array([rows.min()] * 2 + [rows.max() + 1] * 2),
+    )
+    return np.insert(support.grid.plan_of(*ends), 1, support.height, axis=1)
 
 
 def _is_hollow(item: Item, triangles: F64) -> bool:
@@ -143,7 +149,7 @@ def _prisms(triangles: F64) -> list[F64]:
     solids = []
     for corners, n in zip(triangles[large], normal[large] / length[large, None], strict=True):
         if abs(n[1]) > 0.9:
-            low = corners - [0.0, _DEEP_M, 0.0]
+            low = corners - [0.0, _PRISM_M, 0.0]
             solids.append(np.concatenate([corners, low]))
         else:
             solids.append(np.concatenate([corners - _THIN_M / 2 * n, corners + _THIN_M / 2 * n]))
@@ -151,41 +157,66 @@ def _prisms(triangles: F64) -> list[F64]:
 
 
 def _lift(
-    house: House, things: Sequence[_Body], waiting: Sequence[_Body], rng: np.random.Generator
-) -> None:
-    """Put those that wait above their supports, turned at random, apart from each other."""
+    house: House, things: Sequence[_Body], waiting: Sequence[_Body],
+    surfaces: Sequence[TargetTops], rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Put those that wait above their targets, turned at random, apart from each other."""
     balls = [_ball(t.model, t.pose) for t in things if t not in waiting]
     for thing in waiting:
         radius, turn = _radius(thing.model), Rotation.random(random_state=rng).as_matrix()
-        centre = _spot_above(house, thing.support, radius, balls, rng)
-        if centre is None:
-            where = thing.support.name or thing.support.id
-            raise BadInput(house.id, where, f"has no room above it for {thing.model.id}")
+        found = _spot_above_any(thing.onto, surfaces, radius, balls, rng)
+        if found is None:
+            names = ", ".join(one.target.name or one.target.id for one in surfaces[:3])
+            text = f"has no room above it for {thing.model.id}"
+            raise BadInput(house.id, names, text, hint="fewer or smaller things, more supports")
+        thing.onto, centre = found
         thing.pose = np.eye(4)
         thing.pose[:3, :3] = turn
         thing.pose[:3, 3] = centre - turn @ _middle(thing.model)
         balls.append((centre, radius))
 
 
+def _spot_above_any(
+    onto: TargetTops | None, surfaces: Sequence[TargetTops], radius: float,
+    balls: Sequence[tuple[F64, float]], rng: np.random.Generator,
+) -> tuple[TargetTops, F64] | None:  # fmt: skip
+    """A target and a place (3,) above it for a ball: where it was dropped before, else by free area."""
+    areas = np.array([one.area_m2 for one in surfaces])
+    left = list(range(len(surfaces)))
+    while left:
+        at = int(rng.choice(left, p=areas[left] / areas[left].sum()))
+        one = onto or surfaces[at]
+        centre = _spot_above(one.tops, radius, balls, rng)
+        if centre is not None:
+            return one, centre
+        # Skip this target for this ball only.
+        if onto is None:
+            left.remove(at)
+        onto = None
+    return None
+
+
 def _spot_above(
-    house: House, support: Support, radius: float, balls: Sequence[tuple[F64, float]],
+    tops: Sequence[Worktop], radius: float, balls: Sequence[tuple[F64, float]],
     rng: np.random.Generator,
 ) -> F64 | None:  # fmt: skip
-    """The lowest of some open places (3,) of a ball above a support and above other balls."""
-    triangles = level_triangles(house, support)
-    areas = np.linalg.norm(area_vectors(triangles), axis=1)
+    """The lowest of some open places (3,) of a ball above a target's tops and above other balls."""
+    areas = np.array([top.support.area for top in tops])
     best: F64 | None = None
     for _ in range(_TRIES):
-        # A point of the support by area.
-        a, b, c = triangles[int(rng.choice(len(areas), p=areas / areas.sum()))]
-        u, v = sorted(rng.random(2))
-        spot = u * a + (v - u) * b + (1 - v) * c
+        top = tops[int(rng.choice(len(tops), p=areas / areas.sum()))]
+        # A point of the top by area.
+        cells = np.argwhere(top.support.mask)
+        row, column = cells[int(rng.integers(len(cells)))] + rng.random(2)
+        x, z = top.grid.plan_of(column, row)
+        spot = np.array([x, top.support.height, z])
         below = [(at, r) for at, r in balls if np.hypot(*(at - spot)[[0, 2]]) < r + radius]
         height = max(
             at[1] + r + radius + _APART_M for at, r in [*below, (spot, _DROP_M - _APART_M)]
         )
-        centre = np.array([spot[0], height, spot[2]])
-        if (best is None or centre[1] < best[1]) and _is_open(house, centre, radius):
+        centre = np.array([x, height, z])
+        is_lower = best is None or height < best[1]
+        if is_lower and top.free_height_around(centre[[0, 2]], radius) > height + radius - spot[1]:
             best = centre
         if best is not None and not below:
             break
@@ -194,17 +225,6 @@ def _spot_above(
 
 def _ball(model: Model, pose: F64) -> tuple[F64, float]:
     return pose[:3, :3] @ _middle(model) + pose[:3, 3], _radius(model)
-
-
-def _is_open(house: House, centre: F64, radius: float) -> bool:
-    """Whether a ball meets nothing of the home: rays from its middle."""
-    golden = np.pi * (3 - np.sqrt(5))
-    k = np.arange(64)
-    y = 1 - (2 * k + 1) / 64
-    r = np.sqrt(1 - y * y)
-    directions = np.column_stack([r * np.cos(golden * k), y, r * np.sin(golden * k)])
-    t, _face = caster_of(house).first_hit(np.broadcast_to(centre, (64, 3)), directions)
-    return bool((t > radius).all())
 
 
 def _simulate(
@@ -271,10 +291,11 @@ def _mesh(name: str, points: F64) -> str:
     return f'<mesh name="{name}" vertex="{text}"/>'
 
 
-def _has_fallen(house: House, thing: _Body) -> bool:
+def _has_fallen(thing: _Body) -> bool:
+    if thing.onto is None:
+        return False
     y = float((thing.model.shape.points @ thing.pose[:3, :3].T)[:, 1].min() + thing.pose[1, 3])
-    least = float(level_triangles(house, thing.support)[:, :, 1].min())
-    return y < least - _FALLEN_M
+    return y < min(top.support.height for top in thing.onto.tops) - _FALLEN_M
 
 
 def _middle(model: Model) -> F64:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import Item
-from pbrs_farm.dress.supports import Support, supports_of_item
+from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.dress.supports import Support, floor_support, supports_of_item
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from tests.dress.furniture import boards, bookcase, room, solid, thin_table
 
@@ -104,3 +104,16 @@ def test_a_tray_with_a_low_rim_is_a_support() -> None:
 def test_a_worktop_seen_in_the_bowl_of_a_sink_is_no_support() -> None:
     worktop = solid("worktop", [1.0, 0.0, 1.0], [2.0, 0.8, 1.6])
     assert not _supports(worktop, _basin(0.15))
+
+
+def test_a_rooms_floor_is_what_nothing_stands_on_of_its_floor_faces() -> None:
+    slab = replace(solid("floor", [0, -0.1, 0], [3, 0, 3]), kind=ItemKind.FLOOR)
+    # A rug and a chest take their place; a lamp 2 m above the floor does not, nor is there a floor
+    # beyond x = 3 m, where the room goes on.
+    rug, chest = solid("rug", [0, 0, 0], [1, 0.01, 1]), solid("chest", [0, 0, 2], [1, 0.9, 3])
+    lamp = solid("lamp", [2, 2, 2], [2.5, 2.3, 2.5])
+    support = floor_support(SceneTriangles([slab, rug, chest, lamp]), room())
+    assert support is not None
+    assert support.height == 0
+    assert support.area == pytest.approx(3 * 3 - 1 - 1, rel=0.02)
+    assert floor_support(SceneTriangles([rug, chest]), room()) is None

@@ -42,7 +42,7 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 )
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.supports import supports_of_item, surroundings
+from pbrs_farm.dress.supports import faces_around, supports_of_item
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import book_covers, leaning_book, run_of_books, stack_of_books
 from pbrs_farm.dress.worktop import LIFT_M, TopSpot, Worktop
@@ -222,7 +222,7 @@ def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor 
     bitmap = floor_bitmap(space, room)
     grid = PlanGrid(np.asarray(bitmap.origin), 0.0, CELL_M, bitmap.inside.shape)
     plan = grid.centres()
-    around = surroundings(scene, -1, grid, y)
+    around = faces_around(scene, (), grid, y)
     hits, inside = around.hits, bitmap.inside & ~around.solid
     # Rugs carry nothing, but one walks over them.
     stands = (hits.low < y + _HEAD_M) & (hits.high > y + 0.002)
