@@ -1,7 +1,8 @@
-"""The state of the code itself: size, imports, crumbs, names, import cycles, coverage.
+"""The state of the code itself: size, names, imports, cycles, docstrings, coverage.
 
 Effects: runs the test suite under coverage (about six minutes) and writes out/bench/house.json.
-`python -m benchmarks.house --quick` leaves the tests out, writes nothing and lists what it counted.
+`python -m benchmarks.house --quick` leaves the tests out, writes nothing and lists what it counted; words after it
+are folders, and only what is in them is listed.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import os
 import subprocess
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,11 @@ from benchmarks.figures import write_report
 
 PACKAGES = ("pbrs_farm", "workers")
 MARKERS = "not slow and not gpu and not chaos and not infra and not kube and not web and not sweethome3d and not notebooks"
+CODE = (".py", ".toml", ".lua", ".js", ".glsl")
+VENDORED = "pbrs_farm/board/vendor"  # code of others
+KINDS = ("format", "form", "pass", "layer", "thing", "option")
+"""What comes in kinds, as tests name it: @pytest.mark.kinds("format") adds one in a file."""
+SHARED_BY = 3  # files that define a function of one name, and it counts as shared
 LINE_KINDS = (
     "lines_of_statements",
     "lines_of_imports",
@@ -30,6 +36,11 @@ LINE_KINDS = (
     "lines_blank",
 )
 UNITS = {
+    "house.code_lines": "lines of .py, .toml, .lua, .js and .glsl of pbrs_farm and workers, those of others apart",
+    "house.shared_names": "share of module functions whose name three or more files define",
+    "house.glued": "headings of chapters inside files: comments that stand alone between blank lines, below the first ten lines",
+    "house.kinds": "1: a format, a form, a pass, a layer, a piece of furniture and a run option are each added in one file (tests marked kinds)",
+    "house.docstrings": "share of public functions and methods whose docstring has more than one line",
     "house.lines": "lines of .py of pbrs_farm and workers",
     "house.lines_of_statements": "of these, neither blank, comment, docstring nor import",
     "house.lines_of_imports": "of these",
@@ -41,7 +52,7 @@ UNITS = {
     "house.single_importer": "modules whose one importer stands in their own folder",
     "house.twice_named": "names that two or more classes have",
     "house.untyped": "functions with a parameter or result that has no annotation",
-    "house.import_cycles": "groups of modules that import one another, type checking apart",
+    "house.cycles": "groups of modules that import one another, type checking apart",
     "house.coverage": "% of statements run by the tests, subprocesses counted",
 }
 
@@ -52,6 +63,7 @@ Imports = Mapping[str, set[str]]
 def main() -> None:
     """Measure and write out/bench/house.json."""
     figures = static_figures()
+    figures["house.kinds"] = int(kinds_added() == {*KINDS})
     figures["house.coverage"] = coverage_percent()
     write_report("house", figures, UNITS)
 
@@ -62,7 +74,14 @@ def static_figures() -> dict[str, Any]:
     trees = [ast.parse(text) for text in texts.values()]
     kinds = sum((line_kinds(text) for text in texts.values()), Counter[str]())
     imports = imports_of_modules()
+    n_functions = sum(len(names) for names in functions_by_file(trees))
+    shared = shared_names(dict(zip(texts, trees, strict=True)))
+    documented = [is_long for tree in trees for _name, is_long in docstrings(tree)]
     return {
+        "house.code_lines": code_lines(),
+        "house.shared_names": round(sum(map(len, shared.values())) / n_functions, 4),
+        "house.glued": sum(len(headings(text)) for text in texts.values()),
+        "house.docstrings": round(sum(documented) / len(documented), 4),
         "house.lines": kinds.total(),
         **{f"house.{name}": kinds[name] for name in LINE_KINDS},
         "house.files": len(texts),
@@ -70,7 +89,7 @@ def static_figures() -> dict[str, Any]:
         "house.single_importer": len(single_importers(imports)),
         "house.twice_named": len(twice_named(trees)),
         "house.untyped": sum(untyped_functions(tree) for tree in trees),
-        "house.import_cycles": import_cycles(imports),
+        "house.cycles": import_cycles(imports),
     }
 
 
@@ -78,6 +97,80 @@ def sources() -> Iterator[Path]:
     """Every Python file of the packages."""
     for package in PACKAGES:
         yield from sorted(Path(package).rglob("*.py"))
+
+
+def code_lines() -> int:
+    """Lines of everything that is code: TOML holds rules, Lua the ledger, JavaScript and GLSL pictures."""
+    files = [p for package in PACKAGES for p in Path(package).rglob("*") if p.suffix in CODE]
+    ours = [p for p in files if not p.is_relative_to(VENDORED)]
+    return sum(len(p.read_text(encoding="utf-8").splitlines()) for p in ours)
+
+
+def functions_by_file(trees: Iterable[ast.Module]) -> list[list[str]]:
+    """Of each module the names of its functions; methods and nested functions apart."""
+    kind = ast.FunctionDef | ast.AsyncFunctionDef
+    return [[node.name for node in tree.body if isinstance(node, kind)] for tree in trees]
+
+
+def shared_names(trees: Mapping[Path, ast.Module]) -> dict[str, list[Path]]:
+    """Name of a module function -> the files that define one, where these are SHARED_BY or more."""
+    found = defaultdict(list)
+    for path, names in zip(trees, functions_by_file(trees.values()), strict=True):
+        for name in {*names}:
+            found[name].append(path)
+    return {name: files for name, files in found.items() if len(files) >= SHARED_BY}
+
+
+def headings(text: str) -> list[tuple[int, str]]:
+    """(line, text) of the comments that stand alone between blank lines, below a module's head."""
+    lines = text.splitlines()
+    found = []
+    for number, line in enumerate(lines):
+        # The head of a file is no chapter: a licence, constants and their reasons.
+        if number <= 10 or not line.startswith("# ") or lines[number - 1].strip():
+            continue
+        end = number
+        while end < len(lines) and lines[end].startswith("#"):
+            end += 1
+        if end < len(lines) and not lines[end].strip():
+            found.append((number + 1, line))
+    return found
+
+
+def docstrings(tree: ast.Module) -> Iterator[tuple[str, bool]]:
+    """(name, whether its docstring has more than one line) of each public function and method."""
+    kind = ast.FunctionDef | ast.AsyncFunctionDef
+    classes = [n for n in tree.body if isinstance(n, ast.ClassDef) and not n.name.startswith("_")]
+    for owner, nodes in (("", tree.body), *((f"{c.name}.", c.body) for c in classes)):
+        for node in nodes:
+            if isinstance(node, kind) and not node.name.startswith("_"):
+                text = (ast.get_docstring(node) or "").strip()
+                yield owner + node.name, "\n" in text
+
+
+def kinds_added() -> set[str]:
+    """The kinds of which a test marked so adds one and passes; fails loudly where such a test fails."""
+    words = [sys.executable, "-c", _RUN_KINDS]
+    done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+    return {*done.stdout.splitlines()[-1].split()}
+
+
+# Runs the tests marked kinds; its last line names the kinds of those that passed.
+_RUN_KINDS = """
+import pytest
+class Kinds:
+    def __init__(self):
+        self.of, self.passed = {}, set()
+    def pytest_collection_modifyitems(self, items):
+        self.of = {i.nodeid: m.args for i in items for m in i.iter_markers("kinds")}
+    def pytest_runtest_logreport(self, report):
+        if report.when == "call" and report.passed:
+            self.passed |= {*self.of[report.nodeid]}
+kinds = Kinds()
+code = pytest.main(["-q", "-m", "kinds", "tests"], plugins=[kinds])
+print(*kinds.passed)
+raise SystemExit(0 if code in (0, 5) else code)
+"""
 
 
 def line_kinds(text: str) -> Counter[str]:
@@ -193,12 +286,33 @@ def _settings(path: Path, counted: str) -> Path:
     return path
 
 
+def offenders(folders: list[str]) -> Iterator[str]:
+    """What the figures count, a line each: headings, shared names, short docstrings by file, crumbs."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sources()}
+    trees = {path: ast.parse(text) for path, text in texts.items()}
+
+    def is_asked(path: Path) -> bool:
+        return not folders or any(path.is_relative_to(folder) for folder in folders)
+
+    for path, text in texts.items():
+        for number, line in headings(text) if is_asked(path) else ():
+            yield f"heading {path}:{number} {line}"
+    for name, files in sorted(shared_names(trees).items(), key=lambda pair: -len(pair[1])):
+        if any(map(is_asked, files)):
+            yield f"shared {name} {len(files)}: {' '.join(map(str, filter(is_asked, files)))}"
+    for path, tree in trees.items():
+        short = [name for name, is_long in docstrings(tree) if not is_long]
+        if short and is_asked(path):
+            yield f"one line {path}: {' '.join(short)}"
+    yield from (f"single importer {name}" for name in single_importers(imports_of_modules()))
+    yield from (f"twice named {name}" for name in twice_named([*trees.values()]))
+
+
 if __name__ == "__main__":
     if "--quick" in sys.argv:
+        for line in offenders(sys.argv[sys.argv.index("--quick") + 1 :]):
+            print(line)
         for name, value in static_figures().items():
             print(f"{name:<26}{value}")
-        print("single importers:", *single_importers(imports_of_modules()), sep="\n  ")
-        classes = twice_named([ast.parse(p.read_text(encoding="utf-8")) for p in sources()])
-        print("twice named:", *classes, sep="\n  ")
     else:
         main()
