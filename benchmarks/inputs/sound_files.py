@@ -27,7 +27,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         scenestate_files,
         usd_files,
     )
-    from pbrs_farm.export.home_export import export_house
+    from pbrs_farm.export.export_homes import export_house
     from pbrs_farm.read.builtin.builtin_home import builtin_home
 
     plans = {

@@ -16,26 +16,18 @@ from pbrs_farm.commands.arguments import (
     warn,
 )
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.plugins import plugins
-
-FORMS = (
-    "coco", "hdf5", "webdataset", "released", "yolo", "yolo-seg", "nerfstudio", "colmap", "tum", "kitti", "bop",
-    "ply", "captions",
-)  # fmt: skip
-# Forms of homes, not of views: pbrs_farm/export/home_export.py writes them.
-HOME_FORMS = ("gltf", "habitat", "sdf", "usd", "usdz")
+from pbrs_farm.export.form import HomeForm, form_names, form_of
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
-    forms = (*FORMS, *HOME_FORMS, *plugins("exports"))
     text = "finished views in the form another tool reads; or the homes, for simulators"
     p = verb("export", _export, text)
     add = p.add_argument
     add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
-    add("--to", required=True, choices=forms, help="docs/formats.md describes the forms")
+    add("--to", required=True, choices=form_names(), help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
     text = "labels by name (`pbrs-farm layers`), default all there are but radiance"
@@ -72,7 +64,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _export(args: argparse.Namespace) -> int:
-    if args.to in HOME_FORMS:
+    if isinstance(form_of(args.to), HomeForm):
         return _export_homes(args)
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.export.chosen_view import Choice
@@ -102,7 +94,7 @@ def _export(args: argparse.Namespace) -> int:
 
 
 def _export_homes(args: argparse.Namespace) -> int:
-    from pbrs_farm.export.home_export import export_homes
+    from pbrs_farm.export.export_homes import export_homes
     from pbrs_farm.run.output_root import as_files
     from pbrs_farm.settings import settings_from_environment
 

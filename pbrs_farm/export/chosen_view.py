@@ -6,9 +6,6 @@ Effects: reads the view.
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -275,46 +272,3 @@ def _read(file: Path) -> bytes:
         return read_regular(file)
     except OSError as error:
         raise BadInput(file, "", fault_of(error)) from None
-
-
-# Views that a form cannot hold.
-
-LEFT_OUT: Final = "left_out.txt"
-
-
-def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
-    """left_out.txt, `<house>/<view>: <why>` a line, where any view is; the number of files.
-
-    why: begins with "has no".
-    """
-    if not views:
-        return 0
-    lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
-    (out / LEFT_OUT).write_text("".join(lines))
-    return 1
-
-
-# A folder that appears whole or not at all. Effects: writes beside it, renames.
-
-
-@contextmanager
-def new_folder(out: Path) -> Iterator[Path]:
-    """A folder beside out that becomes out at the end, and is removed on any error.
-
-    Raises BadInput where out holds something, or cannot be written.
-    """
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(out, "", "is there already", hint="name a new folder")
-    # Write beside it, on the same file system, then rename.
-    scratch = out.with_name(f".{out.name}.partial")
-    shutil.rmtree(scratch, ignore_errors=True)
-    try:
-        scratch.mkdir(parents=True)
-        yield scratch
-        if out.exists():
-            out.rmdir()  # empty, as checked above
-        scratch.rename(out)
-    except OSError as error:
-        raise BadInput(out, "", f"cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)

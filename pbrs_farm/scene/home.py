@@ -182,7 +182,7 @@ class Home:
             >>> home.export("as_gltf").is_dir()
             True
         """
-        from pbrs_farm.export.home_export import export_house
+        from pbrs_farm.export.export_homes import export_house
 
         export_house(self.house, Path(folder), to)
         return Path(folder)

@@ -7,7 +7,6 @@ import pytest
 
 from pbrs_farm.commands import labelling
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.export_views import FORMS
 from pbrs_farm.images import png_from_array
 from tests.check.roots import SIZE, make_root
 
@@ -33,10 +32,6 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     picture = np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
     (house / "views/v0/opengl_dl.png").write_bytes(png_from_array(picture))
     return folder
-
-
-def test_the_forms_offered_are_the_forms_there_are():
-    assert set(labelling.FORMS) == set(FORMS)
 
 
 def test_export_names_the_folder_after_the_form(root, tmp_path, monkeypatch, capsys):

@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.export.home_export import exported_home
+from pbrs_farm.export.home_pieces import exported_home
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.read.builtin.builtin_home import builtin_home

@@ -13,8 +13,8 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice
-from pbrs_farm.export.coco import compressed_runs, run_lengths
-from pbrs_farm.export.export_views import export, mask_polygons, remarks_of
+from pbrs_farm.export.export_views import export, remarks_of
+from pbrs_farm.export.masks import compressed_runs, mask_polygons, run_lengths
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.images import array_from_png, png_from_array
 from tests.check.roots import SIZE, make_root
@@ -434,7 +434,7 @@ def test_only_what_a_selection_keeps_is_exported(root, tmp_path):
 
 
 def test_a_wrong_form_a_full_folder_and_an_empty_root_are_told(root, tmp_path):
-    with pytest.raises(BadInput, match="coco, hdf5, webdataset, released, yolo"):
+    with pytest.raises(BadInput, match="bop, captions, coco, colmap"):
         export(root, tmp_path / "x", "stl")
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").write_text("mine")

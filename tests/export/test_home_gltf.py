@@ -12,8 +12,9 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import OUTSIDE, Box, House, ItemKind, corners_of_surfaces
 from pbrs_farm.core.recipe import ReadFields, Recipe
-from pbrs_farm.export.gltf_home import glb_of_pieces
-from pbrs_farm.export.home_export import export_homes, exported_home, rooms_json
+from pbrs_farm.export.export_homes import export_homes
+from pbrs_farm.export.home_glb import glb_of_pieces
+from pbrs_farm.export.home_pieces import exported_home, rooms_json
 from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hulls_of_parts
 from pbrs_farm.geometry.solids import box

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import corners_of_surfaces
-from pbrs_farm.export import sdf_home
-from pbrs_farm.export.home_export import ExportedHome, Piece, export_house, exported_home
+from pbrs_farm.export.export_homes import export_house
+from pbrs_farm.export.forms.sdf import write_sdf
+from pbrs_farm.export.home_pieces import ExportedHome, Piece, exported_home
 from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hull_faces
 from tests.export.homes import repaired_home, stored
@@ -34,7 +35,7 @@ def turned(piece: Piece) -> Piece:
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The built-in home as a document."""
     folder = tmp_path_factory.mktemp("sdf")
-    assert sdf_home.write(_HOME, folder) == sum(p.is_file() for p in folder.rglob("*"))
+    assert write_sdf(_HOME, folder) == sum(p.is_file() for p in folder.rglob("*"))
     return folder / f"{_HOME.house.id}.sdf"
 
 
@@ -120,7 +121,7 @@ def test_every_link_has_what_it_needs_and_every_mesh_exists(written: Path) -> No
 def test_poses_put_the_vertices_of_a_mesh_where_the_item_has_them(tmp_path: Path) -> None:
     things = tuple(turned(piece) for piece in _HOME.things[:4])
     home = ExportedHome(_HOME.house, (*_HOME.building, *things))
-    sdf_home.write(home, tmp_path)
+    write_sdf(home, tmp_path)
     models = world_of(tmp_path / f"{home.house.id}.sdf").findall("model")
     for piece, model in zip(things, models[1:], strict=True):
         (link,) = model.findall("link")
@@ -175,7 +176,7 @@ def test_a_spot_looks_where_its_lamp_looks(tmp_path: Path) -> None:
     piece = turned(next(piece for piece in _HOME.things if piece.lamps))
     looks = (0.6, -0.8, 0.0)
     piece = replace(piece, lamps=(replace(piece.lamps[0], spot=(looks, 0.5)),))
-    sdf_home.write(ExportedHome(_HOME.house, (piece,)), tmp_path)
+    write_sdf(ExportedHome(_HOME.house, (piece,)), tmp_path)
     (model,) = world_of(tmp_path / f"{_HOME.house.id}.sdf").findall("model")[1:]
     light = model.find("link/light")
     assert light is not None
@@ -188,7 +189,7 @@ def test_a_spot_looks_where_its_lamp_looks(tmp_path: Path) -> None:
 def test_no_model_has_a_name_that_sdf_or_the_building_has(tmp_path: Path) -> None:
     names = ("world", "building", "building_thing")
     things = tuple(replace(p, name=n) for p, n in zip(_HOME.things, names, strict=False))
-    sdf_home.write(ExportedHome(_HOME.house, things), tmp_path)
+    write_sdf(ExportedHome(_HOME.house, things), tmp_path)
     models = world_of(tmp_path / f"{_HOME.house.id}.sdf").findall("model")
     got = [model.get("name") for model in models]
     assert len(set(got)) == 4

@@ -9,8 +9,9 @@ import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils, UsdValidation
 
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.export import usd_home
-from pbrs_farm.export.home_export import exported_home
+from pbrs_farm.export.forms.usd import write_usd
+from pbrs_farm.export.forms.usdz import write_usdz
+from pbrs_farm.export.home_pieces import exported_home
 from pbrs_farm.read.source import read_house, resolve
 from tests.export.homes import differences, repaired_home
 
@@ -20,8 +21,8 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The built-in home in both forms."""
     folder = tmp_path_factory.mktemp("usd")
     home = exported_home(repaired_home())
-    assert usd_home.write(home, folder) == 1 + len(home.house.textures)
-    assert usd_home.write_package(home, folder) == 1
+    assert write_usd(home, folder) == 1 + len(home.house.textures)
+    assert write_usdz(home, folder) == 1
     return {form: folder / f"{home.house.id}.{form}" for form in ("usdc", "usdz")}
 
 

@@ -9,6 +9,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from pbrs_farm.export.form import ViewForm
+
 
 def write_word_list(views: list[Any], out: Path, _choice: Any) -> int:
     """words.tsv: view, and what is seen, largest first; the number of files.
@@ -23,3 +25,6 @@ def write_word_list(views: list[Any], out: Path, _choice: Any) -> int:
         lines.append(f"{view.house.id}/{view.id}\t{words}")
     (out / "words.tsv").write_text("\n".join(lines) + "\n")
     return 1
+
+
+FORM = ViewForm("word_list", write_word_list, "`words.tsv`: a line of words a view")

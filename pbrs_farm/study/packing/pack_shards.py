@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import new_folder
+from pbrs_farm.export.form import new_folder
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.study.packing.data_card import card, croissant_json, described, root_facts
 from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans

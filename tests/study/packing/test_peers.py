@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from pbrs_farm.core.house_split import SplitShares
-from pbrs_farm.export.coco import compressed_runs
+from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.packing.pack_shards import pack

@@ -1,4 +1,4 @@
-"""A home as a Habitat data set of one scene: stage, objects, regions. Effect: write writes it.
+"""A home as a Habitat data set of one scene: stage, objects, regions. Effects: writes files.
 
 The building is the stage; each thing an object with collision parts of its own. `pbrs-farm run` reads
 the scene back.
@@ -14,14 +14,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.export.gltf_home import glb_of_pieces
-from pbrs_farm.export.home_export import COLLISION, ExportedHome, Piece, digest_name
+from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_glb import glb_of_pieces
+from pbrs_farm.export.home_pieces import COLLIDES, COLLISION, ExportedHome, Piece, digest_name
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
 
 
-def write(home: ExportedHome, folder: Path) -> int:
+def write_habitat(home: ExportedHome, folder: Path) -> int:
     """The data set below folder; the number of files."""
     house, files = home.house, {}
     files[f"stages/{house.id}.glb"] = glb_of_pieces(house, home.building, with_lamps=False)
@@ -115,3 +116,12 @@ def _collision(parts: tuple[F64, ...]) -> bytes:
             "meshes": meshes,
         }
     )
+
+
+FORM = HomeForm(
+    "habitat",
+    write_habitat,
+    "a Habitat data set: the building as stage, an object with collision parts for each thing,"
+    " regions, and `navigable/<id>.json`, the outlines where a disc of 0.2 m can stand",
+    remark=COLLIDES,
+)

@@ -1,4 +1,4 @@
-"""A home as an OpenUSD stage for Isaac Sim and others. Effect: write and write_package write it.
+"""A home as an OpenUSD stage for Isaac Sim and others. Effects: writes files.
 
 Metres, z up, a component an item with its class as a label, UsdPreviewSurface, UsdPhysics, UsdLux.
 `pbrs-farm run` reads it back: items, classes, boxes, rooms and the flux of lamps are the same.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,9 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind, Surface
-from pbrs_farm.export.home_export import ExportedHome, Lamp, Piece, rooms_json
+from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, rooms_json
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
 from pbrs_farm.installation import need
@@ -29,26 +28,12 @@ _Z_UP: Final = ((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (0, 0, 0, 1))
 _LEAST_RADIUS_M: Final = 0.005
 
 
-def write(home: ExportedHome, folder: Path) -> int:
+def write_usd(home: ExportedHome, folder: Path) -> int:
     """<house id>.usdc and textures/; the number of files."""
     need("pxr")
     textures = _write_textures(home.house, folder)
     _Stage(home, folder / f"{home.house.id}.usdc", textures).save()
     return 1 + len(textures)
-
-
-def write_package(home: ExportedHome, folder: Path) -> int:
-    """<house id>.usdz, which holds its textures; the number of files, 1."""
-    need("pxr")
-    from pxr import UsdUtils
-
-    with tempfile.TemporaryDirectory() as scratch:
-        write(home, Path(scratch))
-        stage = Path(scratch) / f"{home.house.id}.usdc"
-        package = folder / f"{home.house.id}.usdz"
-        if not UsdUtils.CreateNewUsdzPackage(str(stage), str(package)):
-            raise MachineFailed(f"{package.name} could not be written")
-    return 1
 
 
 def _write_textures(house: House, folder: Path) -> dict[str, str]:
@@ -316,3 +301,12 @@ def _matrix(b_from_a: F64) -> Any:
     from pxr import Gf
 
     return Gf.Matrix4d(*np.asarray(b_from_a, np.float64).T.ravel().tolist())
+
+
+FORM = HomeForm(
+    "usd",
+    write_usd,
+    "an OpenUSD stage (extra `usd`): `<id>/<id>.usdc` and `textures/`, metres, z up, gravity, for Isaac"
+    " Sim and others",
+    remark=COLLIDES,
+)

@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,10 +27,10 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.export.chosen_view import Choice, ChosenView, blenderproc_k, require_lens
-from pbrs_farm.export.coco import compressed_runs
-from pbrs_farm.formats.house_bundle import house_from_bundle
+from pbrs_farm.export.export_homes import stored_house
+from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
 from pbrs_farm.truth.coverage import coverage
 
 _SPLIT: Final = "train_pbr"
@@ -57,7 +56,8 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     Raises BadInput where no house of the views holds a placed model, and for a lens that is no
     pin-hole.
     """
-    houses = {view.house.id: _house(view) for view in views}
+    folders = {view.house.id: view.entry.folder.parent.parent for view in views}
+    houses = {house: stored_house(folder) for house, folder in folders.items()}
     meshes: dict[str, _ModelMesh] = {}
     for house in houses.values():
         for item in house.items:
@@ -77,18 +77,6 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         n_files += _write_scene(folder, own, houses[house_id], numbers)
     _write_json(out / "camera.json", _camera(views[0]))
     return n_files + 1
-
-
-def _house(view: ChosenView) -> House:
-    return _house_of(view.entry.folder.parent.parent)
-
-
-@lru_cache(maxsize=1)
-def _house_of(folder: Path) -> House:
-    glb, description = (
-        read_regular(folder / name, MAX_SCENE_BYTES) for name in ("house.glb", "house.json")
-    )
-    return house_from_bundle(glb, description)
 
 
 def _numbers(models: list[str]) -> dict[str, int]:
@@ -263,3 +251,13 @@ def _camera(view: ChosenView) -> dict[str, Any]:
 
 def _write_json(path: Path, document: Any) -> None:
     path.write_text(json.dumps(document, indent=1) + "\n")
+
+
+FORM = ViewForm(
+    "bop",
+    write_bop,
+    "poses of placed models in the layout of the BOP challenge: `models/obj_<6 digits>.ply` and"
+    " `models_info.json` in mm, `camera.json`, `train_pbr/<scene>/` with `rgb`, `depth`, `mask`,"
+    " `mask_visib`, `scene_camera.json`, `scene_gt.json`, `scene_gt_info.json`,"
+    " `scene_gt_coco.json`; a scene is a home; its K counts from the centre of the first pixel",
+)

@@ -1,17 +1,15 @@
-"""`pbrs-farm export ROOT --to gltf | habitat | sdf | usd`: homes as scenes of other simulators.
+"""A home as the forms of homes write it: its items as pieces; no effects.
 
-Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or
-not at all. What every form needs of a home is here: each item's meshes in a frame of its own, its
-class, collision parts, mass, lamps, names that files can have, and the floor that can be walked.
+Each piece has meshes in a frame of its own, a class, collision parts, mass, lamps and a name that
+files can have; the home says which floor can be walked.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +17,6 @@ import shapely
 
 from pbrs_farm.core import classes, keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import (
     House,
@@ -31,12 +28,10 @@ from pbrs_farm.core.house import (
     corners_of_surfaces,
 )
 from pbrs_farm.core.lighting import LightForm, flux_lm
-from pbrs_farm.export.chosen_view import new_folder
-from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.geometry.convex_parts import hulls_of_parts
-from pbrs_farm.regular_files import fault_of, read_regular
 
 COLLISION: Final = "the convex hull of each part that hangs together"
+COLLIDES: Final = f"things collide as {COLLISION}"
 _MOST_PARTS: Final = 12  # of an item
 _KG_PER_M3: Final = 100.0  # of collision volume: furniture is mostly air
 _LEAST_KG, _MOST_KG = 0.1, 150.0
@@ -260,90 +255,6 @@ def _walkable(room: Room, pieces: Sequence[Piece]) -> list[F64]:
     pieces_of_floor = [g for g in shapely.get_parts(free) if g.area > 0.01]
     rings = [shapely.simplify(g, 0.01) for g in pieces_of_floor if g.geom_type == "Polygon"]
     return [np.asarray(shapely.get_coordinates(g.exterior)[:-1]) for g in rings]
-
-
-# The homes of an output folder, and the forms.
-
-
-Writer = Callable[[ExportedHome, Path], int]  # writes into a new folder; the number of files
-
-
-def _writer(form: str) -> Writer:
-    if form == "gltf":
-        from pbrs_farm.export import gltf_home
-
-        return gltf_home.write
-    if form == "habitat":
-        from pbrs_farm.export import habitat_home
-
-        return habitat_home.write
-    if form == "sdf":
-        from pbrs_farm.export import sdf_home
-
-        return sdf_home.write
-    if form in ("usd", "usdz"):
-        from pbrs_farm.export import usd_home
-
-        return usd_home.write if form == "usd" else usd_home.write_package
-    raise BadInput("--to", form, "no such form of a home", hint=f"of {', '.join(HOME_FORMS)}")
-
-
-HOME_FORMS: Final = ("gltf", "habitat", "sdf", "usd", "usdz")
-"""Forms that write homes, not views."""
-
-
-def export_homes(folder: Path, out: Path, form: str) -> tuple[int, int, list[str]]:
-    """Write every home of folder to out: (homes, files, what a user should know).
-
-    folder: an output folder, or one of `repair` or `dress` with house.glb. Each home lies in a
-    folder of its id. Raises BadInput where folder holds no home, or out holds something.
-    """
-    write, remarks = _writer(form), []
-    found = house_folders(folder)
-    n_files = 0
-    with new_folder(out) as scratch:
-        for one in found:
-            home = exported_home(stored_house(one))
-            n_files += _write_home(home, scratch / home.house.id, write)
-            if form != "gltf":
-                remarks.append(f"{home.house.id}: things collide as {COLLISION}")
-    return len(found), n_files, remarks
-
-
-def export_house(house: House, out: Path, form: str) -> int:
-    """Write one house to a new folder: the number of files. Raises BadInput where out holds something."""
-    write = _writer(form)
-    with new_folder(out) as scratch:
-        return _write_home(exported_home(house), scratch, write)
-
-
-def _write_home(home: ExportedHome, folder: Path, write: Writer) -> int:
-    folder.mkdir(exist_ok=True)
-    n_files = write(home, folder)
-    if home.credit:
-        (folder / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
-        n_files += 1
-    return n_files
-
-
-def house_folders(folder: Path) -> list[Path]:
-    """Folders that hold house.glb and house.json: folder itself, or those below its houses."""
-    below = folder / "houses"
-    found = sorted(below.iterdir()) if below.is_dir() else [folder]
-    found = [f for f in found if (f / "house.glb").is_file() and (f / "house.json").is_file()]
-    if not found:
-        hint = "an output folder of `run`, `dress` or `repair`"
-        raise BadInput(folder, "", "holds no house.glb and house.json", hint=hint)
-    return found
-
-
-def stored_house(folder: Path) -> House:
-    """The house of a folder's house.glb and house.json; BadInput where they are damaged."""
-    try:
-        data = {name: read_regular(folder / name) for name in ("house.glb", "house.json")}
-    except OSError as error:
-        raise BadInput(folder, "", fault_of(error)) from None
-    return house_from_bundle(data["house.glb"], data["house.json"])
 
 
 def rooms_json(house: House) -> list[dict[str, Any]]:

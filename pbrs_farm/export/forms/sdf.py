@@ -1,4 +1,4 @@
-"""A home as a world of Gazebo, SDF 1.9. Effect: write writes it.
+"""A home as a world of Gazebo, SDF 1.9. Effects: writes files.
 
 Metres, z up, gravity; a static model for the building, a model a thing with visual, convex collision
 parts, mass and lamps. Meshes stay y up, as glTF asks and Gazebo reads them: their poses turn them.
@@ -15,8 +15,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.export.gltf_home import glb_of_pieces
-from pbrs_farm.export.home_export import ExportedHome, Lamp, Piece, digest_name
+from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_glb import glb_of_pieces
+from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, digest_name
 from pbrs_farm.geometry.convex_parts import hull_faces
 
 # (x, y, z) with y up -> (x, -z, y) with z up.
@@ -29,7 +30,7 @@ _BUILDING: Final = "building"
 _RESERVED: Final = (_BUILDING, "world")
 
 
-def write(home: ExportedHome, folder: Path) -> int:
+def write_sdf(home: ExportedHome, folder: Path) -> int:
     """<house id>.sdf and meshes/; the number of files."""
     world = _World(home)
     (folder / "meshes").mkdir(exist_ok=True)
@@ -168,3 +169,11 @@ def _obj(part: F64) -> bytes:
     rows = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in part]
     rows += [f"f {a} {b} {c}" for a, b, c in hull_faces(part) + 1]
     return ("\n".join(rows) + "\n").encode()
+
+
+FORM = HomeForm(
+    "sdf",
+    write_sdf,
+    "a world of Gazebo, SDF 1.9: `<id>/<id>.sdf` and `meshes/`, metres, z up, gravity",
+    remark=COLLIDES,
+)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
+from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.sequences import pose_opencv
 
 _FARTHEST_MM: Final = 65535  # of depth.png: so far, or farther
@@ -103,3 +104,14 @@ def _world_normals(view: ChosenView) -> F64:
     length = np.linalg.norm(local, axis=-1, keepdims=True)
     world = local / np.where(length > 0, length, 1) @ pose_opencv(view)[:3, :3].T
     return np.where((view.array("valid") > 0)[..., None], world, 0)
+
+
+FORM = ViewForm(
+    "ply",
+    write_ply,
+    "`<house>/<view>.ply`, binary: a vertex for each pixel with a depth: `x y z` in metres of the"
+    " world (y up), `nx ny nz` in its axes, `red green blue` of the picture, `label` (NYU40, or"
+    " yours) and `instance`; from the layer `position` where there is one, else from depth and K of"
+    " a pin-hole",
+    has_classes=True,
+)

@@ -1,13 +1,9 @@
-"""A home as one GLB: a node an item, its class in extras, lamps as lights. Effect: write writes it.
-
-`pbrs-farm run` reads it back: items, classes, boxes, rooms and the flux of lamps are the same.
-"""
+"""Pieces of a home as GLB bytes: a node an item, its class in extras, lamps as lights; no effects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, ItemKind
-from pbrs_farm.export.home_export import ExportedHome, Lamp, Piece, rooms_json
+from pbrs_farm.export.home_pieces import Lamp, Piece
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import (
     gltf_asset,
@@ -27,13 +23,6 @@ from pbrs_farm.formats.house_glb import (
 
 _LIGHTS = "KHR_lights_punctual"
 _REPEAT = 10497  # OpenGL's number of a sampler's wrapping
-
-
-def write(home: ExportedHome, folder: Path) -> int:
-    """<house id>.glb; the number of files, 1."""
-    data = glb_of_pieces(home.house, home.pieces, with_lamps=True, rooms=rooms_json(home.house))
-    (folder / f"{home.house.id}.glb").write_bytes(data)
-    return 1
 
 
 def glb_of_pieces(

@@ -22,6 +22,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
+from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
@@ -284,3 +285,12 @@ def _told(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[s
         subject, relation, other = titles[row["subject"]], row["relation"], titles[row["object"]]
         sentences.append(f"{subject[0].upper()}{subject[1:]} is {relation} {other}.")
     return sentences
+
+
+FORM = ViewForm(
+    "captions",
+    write_captions,
+    "`captions.jsonl`, a line a view: `file_name` (`images/<house>/<view>.png`), `text` in plain"
+    " English, `objects` (`id`, `noun`, `box2d`), `relations` (`subject`, `relation`, `object` by id)",
+    has_classes=True,
+)

@@ -1,0 +1,89 @@
+"""COLMAP's text model, a folder for each house. Effects: reads views, writes files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
+from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.sequences import pose_opencv, required_picture
+
+_STEP_PX: Final = 16  # between the pixels of a view that give points
+
+
+def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """<house>/images/<view>.png and sparse/0/{cameras,images,points3D}.txt; the number of files.
+
+    Poses are world to camera with OpenCV axes, in the home's world (metres, y up). Points are
+    surfaces behind every 16th pixel, with its colour and without tracks.
+    """
+    n_files = 0
+    for house in dict.fromkeys(view.house.id for view in views):
+        own = [view for view in views if view.house.id == house]
+        (out / house / "images").mkdir(parents=True)
+        (out / house / "sparse/0").mkdir(parents=True)
+        cameras: dict[str, int] = {}
+        images, points = [], []
+        for number, view in enumerate(own, start=1):
+            picture = required_picture(view, "colmap")
+            (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
+            camera = cameras.setdefault(_camera(view), len(cameras) + 1)
+            # A line of its pose and an empty one: no points of it are named.
+            images.append(f"{number} {_pose(view)} {camera} {view.id}.png\n\n")
+            points += _points(view, picture)
+        _write(out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for c, n in cameras.items()))
+        _write(out / house / "sparse/0/images.txt", images)
+        numbered = (f"{n} {point} 0\n" for n, point in enumerate(points, start=1))
+        _write(out / house / "sparse/0/points3D.txt", numbered)
+        n_files += len(own) + 3
+    return n_files
+
+
+def _write(file: Path, lines: Iterable[str]) -> None:
+    file.write_text("".join(lines))
+
+
+def _camera(view: ChosenView) -> str:
+    require_lens(view, "colmap", "radtan", "fisheye")
+    i = intrinsics_of(view.facts)
+    # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
+    model, more = {
+        "radtan": ("FULL_OPENCV", (0.0, 0.0, 0.0)), "fisheye": ("OPENCV_FISHEYE", ()),
+    }.get(i.lens.model, ("PINHOLE", ()))  # fmt: skip
+    numbers = (i.fx, i.fy, i.cx, i.cy, *i.lens.coefficients, *more)
+    return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
+
+
+def _pose(view: ChosenView) -> str:
+    """`qw qx qy qz tx ty tz`, camera from world."""
+    camera_from_world = np.linalg.inv(pose_opencv(view))
+    x, y, z, w = Rotation.from_matrix(camera_from_world[:3, :3]).as_quat(canonical=True)
+    return " ".join(f"{v:.9g}" for v in (w, x, y, z, *camera_from_world[:3, 3]))
+
+
+def _points(view: ChosenView, picture: str) -> list[str]:
+    """`x y z r g b` of a grid of the view's pixels."""
+    depth, rgb = view.array("depth"), view.array(picture)
+    height, width = depth.shape
+    grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
+    rows, columns = (g.ravel() for g in grid)
+    z = depth[rows, columns] / 1000
+    rows, columns, z = rows[z > 0], columns[z > 0], z[z > 0]
+    # From pixel centres through the lens into the world.
+    pixels = np.stack([columns + 0.5, rows + 0.5], axis=1)
+    local = intrinsics_of(view.facts).directions(pixels) * z[:, None]
+    pose = pose_opencv(view)
+    world = local @ pose[:3, :3].T + pose[:3, 3]
+    colours = rgb[rows, columns]
+    return [
+        f"{x:.4f} {y:.4f} {z:.4f} {r} {g} {b}"
+        for (x, y, z), (r, g, b) in zip(world.tolist(), colours.tolist(), strict=True)
+    ]
+
+
+FORM = ViewForm("colmap", write_colmap, "a text model: cameras, images, points from depth")

@@ -1,0 +1,87 @@
+"""nerfstudio's transforms.json, a folder for each house. Effects: reads views, writes files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.lenses import COEFFICIENTS
+from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
+from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.sequences import required_picture
+
+# z up, as nerfstudio has it  <-  y up.
+Z_UP_FROM_Y_UP: Final[F64] = np.array(
+    [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]], np.float64
+)
+
+
+_MODELS: Final = {
+    "pinhole": "PINHOLE", "radtan": "OPENCV", "fisheye": "OPENCV_FISHEYE",
+    "equirect": "EQUIRECTANGULAR",
+}  # fmt: skip
+"""What nerfstudio calls each lens model; a run has one."""
+
+
+def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """<house>/transforms.json, images/<view>.png and depth/<view>.png (mm); the number of files.
+
+    Poses are camera to world with OpenGL axes in a world with z up; applied_transform is the turn
+    from the home's y up. Views without a picture are an error.
+    """
+    n_files = 0
+    for house in dict.fromkeys(view.house.id for view in views):
+        own = [view for view in views if view.house.id == house]
+        frames = []
+        for view in own:
+            row, n = _frame(view, out / house)
+            frames.append(row)
+            n_files += n
+        transforms = {
+            "camera_model": _MODELS[intrinsics_of(own[0].facts).lens.model],
+            "orientation_override": "none",
+            "depth_unit_scale_factor": 0.001,
+            "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
+            "frames": frames,
+        }
+        (out / house / "transforms.json").write_text(json.dumps(transforms, indent=1) + "\n")
+        n_files += 1
+    return n_files
+
+
+def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
+    # Write the picture and, where it is exported, the depth.
+    require_lens(view, "nerfstudio", *_MODELS)
+    picture, n_files = required_picture(view, "nerfstudio"), 1
+    facts = view.facts
+    pose = Z_UP_FROM_Y_UP @ np.array(facts["world_from_camera_opengl"], np.float64)
+    k = np.array(facts["K"], np.float64)
+    row: dict[str, Any] = {
+        "file_path": f"images/{view.id}.png",
+        "transform_matrix": pose.tolist(),
+        "w": facts["width_px"], "h": facts["height_px"],
+        "fl_x": k[0, 0], "fl_y": k[1, 1], "cx": k[0, 2], "cy": k[1, 2],
+    }  # fmt: skip
+    # Coefficients go by OpenCV's names.
+    lens = intrinsics_of(facts).lens
+    row |= dict(zip(COEFFICIENTS[lens.model], lens.coefficients, strict=True))
+    files = {"images": view.data(picture)}
+    if view.has("depth"):
+        files["depth"] = view.data("depth")
+        row["depth_file_path"] = f"depth/{view.id}.png"
+        n_files += 1
+    if facts.get("time_s") is not None:
+        row["time"] = facts["time_s"]
+    for name, data in files.items():
+        (folder / name).mkdir(parents=True, exist_ok=True)
+        (folder / name / f"{view.id}.png").write_bytes(data)
+    return row, n_files
+
+
+FORM = ViewForm(
+    "nerfstudio", write_nerfstudio, "`transforms.json` (z up, OpenGL axes), pictures, depth in mm"
+)

@@ -1,0 +1,84 @@
+"""The layout of the published PBRS data: <kind>_v2/<house>/<6 digits>_<kind>.png (docs/spec/suncg.md, 5).
+
+Effects: reads views, writes files. Every label is stored in that form already, so files are copied.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
+from pbrs_farm.export.form import ViewForm
+
+# Layer -> where the published data has it.
+FILES: Final = {
+    "mlt_il_ol": "mlt_v2/{house}/{id}_mlt.png",
+    "opengl_il": "opengl_ver2/{house}/{id}_color.png",
+    "depth": "depth_v2/{house}/{id}_depth.png",
+    "normal": "normal_v2/{house}/{id}_norm_camera.png",
+    "valid": "normal_v2/{house}/{id}_valid.png",
+    "semantic": "category_v2/{house}/{id}_category40.png",
+    "boundary": "boundary_v2/{house}/{id}_instance_boundary.png",
+}
+
+
+def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """Every view's files, camera_v2/<house>/room_camera*.txt and data_goodlist_v2.txt; the number.
+
+    id is the view's number in its house, 0-based: its line in room_camera.txt.
+    """
+    houses: dict[str, list[ChosenView]] = defaultdict(list)
+    for view in views:
+        houses[view.house.id].append(view)
+    n_files, good = 0, []  # files written, lines of the list of good views
+    for house, own in houses.items():
+        for number, view in enumerate(own):
+            place = {"house": house, "id": f"{number:06d}"}
+            for layer, published in FILES.items():
+                if view.has(layer):
+                    _write(out / published.format(**place), view.data(layer))
+                    n_files += 1
+            good.append("{house}/{id}\n".format(**place))
+        n_files += _write_cameras(out / "camera_v2" / house, own)
+    (out / "data_goodlist_v2.txt").write_text("".join(good))
+    return n_files + 1
+
+
+def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
+    # A line of both camera files for each view, in the order of the views' numbers.
+    folder.mkdir(parents=True)
+    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views))
+    names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
+    (folder / "room_camera_name.txt").write_text(names)
+    return 2
+
+
+def _write(target: Path, data: bytes) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data)
+
+
+def camera_line(view: ChosenView) -> str:
+    """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score."""
+    require_lens(view, "released")
+    pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    k = np.array(view.facts["K"], np.float64)
+    # Half the fields of view, horizontal and vertical.
+    half = (math.atan(width / 2 / k[0, 0]), math.atan(height / 2 / k[1, 1]))
+    groups = (pose[:3, 3], -pose[:3, 2], pose[:3, 1], half, (view.facts.get("score") or 0.0,))
+    return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups) + "\n"
+
+
+FORM = ViewForm(
+    "released",
+    write_released,
+    "the published PBRS layout: `mlt_v2/<house>/<6 digits>_mlt.png`, `depth_v2`, `normal_v2`,"
+    " `category_v2`, `boundary_v2`, `opengl_ver2`, `camera_v2/<house>/room_camera.txt`,"
+    " `data_goodlist_v2.txt`",
+)

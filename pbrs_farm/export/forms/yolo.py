@@ -1,0 +1,94 @@
+"""YOLO: pictures, a text file of boxes for each, data.yaml. Effects: reads views, writes files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.core.classes import CEILING, FLOOR, WALL
+from pbrs_farm.core.house_split import SPLITS
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.form import ViewForm, name_left_out
+
+# What surrounds the whole picture is no object: it has no boxes.
+_NO_BOX: Final = (0, WALL, FLOOR, CEILING)
+
+
+def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """images/<house>__<view>.png and labels/<house>__<view>.txt; the number of files.
+
+    A line is a box: class (NYU40 id - 1; of a user's table its place among the ids), centre x, y,
+    width, height, as shares of the picture. Views without a picture are left out, and named in
+    left_out.txt.
+    """
+    return write_labelled_pictures(views, out, _box_lines)
+
+
+def write_labelled_pictures(
+    views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
+) -> int:
+    shown = [view for view in views if view.picture is not None]
+    for folder in ("images", "labels"):
+        (out / folder).mkdir()
+    for view in shown:
+        name = f"{view.house.id}__{view.id}"
+        (out / "images" / f"{name}.png").write_bytes(view.data(view.picture or ""))
+        (out / "labels" / f"{name}.txt").write_text("".join(lines_of(view)))
+    without = [view for view in views if view.picture is None]
+    return 2 * len(shown) + name_left_out(out, without, "has no picture")
+
+
+def _box_lines(view: ChosenView) -> Iterable[str]:
+    width, height = view.facts["width_px"], view.facts["height_px"]
+    for number, row in numbered_objects(view):
+        x0, y0, x1, y1 = row["box2d"]
+        box = ((x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height)
+        yield f"{number} " + " ".join(f"{share:.6f}" for share in box) + "\n"
+
+
+def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
+    """The instances that count as objects, each with its class's number."""
+    numbers = {k: number for number, k in enumerate(view.choice.class_names)}
+    # Of a user's classes every one counts: the table says which.
+    none = _NO_BOX if view.choice.classes is None else (0,)
+    for row in view.facts["instances"]:
+        class_id = view.class_of(row)
+        if class_id not in none:
+            yield numbers[class_id], row
+
+
+def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
+    """data.yaml of an export with these splits, or none; the number of files, 1.
+
+    Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
+    the other's, and a comment says so.
+    """
+    folders = {name: f"{name}/images" for name in splits} or {"train": "images", "val": "images"}
+    remarks = [] if splits else ["# without --split, train and val are all views"]
+    for name, other in (("train", "val"), ("val", "train")):
+        if name not in folders:
+            other = other if other in folders else next(iter(folders))
+            folders[name] = folders[other]
+            remarks.append(f"# no home is in {name}: it is {other}")
+    lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
+    names = choice.class_names.values()
+    # A user's name may be anything: JSON's text is YAML's, too.
+    said = names if choice.classes is None else map(json.dumps, names)
+    lines += ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
+    (out / "data.yaml").write_text("\n".join(lines) + "\n")
+    return 1
+
+
+FORM = ViewForm(
+    "yolo",
+    write_yolo,
+    "`images/<house>__<view>.png`, `labels/<house>__<view>.txt` (boxes; class = NYU40 id - 1; none for"
+    " wall, floor, ceiling), `data.yaml`, whose folders count from its own: it works from any"
+    " directory. `train` and `val` always stand there; where no home is in one it is the other's"
+    " folder, and a comment and the command say so. Views without a picture are named in"
+    " `left_out.txt`",
+    has_classes=True,
+    finish=write_data_yaml,
+)

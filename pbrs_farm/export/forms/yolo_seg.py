@@ -1,0 +1,42 @@
+"""YOLO with polygons of what is seen in place of boxes. Effects: reads views, writes files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write_labelled_pictures
+from pbrs_farm.export.masks import mask_polygons
+
+
+def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """As the form yolo; a line is a polygon: class, then x and y of each corner as shares.
+
+    Every connected part of an item's visible mask is a polygon, see mask_polygons.
+    """
+    return write_labelled_pictures(views, out, _polygon_lines)
+
+
+def _polygon_lines(view: ChosenView) -> Iterable[str]:
+    instance = view.array("instance")
+    height, width = instance.shape
+    for number, row in numbered_objects(view):
+        # The mask fills its box: look nowhere else.
+        x0, y0, x1, y1 = row["box2d"]
+        for ring in mask_polygons(instance[y0:y1, x0:x1] == row["id"]):
+            shares = (ring + np.array([x0, y0])) / np.array([width, height])
+            yield f"{number} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
+
+
+FORM = ViewForm(
+    "yolo-seg",
+    write_yolo_seg,
+    "as `yolo`; a line is a polygon of what is seen: one a connected part of an item's mask, its"
+    " outline within a pixel of the mask's; a hole is cut by going to it, around it and back",
+    has_classes=True,
+    finish=write_data_yaml,
+)
