@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from benchmarks.hostile.case import Case, Place, Words, run
-from benchmarks.hostile.sound_inputs import suncg
+from tests.hostile.case import Case, Place, Words, run
+from tests.hostile.sound_inputs import suncg
 from tests.read.suncg.suncg_root import HOUSE, write
 
 Spoil = Callable[[dict[str, Any]], Any]

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
-from benchmarks.hostile.case import Case, by_verb, home
-from benchmarks.hostile.shape_cases import BOX, room_xml, walls
-from benchmarks.hostile.sound_inputs import CHAIRS, archive, chair
+from tests.hostile.case import Case, by_verb, home
+from tests.hostile.shape_cases import BOX, room_xml, walls
+from tests.hostile.sound_inputs import CHAIRS, archive, chair
 from tests.read.sweethome3d.sh3d_source import ROOM, WALLS, WINDOW_OBJ, home_xml, piece, sh3d
 
 NUMBERS: Final = ("NaN", "inf", "-1", "0", "1e308", "1e400", "abc", "", "0x10", "1_000")

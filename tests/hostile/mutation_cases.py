@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.hostile.case import Case, Place, Words, home, run
-from benchmarks.hostile.sound_inputs import (
+from tests.hostile.case import Case, Place, Words, home, run
+from tests.hostile.sound_inputs import (
     MODELS,
     XML,
     archive,

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.hostile.case import Case, Place, Words, run
-from benchmarks.hostile.model_cases import pictures
-from benchmarks.hostile.sound_inputs import suncg
+from tests.hostile.case import Case, Place, Words, run
+from tests.hostile.model_cases import pictures
+from tests.hostile.sound_inputs import suncg
 from tests.read.suncg.suncg_root import HOUSE, at, thing
 
 Spoil = Callable[[dict[str, Any]], Any]

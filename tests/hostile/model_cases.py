@@ -6,8 +6,8 @@ import struct
 from collections.abc import Iterator
 from typing import Final
 
-from benchmarks.hostile.case import Case, home
-from benchmarks.hostile.sound_inputs import CHAIRS, archive, png, zip_of
+from tests.hostile.case import Case, home
+from tests.hostile.sound_inputs import CHAIRS, archive, png, zip_of
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, WALLS, piece
 
 _FACE: Final = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\n"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from benchmarks.hostile.case import Case
-from benchmarks.hostile.process_tree import Ended
+from tests.hostile.case import Case
+from tests.hostile.process_tree import Ended
 
 SLOW_S: Final = 20.0
 MAX_MB: Final = 2000

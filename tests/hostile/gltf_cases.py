@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from benchmarks.hostile.case import Case, Place, Words, by_verb, home, run
-from benchmarks.hostile.model_cases import pictures
-from benchmarks.hostile.sound_inputs import glb, glb_of_parts, parts_of_glb, png, scene
+from tests.hostile.case import Case, Place, Words, by_verb, home, run
+from tests.hostile.model_cases import pictures
+from tests.hostile.sound_inputs import glb, glb_of_parts, parts_of_glb, png, scene
 from tests.read.gltf.gltf_scenes import Scene
 
 Spoil = Callable[[dict[str, Any]], Any]

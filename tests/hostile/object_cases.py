@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
-from benchmarks.hostile.case import ONE_VIEW, Case, Place, Words, run
-from benchmarks.hostile.sound_inputs import glb, parts_of_glb, png, zip_of
+from tests.hostile.case import ONE_VIEW, Case, Place, Words, run
+from tests.hostile.sound_inputs import glb, parts_of_glb, png, zip_of
 from tests.read.gltf.gltf_scenes import Scene
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ
 

@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any, Final
 from xml.sax.saxutils import quoteattr
 
-from benchmarks.hostile.case import Case, Place, Words, run, with_sheet
-from benchmarks.hostile.sound_inputs import CHAIRS, archive, chair, glb, parts_of_glb, scene, suncg
-from benchmarks.hostile.verdict import FORGED
+from tests.hostile.case import Case, Place, Words, run, with_sheet
+from tests.hostile.sound_inputs import CHAIRS, archive, chair, glb, parts_of_glb, scene, suncg
+from tests.hostile.verdict import FORGED
 from tests.read.sweethome3d.sh3d_source import ROOM, WALLS
 
 NAMES: Final = {

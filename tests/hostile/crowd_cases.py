@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hostile.case import Case, Place, Words, home, run
-from benchmarks.hostile.shape_cases import BOX, room_xml, walls
-from benchmarks.hostile.sound_inputs import CHAIRS, archive, chair, glb, scene, suncg
+from tests.hostile.case import Case, Place, Words, home, run
+from tests.hostile.shape_cases import BOX, room_xml, walls
+from tests.hostile.sound_inputs import CHAIRS, archive, chair, glb, scene, suncg
 from tests.read.suncg.suncg_root import room, write_room
 
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any, Final
 
-from benchmarks.hostile.case import Case, Place, Words, run
-from benchmarks.hostile.sound_inputs import glb
+from tests.hostile.case import Case, Place, Words, run
+from tests.hostile.sound_inputs import glb
 
 _RING: Final = [[0, 0], [6, 0], [6, 3], [0, 3]]
 

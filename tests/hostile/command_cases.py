@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, Final
 
-from benchmarks.hostile.case import TINY, Case, Place, Words, run
+from tests.hostile.case import TINY, Case, Place, Words, run
 
 _LINE: Final = "2 1.5 1.5  1 0 0  0 1 0  0.5 0.4 1.0\n"
 _CAMERA: Final = {"eye": [2, 1.5, 1.5], "towards": [1, 0, 0]}

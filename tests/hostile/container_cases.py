@@ -9,8 +9,8 @@ import zipfile
 from collections.abc import Iterator
 from functools import partial
 
-from benchmarks.hostile.case import Case, by_verb, home
-from benchmarks.hostile.sound_inputs import CHAIRS, MODELS, XML, archive, zip_of
+from tests.hostile.case import Case, by_verb, home
+from tests.hostile.sound_inputs import CHAIRS, MODELS, XML, archive, zip_of
 from tests.read.sweethome3d.sh3d_source import WALLS
 
 _HEAD = "<?xml version='1.0'?>"

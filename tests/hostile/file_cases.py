@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from benchmarks.hostile.case import Case, Place, Words, run
-from benchmarks.hostile.sound_inputs import MODELS, glb, suncg
+from tests.hostile.case import Case, Place, Words, run
+from tests.hostile.sound_inputs import MODELS, glb, suncg
 from tests.read.suncg.suncg_root import HOUSE
 
 Maker = Callable[[Path], None]

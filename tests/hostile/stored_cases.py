@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from benchmarks.hostile.case import ONE_VIEW, Case, Place, Words
+from tests.hostile.case import ONE_VIEW, Case, Place, Words
 
 Spoil = Callable[[Path], None]
 

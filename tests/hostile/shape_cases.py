@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hostile.case import Case, Place, Words, by_verb, home, run
-from benchmarks.hostile.sound_inputs import CHAIRS, archive, glb, scene, suncg
+from tests.hostile.case import Case, Place, Words, by_verb, home, run
+from tests.hostile.sound_inputs import CHAIRS, archive, glb, scene, suncg
 from tests.read.gltf.gltf_scenes import CUBE, Scene
 from tests.read.suncg.suncg_meshes import Obj
 from tests.read.suncg.suncg_root import HOUSE, at, room, thing, write, write_room
