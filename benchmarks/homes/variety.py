@@ -8,10 +8,10 @@ already are not measured again.
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import sys
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -23,7 +23,10 @@ from benchmarks.figures import write_report
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.dress.things import bodies
+from pbrs_farm.dress.things import case_goods, hung, radiators
+from pbrs_farm.dress.things.families import FAMILIES
+from pbrs_farm.dress.things.maker import Family, Thing, described_in
+from pbrs_farm.dress.things.things import THINGS
 
 FOLDER: Final = Path("out/bench/variety")
 FIRST_SEED: Final = 61001
@@ -86,17 +89,15 @@ def _things(seed: int) -> Iterator[Row]:
 
 
 def _groups_of_generated() -> dict[str, str]:
-    """The group of each family that the files of things name, and that code makes."""
+    """The group of every generated thing and family, and of the names that their forms have."""
     books = ("books", "stack_of_books", "leaning_book", "open_book", "magazines")
     found = dict.fromkeys(books, "book")
     found |= dict.fromkeys(("framed_picture", "canvas", "poster"), "picture_frame")
-    for path in (Path(bodies.__file__).parent).glob("*.toml"):
-        for name, entry in tomllib.loads(path.read_text()).items():
-            told = re.findall(r"family = ([^\"]*)", json.dumps(entry.get("make", [])))
-            families = re.findall(r"'(\w+)'", " ".join(told))
-            for family in (name, entry.get("family", name), *families):
-                if entry.get("group"):
-                    found[family] = entry["group"]
+    others = described_in((case_goods, hung, radiators), Thing)
+    every: list[Thing[...] | Family] = [*THINGS.values(), *others.values(), *FAMILIES.values()]
+    for one in every:
+        forms = re.findall(r'm\.name = "(\w+)"', inspect.getsource(one.build))
+        found |= dict.fromkeys((one.name, one.called, *forms), one.group)
     return found
 
 

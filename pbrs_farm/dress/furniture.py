@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import shapely
@@ -34,8 +34,10 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix, room_style
 from pbrs_farm.dress.textures.families import pattern_material, photographed
-from pbrs_farm.dress.things.assembly import Made, plain
-from pbrs_farm.dress.things.things import CASE_GOODS
+from pbrs_farm.dress.things import case_goods
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.case_goods import CASE_GOODS, Boards
+from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.hanging import Hanging, next_id
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
@@ -43,15 +45,6 @@ from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 
 _WHITE: Rgb = (0.9, 0.9, 0.88)
-
-
-class Boards(NamedTuple):
-    """What a piece is made of, in the order that case_goods.toml knows."""
-
-    body: Material
-    front: Material
-    top: Material
-    cloth: Rgb = (0.6, 0.58, 0.55)
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +324,7 @@ def _stand(
 
 def _generated(kind: WantedKind, look: Look, size: tuple[float, float, float], own: int) -> Made:
     rng = np.random.default_rng(own)
-    return grained(CASE_GOODS.make(kind.model, rng, look.style, look.boards, size), look)
+    return grained(CASE_GOODS[kind.model].make(rng, look.style, look.boards, size), look)
 
 
 def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Made | None:
@@ -447,7 +440,7 @@ def _chair_before(
     draft: Draft, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
-    made = grained(CASE_GOODS.make("desk_chair", rng, look.style, look.boards), look)
+    made = grained(case_goods.desk_chair.make(rng, look.style, look.boards), look)
     high = made[1].bounds[1]
     out = OUT_M + spot.depth + float(high[2]) + float(rng.uniform(0.05, 0.12))
     y = floor.room.room.floor_y

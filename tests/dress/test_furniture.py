@@ -13,12 +13,13 @@ from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.furniture import KINDS, Boards, furniture
+from pbrs_farm.dress.furniture import KINDS, furniture
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
-from pbrs_farm.dress.things.assembly import Made, plain
-from pbrs_farm.dress.things.things import CASE_GOODS
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.case_goods import CASE_GOODS, Boards, desk_chair
+from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from tests.builders import builtin_home
 from tests.dress.furniture import solid
@@ -46,8 +47,8 @@ def _pieces() -> list[Made]:
             size = tuple(
                 float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
             )
-            found.append(CASE_GOODS.make(kind.model, rng, STYLE, BOARDS, size))
-    return [*found, CASE_GOODS.make("desk_chair", np.random.default_rng(1), STYLE, BOARDS)]
+            found.append(CASE_GOODS[kind.model].make(rng, STYLE, BOARDS, size))
+    return [*found, desk_chair.make(np.random.default_rng(1), STYLE, BOARDS)]
 
 
 def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwards() -> None:
@@ -65,7 +66,7 @@ def test_pieces_are_as_large_as_their_kind_says() -> None:
     for kind in KINDS.values():
         rng = np.random.default_rng(5)
         size = (kind.width[1], kind.height[1], kind.depth[1])
-        w, d, h = CASE_GOODS.make(kind.model, rng, STYLE, BOARDS, size)[0].size
+        w, d, h = CASE_GOODS[kind.model].make(rng, STYLE, BOARDS, size)[0].size
         assert w < size[0] + 0.02
         assert h < size[1] + 0.03
         assert d < size[2] + 0.05
@@ -78,7 +79,7 @@ def test_pieces_are_as_large_as_their_kind_says() -> None:
 def test_the_boards_of_a_shelf_are_found_as_supports(
     name: str, size: tuple[float, float, float], least: int
 ) -> None:
-    made = CASE_GOODS.make(name, np.random.default_rng(2), STYLE, BOARDS, size)
+    made = CASE_GOODS[name].make(np.random.default_rng(2), STYLE, BOARDS, size)
     draft = Draft(builtin_home(), 1)
     room = draft.source.rooms[0]
     middle = room.polygon.mean(0)

@@ -23,7 +23,8 @@ from pbrs_farm.dress.clutter.drapes import (
 )
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.style import Rgb, mix
-from pbrs_farm.dress.things.assembly import made, plain
+from pbrs_farm.dress.things.assembly import made
+from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles

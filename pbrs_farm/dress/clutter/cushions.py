@@ -14,8 +14,9 @@ from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_duvet
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.supports import plan_turn
-from pbrs_farm.dress.things.assembly import Made, smooth
-from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.dress.things import soft
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -62,7 +63,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     if not _has_pillows(bed) and rng.random() < 0.95 * placing.share:
         # Both pillows of a bed are alike.
         own = int(rng.integers(1 << 30))
-        made = THINGS.make("bed_pillow", np.random.default_rng(own), placing.style)
+        made = soft.bed_pillow.make(np.random.default_rng(own), placing.style)
         is_double = bed.width > _DOUBLE_M
         most = (bed.width + 0.04) / 2 - 0.02 if is_double else bed.width
         if made[0].size[0] > most:
@@ -80,12 +81,12 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         return n + 1
     if rng.random() < 0.45 * placing.share:
         # A cushion leans where the pillows end, not across the bed's middle.
-        made = THINGS.make("cushion", rng, placing.style)
+        made = soft.cushion.make(rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         n += lay_down(placing, scene, index, made, *_place(bed, at, 0.56, made), bed.level)
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
-        made = THINGS.make("folded_blanket", rng, placing.style)
+        made = soft.folded_blanket.make(rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
         n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)
@@ -289,7 +290,7 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
     for k in range(2 * n_wanted):
         if n == n_wanted:
             break
-        made = THINGS.make("cushion", rng, placing.style)
+        made = soft.cushion.make(rng, placing.style)
         half = made[0].size[0] / 2 / _CELL_M
         low, high = columns[0] + half + _SIDE_M / _CELL_M, columns[-1] - half - _SIDE_M / _CELL_M
         if high <= low:

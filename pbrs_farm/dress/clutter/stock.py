@@ -70,7 +70,7 @@ class Stock:
             self._faces[piece.id] += _n_faces(shape)
             return piece, shape
         own = np.random.default_rng(number)
-        return THINGS.make(found.made, own, style) if found.made else None
+        return THINGS[found.made].make(own, style) if found.made else None
 
     def _owned(self, kind: str) -> list[Made]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
@@ -102,7 +102,7 @@ def is_round(kind: str) -> bool:
 
 def is_known(kind: str) -> bool:
     """Whether there is such a kind."""
-    return kind in (*_KINDS, *THINGS.names, "book", "magazines")
+    return kind in (*_KINDS, *THINGS, "book", "magazines")
 
 
 def _kind(name: str) -> ThingKind:

@@ -16,7 +16,8 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.things.assembly import hung, metal, plain
+from pbrs_farm.dress.things.assembly import hung
+from pbrs_farm.dress.things.materials import metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
 from pbrs_farm.geometry.solids import box, lathe, sphere
 from pbrs_farm.home.names import RADIATORS, words_of_item

@@ -20,7 +20,8 @@ from pbrs_farm.dress.textiles.curtains import (
 )
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.things.assembly import Made, hung, metal
+from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.materials import metal
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind

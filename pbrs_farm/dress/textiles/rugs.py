@@ -17,8 +17,10 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.textiles.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_pixels
-from pbrs_farm.dress.things.assembly import Made, hung, plain, slab
-from pbrs_farm.dress.things.bodies import loft, oval, rect
+from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.bodies import loft, slab
+from pbrs_farm.dress.things.materials import plain
+from pbrs_farm.dress.things.outlines import oval, rect
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.dress.walls.hung_things import jpeg_texture
 from pbrs_farm.home.room_use import RoomKind

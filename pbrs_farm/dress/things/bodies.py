@@ -1,4 +1,4 @@
-"""Closed bodies that furniture is built of: bevelled and rounded boxes, lofts, tubes, sheets; no effects.
+"""Closed bodies that furniture is built of: boxes, turned bodies, lofts, tubes; no effects.
 
 Metres, y up. Every body is closed, its faces counter-clockwise seen from outside, with normals that
 bend over soft edges and break at sharp ones.
@@ -13,15 +13,28 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
+from pbrs_farm.dress.things.outlines import Outline, Profile, Triple, oval, rect
+from pbrs_farm.geometry import solids
 
-Triple = tuple[float, float, float]
-Outline = Sequence[tuple[float, float]]  # (x, z), clockwise seen from above
+HALF_TURN: Final[F64] = np.diag([-1.0, 1.0, -1.0])  # about the vertical
 
 _SHARP_RAD: Final = np.radians(50)  # where a surface turns by more it has an edge
 
 
-# Boxes whose edges light shows: each vertex has the normal of the face it lies on, so that shading
-# runs round the edge.
+def slab(low: Sequence[float], high: Sequence[float]) -> Surface:
+    """An axis-aligned closed box between two corners, metres."""
+    a, b = np.asarray(low, np.float64), np.asarray(high, np.float64)
+    return solids.box("box", (a + b) / 2, (b - a) / 2, 0)
+
+
+def box(centre: Triple, half: Triple) -> Surface:
+    """An axis-aligned closed box about a point, half as wide, high and deep, metres."""
+    return solids.box("box", np.array(centre), np.array(half), 0)
+
+
+def sphere(centre: Triple, radius: float, *, n: int = 16) -> Surface:
+    """A ball, n sides round."""
+    return solids.sphere("sphere", np.asarray(centre, np.float64), radius, 0, n=n)
 
 
 def bevelled(low: Sequence[float], high: Sequence[float], r: float = 0.003) -> Surface:
@@ -110,57 +123,78 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
     )  # fmt: skip
 
 
-# Outlines in plan, and bodies through outlines at heights.
+def turned(profile: Profile | F64, *, n: int = 16) -> Surface:
+    """The (radius, height) profile (P, 2) turned about the vertical, n sides, smooth normals.
 
-
-def oval(
-    w: float, d: float, *, x: float = 0.0, z: float = 0.0, n: int = 24, power: float = 2.0
-) -> list[tuple[float, float]]:
-    """An ellipse w wide and d deep about (x, z); a higher power is nearer to a rectangle."""
-    t = 2 * np.pi * (np.arange(n) + 0.5) / n
-    c, s = np.cos(t), -np.sin(t)
-    px = np.sign(c) * np.abs(c) ** (2 / power) * w / 2 + x
-    pz = np.sign(s) * np.abs(s) ** (2 / power) * d / 2 + z
-    return [(float(p), float(q)) for p, q in zip(px, pz, strict=True)]
-
-
-def rect(
-    w: float, d: float, r: float = 0.0, *, x: float = 0.0, z: float = 0.0, n: int = 4
-) -> list[tuple[float, float]]:
-    """A rectangle about (x, z) with round corners of radius r, n + 1 points a corner."""
-    r = max(min(r, 0.49 * min(w, d)), 1e-4)
-    found = []
-    for k, (sx, sz) in enumerate(((1, -1), (-1, -1), (-1, 1), (1, 1))):
-        for t in np.pi / 2 * (k + np.arange(n + 1) / n):
-            found.append((
-                float(x + sx * (w / 2 - r) + r * np.cos(t)),
-                float(z + sz * (d / 2 - r) - r * np.sin(t)),
-            ))  # fmt: skip
-    return found
-
-
-def fluted(w: float, ribs: int, depth: float) -> list[tuple[float, float]]:
-    """A circle w wide whose rim goes in and out so many times, by a share of its radius."""
-    n = 3 * ribs
-    t = 2 * np.pi * np.arange(n) / n
-    r = w / 2 * (1 - depth / 2 + depth / 2 * np.cos(ribs * t))
-    return [(float(a * np.cos(b)), float(-a * np.sin(b))) for a, b in zip(r, t, strict=True)]
-
-
-def d_shape(
-    w: float, d: float, *, back: float = 0.0, share: float = 0.6, r: float = 0.01, n: int = 16
-) -> list[tuple[float, float]]:
-    """An outline straight at the back (z = back) and round at the front: basins, toilets, seats.
-
-    share: of its depth that the round front takes; r: radius of its two corners at the back.
+    The profile runs upwards outside; down again inside for a vessel. Where it turns by more than
+    50 degrees there is an edge. Closed where both ends are on the axis.
     """
-    t = np.pi * np.arange(n + 1) / n
-    end = back + d * (1 - share)
-    front = [(float(-w / 2 * np.cos(a)), float(end + d * share * np.sin(a))) for a in t]
-    quarter = np.pi / 2 * np.arange(4) / 3
-    right = [(float(w / 2 - r + r * np.cos(a)), float(back + r - r * np.sin(a))) for a in quarter]
-    left = [(float(-w / 2 + r - r * np.sin(a)), float(back + r - r * np.cos(a))) for a in quarter]
-    return [*front, *right, *left]
+    points = np.asarray(profile, np.float64)
+    steps = np.diff(points, axis=0)
+    steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-12)
+    outward = np.stack([steps[:, 1], -steps[:, 0]], -1)
+    # Average the normals of two stretches at a soft corner.
+    soft = (outward[:-1] * outward[1:]).sum(1) > np.cos(_SHARP_RAD)
+    both = outward[:-1] + outward[1:]
+    both /= np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
+    begin, end = outward.copy(), outward.copy()
+    begin[1:][soft] = both[soft]
+    end[:-1][soft] = both[soft]
+    angles = 2 * np.pi * np.arange(n + 1) / n
+    around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
+    around[-1] = around[0]
+    # Each stretch has a ring of points at its begin and one at its end.
+    ends = np.stack([points[:-1], points[1:]], 1).reshape(-1, 2)
+    slopes = np.stack([begin, end], 1).reshape(-1, 2)
+    positions, normals = (_rings(around, rows).astype(np.float32) for rows in (ends, slopes))
+    return Surface("turned", positions, _ring_faces(points[:, 0] > 0, n), 0, None, normals)
+
+
+def _rings(around: F64, rows: F64) -> F64:
+    # (R * (n + 1), 3): for each (radius, height) the unit ring, so wide and so high.
+    rings = around * rows[:, 0, None, None]
+    rings += np.stack([np.zeros(len(rows)), rows[:, 1], np.zeros(len(rows))], -1)[:, None]
+    return np.asarray(rings.reshape(-1, 3))
+
+
+def _ring_faces(is_wide: Bools, n: int) -> I32:
+    # Of each stretch two triangles a side, or one where it ends on the axis.
+    has_low, has_high = is_wide[:-1], is_wide[1:]
+    i = (
+        np.arange(n, dtype=np.int32)
+        + 2 * (n + 1) * np.arange(len(has_low), dtype=np.int32)[:, None]
+    )
+    j = i + np.int32(n + 1)
+    faces = np.empty((len(has_low), 2, n, 3), np.int32)
+    faces[:, 0] = np.stack([i, i + 1, j + has_high[:, None]], -1)
+    faces[:, 1] = np.stack([i, j + 1, j], -1)
+    return np.asarray(faces[np.stack([has_low, has_high], 1)].reshape(-1, 3))
+
+
+def cylinder(r: float, low: float, high: float, *, n: int = 16) -> Surface:
+    """An upright cylinder about the axis between two heights."""
+    return frustum((r, low), (r, high), n=n)
+
+
+def frustum(low: tuple[float, float], high: tuple[float, float], *, n: int = 16) -> Surface:
+    """A cone without its tip: (radius, height) of its lower and of its upper end."""
+    return turned([(0.0, low[1]), low, high, (0.0, high[1])], n=n)
+
+
+def vessel(outside: Profile, wall_m: float, *, n: int = 16) -> Surface:
+    """A vessel open at the top: the outer profile from the axis to the rim, and its inside."""
+    outer = np.asarray(outside, np.float64)
+    inner = outer[::-1].copy()
+    inner[:, 0] = np.maximum(inner[:, 0] - wall_m, 0.0)
+    inner[:, 1] = np.maximum(inner[:, 1], outer[0, 1] + wall_m)
+    inner[0, 1] = outer[-1, 1]
+    inner[-1, 0] = 0.0
+    # Leave out what the floor of the inside flattens.
+    keep = np.ones(len(inner), np.bool_)
+    keep[1:-1] = inner[1:-1, 0] > 0
+    profile = np.concatenate([outer, inner[keep]])
+    moves = np.concatenate([[True], np.linalg.norm(np.diff(profile, axis=0), axis=1) > 1e-6])
+    return turned(profile[moves], n=n)
 
 
 def loft(rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0) -> Surface:
@@ -204,30 +238,6 @@ def disc(
     small = oval(w - 2 * e, d - 2 * e, x=x, z=z, n=n, power=power)
     wide = oval(w, d, x=x, z=z, n=n, power=power)
     return loft([(small, low), (wide, low + e), (wide, high - e), (small, high)])
-
-
-# Tubes along a path.
-
-
-def bent(points: Sequence[Triple], r: float, *, n: int = 4) -> list[Triple]:
-    """The path with its corners rounded, r before and after each."""
-    path = [np.asarray(p, np.float64) for p in points]
-    found = [path[0]]
-    for before, corner, after in zip(path, path[1:], path[2:], strict=False):
-        to, off = before - corner, after - corner
-        near = min(r, 0.49 * float(np.linalg.norm(to)), 0.49 * float(np.linalg.norm(off)))
-        a = corner + to / np.linalg.norm(to) * near
-        b = corner + off / np.linalg.norm(off) * near
-        for t in np.linspace(0, 1, n + 1):
-            found.append((1 - t) ** 2 * a + 2 * t * (1 - t) * corner + t**2 * b)
-    found.append(path[-1])
-    return [(float(p[0]), float(p[1]), float(p[2])) for p in found]
-
-
-def ring_path(r: float, *, y: float = 0.0, n: int = 24, share: float = 1.0) -> list[Triple]:
-    """Points on a level circle about the origin, or on a share of it; the first comes again at the end."""
-    t = 2 * np.pi * share * np.arange(n + 1) / n
-    return [(float(r * np.cos(a)), float(y), float(-r * np.sin(a))) for a in t]
 
 
 def tube(path: Sequence[Triple], r: float, *, n: int = 8, end: float | None = None) -> Surface:
@@ -302,135 +312,35 @@ def square_tube(a: Triple, b: Triple, w: float, d: float) -> Surface:
     return Surface("bar", points.astype(np.float32), bar.faces, 0, None, normals.astype(np.float32))
 
 
-# Cloth: sheets of a thickness, with folds.
+def stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
+    """A body stretched along the axes."""
+    scale = np.asarray(size)
+    # Normals scale by the inverse, so that they stay at right angles to the surface.
+    normals = np.asarray(surface.normals, np.float64) / scale
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    points = (surface.positions.astype(np.float64) * scale).astype(np.float32)
+    return Surface(surface.name, points, surface.faces, 0, None, normals.astype(np.float32))
 
 
-def sheet(grid: F64, thick: float) -> Surface:
-    """A closed sheet around a grid of places (rows, columns, 3), half its thickness to either side."""
-    du, dv = np.gradient(grid, axis=1), np.gradient(grid, axis=0)
-    normal = np.cross(du, dv)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    rows, columns = grid.shape[:2]
-    upper, lower = grid + normal * thick / 2, grid - normal * thick / 2
-    i = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    first = np.concatenate([
-        np.stack([i, i + 1, i + columns + 1], -1), np.stack([i, i + columns + 1, i + columns], -1),
-    ])  # fmt: skip
-    n = rows * columns
-    last = n - columns
-    rim = np.concatenate([
-        np.arange(columns - 1), np.arange(rows - 1) * columns + columns - 1,
-        last + np.arange(columns - 1, 0, -1), np.arange(rows - 1, 0, -1) * columns,
-    ])  # fmt: skip
-    after = np.roll(rim, -1)
-    sides = np.concatenate([
-        np.stack([rim, rim + n, after + n], -1), np.stack([rim, after + n, after], -1),
-    ])  # fmt: skip
-    points = np.concatenate([upper.reshape(-1, 3), lower.reshape(-1, 3)])
-    faces = np.concatenate([first, first[:, ::-1] + n, sides])
-    return creased("sheet", points, faces, np.radians(75))
+def sheared(surface: Surface, foot: tuple[float, ...], top: tuple[float, ...]) -> Surface:
+    """An upright body 1 m high as a leg from foot to top: what was level stays level."""
+    shear = np.eye(3)
+    shear[:, 1] = np.asarray(top) - foot
+    points = surface.positions.astype(np.float64) @ shear.T + np.asarray(foot)
+    return smooth(surface.name, points, surface.faces)
 
 
-def draped(
-    w: float, d: float, drop: float, thick: float, *, folds: float = 0.012, wave: float = 1.0,
-    n: int = 14,
-) -> Surface:  # fmt: skip
-    """A cover over the left, right and front edge of what is w wide and d deep about the origin.
-
-    Its top is at y = 0, drop hangs down; folds: how deep they are at the hem; wave: how many.
-    """
-    reach = drop + 0.02
-    hem = np.array([0.01, reach / 2, reach])
-    x_at = np.r_[-w / 2 - hem[::-1], np.linspace(-w / 2 + 0.05, w / 2 - 0.05, n), w / 2 + hem]
-    z_at = np.r_[np.linspace(-d / 2, d / 2 - 0.05, n), d / 2 + hem]
-    x, z = np.meshgrid(_over_edge(x_at, w / 2)[0], _over_edge(z_at, d / 2)[0])
-    fall_x, fall_z = np.meshgrid(_over_edge(x_at, w / 2)[1], _over_edge(z_at, d / 2)[1])
-    # A corner hangs lower than an edge.
-    fall = (fall_x**4 + fall_z**4) ** 0.25
-    share = fall / max(drop, 1e-6)
-    ripple = folds * share * np.sin(28.0 * wave * (x / max(w, 0.1) + 1.7 * z / max(d, 0.1)))
-    # On top it lies in soft waves.
-    swell = np.sin(7.1 * wave * x / w + 2.3 * z / d) + np.sin(5.3 * wave * z / d - 3.1 * x / w)
-    swell *= 0.35 * folds * (1 - share)
-    to_side, to_front = np.sign(x) * (fall_x >= fall_z), 1.0 * (fall_z > fall_x)
-    grid = np.stack([x + ripple * to_side, swell - fall, z + ripple * to_front], -1)
-    return sheet(grid[::-1], thick)
-
-
-def _over_edge(at: F64, half: float) -> tuple[F64, F64]:
-    """(place across, how far it hangs) of cloth that lies up to half either way and hangs below."""
-    over = np.maximum(np.abs(at) - half, 0.0)
-    out = np.minimum(np.abs(at), half) + 0.02 * np.minimum(over / 0.05, 1.0)
-    return np.sign(at) * out, np.maximum(over - 0.015, 0.0)
-
-
-def tub(w: float, d: float, y: float, low: float, high: float, t: float, *, n: int = 18) -> Surface:
-    """A padded wall round the back of an oval w by d, from y up: `low` at its ends, `high` at its middle."""
-    # From the right end past the back to the left one; a third of the way round stays open in front.
-    angle = np.linspace(-0.22 * np.pi, 1.22 * np.pi, n + 1)
-    top = low + (high - low) * np.sin(np.pi * np.linspace(0, 1, n + 1)) ** 1.5
-    rings = []
-    for a, tall in zip(angle, top, strict=True):
-        out = np.array([np.cos(a), 0.0, -np.sin(a)])
-        size = np.array([w / 2, 0.0, d / 2])
-        outer, inner = out * size, out * (size - np.array([t, 0.0, t]))
-        mid = (outer + inner) / 2
-        e = min(0.35 * t, 0.2 * (tall - y))
-        lifted = [
-            (outer, y), (outer, tall - e), (outer * 0.75 + mid * 0.25, tall - 0.3 * e), (mid, tall),
-            (inner * 0.75 + mid * 0.25, tall - 0.3 * e), (inner, tall - e), (inner, y),
-        ]  # fmt: skip
-        rings.append(np.array([p + np.array([0.0, h, 0.0]) for p, h in lifted]))
-    places = np.stack(rings)
-    k = places.shape[1]
-    points = np.concatenate([places.reshape(-1, 3), places[[0, -1]].mean(1)])
-    i = np.arange(k)
-    j = (i + 1) % k
-    faces = []
-    for row in range(n):
-        a0, b0 = row * k, (row + 1) * k
-        faces += [np.stack([a0 + i, b0 + j, a0 + j], -1), np.stack([a0 + i, b0 + i, b0 + j], -1)]
-    last = len(places) * k
-    faces += [np.stack([np.full(k, last), i, j], -1)]
-    faces += [np.stack([np.full(k, last + 1), n * k + j, n * k + i], -1)]
-    return creased("tub", points, np.concatenate(faces), np.radians(60))
-
-
-def chair_shell(w: float, d: float, seat: float, high: float, thick: float) -> Surface:
-    """A seat and a back in one bent sheet: the seat's top at `seat`, the back's edge at `high`."""
-    rows, columns = 15, 9
-    u = np.linspace(-1, 1, columns)
-    # Along: from the front edge down over the seat and up the back.
-    z = np.r_[d / 2 - 0.01, np.linspace(d / 2 - 0.04, -d / 2 + 0.16, 6), -d / 2 + 0.1,
-              np.linspace(-d / 2 + 0.065, -d / 2 + thick / 2 + 0.003, 7)]  # fmt: skip
-    top = high - thick / 2 - 0.002
-    low = seat - thick / 2
-    y = np.r_[low - 0.025, np.full(6, low) - 0.012 * np.sin(np.linspace(0, np.pi, 6)), low + 0.03,
-              np.linspace(low + 0.09, top, 7)]  # fmt: skip
-    half = w / 2 - thick / 2 - 0.001
-    taper = np.r_[0.86, 0.93, np.ones(7), np.linspace(0.99, 0.72, 6)]
-    grid = np.empty((rows, columns, 3))
-    curl = np.r_[np.zeros(2), np.full(5, 0.035), 0.05, np.linspace(0.06, 0.03, 7)]
-    is_back = np.r_[np.zeros(7), 0.4, np.ones(7)]
-    grid[..., 0] = half * taper[:, None] * u[None]
-    grid[..., 1] = y[:, None] + (curl * (1 - is_back))[:, None] * u[None] ** 4
-    grid[..., 2] = z[:, None] + (curl * is_back)[:, None] * u[None] ** 2
-    return sheet(grid, thick)
-
-
-def hanging(w: float, h: float, depth: float, thick: float, folds: float) -> Surface:
-    """Cloth that hangs in folds along x, its top at y = h: curtains of showers, towels on rails."""
-    n = max(int(folds * 6), 8)
-    x = np.linspace(-w / 2, w / 2, n + 1)
-    y = np.linspace(h, 0.0, 6)
-    grid = np.empty((len(y), len(x), 3))
-    grid[..., 0], grid[..., 1] = x[None], y[:, None]
-    wide = 0.55 + 0.45 * (1 - y / h)
-    grid[..., 2] = depth / 2 * wide[:, None] * np.sin(2 * np.pi * folds * (x / w + 0.5))[None]
-    return sheet(grid[::-1], thick)
-
-
-# Normals that break at sharp edges.
+def smooth(name: str, points: F64, faces: I32) -> Surface:
+    """A surface whose shading normals are the mean of its faces', by area."""
+    corners = points[faces]
+    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], n)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return Surface(
+        name, points.astype(np.float32), faces.astype(np.int32), 0, None, normals.astype(np.float32)
+    )
 
 
 def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
@@ -462,13 +372,3 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
         name, points[vertex[first]].astype(np.float32),
         number.reshape(-1, 3).astype(np.int32), 0, None, normals[first].astype(np.float32),
     )  # fmt: skip
-
-
-SOLIDS: Final = {
-    "bevelled": bevelled, "rounded": rounded, "loft": loft, "board": board, "disc": disc,
-    "tube": tube, "square_tube": square_tube, "hoop": hoop, "tub": tub, "chair_shell": chair_shell, "draped": draped, "hanging": hanging,
-}  # fmt: skip
-
-OUTLINES: Final = {
-    "oval": oval, "rect": rect, "d_shape": d_shape, "fluted": fluted, "bent": bent, "ring_path": ring_path,
-}  # fmt: skip

@@ -15,7 +15,8 @@ from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material, Surface, Texture
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Made, Part, any_colour, made, transformed
+from pbrs_farm.dress.things.assembly import Made, Part, made, transformed
+from pbrs_farm.dress.things.materials import any_colour
 from pbrs_farm.geometry.solids import box
 
 # One picture with the spines, covers and page edges of a home's books.

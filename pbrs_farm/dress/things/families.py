@@ -1,4 +1,4 @@
-"""The generated catalogue: families of furniture that TOML files describe, many variations each; no effects but reading.
+"""The generated catalogue: families of furniture, many variations each; no effects but reading.
 
 A variation is known by its family, its number and its taste (`generated#cooker-07-nordic`); its size
 is told without making it, its shape is made when it is used. Variations of a set (a kitchen) that
@@ -8,10 +8,11 @@ have one number share what the set draws.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,16 +23,26 @@ from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.things import (
+    bathroom,
+    beds,
+    joints,
+    kitchen,
+    lamps,
+    radiators,
+    seating,
+    storage,
+    tables,
+)
 from pbrs_farm.dress.things.assembly import GENERATED
-from pbrs_farm.dress.things.bodies import OUTLINES, SOLIDS
-from pbrs_farm.dress.things.things import STUFFS, things_of
+from pbrs_farm.dress.things.maker import Family, described_in
 
-VERSION: Final = 3
-"""Of the words and solids of families: part of the catalogue's digest. Raised when a shape changes."""
+VERSION: Final = 4
+"""Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
-FILES: Final = ("joints", "kitchen", "bathroom", "seating", "tables", "storage", "beds_and_lamps")
+_MODULES: Final = (kitchen, bathroom, seating, tables, storage, beds, lamps, radiators)
 
-FAMILIES: Final = things_of(*FILES, **SOLIDS, **OUTLINES, **STUFFS)
+FAMILIES: Final[Mapping[str, Family]] = described_in(_MODULES, Family)
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
@@ -57,8 +68,8 @@ def family_pieces() -> tuple[Piece, ...]:
     """Every variation, in the order of the files."""
     return tuple(
         _piece(name, number)
-        for name, entry in FAMILIES.entries.items()
-        for number in range(1, entry.variants + 1)
+        for name, family in FAMILIES.items()
+        for number in range(1, family.variants + 1)
     )
 
 
@@ -67,8 +78,8 @@ def _numbers() -> dict[str, tuple[str, int]]:
     # Of each piece's id: its family, its number.
     rows = (
         (name, number)
-        for name, entry in FAMILIES.entries.items()
-        for number in range(1, entry.variants + 1)
+        for name, family in FAMILIES.items()
+        for number in range(1, family.variants + 1)
     )
     return {piece.id: row for piece, row in zip(family_pieces(), rows, strict=True)}
 
@@ -87,33 +98,31 @@ def drawn_size(piece: Piece) -> tuple[float, float, float]:
 
 def _drawn(piece: Piece) -> Shape:
     name, number = _numbers()[piece.id]
-    entry = FAMILIES.entries[name]
-    known = {}
-    if entry.set_name:
-        set_rng, set_style = _stream(entry.set_name, number)
-        known = FAMILIES.values(entry.set_name, set_rng, set_style)
-    _, style = _stream(entry.set_name or name, number)
+    family = FAMILIES[name]
+    style, shared = _shared(family, number)
     rng = np.random.default_rng(keys.seed("family", "shape", name, number))
-    _, shape = FAMILIES.make(name, rng, style, piece.size, known=known)
+    _, shape = family.make(rng, style, piece.size, *shared)
     return shape
 
 
-def _stream(name: str, number: int) -> tuple[np.random.Generator, Style]:
-    rng = np.random.default_rng(keys.seed("family", name, number))
-    return rng, style_for(rng)
+def _shared(family: Family, number: int) -> tuple[Style, tuple[Any, ...]]:
+    # The taste of a variation, and what it has in common with those of its set.
+    of = family.of_set.__name__ if family.of_set else family.name
+    rng = np.random.default_rng(keys.seed("family", of, number))
+    style = style_for(rng)
+    return style, family.shared(rng, style)
 
 
 def _piece(name: str, number: int) -> Piece:
-    entry = FAMILIES.entries[name]
-    rng, style = _stream(entry.set_name or name, number)
-    known = FAMILIES.values(entry.set_name, rng, style) if entry.set_name else {}
+    family = FAMILIES[name]
+    style, shared = _shared(family, number)
     own = np.random.default_rng(keys.seed("family", "size", name, number))
     taste = style.name.replace(" ", "-")
     return Piece(
-        f"{GENERATED}{name}-{number:02d}-{taste}", entry.family.replace("_", " ").capitalize(),
-        entry.group, entry.place, entry.nyu40, FAMILIES.size(name, own, style, known),
-        ItemKind.LAMP if entry.nyu40 == LAMP else ItemKind.OBJECT,
-        of_set=f"{entry.set_name} {number}" if entry.set_name else "",
+        f"{GENERATED}{name}-{number:02d}-{taste}", family.called.replace("_", " ").capitalize(),
+        family.group, family.place, family.nyu40, family.size(own, style, *shared),
+        ItemKind.LAMP if family.nyu40 == LAMP else ItemKind.OBJECT,
+        of_set=f"{family.of_set.__name__} {number}" if family.of_set else "",
     )  # fmt: skip
 
 
@@ -159,5 +168,5 @@ def _lit(shape: Shape, piece: Piece) -> Shape:
 
 @cache
 def _digest() -> str:
-    texts = [Path(__file__).with_name(f"{name}.toml").read_bytes() for name in FILES]
+    texts = [Path(str(module.__file__)).read_bytes() for module in (joints, *_MODULES)]
     return keys.digest(VERSION, *(hashlib.sha256(text).hexdigest() for text in texts))

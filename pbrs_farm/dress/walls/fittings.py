@@ -17,11 +17,14 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.textiles.rug_patterns import RUGS, rug_pixels
-from pbrs_farm.dress.things.assembly import Made, Part, hung, plain, transformed, turned
+from pbrs_farm.dress.things import hung as hung_furniture
+from pbrs_farm.dress.things import radiators
+from pbrs_farm.dress.things.assembly import Made, Part, hung, transformed
+from pbrs_farm.dress.things.bodies import turned
+from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     CUPBOARD_FORMS,
-    HUNG_THINGS,
     SWITCH_FORMS,
     clock,
     faced_slab,
@@ -71,7 +74,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     if rng.random() < 0.35:
         diameter = float(rng.uniform(0.45, 0.75))
         made, low = (
-            HUNG_THINGS.make("round_mirror", rng, style, diameter, frame),
+            hung_furniture.round_mirror.make(rng, style, diameter, frame),
             1.55 - diameter / 2,
         )
     else:
@@ -149,8 +152,8 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         return
     # All switches of a home are of one make.
     form = int(hanging.draft.rng("switches", "form").integers(SWITCH_FORMS))
-    switch = _fitting(catalogue, "switch", rng) or HUNG_THINGS.make(
-        "wall_switch", rng, style, 1, colour, form
+    switch = _fitting(catalogue, "switch", rng) or hung_furniture.wall_switch.make(
+        rng, style, 1, colour, form
     )
     lit = 0
     for door in room.doors:
@@ -159,8 +162,8 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
             lit += 1
     for _ in range(WANTS[room.kind].sockets):
         n = int(rng.choice([1, 1, 2, 3]))
-        socket = _fitting(catalogue, "socket", rng) or HUNG_THINGS.make(
-            "wall_socket", rng, style, n, colour
+        socket = _fitting(catalogue, "socket", rng) or hung_furniture.wall_socket.make(
+            rng, style, n, colour
         )
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
@@ -220,7 +223,7 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
     paint = coat_material(joinery_scheme(hanging.draft, style).radiator)
 
     def make(wide: float, high: float) -> Made:
-        return HUNG_THINGS.make("panel_radiator", rng, style, wide, high, paint)
+        return radiators.wall_radiator.make(rng, style, wide, high, paint)
 
     for window in room.windows:
         side = window.side_of(room.room.id)
@@ -278,7 +281,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
     if is_bath and rng.random() < _RADIATORS * share:
-        hang_anywhere(hanging, HUNG_THINGS.make("towel_radiator", rng, style), _LADDER_M, 0.2, rng)
+        hang_anywhere(hanging, radiators.towel_radiator.make(rng, style), _LADDER_M, 0.2, rng)
     wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
     board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
     # What hangs in one room is of one make, of several widths.
@@ -306,18 +309,18 @@ def _shelf(
     if kind < 0.5:
         boards = int(rng.choice([1, 2, 2, 3]))
         return (
-            HUNG_THINGS.make("wall_shelf", rng, style, width, depth, boards, board),
+            hung_furniture.wall_shelf.make(rng, style, width, depth, boards, board),
             1.5 if boards == 1 else 1.38,
             _ABOVE_M,
         )
     if kind < 0.75:
         height = float(rng.choice([0.34, 0.34, 0.62]))
-        made = HUNG_THINGS.make("open_cupboard", rng, style, board, width, height, depth)
+        made = hung_furniture.open_cupboard.make(rng, style, board, width, height, depth)
         return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
     n_doors = max(1, round(width / 0.45))
     height = float(rng.uniform(0.38, 0.6))
     given = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
-    made = HUNG_THINGS.make("wall_cupboard", rng, style, *given)
+    made = hung_furniture.wall_cupboard.make(rng, style, *given)
     return made, float(rng.uniform(1.4, 1.6)), 0.05
 
 

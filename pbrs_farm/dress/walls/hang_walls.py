@@ -13,7 +13,8 @@ from pbrs_farm.core.classes import BED, CABINET, COUNTER, OTHERFURNITURE, SHELVE
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, mix
-from pbrs_farm.dress.things.assembly import plain
+from pbrs_farm.dress.things import hung as hung_furniture
+from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.fittings import (
     fit_switches,
     hang_clock,
@@ -24,7 +25,7 @@ from pbrs_farm.dress.walls.fittings import (
     wants_radiators,
 )
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS, HUNG_THINGS
+from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
 from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
@@ -103,12 +104,12 @@ def _hang_cupboards(
                 continue
             is_open = rng.random() < _OPEN
             if is_open:
-                made = HUNG_THINGS.make(
-                    "open_cupboard", rng, style, body, w, height, _DEEP_M - 0.04
+                made = hung_furniture.open_cupboard.make(
+                    rng, style, body, w, height, _DEEP_M - 0.04
                 )
             else:
                 given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
-                made = HUNG_THINGS.make("wall_cupboard", rng, style, *given)
+                made = hung_furniture.wall_cupboard.make(rng, style, *given)
             tags = ("support",) if is_open else ()
             hanging.hang(*made, k, s + w / 2, low, margin_m=0.0, tags=tags)
             s += w + 0.001
@@ -118,7 +119,7 @@ def _hang_rail(
     hanging: Hanging, runs: list[tuple[int, float, float]], style: Style, rng: np.random.Generator
 ) -> None:
     width = float(rng.uniform(0.55, 0.95))
-    piece, shape = HUNG_THINGS.make("tool_rail", rng, style, width)
+    piece, shape = hung_furniture.tool_rail.make(rng, style, width)
     bottom = float(shape.bounds[0, 1])
     low = hanging.floor_y + 0.97 - bottom
     for k, s0, s1 in runs:
@@ -156,7 +157,7 @@ def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) 
         return
     beds = [space.bounds[k] for k in hanging.room.items if items[k].nyu40 == BED]
     for n in range(WANTS[kind].most_coats, 0, -1):
-        piece, shape = HUNG_THINGS.make("coat_rack", rng, style, n, kind is RoomKind.BATHROOM)
+        piece, shape = hung_furniture.coat_rack.make(rng, style, n, kind is RoomKind.BATHROOM)
         low, high = shape.bounds
         width, bottom = float(high[0] - low[0]), hanging.floor_y + _HOOKS_M
         places = [

@@ -1,6 +1,6 @@
 """Pictures as things: framed, on canvas, as posters; mirrors and clocks; no effects.
 
-What needs no picture is described in things/hung_things.toml.
+What needs no picture is in things/hung.py.
 
 Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at the origin.
 """
@@ -8,7 +8,6 @@ Shapes have their back at z = 0 and grow to +z, the middle of the lower edge at 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -18,15 +17,14 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Made, hung, metal, plain, smooth
-from pbrs_farm.dress.things.things import things_of
-from pbrs_farm.geometry.solids import box, lathe, quads_surface
+from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.hung import facing_disc, ring
+from pbrs_farm.dress.things.materials import metal, plain
+from pbrs_farm.geometry.solids import box, quads_surface
 from pbrs_farm.images import jpeg_from_array
 
 _UNIT = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
 _JPEG_QUALITY = 88
-# Turns what stands upright so that its top looks along +z.
-_LYING = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
 def jpeg_texture(name: str, pixels: Srgb8Image) -> Texture:
@@ -47,23 +45,6 @@ def frame_material(rng: np.random.Generator, style: Style) -> Material:
     if kind < 0.92:
         return metal(style)
     return plain("frame dark", shade(style.wood.dark, 0.6), 0.35)
-
-
-def ring(
-    name: str, low: Sequence[float] | F64, high: Sequence[float] | F64, width: float, depth: float
-) -> Surface:
-    """A closed rectangular moulding with mitred corners; low, high (2,) are its outer corners."""
-    outer = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
-    inner = outer + width * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-    quads = []
-    for k in range(4):
-        a, b, c, d = outer[k], outer[(k + 1) % 4], inner[(k + 1) % 4], inner[k]
-        front, back = [_at(p, depth) for p in (a, b, c, d)], [_at(p, 0.0) for p in (a, b, c, d)]
-        quads.append(front)
-        quads.append([back[1], back[0], back[3], back[2]])
-        quads.append([back[0], back[1], front[1], front[0]])
-        quads.append([back[2], back[3], front[3], front[2]])
-    return quads_surface(name, np.array(quads), 0)
 
 
 def faced_slab(name: str, low: F64, high: F64, z: tuple[float, float]) -> tuple[Surface, Surface]:
@@ -135,12 +116,12 @@ def mirror(width: float, height: float, frame: Material | None, bar: float = 0.0
 def clock(diameter: float, dial: Texture, frame: Material) -> Made:
     """A round wall clock with a printed dial."""
     r = diameter / 2
-    rim = np.array([[0, 0], [r, 0], [r, 0.035], [r - 0.012, 0.035], [r - 0.012, 0.024]])
-    face = _disc("dial", np.array([[r - 0.012, 0.024], [0, 0.024]]), r)
+    rim = facing_disc([(0, 0), (r, 0), (r, 0.035), (r - 0.012, 0.035), (r - 0.012, 0.024)], r)
+    face = replace(facing_disc([(r - 0.012, 0.024), (0, 0.024)], r), name="dial")
     # Lay the dial's picture over the disc.
     uv = (face.positions[:, :2] - [0, r]) / (2 * (r - 0.012)) + 0.5
     parts = [
-        (_disc("rim", rim, r), frame),
+        (replace(rim, name="rim"), frame),
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
     ]
     return hung("clock", "clock", OTHERPROP, parts, [dial])
@@ -157,61 +138,5 @@ def _printed(texture: Texture, roughness: float = 0.7) -> Material:
     return Material(f"print {texture.id[:8]}", texture_id=texture.id, roughness=roughness)
 
 
-def _disc(name: str, profile: F64, up: float) -> Surface:
-    """A profile (radius, height) turned about +z, its middle at y = up."""
-    upright = lathe(name, profile, np.zeros(3), 0, n=40)
-    normals = upright.normals
-    assert normals is not None
-    turned = replace(
-        upright,
-        positions=(upright.positions @ _LYING.T.astype(np.float32)).astype(np.float32),
-        normals=(normals @ _LYING.T.astype(np.float32)).astype(np.float32),
-    )
-    return _moved(turned, (0.0, up, 0.0))
-
-
-def _moved(surface: Surface, offset: tuple[float, float, float]) -> Surface:
-    return replace(surface, positions=(surface.positions + np.array(offset)).astype(np.float32))
-
-
-def _at(p: F64, z: float) -> list[float]:
-    return [float(p[0]), float(p[1]), z]
-
-
-def _draped(wide: float, long: float, deep: float, phase: float) -> Surface:
-    """A closed hanging bag of cloth, its top at y = 0: pinched above, folded below."""
-    n, rows = 22, 9
-    angles = 2 * np.pi * np.arange(n) / n
-    v = np.linspace(0, 1, rows)
-    # Widen from the collar to the shoulders, then slowly to the hem.
-    grow = np.interp(v, [0.0, 0.06, 0.14, 0.5, 1.0], [0.25, 0.62, 0.9, 0.85, 1.0])
-    fold = 1 + 0.22 * v[:, None] * np.sin(5 * angles + phase + 0.8 * v[:, None])
-    x = wide / 2 * grow[:, None] * np.cos(angles)
-    z = deep / 2 * np.minimum(grow + 0.1, 1.0)[:, None] * np.sin(angles) * fold
-    y = np.broadcast_to(-long * v[:, None], x.shape)
-    ring = np.stack([x, y, z], -1).reshape(-1, 3)
-    points = np.concatenate([ring, [[0.0, 0.0, 0.0]], [[0.0, -long, 0.0]]])
-    k, after = np.arange(n), (np.arange(n) + 1) % n
-    faces = [np.stack([np.full(n, rows * n), after, k], -1)]
-    for r in range(rows - 1):
-        a, b = r * n, (r + 1) * n
-        faces += [
-            np.stack([a + k, a + after, b + after], -1),
-            np.stack([a + k, b + after, b + k], -1),
-        ]
-    last = (rows - 1) * n
-    faces.append(np.stack([np.full(n, rows * n + 1), last + k, last + after], -1))
-    return smooth("coat", points, np.concatenate(faces).astype(np.int32))
-
-
-HUNG_THINGS: Final = things_of(
-    "hung_things",
-    diagonal=lambda *scale: np.diag(scale),
-    disc=lambda profile, up, x=0.0: _moved(_disc("disc", np.array(profile), up), (x, 0.0, 0.0)),
-    ring=lambda low, high, width, depth: ring("ring", low, high, width, depth),
-    draped=_draped,
-    mirror_glass=Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9)),
-)
-"""What hangs on walls and needs no picture: most take their sizes and materials."""
 CUPBOARD_FORMS: Final = 6
 SWITCH_FORMS: Final = 6

@@ -16,16 +16,10 @@ from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
+from pbrs_farm.dress.things import hung as hung_furniture
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import (
-    HUNG_THINGS,
-    canvas,
-    frame_material,
-    framed,
-    jpeg_texture,
-    poster,
-)
+from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
 from pbrs_farm.dress.walls.prints import print_pixels
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.images import decode_photo
@@ -283,7 +277,7 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
     frame = frame_material(rng, style)
-    made = HUNG_THINGS.make("pin_board", rng, style, width, height, frame)
+    made = hung_furniture.pin_board.make(rng, style, width, height, frame)
     low = hanging.floor_y + _LOW_M
     places = _over_desks(hanging, space)
     if kind is not RoomKind.BEDROOM:

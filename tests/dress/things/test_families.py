@@ -8,7 +8,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY, Piece, Place
 from pbrs_farm.core.house import ItemKind, Surface
 from pbrs_farm.core.mesh import closed_edge_share, face_areas, signed_volume, triangle_corners
-from pbrs_farm.dress.things import bodies
+from pbrs_farm.dress.things import bodies, cloth, outlines
 from pbrs_farm.dress.things.families import (
     FAMILIES,
     drawn_size,
@@ -17,7 +17,7 @@ from pbrs_farm.dress.things.families import (
     with_families,
 )
 
-_NAMES = sorted(name for name, entry in FAMILIES.entries.items() if entry.variants)
+_NAMES = sorted(FAMILIES)
 _MOST_FACES = 3800
 
 
@@ -94,11 +94,11 @@ def test_bodies_enclose_what_their_formulas_say() -> None:
     assert cut == pytest.approx(1 - 12 * 0.02**2 / 2, abs=2e-4)
     ball = volume(bodies.rounded((0, 0, 0), (2, 2, 2), 1.0, n=12))
     assert ball == pytest.approx(4 / 3 * np.pi, rel=0.04)
-    cone = [(bodies.oval(2, 2, n=64), 0.0), (bodies.oval(1, 1, n=64), 1.0)]
+    cone = [(outlines.oval(2, 2, n=64), 0.0), (outlines.oval(1, 1, n=64), 1.0)]
     assert volume(bodies.loft(cone)) == pytest.approx(np.pi / 3 * (1 + 0.5 + 0.25), rel=0.01)
     pipe = bodies.tube([(0, 0, 0), (0, 1, 0), (1, 1, 0)], 0.1, n=32)
     assert volume(pipe) == pytest.approx(2 * np.pi * 0.1**2, rel=0.03)
-    ring = bodies.hoop(bodies.oval(2, 2, n=64), 0.5, 0.1, n=32)
+    ring = bodies.hoop(outlines.oval(2, 2, n=64), 0.5, 0.1, n=32)
     assert volume(ring) == pytest.approx(2 * np.pi**2 * 0.1**2, rel=0.02)
-    sheet = bodies.hanging(1.0, 2.0, 0.0, 0.01, 3.0)
+    sheet = cloth.hanging(1.0, 2.0, 0.0, 0.01, 3.0)
     assert volume(sheet) == pytest.approx(1.0 * 2.0 * 0.01, rel=0.05)

@@ -34,10 +34,10 @@ def _hold(made: Made, most_faces: int = 1500) -> None:
     assert np.asarray(piece.size)[[0, 2, 1]] == pytest.approx(high - low, abs=1e-5)
 
 
-@pytest.mark.parametrize("name", sorted(THINGS.names))
+@pytest.mark.parametrize("name", sorted(THINGS))
 def test_a_thing_is_closed_and_stands_on_its_base(name: str) -> None:
     for seed in range(6):
-        _hold(THINGS.make(name, np.random.default_rng(seed), _STYLE))
+        _hold(THINGS[name].make(np.random.default_rng(seed), _STYLE))
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_a_thing_is_closed_and_stands_on_its_base(name: str) -> None:
 )  # fmt: skip
 def test_a_thing_is_as_high_as_a_real_one(name: str, least: float, most: float) -> None:
     for seed in range(6):
-        piece, _ = THINGS.make(name, np.random.default_rng(seed), _STYLE)
+        piece, _ = THINGS[name].make(np.random.default_rng(seed), _STYLE)
         assert least <= piece.size[2] <= most
 
 
@@ -100,7 +100,7 @@ def test_every_cell_of_the_covers_lies_in_the_picture() -> None:
 def test_the_same_seed_gives_the_same_bits() -> None:
     again = book_covers(np.random.default_rng(2), _STYLE)
     assert again.texture == _COVERS.texture
-    for name in THINGS.names:
-        one, two = (THINGS.make(name, np.random.default_rng(7), _STYLE) for _ in range(2))
+    for name in THINGS:
+        one, two = (THINGS[name].make(np.random.default_rng(7), _STYLE) for _ in range(2))
         assert one[0] == two[0], name
         assert one[1].surfaces[0].positions.tobytes() == two[1].surfaces[0].positions.tobytes()

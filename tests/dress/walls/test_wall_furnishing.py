@@ -15,11 +15,12 @@ from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.things import hung, radiators
+from pbrs_farm.dress.things.maker import Thing
 from pbrs_farm.dress.walls import walls
 from pbrs_farm.dress.walls.fittings import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
-from pbrs_farm.dress.walls.hung_things import HUNG_THINGS
 from pbrs_farm.home.room_use import RoomKind
 from tests.builders import builtin_home
 from tests.dress.furniture import solid
@@ -54,19 +55,19 @@ def _named(draft: Draft, name: str) -> list[Item]:
 
 
 @pytest.mark.parametrize(
-    ("name", "given"),
+    ("thing", "given"),
     [
-        ("panel_radiator", (1.0, 0.5, Material("paint"))), ("coat_rack", (3, False)),
-        ("pin_board", (0.8, 0.5, Material("frame"))), ("tool_rail", (0.9,)), ("towel_radiator", ()),
-        *(("wall_cupboard", (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2, n)) for n in range(6)),
-        ("open_cupboard", (Material("body"), 0.8, 0.6, 0.3)),
-        *(("wall_switch", (2, (0.9, 0.9, 0.9), n)) for n in range(6)),
+        (radiators.wall_radiator, (1.0, 0.5, Material("paint"))), (hung.coat_rack, (3, False)),
+        (hung.pin_board, (0.8, 0.5, Material("frame"))), (hung.tool_rail, (0.9,)), (radiators.towel_radiator, ()),
+        *((hung.wall_cupboard, (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2, n)) for n in range(6)),
+        (hung.open_cupboard, (Material("body"), 0.8, 0.6, 0.3)),
+        *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n)) for n in range(6)),
     ],
 )  # fmt: skip
 def test_what_hangs_begins_at_its_wall_and_faces_outwards(
-    name: str, given: tuple[object, ...]
+    thing: Thing[...], given: tuple[object, ...]
 ) -> None:
-    _piece, shape = HUNG_THINGS.make(name, np.random.default_rng(1), _style(), *given)
+    _piece, shape = thing.make(np.random.default_rng(1), _style(), *given)
     assert shape.bounds[0, 2] == pytest.approx(0.0, abs=1e-6)
     for surface in shape.surfaces:
         corners = triangle_corners(surface.positions, surface.faces)

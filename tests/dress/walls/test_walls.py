@@ -20,6 +20,7 @@ from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.things.hung import round_mirror
 from pbrs_farm.dress.walls import hung_things, walls
 from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
@@ -155,9 +156,7 @@ def test_a_round_thing_looks_away_from_the_wall() -> None:
     dial = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     for _piece, shape in (
         hung_things.clock(0.3, dial, Material("rim")),
-        hung_things.HUNG_THINGS.make(
-            "round_mirror", np.random.default_rng(1), _style(), 0.5, Material("rim")
-        ),
+        round_mirror.make(np.random.default_rng(1), _style(), 0.5, Material("rim")),
     ):
         front = shape.surfaces[1]
         assert front.normals is not None

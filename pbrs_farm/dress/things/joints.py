@@ -1,0 +1,185 @@
+"""What furniture is put together from: fronts, pulls, legs; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+from numpy import pi
+
+from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
+from pbrs_farm.core.house import Material
+from pbrs_farm.dress.things.bodies import bevelled, loft, slab, tube, turned
+from pbrs_farm.dress.things.maker import Maker, Pair
+from pbrs_farm.dress.things.materials import FROSTED
+from pbrs_farm.dress.things.outlines import bent, d_shape, ring_path, rings, scaled
+
+
+class Look(NamedTuple):
+    """What the doors and drawers of a piece look like."""
+
+    kind: str  # of a front: flat, shaker, grooved, raised, glazed
+    front: Material
+    body: Material
+    top: Material
+    pull: str  # what opens them: bar, bow, square, knob, disc, ring, cup, edge, none
+    pull_stuff: Material
+
+
+def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, stuff: Material) -> None:
+    """A front 19 mm thick before z, 2 mm within its edges: flat, shaker, grooved, raised or glazed."""
+    a, b, c, d = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
+    rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
+    with m.of(stuff):
+        if kind == "shaker" or kind == "glazed":
+            m.add(bevelled((a, c, z), (a + rail, d, z + 0.019), 0.0015))
+            m.add(bevelled((b - rail, c, z), (b, d, z + 0.019), 0.0015))
+            m.add(bevelled((a + rail, c, z), (b - rail, c + rail, z + 0.019), 0.0015))
+            m.add(bevelled((a + rail, d - rail, z), (b - rail, d, z + 0.019), 0.0015))
+            if kind == "shaker":
+                m.add(slab((a + rail, c + rail, z), (b - rail, d - rail, z + 0.011)))
+            else:
+                m.add(slab((a + rail, c + rail, z + 0.006), (b - rail, d - rail, z + 0.01)),
+                    of=FROSTED)  # fmt: skip
+        elif kind == "grooved":
+            m.add(slab((a, c, z), (b, d, z + 0.012)))
+            n = max(2, round((b - a) / 0.11))
+            for k in range(n):
+                m.add(bevelled((a + (b - a) * k / n + 0.001, c, z + 0.012),
+                    (a + (b - a) * (k + 1) / n - 0.001, d, z + 0.019), 0.002))  # fmt: skip
+        else:
+            m.add(bevelled((a, c, z), (b, d, z + 0.019), 0.002))
+            if kind == "raised" and b - a > 0.16 and (d - c > 0.12):
+                m.add(bevelled((a + rail * 0.8, c + rail * 0.8, z + 0.019),
+                    (b - rail * 0.8, d - rail * 0.8, z + 0.025), 0.006))  # fmt: skip
+
+
+def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float,
+    stuff: Material) -> None:  # fmt: skip
+    """What a front is opened by, its foot at z: bar, bow, knob, cup, edge, ring or none. across: it lies along x."""
+    h = long / 2
+    with m.of(stuff), m.moved(at=(x, y, z)):
+        match kind:
+            case "knob":
+                m.add(turned([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
+                    (0.013, 0.025), (0.0, 0.027)], n=10), turn=LYING_ALONG_Z)  # fmt: skip
+            case "disc":
+                m.add(turned([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015),
+                    (0.019, 0.022), (0.0, 0.023)], n=12), turn=LYING_ALONG_Z)  # fmt: skip
+        with m.moved(turn=rotation_z(0.0 if across else pi / 2)):
+            match kind:
+                case "bar":
+                    m.add(tube([(-h, 0.0, 0.027), (h, 0.0, 0.027)], 0.006, n=8))
+                    for s in (-0.8 * h, 0.8 * h):
+                        m.add(tube([(s, 0.0, 0.0), (s, 0.0, 0.027)], 0.0045, n=6))
+                case "bow":
+                    m.add(tube(bent([(-h, 0.0, 0.0), (-0.8 * h, 0.0, 0.027), (0.8 * h, 0.0, 0.027),
+                        (h, 0.0, 0.0)], 0.02, n=3), 0.0055, n=8))  # fmt: skip
+                case "square":
+                    m.add(bevelled((-h, -0.005, 0.02), (h, 0.005, 0.028), 0.0015))
+                    for s in (-h + 0.006, h - 0.006):
+                        m.add(slab((s - 0.005, -0.005, 0.0), (s + 0.005, 0.005, 0.021)))
+                case "cup":
+                    m.add(loft(rings(d_shape, [(min(long, 0.09), 0.024, 0.0),
+                        (min(long, 0.085), 0.022, 0.022), (0.05, 0.012, 0.03)], share=0.9)),
+                        at=(0.0, -0.012, 0.0))  # fmt: skip
+                case "edge":
+                    m.add(bevelled((-h, -0.002, 0.0), (h, 0.002, 0.022), 0.0008))
+                    m.add(bevelled((-h, -0.014, 0.019), (h, 0.0015, 0.022), 0.0008))
+                case "ring":
+                    m.add(bevelled((-0.012, -0.016, 0.0), (0.012, 0.016, 0.003), 0.001))
+                    m.add(tube(ring_path(0.018, n=14), 0.0028, n=6), turn=rotation_x(pi / 2),
+                        at=(0.0, -0.016, 0.012))  # fmt: skip
+                    m.add(tube([(0.0, 0.0, 0.0), (0.0, 0.0, 0.016)], 0.004, n=6))
+
+
+def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool,
+    is_high: bool) -> None:  # fmt: skip
+    """A front with a pull at the side away from its hinges: at its upper end below, its lower end above eyes."""
+    panel(m, look.kind, x, y, z, look.front)
+    tall = y[1] - y[0]
+    a = x[1] - 0.04 if opens_left else x[0] + 0.04
+    long = min(0.16, 0.4 * tall)
+    b = y[0] + 0.06 + long / 2 if is_high else y[1] - 0.06 - long / 2
+    b = y[0] + 0.5 * tall if tall > 1.1 else b
+    if look.pull == "edge":
+        pull(m, "edge", (x[0] + x[1]) / 2, y[0] if is_high else y[1] - 0.004, z + 0.012, True,
+            0.7 * (x[1] - x[0]), look.pull_stuff)  # fmt: skip
+    elif look.pull == "cup":
+        pull(m, "knob", a, b, z + 0.019, False, long, look.pull_stuff)
+    else:
+        pull(m, look.pull, a, b, z + 0.019, False, long, look.pull_stuff)
+
+
+def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
+    wide, tall = x[1] - x[0], y[1] - y[0]
+    # What has a frame on doors is flat on low drawers.
+    panel(m,
+        "flat" if (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed" else look.kind, x,
+        y, z, look.front)  # fmt: skip
+    middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
+        min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))  # fmt: skip
+    if look.pull == "edge":
+        pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_stuff)
+    elif look.pull in ("knob", "disc", "ring") and wide > 0.6:
+        for s in (-0.25, 0.25):
+            pull(m, look.pull, middle + s * wide, high, z + 0.019, True, long, look.pull_stuff)
+    else:
+        pull(m, look.pull, middle, high, z + 0.019, True, long, look.pull_stuff)
+
+
+def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
+    is_high: bool) -> None:  # fmt: skip
+    """Columns of fronts before z, each column named from the top: 'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'."""
+    n = len(columns)
+    for k, kinds in enumerate(columns):
+        a, b = x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n
+        total, below = 0.0, 0.0
+        for kind in kinds:
+            total += 3.4 if kind == "door" else 0.7 if kind == "low" else 1.0
+        for kind in kinds:
+            above = below
+            below += 3.4 if kind == "door" else 0.7 if kind == "low" else 1.0
+            c, d = y[1] - (y[1] - y[0]) * below / total, y[1] - (y[1] - y[0]) * above / total
+            match kind:
+                case "door":
+                    door_front(m, look, (a, b), (c, d), z, k % 2 == 0 if n > 1 else True, is_high)
+                case "drawer" | "low" | "flap":
+                    drawer_front(m, look, (a, b), (c, d), z)
+
+
+def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
+    stuff: Material) -> None:  # fmt: skip
+    """One of furniture's legs from foot (x, z) to top (x, z) at a height: square, round, tapered, hairpin or bun."""
+    a, b = (foot[0], 0.0, foot[1]), (top[0], high, top[1])
+    with m.of(stuff):
+        match kind:
+            case "square":
+                m.add(bevelled((top[0] - thick / 2, 0.0, top[1] - thick / 2),
+                    (top[0] + thick / 2, high, top[1] + thick / 2), 0.003))  # fmt: skip
+            case "round":
+                m.add(tube([a, b], thick / 2, n=12))
+            case "tapered":
+                m.add(tube([a, b], 0.3 * thick, n=12, end=0.55 * thick))
+            case "bun":
+                m.add(turned(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
+                    (0.35, 0.85), (0.5, 1), (0, 1)]), n=16), at=(top[0], 0.0, top[1]))  # fmt: skip
+            case "hairpin":
+                for s in (-1.0, 1.0):
+                    m.add(tube([(foot[0], 0.004, foot[1]), (top[0] + s * 0.035, high, top[1])],
+                        0.005, n=6))  # fmt: skip
+                m.add(tube([(foot[0] - 0.008, 0.005, foot[1]), (foot[0] + 0.008, 0.005, foot[1])],
+                    0.005, n=6))  # fmt: skip
+            case "turned":
+                m.add(turned(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
+                    (0.5, 0.3), (0.42, 0.62), (0.55, 0.7), (0.4, 0.74), (0.55, 0.78), (0.55, 1),
+                    (0, 1)]), n=14), at=(top[0], 0.0, top[1]))  # fmt: skip
+
+
+def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
+    splay: float, stuff: Material) -> None:  # fmt: skip
+    """Under what is w wide and d deep, inset from its edges, leaning outwards by splay."""
+    for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
+        leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
+            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, stuff)  # fmt: skip
