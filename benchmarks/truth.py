@@ -27,8 +27,8 @@ from pbrs_farm.repair import repair
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.area_emitters import area_emitters_of_house
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
-from pbrs_farm.transport.scene_tables.scene_tables import area_emitters_of_house
 from pbrs_farm.transport.scene_tables.sky import uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.truth.surface_layers import albedo_label

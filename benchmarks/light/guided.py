@@ -150,7 +150,7 @@ def _picture(
     """
     trial, trial_s = pilot.trial_weights, [0.0]
 
-    def told(
+    def tried_at_view(
         device_scene: DeviceScene,
         emitters: Emitters,
         _small: Camera,
@@ -163,7 +163,7 @@ def _picture(
         trial_s.append(time.process_time() - before)
         return replace(tried, is_guided=guided)
 
-    with patch.object(pilot, "trial_weights", told):
+    with patch("pbrs_farm.transport.view_emitters.trial_weights", tried_at_view):
         began = time.process_time()
         result = scene.render(camera.with_size(*SIZE), "-", fields, seed)
         spent = time.process_time() - began - sum(trial_s)

@@ -15,9 +15,9 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.sample import sample_cameras
-from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.photo_sampler import NYUV2_SHARES
 from pbrs_farm.sample.photo_score import item_roles, photo_shares
 from pbrs_farm.sample.view_score import DEPTH_SIZE, overlap

@@ -1,4 +1,4 @@
-"""Plan polygons -> the triangles of floors, ceilings and roofs over them; no effects."""
+"""Plan polygons: rooms' as shapes, and the triangles of floors, ceilings and roofs over them; no effects."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import shapely
 from scipy.spatial import ConvexHull, QhullError
 
 from pbrs_farm.core.arrays import F64, I32, I64, Points2
-from pbrs_farm.core.house import Surface
+from pbrs_farm.core.house import Room, Surface
 
 # Horizontal polygons as triangle surfaces: floors and ceilings.
 
@@ -20,6 +20,13 @@ def signed_area(polygon: Points2) -> float:
     """Area of (N, 2), positive if counter-clockwise with the second axis up."""
     x, z = polygon[:, 0], polygon[:, 1]
     return float(0.5 * np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))
+
+
+def room_shape(room: Room) -> shapely.Geometry:
+    """The room's polygon in plan (x, z), made valid; empty for fewer than three corners."""
+    if len(room.polygon) < 3 or not np.isfinite(room.polygon).all():
+        return shapely.Polygon()
+    return shapely.make_valid(shapely.Polygon(room.polygon))
 
 
 def counter_clockwise(polygon: Points2) -> Points2:

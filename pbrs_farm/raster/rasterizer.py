@@ -7,19 +7,18 @@ Light is summed in linear half floats, 4 samples a pixel, resolved in linear lig
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I64, Bools, Matrix4, Srgb8Image
+from pbrs_farm.core.arrays import F64, I64, Srgb8Image
 from pbrs_farm.core.camera import Camera, pinholes_of
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
-from pbrs_farm.core.house import House, Material, MaterialKind, Surface
-from pbrs_farm.core.mesh import triangle_corners, unit_normals
+from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import RasterFields
+from pbrs_farm.raster.draw_mesh import mesh_from_house
 from pbrs_farm.raster.gl_device import (
     RenderTarget,
     n_samples,
@@ -27,7 +26,8 @@ from pbrs_farm.raster.gl_device import (
     srgb8_from_half,
     texture_from_pixels,
 )
-from pbrs_farm.raster.light_choice import LIGHT_FLOATS, best_lights, brightness_scale, light_table
+from pbrs_farm.raster.light_choice import LIGHT_FLOATS, brightness_scale
+from pbrs_farm.raster.projection import boxes_in_view, clip_from_world, distance_to_boxes, far_plane
 from pbrs_farm.raster.shader_programs import (
     Feature,
     depth_program,
@@ -36,193 +36,12 @@ from pbrs_farm.raster.shader_programs import (
     light_features,
     surface_program,
 )
-
-# Projection: camera to OpenGL clip space on Camera.rays()' pixel grid, frustum culling.
-
-
-NEAR_PLANE_M = 0.02  # closer than any camera stands to a wall
-
-
-def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
-    """(4, 4) world to clip space; pixel centres lie at +0.5 in the coordinates of K, row 0 on top."""
-    # Shift the principal point: clip space runs from -1 to 1, upwards, across the picture.
-    i = camera.intrinsics
-    w, h, n, f = i.width_px, i.height_px, NEAR_PLANE_M, far_m
-    clip_from_camera = np.array(
-        [
-            [2 * i.fx / w, 0, 1 - 2 * i.cx / w, 0],
-            [0, 2 * i.fy / h, 2 * i.cy / h - 1, 0],
-            [0, 0, -(f + n) / (f - n), -2 * f * n / (f - n)],
-            [0, 0, -1, 0],
-        ]
-    )
-    return np.asarray(clip_from_camera @ np.linalg.inv(camera.world_from_camera))
-
-
-def far_plane(camera: Camera, low: F64, high: F64) -> float:
-    """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre."""
-    if not len(low):
-        return 1.0
-    # Measure to the farthest corner of the box around all boxes.
-    reach = np.maximum(np.abs(low.min(0) - camera.eye), np.abs(high.max(0) - camera.eye))
-    return max(1.0, 1.01 * float(np.linalg.norm(reach)))
-
-
-def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
-    """(N,) bool: the box is not wholly outside one plane of the view frustum."""
-    # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
-    planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
-    normal, offset = planes[:, :3], planes[:, 3]
-    # Test the corner of each box that lies farthest inwards.
-    farthest = np.where(normal[:, None] > 0, high, low)
-    return np.asarray((np.einsum("pk,pnk->pn", normal, farthest) + offset[:, None] >= 0).all(0))
-
-
-def distance_to_boxes(eye: F64, low: F64, high: F64) -> F64:
-    """(N,) distance from eye to the nearest point of each box."""
-    gap = np.maximum(np.maximum(low - eye, eye - high), 0.0)
-    return np.asarray(np.sqrt(np.einsum("nk,nk->n", gap, gap)))
-
-
-# Vertex buffers: a house as one vertex buffer, one index buffer and draw calls.
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DrawMesh:
-    """All triangles of a house for OpenGL; a draw is those of one item with one material."""
-
-    vertices: F32  # (V, 8) position (world, m), normal (unit), uv (v up)
-    indices: NDArray[np.uint32]  # (F, 3)
-    draw_first: I64  # (D,) first triangle
-    draw_count: I64  # (D,) number of triangles
-    draw_item: I64  # (D,) instance id
-    draw_material: I64  # (D,) index into House.materials
-    draw_low: F64  # (D, 3) corners of the bounding box in the world
-    draw_high: F64
-
-    @property
-    def n_draws(self) -> int:
-        """The number of draws."""
-        return len(self.draw_first)
-
-
-def mesh_from_house(house: House) -> DrawMesh:
-    """The mesh of every surface of house, panes included; non-finite triangles are dropped."""
-    vertices: list[F32] = []
-    indices: list[NDArray[np.uint32]] = []
-    rows: list[tuple[int, int, int, int]] = []
-    boxes: list[tuple[F32, F32]] = []
-    n_vertices = n_faces = 0
-
-    # Write item by item, and within an item material by material: each pair is one draw.
-    for instance, item in enumerate(house.items, start=1):
-        for material in dict.fromkeys(s.material for s in item.surfaces):
-            first, corners = n_faces, []
-            for surface in item.surfaces:
-                if surface.material != material:
-                    continue
-                v, f = _vertices(surface)
-                vertices.append(v)
-                indices.append((f + n_vertices).astype(np.uint32))
-                corners.append(v[f.reshape(-1), :3])
-                n_vertices, n_faces = n_vertices + len(v), n_faces + len(f)
-            if n_faces > first:
-                points = np.concatenate(corners)
-                boxes.append((points.min(0), points.max(0)))
-                rows.append((first, n_faces - first, instance, material))
-
-    table = np.array(rows, np.int64).reshape(-1, 4)
-    box = np.array(boxes, np.float64).reshape(-1, 2, 3)
-    return DrawMesh(
-        np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
-        np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
-        *table.T, *np.moveaxis(box, 1, 0),
-    )  # fmt: skip
-
-
-def _vertices(surface: Surface) -> tuple[F32, I64]:
-    """(V, 8) vertices and (F, 3) faces of a surface; flat ones get three vertices per face."""
-    # Drop faces with a vertex that is not finite.
-    points, faces = surface.positions, surface.faces.astype(np.int64)
-    finite: Bools = np.all(np.isfinite(points), axis=1)
-    faces = faces[np.all(finite[faces], axis=1)]
-    uvs = surface.uvs if surface.uvs is not None else np.zeros((len(points), 2), np.float32)
-    normals = surface.normals
-    # Split vertices where a normal is missing or not of unit length: faces have their own there.
-    if normals is None or not _is_unit(normals[faces.reshape(-1)]).all():
-        corner = faces.reshape(-1)
-        own = unit_normals(triangle_corners(points, faces))
-        own[~own.any(1)] = (0.0, 1.0, 0.0)  # up, where a triangle has no area
-        flat = np.repeat(own.astype(np.float32), 3, axis=0)
-        if normals is not None:
-            given = normals[corner]
-            flat = np.where(_is_unit(given)[:, None], given, flat)
-        points, normals, uvs = points[corner], flat, uvs[corner]
-        faces = np.arange(len(corner)).reshape(-1, 3)
-    finite_uvs = np.where(np.isfinite(uvs), uvs, np.float32(0))
-    return np.concatenate([points, normals, finite_uvs], 1, dtype=np.float32), faces
-
-
-def _is_unit(normals: F32) -> Bools:
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(np.einsum("ij,ij->i", normals, normals) - 1) < 0.1)
-
-
-# Uniform blocks of the shaders: one of each material, one of each item's lights.
-
-
-BLOCK_FLOATS = 16  # four vec4, as surface.frag.glsl declares them
-_HEADER_FLOATS = 4  # before the lights: their number, transmission, 0, 0
-LAMP_TRANSMISSION = 0.1  # share of light that passes through a lamp's own parts: shades look lit
-
-_EMISSION = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
-
-
-def material_blocks(house: House) -> F32:
-    """(n_materials, 16) the Material block of each material."""
-    rows = [_material_block(m) for m in house.materials]
-    return np.array(rows, np.float32).reshape(-1, BLOCK_FLOATS)
-
-
-def _material_block(material: Material) -> list[float]:
-    # Decode colours to linear light; a black highlight gets exponent 0, which switches it off.
-    diffuse = linear_from_srgb(np.array(material.diffuse))
-    specular = linear_from_srgb(np.array(material.specular))
-    emission = _EMISSION.get(material.kind, 0.0) * diffuse
-    exponent = material.shininess if specular.any() else 0.0
-    is_pane = material.kind is MaterialKind.PANE
-    return [
-        *diffuse, material.opacity,
-        *specular, exponent,
-        *emission, 0.0,
-        float(is_pane), 0.0, 0.0, 0.0,
-    ]  # fmt: skip
-
-
-def light_blocks(house: House, n_best: int) -> F32:
-    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights."""
-    lights = light_table(house)
-    block = np.zeros((len(house.items) + 1, _HEADER_FLOATS + LIGHT_FLOATS * n_best), np.float32)
-    if len(lights) and house.items:
-        bounds = np.array([item.bounds for item in house.items])
-        best = best_lights(lights, bounds[:, 0], bounds[:, 1], n_best)
-        block[1:, 0] = best.shape[1]
-        block[1:, 1] = [LAMP_TRANSMISSION if item.lights else 0.0 for item in house.items]
-        end = _HEADER_FLOATS + LIGHT_FLOATS * best.shape[1]
-        block[1:, _HEADER_FLOATS:end] = lights[best].reshape(len(best), -1)
-    return block
-
-
-def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
-    """Rows padded so that each starts at a multiple of alignment_bytes."""
-    step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
-    padded = np.zeros((len(rows), step), np.float32)
-    padded[:, : rows.shape[1]] = rows
-    return padded
-
-
-# The rasterizer.
-
+from pbrs_farm.raster.uniform_blocks import (
+    BLOCK_FLOATS,
+    aligned_rows,
+    light_blocks,
+    material_blocks,
+)
 
 SKY_SRGB = (0.78, 0.87, 0.96)  # background: behind windows and beyond the house
 
@@ -359,7 +178,7 @@ class Rasterizer:
         """
         # Draw opaque surfaces into the depth texture and count the samples that pass.
         program, vao = self._program("depth", 0)
-        _set(program, clip_from_world=clip)
+        _set_uniforms(program, clip_from_world=clip)
         see_through = Feature.TRANSPARENT | Feature.ALPHA_CUTOUT
         is_solid = (self._features[self._mesh.draw_material[draws]] & see_through) == 0
         target.begin_depth_prepass()
@@ -375,7 +194,7 @@ class Rasterizer:
     def _begin_surfaces(
         self, mode: str, features: int, camera: Camera, clip: F64, forward: F64
     ) -> None:
-        _set(
+        _set_uniforms(
             self._program(mode, features)[0],
             clip_from_world=clip,
             eye=camera.eye,
@@ -470,7 +289,7 @@ class Rasterizer:
         return self._targets[size]
 
 
-def _set(program: Any, **values: Any) -> None:
+def _set_uniforms(program: Any, **values: Any) -> None:
     """Set the uniforms the program has; matrices (4, 4) are given row by row."""
     for name, value in values.items():
         if name in program:

@@ -20,7 +20,6 @@ IL_HEADLIGHT = 0.06  # faint headlight of OpenGL-IL: what no lamp reaches is dim
 MAX_PANE_OPACITY = 0.08  # most that a window pane hides of what is behind it
 PANE_MIRROR = 0.5  # share of the sky's colour in a pane's reflection
 GLASS_MIRROR = 0.7  # and in that of other glass
-
 _VERSION = "#version 330\n"
 
 
@@ -58,13 +57,12 @@ def _source(name: str) -> str:
     return (files("pbrs_farm.raster") / name).read_text("utf-8")
 
 
-# Shader features that a material and a house's lamps need, as bits.
-# A software renderer pays for every instruction of a shader at every pixel, so each combination
-# of features gets the smallest program that is right for it.
-
-
 class Feature(IntFlag):
-    """What a surface's shader must be able to do; the names are the shader's #defines."""
+    """What a surface's shader must be able to do; the names are the shader's #defines.
+
+    A software renderer pays for every instruction of a shader at every pixel, so each combination of
+    features gets the smallest program that is right for it.
+    """
 
     GLOSSY = 1  # a specular highlight
     ALPHA_CUTOUT = 2  # the texture's alpha discards fragments

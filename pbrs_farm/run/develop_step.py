@@ -27,9 +27,9 @@ from pbrs_farm.run.step_cache import StepOutput, Work
 from pbrs_farm.selection import scene_quality, view_record
 from pbrs_farm.selection.quality import ViewPlace
 from pbrs_farm.store.object_store import Store
+from pbrs_farm.transport.develop.camera_sensor import SensorShot
 from pbrs_farm.transport.develop.mode_pictures import (
     LinearAovs,
-    SensorShot,
     denoised,
     develop,
     wanted_exposures,

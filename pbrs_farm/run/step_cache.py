@@ -29,7 +29,7 @@ from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.object_store import Store, get_or_none, put_done
-from pbrs_farm.transport.light_result import Arrays
+from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 

@@ -22,9 +22,9 @@ from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.core.svg import Element, element, svg_file, svg_text
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import RoomReport, Verdict
 from pbrs_farm.sample.house_sampler import Sampling
-from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.room_sampler import RoomTrace
 
 # A drawing of polygons, lines, dots and text, as SVG text or as an RGB array.

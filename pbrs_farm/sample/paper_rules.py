@@ -13,6 +13,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.mesh import distances_to_triangles
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.eye_probes import ItemCounter, enclosed, not_above_floor
@@ -76,13 +77,6 @@ def room_grid(room: Room) -> Grid:
     """The grid over a room's polygon; eye heights count from the floor's surface."""
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
     return Grid(float(x0), float(z0), float(x1), float(z1), room.floor_y)
-
-
-def room_shape(room: Room) -> shapely.Geometry:
-    """The room's polygon, made valid; empty for fewer than three corners."""
-    if len(room.polygon) < 3 or not np.isfinite(room.polygon).all():
-        return shapely.Polygon()
-    return shapely.make_valid(shapely.Polygon(room.polygon))
 
 
 def rejections(

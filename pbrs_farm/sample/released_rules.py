@@ -10,10 +10,10 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Geometry, House, Item, ItemKind, Room, corners_of_surfaces
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.eye_probes import ItemCounter
-from pbrs_farm.sample.paper_rules import room_shape
 
 _MASK_CELL_M = 0.05  # without a clearance
 _MAX_MASK_CELL_M = 0.1  # else half the clearance, but at most this

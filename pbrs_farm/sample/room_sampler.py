@@ -19,6 +19,7 @@ from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.camera import Intrinsics, View
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample import paper_rules, released_rules
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
@@ -169,7 +170,7 @@ class RoomSampler:
         room = self.room
         if self.house.is_repaired and not room.lit_by:
             return "nothing lights it: neither lamp nor window nor sky"
-        if shapely.area(paper_rules.room_shape(room)) <= 0:
+        if shapely.area(room_shape(room)) <= 0:
             return "its polygon has no area"
         if self.fields.preset == "released" and not (room.has_floor and room.has_ceiling):
             return "the released sampler needs a floor and a ceiling"

@@ -13,8 +13,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.eye_probes import ItemCounter, counted
-from pbrs_farm.sample.paper_rules import room_shape
 from pbrs_farm.sample.view_score import object_columns
 
 OUTSIDE = "out"  # room id in the views of cameras that stand in no room

@@ -47,7 +47,7 @@ from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.scene.models import Model
 from pbrs_farm.scene.rendering import Renderer
 from pbrs_farm.scene.viewpoints import Viewpoint, Viewpoints, viewpoint_of
-from pbrs_farm.transport.scene_tables.scene_tables import rgb_from_kelvin
+from pbrs_farm.transport.scene_tables.area_emitters import rgb_from_kelvin
 
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport

@@ -8,11 +8,13 @@ from typing import Any, Final
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import shapely
 
-from pbrs_farm.core.arrays import F64, I64, Bools
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
 from pbrs_farm.transport.kernels.emitters import Emitters
@@ -95,10 +97,11 @@ def floor_points(room: Room, n: int, seed: int) -> F64:
     # Draw points in the polygon's box and keep those inside, until there are enough.
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
+    shape = room_shape(room)
     kept: list[F64] = []
     for _attempt in range(_MAX_ATTEMPTS):
         tried = low + (high - low) * rng.random((4 * n, 2))
-        kept.append(tried[_inside(tried, room.polygon)])
+        kept.append(tried[shapely.contains_xy(shape, tried[:, 0], tried[:, 1])])
         if sum(len(k) for k in kept) >= n:
             break
     # Fill up with the polygon's middle should it be too thin to hit.
@@ -178,15 +181,3 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
         indoor += l_in
         s += 1
     return outdoor, indoor
-
-
-def _inside(points: F64, polygon: F64) -> Bools:
-    """(N,) bool: the point lies inside the polygon, by the crossing rule."""
-    # Flip at each edge that a ray towards +x from the point crosses.
-    inside = np.zeros(len(points), bool)
-    for a, b in zip(polygon, np.roll(polygon, -1, 0), strict=True):
-        crosses = (a[1] > points[:, 1]) != (b[1] > points[:, 1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x = a[0] + (points[:, 1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-        inside ^= crosses & (points[:, 0] < x)
-    return inside

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, RadianceImage
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.transport.light_result import LightResult
-from pbrs_farm.transport.scene_tables.scene_tables import AreaEmitter
+from pbrs_farm.transport.scene_tables.area_emitters import AreaEmitter
 
 MAX_SUMS: Final = 2**32  # pixels x lamps x 3 of one launch: the kernel counts them in 32 bits
 

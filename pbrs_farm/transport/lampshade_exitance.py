@@ -13,7 +13,7 @@ from pbrs_farm.core.mesh import face_areas, triangle_bounds, triangle_corners, u
 from pbrs_farm.transport.illuminance import radiosity
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.lamp_guiding import BACK_SIDE, GuidingTargets, no_targets
+from pbrs_farm.transport.kernels.guiding_targets import BACK_SIDE, GuidingTargets, no_targets
 from pbrs_farm.transport.scene_tables.material_rows import F0, KD, KIND, SURFACE, TAU
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables, bounding_spheres
 

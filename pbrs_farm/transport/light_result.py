@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -13,6 +13,9 @@ from pbrs_farm.core.arrays import F32, Mask, RadianceImage, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
+
+BLACK_CD_M2 = 0.05  # what 1 lx makes of a surface that reflects a sixth
+_TILES = 8  # along each side of the picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,10 +63,6 @@ def blackened(result: LightResult, mask: Mask) -> LightResult:
         normal=cleared(result.normal),
         lamps={number: cleared(image) for number, image in result.lamps.items()},
     )
-
-
-BLACK_CD_M2 = 0.05  # what 1 lx makes of a surface that reflects a sixth
-_TILES = 8  # along each side of the picture
 
 
 def darkness_of_picture(result: LightResult) -> str:
@@ -201,45 +200,3 @@ def _noises(
         "indoor": relative_noise(a[1], b[1]),
         "sum": relative_noise(a[0] + a[1], b[0] + b[1]),
     }
-
-
-# What a long render keeps of itself, so that a killed one goes on from there.
-
-
-Arrays = Mapping[str, NDArray[Any]]
-
-
-class RenderCheckpoint(Protocol):
-    """Where a render says how far it is, and what it could go on from.
-
-    A render has parts (light that meets one surface, the chains ...), each with a state of its own
-    from which it goes on to the same picture.
-    """
-
-    @property
-    def spent_s(self) -> float:
-        """Seconds that went into what was kept."""
-        ...
-
-    def kept(self, part: str) -> Arrays:
-        """The state of a part as it was kept; {} where nothing was."""
-        ...
-
-    def keep(self, part: str, share: float, state: Callable[[], Arrays]) -> None:
-        """A launch has ended: share (0..1) of the whole render is done.
-
-        state: gives the part's arrays, which may be asked for now or when a later part calls.
-        """
-        ...
-
-
-class NoCheckpoint:
-    """A render that nobody goes on with."""
-
-    spent_s = 0.0
-
-    def kept(self, _part: str) -> Arrays:
-        return {}
-
-    def keep(self, _part: str, _share: float, _state: Callable[[], Arrays]) -> None:
-        return None

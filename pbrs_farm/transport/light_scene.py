@@ -6,6 +6,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -19,29 +20,18 @@ from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
-from pbrs_farm.transport.light_result import (
-    LightResult,
-    NoCheckpoint,
-    RenderCheckpoint,
-    blackened,
-    joined_result,
-    result_from_sums,
-)
-from pbrs_farm.transport.scene_tables.portals import nearest_portals, portals_of_house
-from pbrs_farm.transport.scene_tables.scene_tables import (
-    SceneTables,
-    bounding_spheres,
-    tables_from_house,
-)
+from pbrs_farm.transport.light_result import LightResult, blackened, joined_result, result_from_sums
+from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
+from pbrs_farm.transport.scene_tables.portals import portals_of_house
+from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
 
 if TYPE_CHECKING:
-    from pbrs_farm.transport.kernels.emitters import EmitterWeights
+    from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
     from pbrs_farm.transport.sample_passes import SampledView
+    from pbrs_farm.transport.view_emitters import ViewEmitters
 
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
-_PILOT_SEED: Final = 0x5EED  # parts the pilot's random stream from the picture's
-_TRIAL_SEED: Final = 0x7A1A1  # and that of the trial of guided rays
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,15 +61,13 @@ class LightScene:
         self.sky = sky
         self.variant = variant
         self.notes = tables.notes
-        self._portals = portals
         mitsuba(variant)
         self.device_scene: Any = None
-        self._piloted: tuple[Any, EmitterWeights] | None = None  # the last pilot and its weights
-        self._emitters: Any = None  # built at the first view, then given each view's weights
         if not variant.startswith("scalar"):
             from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
             self.device_scene = DeviceScene(tables, one_scene=variant.startswith("cuda"))
+        self._portals = portals
         # OptiX takes one scene in a kernel: there windows show the sky alone.
         self._outside = outside if variant.startswith("llvm") else None
 
@@ -159,7 +147,7 @@ class LightScene:
         mitsuba(self.variant)
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
-        emitters, weights = self._emitters_of_pilot(pilot, fields)
+        emitters, weights = self._view_emitters.of_pilot(pilot.camera, fields, pilot.seed)
         view = SampledView(self.device_scene, emitters, camera, fields, seed)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
@@ -218,16 +206,11 @@ class LightScene:
             return {}
         mitsuba(self.variant)
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
-        from pbrs_farm.transport.pilot import weights_by_distance
 
-        # Weight the lamps by their distance: there is no view that a pilot could render.
-        spheres = bounding_spheres(self.tables)
         lux: dict[str, dict[str, float]] = {}
         for room in house.rooms:
             points = floor_points(room, _FLOOR_POINTS, seed)
-            portals = nearest_portals(self._portals, points.mean(0))
-            weights = weights_by_distance(spheres, points.mean(0), len(portals))
-            emitters = self._emitters_of_view(portals, weights)
+            emitters = self._view_emitters.at_place(points.mean(0))
             outdoor, indoor = illuminance_lx(self.device_scene, emitters, points, seed)
             lux[room.id] = {"outdoor": round(outdoor, 2), "indoor": round(indoor, 2)}
         return lux
@@ -249,6 +232,22 @@ class LightScene:
         raise RenderFailed(
             f"no light found in room {room_id}: {text}", view=room_id, mode="light", seed=seed
         )
+
+    def emitters(
+        self, camera: Camera, fields: LightFields, seed: int
+    ) -> tuple[Emitters, EmitterWeights]:
+        """The emitters with the sampling weights of a camera's view, for `path_tracer.trace`.
+
+        Not for scalar variants. The weights of the next call replace these.
+        """
+        return self._view_emitters.measure(camera, fields, seed)
+
+    @cached_property
+    def _view_emitters(self) -> ViewEmitters:
+        """Built for the first view. Not for scalar variants."""
+        from pbrs_farm.transport.view_emitters import ViewEmitters
+
+        return ViewEmitters(self.device_scene, self.tables, self.sky, self._portals, self._outside)
 
     def _render_scalar(self, camera: Camera, fields: LightFields, seed: int) -> LightResult:
         """Both groups by Mitsuba's own plugins: scalar variants have no arrays for our kernels."""
@@ -275,64 +274,3 @@ class LightScene:
         guides = LightResult(black, black, np.ones_like(black), black, {}, 0, 0, {})
         facts = {"integrator": "mitsuba path", "seed": seed}
         return joined_result(None, guides, halves, 0, facts, spp=2 * half.spp)
-
-    def _emitters_of_pilot(self, pilot: Pilot, fields: LightFields) -> tuple[Any, EmitterWeights]:
-        """As emitters, by the pilot of a view; run again only when it is another one than last."""
-        camera = pilot.camera
-        key = pilot.seed, camera.intrinsics, camera.world_from_camera.tobytes(), fields
-        if self._piloted is None or self._piloted[0] != key:
-            emitters, weights = self.emitters(camera, fields, pilot.seed)
-            self._piloted = key, weights
-            return emitters, weights
-        weights = self._piloted[1]
-        portals = nearest_portals(self._portals, camera.eye)
-        return self._emitters_of_view(portals, weights), weights
-
-    def emitters(
-        self, camera: Camera, fields: LightFields, seed: int
-    ) -> tuple[Any, EmitterWeights]:
-        """(emitters, their EmitterWeights) with the sampling weights of this view."""
-        from pbrs_farm.transport.pilot import pilot_weights, trial_weights, uniform_weights
-
-        # Start from uniform weights; a pilot measures what each emitter brings to the view.
-        portals = nearest_portals(self._portals, camera.eye)
-        weights = uniform_weights(self.n_lamps, len(portals))
-        emitters = self._emitters_of_view(portals, weights)
-        if fields.pilot_spp > 0:
-            n = self.n_lamps, len(portals)
-            weights = pilot_weights(
-                self.device_scene, emitters, camera, *n, fields, seed ^ _PILOT_SEED
-            )
-            emitters.set_weights(weights)
-            emitters.sunlit.choose_cells(self.device_scene, emitters.sun)
-            # Guide the rays where that pays; Metropolis always guides its own.
-            if self.n_lamps > 0 and fields.integrator == "path":
-                trial_seed = seed ^ _TRIAL_SEED
-                weights = trial_weights(
-                    self.device_scene, emitters, camera, weights, fields, trial_seed
-                )
-            emitters.set_weights(weights)
-        return emitters, weights
-
-    def _emitters_of_view(self, portals: F64, weights: Any) -> Any:
-        """The emitters, their tables built once, with the portals and weights of a view."""
-        from pbrs_farm.transport.kernels.emitters import Emitters
-
-        # Measure the lampshades' exitance once, with rays that are not guided yet and every lamp
-        # alike: whichever view or room is first changes no picture.
-        if self._emitters is None:
-            from pbrs_farm.transport.lampshade_exitance import guiding_targets, pdfs_by_face
-            from pbrs_farm.transport.pilot import uniform_weights
-
-            uniform = uniform_weights(self.n_lamps, len(portals))
-            self._emitters = Emitters(self.tables, self.sky, portals, uniform)
-            targets = guiding_targets(self.device_scene, self._emitters, self.tables, 0)
-            self.device_scene.set_guiding_targets(*pdfs_by_face(targets))
-            self._emitters.set_targets(targets)
-            if self._outside is not None:
-                from pbrs_farm.transport.kernels.outside import Outside
-
-                beyond, tables = self._outside
-                self._emitters.outside = Outside(tables, beyond, self.sky)
-        self._emitters.set_view(portals, weights)
-        return self._emitters

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.arrival_rates import ArrivalCounts
 from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.outdoor_choice import ArrivalCounts, TechniqueCounts
+from pbrs_farm.transport.kernels.outdoor_choice import TechniqueCounts
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,

@@ -18,9 +18,10 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import LightFields
+from pbrs_farm.transport.kernels.arrival_rates import arrival_rates
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import DOME, FIRST_PORTAL, SUN, Emitters, EmitterWeights
-from pbrs_farm.transport.kernels.outdoor_choice import arrival_rates, weights_by_place
+from pbrs_farm.transport.kernels.outdoor_choice import weights_by_place
 from pbrs_farm.transport.path_tracer import Lanes, SampleSums, trace
 
 # Least weights: what no pilot path has found may still be there. Those of many lamps are less, or

@@ -5,8 +5,6 @@ Effects: reads the clock where there is a time budget.
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -17,54 +15,10 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.light_result import Arrays, RenderCheckpoint, result_from_sums
+from pbrs_farm.transport.light_result import result_from_sums
 from pbrs_farm.transport.path_tracer import Lanes, SampleSums, sums_from_arrays, trace
-
-# Time budgets: how many more samples fit. Effects: reads the clock.
-
-
-_FIRST_SPP: Final = 4  # samples of the first launch, which measures the pace
-
-
-class TimeBudget:
-    """A budget of seconds that counts down from now, spent_s of it gone; 0 sets no limit."""
-
-    def __init__(self, budget_s: float, spent_s: float = 0.0) -> None:
-        self.is_limited = budget_s > 0
-        self._budget_s = budget_s
-        self._last = time.monotonic()
-        self._end = self._last + budget_s - spent_s
-        self._s_per_sample: float | None = None  # of the last launch
-
-    @property
-    def share(self) -> float:
-        """Of the budget that is spent; 0 without a limit."""
-        if not self.is_limited:
-            return 0.0
-        return 1 - max(self._end - time.monotonic(), 0.0) / self._budget_s
-
-    @property
-    def left_s(self) -> float:
-        """Seconds that are left; infinite without a limit."""
-        return self._end - time.monotonic() if self.is_limited else math.inf
-
-    def n_that_fit(self, most: int) -> int:
-        """Samples of the next launch, at most `most`; 0 when none fits any more."""
-        if not self.is_limited:
-            return most
-        if self._s_per_sample is None:
-            return min(_FIRST_SPP, most)
-        left_s = self._end - time.monotonic()
-        return max(min(int(left_s / self._s_per_sample), most), 0)
-
-    def record(self, n: int) -> None:
-        """Take the time since the last launch for n samples as the pace of the next."""
-        began, self._last = self._last, time.monotonic()
-        self._s_per_sample = (self._last - began) / n
-
-
-# Passes of `path` over a view.
-
+from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
+from pbrs_farm.transport.time_budget import TimeBudget
 
 _SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
 _SPP: Final = "spp"  # in what is kept: samples of each pixel so far

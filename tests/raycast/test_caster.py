@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
-from pbrs_farm.raycast.caster import Caster, hit_record_from_faces
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.raycast.hit_records import hit_record_from_faces
 from tests.raycast.scenes import camera, geometry, soup, wall
 
 VARIANTS = ("llvm_ad_rgb", "scalar_rgb")

@@ -11,8 +11,9 @@ import pytest
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant
-from pbrs_farm.transport.light_result import Arrays, LightResult
+from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.scene_tables.sky import sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from tests.transport.test_path_tracer import FIELDS, RECIPE

@@ -25,8 +25,8 @@ from pbrs_farm.core.walkable import (
     clearance_m,
     connected_ways,
 )
+from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
-from pbrs_farm.sample.paper_rules import room_shape
 
 LEAST_WAY_M2: Final = 0.05  # of places for a person's middle; less is no region to walk in
 _DOOR_DEPTH_M: Final = 0.35  # from a door's middle plane to where its rooms have begun

@@ -1,17 +1,17 @@
 """Light that comes straight from an emitter to a vertex, by shadow rays; kernels, no effects.
 
 Next-event estimation: one shadow ray goes to the sky, one to a lamp and in `path` one to a sunlit point
-(sunlight.py), weighted against the scattered ray by the balance heuristic (Veach 1997, section 9.2).
+(sunlit_points.py), weighted against the scattered ray by the balance heuristic (Veach 1997, section 9.2).
 """
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 
-from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, luminance, view_independent_pdf
+from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, view_independent_pdf
 from pbrs_farm.transport.kernels.device_scene import offset_ray_origin
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, SUN, DirectionSample
 from pbrs_farm.transport.kernels.guided_rays import Guiding
@@ -24,60 +24,12 @@ from pbrs_farm.transport.kernels.path_state import (
     Vertex,
 )
 from pbrs_farm.transport.kernels.sampler import Sampler
-from pbrs_farm.transport.kernels.sunlight import SunlitSample
-
-# Russian roulette of shadow rays: one that can bring little is cast by chance; kernels.
-# A shadow ray costs the same whatever it can bring. What it would bring if nothing stood in its
-# way is known before it is cast, and how often one like it arrives is, too (outdoor_choice.py).
-# Where the product of both lies below a threshold it is cast with a chance in proportion to that,
-# and what it brings is divided by the chance, so that the mean stays (Arvo and Kirk 1990). The
-# chance has a least value: without it dark corners of a bright view had spots as bright as the
-# threshold. What a ray cast by chance brings is at most the threshold over the share of such rays
-# that arrives (0.02 at least), and at most ten times what it would bring if all were cast.
-
-
-LEAST_CHANCE: Final = 0.1
-# Random dimensions beyond all of the vertices' own: Metropolis, which has no such roulette, keeps its
-# stored numbers.
-FREE_DIM: Final = 1 << 16
-
-
-class ShadowRoulette(NamedTuple):
-    """Whether a shadow ray is cast at a vertex."""
-
-    beta: Any  # Color3f, throughput of the path up to the vertex
-    threshold: Any  # expected luminance from which on every ray is cast; 0 = every ray is
-    u: Any  # random number
-
-    def cast_by_chance(self, unshadowed: Any, rate: Any) -> tuple[Any, Any]:
-        """(Bool: the ray is cast, chance of that) by what it would bring, before the throughput.
-
-        rate: share of such rays that arrive.
-        """
-        expected = luminance(self.beta * unshadowed) * rate
-        chance = dr.maximum(expected / self.threshold, LEAST_CHANCE)
-        chance = dr.select(expected < self.threshold, chance, mi.Float(1))
-        return self.u < chance, chance
-
-
-def shadow_roulette(
-    beta: Any, threshold: Any, sampler: Sampler, dim: Any, number: int
-) -> ShadowRoulette | None:
-    """The roulette of one of a vertex's shadow rays; none without a throughput.
-
-    dim: the first random dimension of the vertex. number: of the shadow ray, each its own.
-    """
-    if beta is None:
-        return None
-    return ShadowRoulette(beta, threshold, sampler.get_1d(dim + (FREE_DIM + number)))
-
-
-# Light that comes straight from an emitter to a vertex, by shadow rays.
-
+from pbrs_farm.transport.kernels.shadow_roulette import FREE_DIM, ShadowRoulette, shadow_roulette
+from pbrs_farm.transport.kernels.sunlit_points import SunlitSample
 
 # Random dimensions of a vertex, one or two numbers each; path_step.py has the others.
 _LAMP, _LAMP_UV, _OUT, _OUT_UV = 4, 5, 7, 8
-_SUNLIT = 3  # after those of roulette (direct_light.py)
+_SUNLIT = 3  # after those of roulette (shadow_roulette.py)
 
 
 class Strategy(NamedTuple):

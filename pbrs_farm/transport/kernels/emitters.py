@@ -15,105 +15,44 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.lighting import Group
+from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, ArrivalRates
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
+from pbrs_farm.transport.kernels.guiding_targets import GuidingTargets, TargetSampler, no_targets
 from pbrs_farm.transport.kernels.lamp_guiding import (
     MAX_NEAR,
-    GuidingTargets,
     NearbyLamps,
     NearbyLampSampler,
     ReferencePoint,
-    TargetSampler,
-    no_targets,
     sample_discrete,
 )
-from pbrs_farm.transport.kernels.outdoor_choice import (
-    FIRST_LAMP,
-    ArrivalRates,
-    OutdoorChoice,
-    VoxelGrid,
-    choose_technique,
-)
-from pbrs_farm.transport.kernels.packets import colour, point, vector
+from pbrs_farm.transport.kernels.outdoor_choice import OutdoorChoice, choose_technique
+from pbrs_farm.transport.kernels.packets import colour, vector
 from pbrs_farm.transport.kernels.sampler import (
     alias_rows,
     device_array,
     opaque3,
     sample_alias_table,
 )
-from pbrs_farm.transport.kernels.sunlight import SunDisc, SunlitPoints
+from pbrs_farm.transport.kernels.sun import SunDisc
+from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
+from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, solid_angles
 
-# Points on lamps, where shadow rays end; kernels.
-# Effects: holds buffers on the device.
-
 if TYPE_CHECKING:
     from pbrs_farm.transport.kernels.outside import Outside
-
-
-class LampPointSampler:
-    """The triangles of all lamps on the device."""
-
-    def __init__(self, tables: SceneTables) -> None:
-        self._first = padded(mi.UInt32, tables.lamp_first, tables.lamp_first[-1:])
-        self._faces = padded(mi.UInt32, tables.lamp_faces, np.zeros(1, np.uint32))
-        alias = [np.zeros((0, 2), np.float32)] + [
-            alias_rows(np.diff(tables.lamp_areas[a:b], prepend=0.0))
-            for a, b in zip(tables.lamp_first[:-1], tables.lamp_first[1:], strict=True)
-        ]
-        self._alias = padded(mi.Float, np.concatenate(alias), np.ones((1, 2), np.float32))
-        symmetries = tables.lamp_symmetries.ravel()
-        self._symmetries = padded(mi.Float, symmetries, np.zeros(4, np.float32))
-
-    def sample(
-        self, scene: DeviceScene, lamp: Any, p: Any, u: Any, uv: Any, active: Any
-    ) -> tuple[Any, Any, Any]:
-        """(point on a lamp, unit normal there, whether p can see it), uniform over area_share of it."""
-        # Choose a triangle by area, and a point on that.
-        first = dr.gather(mi.UInt32, self._first, lamp, active)
-        count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
-        triangle, _u = sample_alias_table(self._alias, first, count, u, active)
-        face = dr.gather(mi.UInt32, self._faces, first + triangle, active)
-        q, n = scene.sample_face(face, uv, active)
-        # Take the opposite point of a symmetric lamp where this one is turned away.
-        centre, side = self._symmetry(lamp, p, active)
-        is_away = dr.dot(n, p - q) * side < 0
-        q, n = dr.select(is_away, 2 * centre - q, q), dr.select(is_away, -n, n)
-        return q, n, dr.dot(n, p - q) * side >= 0
-
-    def area_share(self, lamp: Any, p: Any, active: Any) -> Any:
-        """Share of a lamp's area that points for p are drawn from: half of a symmetric one."""
-        _centre, side = self._symmetry(lamp, p, active)
-        return dr.select(side != 0, mi.Float(0.5), 1)
-
-    def _symmetry(self, lamp: Any, p: Any, active: Any) -> tuple[Any, Any]:
-        """(centre, signed radius of a symmetric lamp around which p lies, or 0)."""
-        row = dr.gather(mi.Vector4f, self._symmetries, lamp, active)
-        is_outside = dr.squared_norm(p - point(row)) > dr.square(row[3])
-        return point(row), dr.select(is_outside, row[3], 0)
-
-
-def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
-    """Rows and one more on the device, so that a house without lamps has a row, too."""
-    return device_array(kind, np.concatenate([rows, last]).ravel())
-
-
-# Sampling and evaluating emitters.
-
+from pbrs_farm.transport.kernels.lamp_points import LampPointSampler, padded
 
 SUN, DOME, FIRST_PORTAL = 0, 1, 2  # outdoor techniques; those from FIRST_PORTAL on are portals
-
 # Of the shadow rays to lamps, those that go by where the lamps are; the others go by the weights
 # of the view alone (walls hide lamps). Where it is known which rays arrive it is more, as far as the
 # nearby lamps have the weight of the view.
 NEARBY_SHARE, MAX_NEARBY_SHARE = 0.5, 0.9
-
 _PORTAL_PACKETS = 3  # corner, first edge, second edge
 
 
@@ -126,9 +65,9 @@ class EmitterWeights:
     outdoor_by_place: F64 | None = None  # the same by voxel (outdoor_choice.py), None = everywhere
     is_guided: bool = True  # a part of the rays is guided into lamps
     # Luminance of outdoor and indoor light that a shadow ray must be able to bring, or it is cast by
-    # chance (direct_light.py); 0 = all are cast.
+    # chance (shadow_roulette.py); 0 = all are cast.
     shadow_thresholds: tuple[float, float] = (0.0, 0.0)
-    arrival_rates: F64 | None = None  # (voxels, kinds) of outdoor_choice.py, None = all rays arrive
+    arrival_rates: F64 | None = None  # (voxels, kinds) of arrival_rates.py, None = all rays arrive
     vertices: I64 | None = None  # (voxels,) of the pilot's paths, None = no sunlit points
 
 
@@ -140,7 +79,7 @@ class DirectionSample(NamedTuple):
     radiance: Any  # Color3f from there
     pdf: Any  # per solid angle, of all techniques that could have drawn it
     valid: Any
-    kind: Any  # UInt32, of outdoor_choice.py
+    kind: Any  # UInt32, of arrival_rates.py
     emitter: Any = None  # UInt32 number of the lamp, None for the sky
 
 

@@ -29,8 +29,8 @@ from pbrs_farm.transport.kernels.device_scene import (
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.kernels.guiding_targets import NO_FACE
 from pbrs_farm.transport.kernels.lamp_guiding import (
-    NO_FACE,
     NearbyLamps,
     cone_pdf,
     sample_cones,

@@ -15,86 +15,15 @@ from typing import Any, Final, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LUMINANCE
-from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
+from pbrs_farm.transport.kernels.guiding_targets import GuidingTargets, no_targets
 from pbrs_farm.transport.kernels.packets import point
-from pbrs_farm.transport.kernels.sampler import alias_rows, device_array, sample_alias_table
+from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, bounding_spheres
 
-# Guiding targets: lit face sides inside lampshades that guided rays aim at; kernels.
-
-
-BACK_SIDE: Final = 0x80000000
-NO_FACE: Final = 0xFFFFFFFF
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GuidingTargets:
-    """Face sides that reflect a lamp's light, lamp by lamp: S sides, L lamps."""
-
-    sides: NDArray[np.uint32]  # (S,) face, + BACK_SIDE for its back
-    probabilities: F64  # (S,) of each among its lamp's sides, sum 1
-    pdfs: F64  # (S,) per m2
-    first: I64  # (L + 1,) first side of each lamp
-    shares: F64  # (L,) of the lamp's light that its sides send out, 0..1
-    interiors: F64  # (L, 4) centre, radius in m around the bulb; radius 0 = none
-
-
-class TargetSample(NamedTuple):
-    """A direction to a guiding target."""
-
-    d: Any  # unit Vector3f
-    face: Any  # UInt32, the face that the ray must meet
-    valid: Any
-
-
-class TargetSampler:
-    """The guiding targets of a scene on the device."""
-
-    def __init__(self, targets: GuidingTargets) -> None:
-        parts = zip(targets.first[:-1], targets.first[1:], strict=True)
-        rows = [alias_rows(targets.probabilities[a:b]) for a, b in parts if b > a]
-        alias = np.concatenate([*rows, np.ones((1, 2), np.float32)])
-        self._alias = device_array(mi.Float, alias.ravel())
-        # Two more, so that it is no array of one, which would be another kernel.
-        self._sides = device_array(mi.UInt32, np.append(targets.sides, np.zeros(2, np.uint32)))
-        first = np.append(targets.first, targets.first[-1:]).astype(np.uint32)
-        self._first = device_array(mi.UInt32, first)
-
-    def sample(
-        self, scene: DeviceScene, p: Any, ng: Any, lamp: Any, u: Any, uv: Any, active: Any
-    ) -> TargetSample:
-        """The direction from p, on a face of normal ng, to a point on a target of a lamp."""
-        # Choose a target of the lamp, then a point on its face.
-        first = dr.gather(mi.UInt32, self._first, lamp, active)
-        count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
-        active = active & (count > 0)
-        k, _u = sample_alias_table(self._alias, first, dr.maximum(count, 1), u, active)
-        side = dr.gather(mi.UInt32, self._sides, first + k, active)
-        face = side & (BACK_SIDE - 1)
-        q, n = scene.sample_face(face, uv, active)
-        # Aim from where the ray will start, or it would miss what is small and near.
-        origin = offset_ray_origin(p, dr.select(dr.dot(ng, q - p) > 0, ng, -ng))
-        d = dr.normalize(q - origin)
-        n = dr.select(side >= BACK_SIDE, -n, n)
-        return TargetSample(d, face, active & (dr.dot(n, d) < 0))
-
-
-def no_targets(n_lamps: int) -> GuidingTargets:
-    """The targets of lamps that have none."""
-    none, first = np.zeros(0), np.zeros(n_lamps + 1, np.int64)
-    interiors = np.zeros((n_lamps, 4))
-    return GuidingTargets(none.astype(np.uint32), none, none, first, np.zeros(n_lamps), interiors)
-
-
-# Importances of the lamps near a vertex, for shadow rays and guided rays.
-
-
 MAX_NEAR: Final = 8  # lamps that are weighted by where they are
-
 _MIN_RADIUS_M: Final = 0.03
 _MAX_SIN2: Final = 0.98  # of half a cone's opening; wider, the vertex counts as inside
 _CONE_EDGE: Final = 5e-4  # tolerance of a cone's height, against float32 at its edge
@@ -154,7 +83,7 @@ class NearbyLampSampler:
         spheres = bounding_spheres(tables)
         spheres[:, 3] = np.maximum(spheres[:, 3], _MIN_RADIUS_M)
         self._n = len(spheres)
-        self._host_spheres = _padded(spheres)
+        self._host_spheres = _pad_slots(spheres)
         self._spheres = device_array(mi.Float, self._host_spheres.ravel())
         self._fluxes = (
             tables.lamp_rows[:, :3].astype(np.float64) @ LUMINANCE * tables.lamp_rows[:, 3]
@@ -178,7 +107,7 @@ class NearbyLampSampler:
     def set_targets(self, targets: GuidingTargets) -> None:
         """Set what of each lamp's light guided rays can find."""
         self._shares = targets.shares
-        self._host_interiors = _padded(targets.interiors)
+        self._host_interiors = _pad_slots(targets.interiors)
         self._interiors = device_array(mi.Float, self._host_interiors.ravel())
         self._update()
 
@@ -193,7 +122,7 @@ class NearbyLampSampler:
             rows[order, 3] = self._fluxes[order] / np.maximum(self._weights[order], 1e-12)
         rows[order, 0] = self._weights[order]
         rows[:, 1] = self._shares
-        strengths = _padded(rows)
+        strengths = _pad_slots(rows)
         self._strengths = device_array(mi.Float, strengths.ravel())
         # Let all lanes share their numbers: cheaper than gathered ones.
         chosen = np.append(order, np.zeros(MAX_NEAR - len(order), order.dtype))
@@ -202,7 +131,7 @@ class NearbyLampSampler:
             _Slot(
                 dr.opaque(mi.UInt32, int(lamp)),
                 dr.opaque(mi.Float, float(k < len(order))),
-                _LampRows(*(_shared(table[lamp]) for table in tables)),
+                _LampRows(*(_shared_packet(table[lamp]) for table in tables)),
             )
             for k, lamp in enumerate(chosen)
         ]
@@ -323,11 +252,11 @@ def cone_pdf(cones: Cones, d: Any) -> Any:
     return pdf / dr.maximum(cones.total, 1e-30)
 
 
-def _padded(rows: F64) -> F32:
+def _pad_slots(rows: F64) -> F32:
     """(L + 1, 4) rows: one more, so that a house without lamps has a row, too."""
     return np.append(rows, np.zeros((1, 4)), 0).astype(np.float32)
 
 
-def _shared(row: F32) -> Any:
+def _shared_packet(row: F32) -> Any:
     """A packet of four floats that all lanes share."""
     return mi.Vector4f(*(dr.opaque(mi.Float, float(x)) for x in row))

@@ -17,14 +17,10 @@ from pbrs_farm.transport.kernels.device_scene import (
     offset_ray_origin,
 )
 from pbrs_farm.transport.kernels.emitters import Emitters
-from pbrs_farm.transport.kernels.lamp_guiding import (
-    NO_FACE,
-    NearbyLamps,
-    ReferencePoint,
-    no_reference,
-)
+from pbrs_farm.transport.kernels.guiding_targets import NO_FACE
+from pbrs_farm.transport.kernels.lamp_guiding import NearbyLamps, ReferencePoint, no_reference
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, Sampler
-from pbrs_farm.transport.kernels.sunlight import SunlitPoints
+from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
@@ -109,7 +105,7 @@ class DirectLightSample(NamedTuple):
     d: Any  # unit direction to the emitter
     incident: Any  # radiance times visibility and MIS weight, over the pdf
     emitter: Any = None  # number of the lamp, None for the sky
-    kind: Any = None  # of the shadow ray (outdoor_choice.py)
+    kind: Any = None  # of the shadow ray (arrival_rates.py)
     is_cast: Any = False  # Bool
     arrives: Any = False  # Bool: nothing stands in its way
 

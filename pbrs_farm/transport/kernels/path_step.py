@@ -32,7 +32,8 @@ from pbrs_farm.transport.kernels.guided_rays import (
     survival_boost,
     target_technique_share,
 )
-from pbrs_farm.transport.kernels.lamp_guiding import NO_FACE, no_reference
+from pbrs_farm.transport.kernels.guiding_targets import NO_FACE
+from pbrs_farm.transport.kernels.lamp_guiding import no_reference
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,

@@ -1,8 +1,8 @@
-"""Random numbers as pure functions of (pixel, sample, dimension): hashed, or scrambled Sobol.
+"""Random numbers as pure functions of (pixel, sample, dimension), hashed or scrambled Sobol, and alias tables; kernels.
 
 No state travels with a path: dimension d of sample s of pixel p is computed when it is asked for.
 Neighbouring streams of PCG32 are correlated; every number here comes out of a hash of all its
-coordinates instead.
+coordinates instead. An alias table samples a discrete distribution in constant time (Vose 1991). No effects.
 """
 
 from __future__ import annotations
@@ -130,9 +130,6 @@ def _pascal(x: Any) -> Any:
     ):
         x = x ^ ((x >> shift) & mi.UInt32(mask))
     return x
-
-
-# Alias tables: sampling a discrete distribution in constant time (Vose 1991).
 
 
 def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:

@@ -14,6 +14,7 @@ from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera
 from pbrs_farm.transport.kernels.path_state import PathContext, film_position
 
 ROUND_STEPS: Final = 16  # of a chain, from one reconnection to the next
+NO_PIXEL: Final = 0xFFFFFFFF
 
 
 class Film(NamedTuple):
@@ -72,12 +73,6 @@ def splat(film: Film, chain: Any, pixel: Any, value: Any, active: Any) -> None:
     for c in range(3):
         # In this mode the kernel does not depend on the picture's size.
         dr.scatter_add(film.splats, value[c], first + c, active, mode=dr.ReduceMode.Direct)
-
-
-# Which pixels a path's suffix is shown to: groups spread over the picture.
-
-
-NO_PIXEL: Final = 0xFFFFFFFF
 
 
 class PixelGroups(NamedTuple):

@@ -21,14 +21,13 @@ vertices send each other stays mostly with 3.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
@@ -41,134 +40,15 @@ from pbrs_farm.transport.kernels.path_state import (
     PathContext,
     device_fields,
 )
-from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
-from pbrs_farm.transport.light_result import Arrays
-from pbrs_farm.transport.metropolis.film import (
-    ROUND_STEPS,
-    ChainContext,
-    Chains,
-    Film,
-    stratified_groups,
-)
-from pbrs_farm.transport.metropolis.markov_chains import (
-    STORED_DIMS,
-    ChainSums,
-    Mutations,
-    draw_paths,
-    mutate,
-)
-from pbrs_farm.transport.metropolis.reconnection import (
-    Prefixes,
-    Rounds,
-    prefix_schedule,
-    reconnect,
-    trace_prefixes,
-)
-from pbrs_farm.transport.metropolis.suffixes import SUFFIX_FLOATS, no_records
+from pbrs_farm.transport.kernels.sampler import device_array
+from pbrs_farm.transport.metropolis.chain_start import bootstrap_chains, flat_film, with_importance
+from pbrs_farm.transport.metropolis.film import ROUND_STEPS, ChainContext, Chains, stratified_groups
+from pbrs_farm.transport.metropolis.markov_chains import ChainSums, Mutations, mutate
+from pbrs_farm.transport.metropolis.prefixes import Prefixes, prefix_schedule, trace_prefixes
+from pbrs_farm.transport.metropolis.reconnection import Rounds, reconnect
+from pbrs_farm.transport.metropolis.suffixes import no_records
+from pbrs_farm.transport.render_checkpoint import Arrays
 from pbrs_farm.transport.sample_passes import SampledView
-
-# How the chains of `metropolis` begin: independent paths, their importance, a draw of them.
-
-
-_PATHS_PER_TILE: Final = 256  # of the importance
-_MIN_RELATIVE_LIGHT: Final = 0.05  # of the mean, in the importance
-
-
-def flat_film(shape: tuple[int, int]) -> Film:
-    """A black film of even importance."""
-    height, width = shape
-    flat = device_array(mi.Float, np.ones(height * width, np.float32))
-    splats = dr.zeros(mi.Float, 2 * height * width * 3)
-    return Film(dr.opaque(mi.UInt32, width), dr.opaque(mi.UInt32, height), splats, flat)
-
-
-def with_importance(
-    context: ChainContext, shape: tuple[int, int], n_paths: int, seed: int
-) -> ChainContext:
-    """The context with the film's importance as n_paths independent paths tell it."""
-    pilot = _draw(context, n_paths, seed)
-    importance = pixel_importance(shape, pilot.pixel.numpy(), pilot.target.numpy())
-    on_device = device_array(mi.Float, importance.ravel())
-    return context._replace(film=context.film._replace(importance=on_device))
-
-
-def pixel_importance(shape: tuple[int, int], pixels: NDArray[np.uint32], luminances: F32) -> F32:
-    """(H, W) what a unit of luminance counts: about 1 / the light expected at a pixel.
-
-    Without it chains go where the picture is bright; with it every pixel gets its share (Veach's
-    two stages, 1997). From N paths, their pixels and luminances: means over tiles of about
-    _PATHS_PER_TILE, blended between tiles, held above a part of the mean. Any positive ones are unbiased.
-    """
-    height, width = shape
-    side = max(int(np.sqrt(_PATHS_PER_TILE * height * width / len(pixels))), 1)
-    rows, columns = -(-height // side), -(-width // side)
-    tile = (pixels // width // side) * columns + pixels % width // side
-    count = np.bincount(tile, minlength=rows * columns)
-    total = np.bincount(tile, luminances.astype(np.float64), rows * columns)
-    grid = (total / np.maximum(count, 1)).reshape(rows, columns)
-    mean = grid.mean()
-    if not mean > 0:
-        return np.ones(shape, np.float32)
-    y, x = (_between(n, side, m) for n, m in ((height, rows), (width, columns)))
-    light = y @ grid @ x.T
-    return np.asarray(mean / (light + _MIN_RELATIVE_LIGHT * mean), np.float32)
-
-
-def _between(n: int, side: int, n_tiles: int) -> F64:
-    """(n, n_tiles) linear weights of tiles of `side` pixels at each of n pixels."""
-    at = np.clip((np.arange(n) + 0.5) / side - 0.5, 0, n_tiles - 1)
-    return np.asarray(np.maximum(1 - np.abs(at[:, None] - np.arange(n_tiles)[None]), 0))
-
-
-def _path_keys(n: int, seed: int) -> Any:
-    return stream_key(dr.arange(mi.UInt32, n), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
-
-
-def _draw(context: ChainContext, n: int, seed: int) -> Chains:
-    """n independent paths."""
-    paths = draw_paths(context, HashedSampler(_path_keys(n, seed), mi.UInt32(0)), n)
-    dr.eval(*paths)
-    return paths
-
-
-def bootstrap_chains(
-    context: ChainContext, n_bootstrap: int, n_chains: int, seed: int
-) -> tuple[Chains | None, float]:
-    """(chains at independent paths, drawn in proportion to I; sum of I over n_bootstrap paths).
-
-    None where no path brings light.
-    """
-    paths = _draw(context, n_bootstrap, seed)
-    key = _path_keys(n_bootstrap, seed)
-    targets = paths.target.numpy().astype(np.float64)
-    if targets.sum() <= 0:
-        return None, 0.0
-    # Choose by equidistant quantiles from a random offset, in random order.
-    quantiles = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
-    chosen = np.searchsorted(np.cumsum(targets) / targets.sum(), quantiles)
-    chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
-    at = mi.UInt32(chosen.astype(np.uint32))
-
-    # Draw the numbers of the chosen paths again; copy what the paths are.
-    n, n_paths = dr.opaque(mi.UInt32, n_chains), dr.opaque(mi.UInt32, n_bootstrap)
-    index = dr.arange(mi.UInt32, STORED_DIMS * n_chains)
-    keys = dr.gather(mi.UInt32, key, dr.gather(mi.UInt32, at, index % n))
-    column = dr.arange(mi.UInt32, SUFFIX_FLOATS * n_chains)
-    source = column // n * n_paths + dr.gather(mi.UInt32, at, column % n)
-    chains = Chains(
-        samples=HashedSampler(keys, mi.UInt32(0)).get_1d(index // n),
-        light=dr.gather(mi.Color3f, paths.light, at),
-        target=dr.gather(mi.Float, paths.target, at),
-        pixel=dr.gather(mi.UInt32, paths.pixel, at),
-        shared=dr.gather(mi.Float, paths.shared, at),
-        suffixes=dr.gather(mi.Float, paths.suffixes, source),
-    )
-    dr.eval(*chains)
-    return chains, float(targets.sum())
-
-
-# Primary-sample-space Metropolis light transport over the camera path.
-
 
 MIN_STEPS: Final = 64  # of a chain
 _MIN_RR_DEPTH: Final = 3
@@ -214,7 +94,7 @@ class ChainRun:
     """
 
     def __init__(
-        self, view: SampledView, context: ChainContext, min_segments: int, started: _Started
+        self, view: SampledView, context: ChainContext, min_segments: int, started: _StartedChains
     ) -> None:
         i, fields = view.camera.intrinsics, view.fields
         self._shape, self._n_pixels = (i.height_px, i.width_px), i.height_px * i.width_px
@@ -296,7 +176,7 @@ class ChainRun:
         }
 
 
-_Started = tuple[Chains, _Totals]
+_StartedChains = tuple[Chains, _Totals]
 
 
 def chain_run(
@@ -338,7 +218,7 @@ def _wanted(view: SampledView) -> int:
     return view.fields.mutations_per_pixel * i.width_px * i.height_px
 
 
-def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _Started]:
+def _restored(context: ChainContext, kept: Arrays) -> tuple[ChainContext, _StartedChains]:
     """A run's context and chains as ChainRun.state gave them."""
     film = context.film._replace(
         splats=device_array(mi.Float, kept["splats"]),

@@ -14,16 +14,12 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.core.lighting import Group
-from pbrs_farm.transport.light_result import (
-    Arrays,
-    LightResult,
-    RenderCheckpoint,
-    joined_result,
-    result_from_sums,
-)
+from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
 from pbrs_farm.transport.metropolis.film import ROUND_STEPS
 from pbrs_farm.transport.metropolis.integrator import MIN_STEPS, ChainRun, Estimate, chain_run
-from pbrs_farm.transport.sample_passes import SampledView, TimeBudget, direct_sums
+from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
+from pbrs_farm.transport.sample_passes import SampledView, direct_sums
+from pbrs_farm.transport.time_budget import TimeBudget
 
 _DIRECT_COST: Final = 0.05  # of a direct sample, in mutations of both groups; for the share done
 GPU_CHAIN_ROUNDS: Final = 1 << 20  # suffixes of 160 bytes, 0.2 GB

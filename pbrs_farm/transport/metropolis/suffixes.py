@@ -16,7 +16,12 @@ from pbrs_farm.transport.kernels.path_state import (
     StepResult,
 )
 
-# A path under way that is split at its second vertex, so that its suffix can be reconnected.
+SUFFIX_FLOATS: Final = 36
+SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
+MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
+# Columns of a suffix that are written one by one; record_suffix lists the others.
+# At the end _PDFS holds the share of p2 that the surface draws, _GUIDED_PDF the rest of p2.
+_PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 
 
 @dataclass
@@ -38,18 +43,6 @@ class SplitPath:
 def no_direction() -> DirectionPdfs:
     """Before there is a vertex."""
     return DirectionPdfs(mi.Float(0), mi.Float(1), mi.Float(0))
-
-
-# Suffixes of paths, recorded as reconnection.py shows them to other pixels.
-
-
-SUFFIX_FLOATS: Final = 36
-SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
-MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
-
-# Columns of a suffix that are written one by one; record_suffix lists the others.
-# At the end _PDFS holds the share of p2 that the surface draws, _GUIDED_PDF the rest of p2.
-_PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 
 
 class SuffixRecords(NamedTuple):

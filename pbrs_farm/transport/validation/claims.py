@@ -27,7 +27,25 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 
-# z-tests whether two noisy images have one mean, over blocks of pixels; pure numpy.
+# Standard errors allowed of one mean, its error measured by twelve runs: fails once in 2,500.
+_SIGMAS: Final = 5.0
+# Standard errors allowed of the worst of 16 blocks, four pooled runs: fails once in 20,000.
+_BLOCK_SIGMAS: Final = 5.0
+_MEASURING_SEEDS: Final = range(12)  # of the twelve runs
+_LM_PER_W: Final = 179  # luminous efficacy of the lamps' white
+# Fields of both integrators: no pilot and no denoiser, so that nothing but the estimator is tested.
+_PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
+_CHAINS: Final = LightFields(
+    integrator="metropolis",
+    filter="box",
+    denoise=False,
+    direct_spp=32,
+    mutations_per_pixel=128,
+    chains=2048,
+)
+# Half of the mutations, for the rooms in which every path is lit.
+_FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
+_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a sky that is white and even
 
 
 def blocks(picture: F32, n: int = 4) -> F64:
@@ -50,30 +68,6 @@ def z_scores(a: Sequence[F64], b: Sequence[F64]) -> F64:
     # Divide the difference by its standard error.
     error = np.sqrt(x.var(0, ddof=1).mean() / len(x) + y.var(0, ddof=1).mean() / len(y))
     return np.asarray((x.mean(0) - y.mean(0)) / error)
-
-
-# The claims of `pbrs-farm verify --light`.
-
-
-# Standard errors allowed of one mean, its error measured by twelve runs: fails once in 2,500.
-_SIGMAS: Final = 5.0
-# Standard errors allowed of the worst of 16 blocks, four pooled runs: fails once in 20,000.
-_BLOCK_SIGMAS: Final = 5.0
-_MEASURING_SEEDS: Final = range(12)  # of the twelve runs
-_LM_PER_W: Final = 179  # luminous efficacy of the lamps' white
-# Fields of both integrators: no pilot and no denoiser, so that nothing but the estimator is tested.
-_PATH: Final = LightFields(filter="box", pilot_spp=0, denoise=False)
-_CHAINS: Final = LightFields(
-    integrator="metropolis",
-    filter="box",
-    denoise=False,
-    direct_spp=32,
-    mutations_per_pixel=128,
-    chains=2048,
-)
-# Half of the mutations, for the rooms in which every path is lit.
-_FEW_CHAINS: Final = _CHAINS.model_copy(update={"mutations_per_pixel": 64})
-_SKY_OF_ONE: Final = (1.0, 1.0, 1.0)  # radiance of a sky that is white and even
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +105,6 @@ def _rendered(
 
 def _spp(n: int, **more: object) -> LightFields:
     return _PATH.model_copy(update={"spp": n, **more})
-
-
-# Claims with a closed form
 
 
 def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], LightClaim]:
@@ -184,9 +175,6 @@ def _near(text: str, measured: float, expected: float, tolerance: float, unit: s
     )
 
 
-# Claims that two estimators have one mean
-
-
 def _window() -> tuple[House, Camera]:
     return rooms.window_room(0.7, lumen=800)
 
@@ -230,9 +218,6 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> LightCla
     return LightClaim(
         text, f"worst |z| {worst:.2f} of {n} blocks", f"< {_BLOCK_SIGMAS:g}", worst < _BLOCK_SIGMAS
     )
-
-
-# Claims that hold to the bit
 
 
 def _groups_sum(variant: str) -> LightClaim:

@@ -15,7 +15,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.gltf.scene import read_gltf
 from pbrs_farm.repair import repair
-from pbrs_farm.transport.scene_tables.scene_tables import area_emitters_of_house, lamp_rgb
+from pbrs_farm.transport.scene_tables.area_emitters import area_emitters_of_house, lamp_rgb
 from tests.read.gltf.gltf_scenes import item, read, two_rooms
 from tests.read.small_houses import png
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.recipe import SensorFields, ToneFields, recipe_from_name
-from pbrs_farm.transport.develop.mode_pictures import (
+from pbrs_farm.transport.develop.camera_sensor import (
     Exposure,
     _electrons_read,
     chosen_exposure,

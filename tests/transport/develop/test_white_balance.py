@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.transport.develop.mode_pictures import white_balance
+from pbrs_farm.transport.develop.white_balance import white_balance
 
 PINK = np.array([0.9, 0.11, 0.32])
 

@@ -14,7 +14,7 @@ from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.kernels import guided_rays as guide
-from pbrs_farm.transport.kernels.lamp_guiding import BACK_SIDE, GuidingTargets
+from pbrs_farm.transport.kernels.guiding_targets import BACK_SIDE, GuidingTargets
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
@@ -68,7 +68,7 @@ def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
 def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, camera = loaded(hard_rooms.open_shade())
     fields = FIELDS.model_copy(update={"spp": 16})
-    plain = "pbrs_farm.transport.pilot.trial_weights"
+    plain = "pbrs_farm.transport.view_emitters.trial_weights"
     monkeypatch.setattr(plain, lambda *given: replace(given[3], is_guided=False))
     result = scene.render(camera, "0_0", fields, 1)
     assert result.facts["guided"] is False

@@ -49,12 +49,12 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
     return LightScene.load(house, {}, RECIPE, SKY), camera
 
 
-def traced(scene: LightScene, camera: Camera, weights: Any, seed: int) -> Any:
+def traced(scene: LightScene, emitters: Any, camera: Camera, weights: Any, seed: int) -> Any:
     from pbrs_farm.transport.path_tracer import Lanes, trace
 
-    scene._emitters.set_weights(weights)
+    emitters.set_weights(weights)
     lanes = Lanes(32, 24, 0, 64, seed, is_trial=True)
-    return trace(scene.device_scene, scene._emitters, camera, lanes, FIELDS)
+    return trace(scene.device_scene, emitters, camera, lanes, FIELDS)
 
 
 def plain_half(lanes: Any) -> Any:
@@ -65,7 +65,8 @@ def plain_half(lanes: Any) -> Any:
 def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_or_the_views() -> (
     None
 ):
-    from pbrs_farm.transport.kernels.outdoor_choice import N_KINDS, VoxelGrid, arrival_rates
+    from pbrs_farm.transport.kernels.arrival_rates import N_KINDS, arrival_rates
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
     grid = VoxelGrid(np.array([[0.1, 0.1, 0.1], [2.4, 0.1, 0.1]], np.float32))
     assert grid.n_voxels == 5
@@ -81,7 +82,7 @@ def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_o
 
 
 def test_a_voxel_counts_with_the_26_around_it() -> None:
-    from pbrs_farm.transport.kernels.outdoor_choice import VoxelGrid
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
     grid = VoxelGrid(np.array([[0, 0, 0], [1.9, 1.4, 2.4]], np.float32))
     ones = np.ones((grid.n_voxels, 1), np.uint32)
@@ -99,11 +100,11 @@ def test_a_voxel_counts_with_the_26_around_it() -> None:
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
     tried: tuple[LightScene, Camera],
 ) -> None:
-    from pbrs_farm.transport.kernels.outdoor_choice import FIRST_LAMP, FIRST_SUNLIT
+    from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, FIRST_SUNLIT
 
     scene, camera = tried
-    _emitters, weights = scene.emitters(camera, FIELDS, 1)
-    counts = traced(scene, camera, replace(weights, arrival_rates=None), 2).arrivals
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
+    counts = traced(scene, emitters, camera, replace(weights, arrival_rates=None), 2).arrivals
     cast, arrived = counts.sum(1)
     slot = np.argsort(-weights.lamps, kind="stable")
     hidden = FIRST_LAMP + int(np.flatnonzero(slot == 2)[0])
@@ -118,10 +119,10 @@ def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
 
 def test_rates_let_more_of_fewer_shadow_rays_arrive(tried: tuple[LightScene, Camera]) -> None:
     scene, camera = tried
-    _emitters, weights = scene.emitters(camera, FIELDS, 1)
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
     assert weights.arrival_rates is not None
     (cast, arrived), (cast_all, arrived_all) = (
-        traced(scene, camera, w, 2).arrivals.sum((1, 2), dtype=np.int64)
+        traced(scene, emitters, camera, w, 2).arrivals.sum((1, 2), dtype=np.int64)
         for w in (weights, replace(weights, arrival_rates=None))
     )
     assert cast < 0.9 * cast_all
@@ -133,7 +134,7 @@ def test_rates_leave_the_mean_alone(tried: tuple[LightScene, Camera], are_random
     # Significance: 16 blocks of two groups, |z| < 4.5 each is missed by chance once in 4500 runs.
     # Random rates are wrong everywhere: chances and pdfs must agree whatever the rates are.
     scene, camera = tried
-    _emitters, weights = scene.emitters(camera, FIELDS, 1)
+    emitters, weights = scene.emitters(camera, FIELDS, 1)
     rates = weights.arrival_rates
     assert rates is not None
     if are_random:
@@ -141,7 +142,9 @@ def test_rates_leave_the_mean_alone(tried: tuple[LightScene, Camera], are_random
     found: list[list[list[Any]]] = []
     for by_place, first_seed in ((rates, 10), (None, 20)):
         own = replace(weights, arrival_rates=by_place)
-        sums = [traced(scene, camera, own, seed) for seed in range(first_seed, first_seed + 8)]
+        sums = [
+            traced(scene, emitters, camera, own, seed) for seed in range(first_seed, first_seed + 8)
+        ]
         pairs = [[s.outdoor for s in sums], [s.indoor for s in sums]]
         found.append([[blocks(plain_half(x)) for x in pictures] for pictures in pairs])
     for with_rates, without in zip(*found, strict=True):

@@ -44,7 +44,7 @@ def test_every_point_of_a_ball_faces_the_vertex_and_lies_on_the_ball() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.emitters import LampPointSampler
+    from pbrs_farm.transport.kernels.lamp_points import LampPointSampler
 
     scene = scene_of(0.3, symmetric=True)
     n = 20_000

@@ -29,7 +29,7 @@ FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 64
 def test_voxels_are_half_a_metre(
     size: tuple[float, ...], edge: float, shape: tuple[int, ...]
 ) -> None:
-    from pbrs_farm.transport.kernels.outdoor_choice import voxel_grid
+    from pbrs_farm.transport.kernels.voxel_grid import voxel_grid
 
     corners = np.add([np.zeros(3), size], (1, 2, 3)).astype(np.float32)
     low, found, found_edge = voxel_grid(corners)
@@ -37,7 +37,7 @@ def test_voxels_are_half_a_metre(
 
 
 def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
-    from pbrs_farm.transport.kernels.outdoor_choice import voxel_grid
+    from pbrs_farm.transport.kernels.voxel_grid import voxel_grid
 
     _low, shape, edge = voxel_grid(np.float32([(0, 0, 0), (900, 30, 700)]))
     assert shape.prod() <= 1 << 16
@@ -60,11 +60,8 @@ def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
 
 
 def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> None:
-    from pbrs_farm.transport.kernels.outdoor_choice import (
-        MAX_TECHNIQUES,
-        VoxelGrid,
-        weights_by_place,
-    )
+    from pbrs_farm.transport.kernels.outdoor_choice import MAX_TECHNIQUES, weights_by_place
+    from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
     grid = VoxelGrid(np.array([[0, 0, 0], [3.2, 0.2, 0.2]], np.float32))
     assert grid.n_voxels == 7

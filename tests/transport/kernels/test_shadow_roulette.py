@@ -35,7 +35,7 @@ def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least()
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.direct_light import ShadowRoulette
+    from pbrs_farm.transport.kernels.shadow_roulette import ShadowRoulette
 
     n = 100_000
     u = (dr.arange(mi.Float, n) + 0.5) / n

@@ -88,7 +88,7 @@ def renders(scene: LightScene, camera: Camera, seeds: range) -> list[LightResult
 
 def hide_points(patch: pytest.MonkeyPatch) -> None:
     """Let views have no sunlit points."""
-    from pbrs_farm.transport.kernels.sunlight import SunlitPoints
+    from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 
     real = SunlitPoints.set_view
     patch.setattr(SunlitPoints, "set_view", lambda self, _vertices: real(self, None))
@@ -153,13 +153,8 @@ def points_seen(emitters: object, p: np.ndarray, n: int) -> np.ndarray:
 
 
 def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
-    from pbrs_farm.transport.kernels.sunlight import (
-        COS_SUN,
-        PLANE_PDF,
-        RADIANCE,
-        traced_points,
-        used_cells,
-    )
+    from pbrs_farm.transport.kernels.sun_rays import COS_SUN, PLANE_PDF, RADIANCE
+    from pbrs_farm.transport.kernels.sunlit_tables import traced_points, used_cells
 
     house, camera = bare_room()
     scene = sunny(house)
@@ -193,7 +188,8 @@ def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> Non
     house = replace(house, items=(replace(walls, surfaces=(*walls.surfaces, terrace)),))
     scene = sunny(house)
     emitters, weights = scene.emitters(camera, FIELDS, 1)
-    from pbrs_farm.transport.kernels.sunlight import PLANE_PDF, traced_points, used_cells
+    from pbrs_farm.transport.kernels.sun_rays import PLANE_PDF
+    from pbrs_farm.transport.kernels.sunlit_tables import traced_points, used_cells
 
     device, grid = scene.device_scene, emitters.outdoor_choice._grid
     used = used_cells(device, emitters.sun, grid, weights.vertices)
@@ -274,7 +270,7 @@ def test_a_cell_is_found_again_along_the_sun() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from pbrs_farm.transport.kernels.sunlight import SunPlane
+    from pbrs_farm.transport.kernels.sun import SunPlane
 
     direction = np.array([0.48, 0.6, -0.64])
     plane = SunPlane(direction, np.array([(0.0, 0, 0), (3, 2, 4)]))
@@ -289,7 +285,7 @@ def test_a_cell_is_found_again_along_the_sun() -> None:
 
 
 def test_a_vast_plane_has_no_more_cells_than_fit() -> None:
-    from pbrs_farm.transport.kernels.sunlight import SunPlane
+    from pbrs_farm.transport.kernels.sun import SunPlane
 
     plane = SunPlane(np.array([0.0, 1.0, 0.0]), np.array([(0.0, 0, 0), (90, 3, 70)]))
     assert plane.n_cells <= 1 << 15

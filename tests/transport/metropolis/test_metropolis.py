@@ -165,7 +165,7 @@ def test_the_rounds_of_a_launch_change_no_picture(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize("n_pixels", [768, 19200, 307200, 2073600])
 def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) -> None:
     from pbrs_farm.transport.metropolis.film import ROUND_STEPS
-    from pbrs_farm.transport.metropolis.reconnection import prefix_schedule
+    from pbrs_farm.transport.metropolis.prefixes import prefix_schedule
 
     n_sets, every = prefix_schedule(n_chains, n_pixels)
     assert n_sets > 0
@@ -175,7 +175,7 @@ def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) ->
 
 
 def test_a_launch_has_every_set_of_prefixes_of_its_rounds() -> None:
-    from pbrs_farm.transport.metropolis.reconnection import PrefixSchedule
+    from pbrs_farm.transport.metropolis.prefixes import PrefixSchedule
 
     schedule = PrefixSchedule(n_sets=2, every=5)
     assert schedule.sets_of(range(5)) == range(2)

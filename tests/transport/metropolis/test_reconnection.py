@@ -51,7 +51,7 @@ def test_groups_are_spread_and_neighbours_are_apart() -> None:
 
 
 def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
-    from pbrs_farm.transport.metropolis.integrator import pixel_importance
+    from pbrs_farm.transport.metropolis.chain_start import pixel_importance
 
     rng = np.random.default_rng(0)
     pixels = rng.integers(0, 48 * 64, 30_000).astype(np.uint32)
@@ -64,7 +64,7 @@ def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
 
 
 def test_a_black_picture_has_even_importance() -> None:
-    from pbrs_farm.transport.metropolis.integrator import pixel_importance
+    from pbrs_farm.transport.metropolis.chain_start import pixel_importance
 
     importance = pixel_importance((3, 4), np.zeros(10, np.uint32), np.zeros(10, np.float32))
     assert np.array_equal(importance, np.ones((3, 4), np.float32))

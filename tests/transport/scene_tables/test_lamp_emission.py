@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.transport.scene_tables.scene_tables import area_emitters_of_house, rgb_from_kelvin
+from pbrs_farm.transport.scene_tables.area_emitters import area_emitters_of_house, rgb_from_kelvin
 from pbrs_farm.transport.validation import known_rooms as rooms
 
 FAST = recipe_from_name("fast")

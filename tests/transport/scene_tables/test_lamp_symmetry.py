@@ -8,7 +8,8 @@ import pytest
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.transport.scene_tables.scene_tables import symmetry_row, tables_from_house
+from pbrs_farm.transport.scene_tables.lamp_symmetry import symmetry_row
+from pbrs_farm.transport.scene_tables.scene_tables import tables_from_house
 from pbrs_farm.transport.validation import known_rooms as rooms
 
 RECIPE = recipe_from_name("fast")

@@ -1,0 +1,82 @@
+"""White balance: gains that turn the light's colour in a picture towards white; no effects."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, RadianceImage
+from pbrs_farm.core.frames import LUMINANCE
+
+_SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
+_SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
+_FILLED: Final = 0.5  # share of pixels from which one colour fills a view
+# Of a light, in natural logarithms of linear sRGB: green over the mean of red and blue, and red
+# over blue. Black bodies from 2,300 K on and clear skies lie within.
+_TINT: Final = (-0.1, 0.35)
+_WARMTH: Final = (-0.7, 1.6)
+
+
+def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: float) -> F32:
+    """(3,) gains that turn the illuminant's colour towards white, as a camera's do; luminance 1.
+
+    The illuminant is radiance over albedo, which is known here: the median of its logarithm over
+    pixels that are neither dark nor overexposed. strength: 0 leaves the colour, 1 makes it
+    neutral. Ones when fewer than 16 pixels tell it. Where one colour fills the view, the light that
+    its walls reflect at each other has that colour, and no camera would take it for a lamp's: the
+    illuminant is then clamped to colours that lamps and skies have.
+    """
+    # Take pixels between the 10th and the 90th percentile of luminance.
+    level = radiance @ LUMINANCE
+    usable = (level > 0) & all_channels(albedo > 0.02) & all_channels(radiance > 0)
+    if strength == 0 or usable.sum() < 16:
+        return np.ones(3, np.float32)
+    low, high = np.percentile(level[usable], [10, 90])
+    usable &= (level >= low) & (level <= high)
+    # Scale against the illuminant, at constant luminance.
+    reflecting = albedo[usable]
+    light = np.exp(_medians(np.log(radiance[usable] / reflecting)))
+    if _one_colour_fills(reflecting):
+        light = _clamp_to_lamps_and_skies(light)
+    gains = (light / (light @ LUMINANCE)) ** -strength
+    return np.asarray(gains / (gains @ LUMINANCE), np.float32)
+
+
+def _one_colour_fills(albedo: F32) -> bool:
+    """Whether most of (N, 3) albedos share one saturated hue."""
+    red, green, blue = albedo.T
+    top = np.maximum(np.maximum(red, green), blue)
+    is_colour = top - np.minimum(np.minimum(red, green), blue) > _SATURATED * top
+    if is_colour.mean() <= _FILLED:
+        return False
+    # Count those whose hue is near the median one.
+    coloured = albedo[is_colour]
+    chroma = coloured - coloured.mean(1, keepdims=True)
+    hue = chroma / np.maximum(np.linalg.norm(chroma, axis=1, keepdims=True), 1e-9)
+    common = _medians(hue)
+    length = float(np.linalg.norm(common))
+    n_common = np.count_nonzero(hue @ common > _SAME_HUE_COS * length) if length > 0 else 0
+    return bool(n_common / len(albedo) > _FILLED)
+
+
+def all_channels(holds: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) whether all three of (H, W, 3) hold: `np.all` over so short an axis takes four times as long."""
+    return holds[..., 0] & holds[..., 1] & holds[..., 2]
+
+
+def _medians(rows: F32) -> F32:
+    """(3,) medians of (N, 3) rows, channel by channel."""
+    return np.array([np.median(np.ascontiguousarray(channel)) for channel in rows.T], rows.dtype)
+
+
+def _clamp_to_lamps_and_skies(light: F32) -> F32:
+    """A light's colour with its tint and warmth clamped to what lamps and skies have."""
+    red, green, blue = np.log(light)
+    mean = (red + green + blue) / 3
+    tint = np.clip(green - (red + blue) / 2, *_TINT)
+    warmth = np.clip(red - blue, *_WARMTH)
+    others = mean - tint / 3  # mean of red and blue
+    logs = [others + warmth / 2, mean + 2 * tint / 3, others - warmth / 2]
+    return np.exp(np.array(logs, np.float32))
