@@ -21,8 +21,8 @@ from pbrs_farm.core.frames import LM_PER_W, srgb_from_linear
 from pbrs_farm.core.house import House, Material, corners_of_surfaces, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import resolve, variants
 from pbrs_farm.repair import repair
 from pbrs_farm.run.local import Run, run_local
 from pbrs_farm.run.plan import wanted

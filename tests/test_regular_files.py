@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular, real_path
 
 

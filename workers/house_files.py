@@ -17,20 +17,14 @@ from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.dress_catalogue import GENERATED, has_furniture
+from pbrs_farm.prepare.source import SourceRef, home_id, resolve, variants, words_of_homes
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.source import SourceRef, home_id, resolve, variants
 from pbrs_farm.store.object_store import Store
 from workers.job import HouseEntry
 
 # Where sources lie in the store.
 FOLDER: Final = "jobs/sources/"
 _LIBRARIES: Final = f"{FOLDER}libraries/"  # the user's own, to dress with
-# Kinds that are files of their own, and the suffixes of those that are one file.
-_FILES: Final = ("sweethome3d", "gltf", "scenestate", "front3d", "habitat", "usd", "ifc", "plan")
-_UPLOADED: Final = (
-    ".sh3d", ".xml", ".zip", ".glb", ".json", ".geojson", ".usd", ".usda", ".usdc", ".usdz", ".ifc",
-    ".ifczip", ".csv", ".svg", ".txt",
-)  # fmt: skip
 
 
 def entries_from_arguments(
@@ -44,16 +38,13 @@ def entries_from_arguments(
     # Take each house once, whatever arguments name it.
     found: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
-    for argument in arguments:
-        for one in _expanded(argument):
-            note_step(one, "read")
-            for ref in variants(resolve(one, files, models=models), seeds):
-                entry = HouseEntry(
-                    house_id=ref.house_id,
-                    source=_placed(ref).model_dump_json(),
-                    sha256=ref.fingerprint,
-                )
-                found.setdefault(ref.house_id, (entry, ref))
+    for word in words_of_homes(arguments):
+        note_step(word, "read")
+        for ref in variants(resolve(word, files, models=models), seeds):
+            entry = HouseEntry(
+                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint
+            )
+            found.setdefault(ref.house_id, (entry, ref))
     return list(found.values())
 
 
@@ -67,11 +58,17 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
         if place != path:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
-    drawn = ("example", "sweethome3d", "plugin")
-    if any(ref.kind in drawn or _is_furnished(ref) for ref in refs):
+    if any(_uses_packages(ref) for ref in refs):
         _upload_package(store, homes_package.PACKAGE)
     if any(ref.kind == "plugin" or _is_furnished(ref) for ref in refs):
         _upload_package(store, furniture_package.PACKAGE)
+
+
+def _uses_packages(ref: SourceRef) -> bool:
+    """Whether a home has models of the examples' package."""
+    entry = ref.format
+    is_from_package = ref.kind in ("example", "plugin") or _is_furnished(ref)
+    return is_from_package or (entry is not None and entry.uses_packages)
 
 
 def _is_furnished(ref: SourceRef) -> bool:
@@ -103,13 +100,7 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
     SUNCG, files with others beside them or with a folder of models, and what plugins read.
     """
-    is_file = ref.kind in ("suncg", "reader", *_FILES)
-    return is_file and _placed(ref).location == ref.location
-
-
-def path_of(ref: SourceRef) -> Path:
-    """Where a source that is left in place lies."""
-    return Path(ref.location.partition(":")[2] if ref.kind == "reader" else ref.location)
+    return ref.format is not None and _placed(ref).location == ref.location
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
@@ -190,24 +181,15 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
             write_whole(cache_folder() / name, store.get(key))
 
 
-def _expanded(word: str) -> list[str]:
-    """A folder of house files -> the files; anything else is itself."""
-    path = Path(word)
-    if path.is_dir() and not (path / "house.json").exists():
-        files = sorted(p for p in path.iterdir() if p.suffix.lower() in (".sh3d", ".glb"))
-        if files:
-            return [str(p) for p in files]
-    return [word]
-
-
 def _placed(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
-    path = Path(ref.location)
-    # A file with others beside it cannot travel as one object; Sweet Home 3D's are a package's.
-    has_side_files = ref.kind != "sweethome3d" and bool(ref.companions or ref.models)
-    if has_side_files or ref.kind not in _FILES or path.suffix.lower() not in _UPLOADED:
+    entry = ref.format
+    if entry is None or ref.kind == "reader" or not entry.travels:
         return ref
-    key = f"{FOLDER}{home_id(ref)}/{_key_name(path.name)}"
+    # A file with others beside it cannot travel as one object; Sweet Home 3D's are a package's.
+    if ref.models or (ref.companions and not entry.uses_packages):
+        return ref
+    key = f"{FOLDER}{home_id(ref)}/{_key_name(ref.given.path.name)}"
     return ref.model_copy(update={"location": key})
 
 

@@ -18,7 +18,8 @@ import numpy as np
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.dressing import dress
-from pbrs_farm.read.source import read_house, resolve, variants
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve, variants
 
 PARTS = ("dress", "views", "bits")
 LEAST_SHARE = 0.0005  # of a picture's pixels, to be seen

@@ -13,7 +13,7 @@ import time
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.read.source import resolve, variants
+from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
 from pbrs_farm.run.steps import camera_seed

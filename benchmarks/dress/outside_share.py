@@ -19,9 +19,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Opening, Room, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.surroundings import with_surroundings
-from pbrs_farm.prepare.read_source import house_of_source
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import resolve
 from pbrs_farm.repair import repair
 
 N_RAYS = 2_000  # a window
@@ -33,7 +33,7 @@ NEAR_M = 5.0  # eyes stand no farther from a window
 def measured(name: str) -> dict[str, Any]:
     """Rays that left a home by its windows, those that met something, triangles, seconds."""
     recipe = recipe_from_name("fast")
-    house = repair(house_of_source(resolve(name), recipe.read), recipe.repair)[0]
+    house = repair(read_house(resolve(name), recipe.read), recipe.repair)[0]
     n_left = n_met = n_faces = 0
     seconds = 0.0
     for seed in range(N_SEEDS):

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from pbrs_farm.core.recipe import recipe_from_name, with_settings
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run.output_root import claim_root
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import store_from_url

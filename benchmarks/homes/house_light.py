@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work

@@ -85,9 +85,9 @@ def measure(name: str) -> dict[str, Any]:
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.core.recipe import Recipe
+    from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.raycast.variant import set_threads
-    from pbrs_farm.read.source import read_house
     from pbrs_farm.repair import repair
 
     recipe = Recipe()
@@ -116,7 +116,7 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def _source(name: str, folder: Path) -> Any:
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.source import resolve
 
     if name != SUNCG:
         return resolve(name)

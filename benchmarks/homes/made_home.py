@@ -54,13 +54,13 @@ def of_house(seed: int) -> dict[str, Any]:
     from pbrs_farm.generate.made import made
     from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
     from pbrs_farm.prepare.finished_house import repaired_house
-    from pbrs_farm.prepare.read_source import house_of_source
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import resolve
 
     recipe = recipe_from_name("fast")
     source = resolve(MadeHome(seed).word)
     data = made(MadeHome(seed), catalogue_of_words("")).data
-    house = house_of_source(source, recipe.read)
+    house = read_house(source, recipe.read)
     _repaired, report = repaired_house(source, recipe)
     # All furniture counts as new; walls, doors and windows came with the home.
     bare = house.with_items(tuple(i for i in house.items if _is_structure(i.kind)))

@@ -68,11 +68,11 @@ def _things(seed: int) -> Iterator[Row]:
     from pbrs_farm.dress.dressing import dress
     from pbrs_farm.dress.swap import pieces_by_plain_id, plain_id
     from pbrs_farm.prepare.dress_catalogue import catalogue_of
-    from pbrs_farm.prepare.read_source import house_of_source
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import resolve
 
     recipe = recipe_from_name("fast")
-    source: House = house_of_source(resolve(MadeHome(seed).word), recipe.read)
+    source: House = read_house(resolve(MadeHome(seed).word), recipe.read)
     catalogue = catalogue_of(recipe.dress)
     # What surfaces look like changes no model.
     fields = recipe.dress.model_copy(update={"surfaces": 0.0, "parts": 0.0})

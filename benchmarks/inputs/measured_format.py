@@ -17,7 +17,7 @@ def measure(title: str) -> dict[str, Any]:
     from pbrs_farm.core.house import Enclosure
     from pbrs_farm.core.recipe import recipe_from_name
     from pbrs_farm.prepare.finished_house import repaired_house
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.source import resolve
 
     sound = sound_files()[title]
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""The realistic house of each format that is read, by the title of pbrs_farm/read/formats.csv. Effects: files."""
+"""The realistic house of each format that is read, by the title of its entry in prepare/formats.py. Effects: files."""
 
 from __future__ import annotations
 

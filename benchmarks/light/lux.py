@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks.figures import write_report
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step

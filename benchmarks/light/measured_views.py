@@ -10,7 +10,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.read.source import resolve, variants
+from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sky_for_house

@@ -17,7 +17,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run.house_cache import decoded_textures, panorama_for_house
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
 from pbrs_farm.transport.light_scene import LightScene

@@ -10,8 +10,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import resolve
 from pbrs_farm.run.chosen_cameras import pilot_of_view
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
 from pbrs_farm.run.local import Run, run_local

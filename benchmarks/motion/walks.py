@@ -12,8 +12,8 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import resolve
 from pbrs_farm.run.steps import camera_seed
 from pbrs_farm.sample.paper_rules import near_any_triangle
 from pbrs_farm.sample.walks.walk_sampler import sample_walk

@@ -47,7 +47,7 @@ BESIDE_M = 0.4  # from an opening's middle plane to a point that surely lies in 
 def home_without_coats(name: str) -> tuple[House, LightScene, dict[str, NDArray[np.uint8]]]:
     """(repaired house, its scene without coats, decoded textures) of an example home."""
     from pbrs_farm.prepare.finished_house import repaired_house
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.source import resolve
     from pbrs_farm.run.house_cache import decoded_textures
 
     recipe = Recipe()

@@ -26,8 +26,9 @@ from pbrs_farm.assets.debian import cache_folder
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, Recipe
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_report import Verdict

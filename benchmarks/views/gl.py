@@ -13,8 +13,9 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raster import Rasterizer
-from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.run.house_cache import decoded_textures
 
 HOME = "2BedroomApartmentWithBowWindow"

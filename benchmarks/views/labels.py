@@ -19,8 +19,9 @@ from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.layer_file import layer_bytes
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import read_house, resolve
 from pbrs_farm.repair import repair
 from pbrs_farm.run.house_cache import decoded_textures
 from tests.check.roots import make_root

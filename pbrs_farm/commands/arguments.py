@@ -200,15 +200,14 @@ def views_wanted(args: argparse.Namespace) -> int:
 
 
 def home_arguments(homes: list[str], houses: str | None) -> list[str]:
-    """The homes asked for, ranges of made ones one by one.
+    """The homes asked for, those of ranges and of folders one by one.
 
     houses: a list of SUNCG houses, and homes their root alone. Raises BadInput.
     """
-    from pbrs_farm.core.made_home import expanded
-    from pbrs_farm.read.source import suncg_list
+    from pbrs_farm.prepare.source import suncg_list, words_of_homes
 
     if not houses:
-        return expanded(homes)
+        return words_of_homes(homes)
     if len(homes) != 1:
         raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")
     return suncg_list(Path(homes[0]), Path(houses))

@@ -121,8 +121,8 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
     from pbrs_farm.prepare.finished_house import finished_house
+    from pbrs_farm.prepare.source import resolve, variants
     from pbrs_farm.progress import share_bar
-    from pbrs_farm.read.source import resolve, variants
     from pbrs_farm.run.attributions import attribution_text
     from pbrs_farm.store.folder import FolderStore
 
@@ -170,7 +170,7 @@ def _before_after(
     from pbrs_farm.crash_notes import note_step
     from pbrs_farm.gallery.contact_sheet import before_after_png
     from pbrs_farm.prepare.finished_house import repaired_house
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.source import resolve
     from pbrs_farm.run.view_pairs import pairs
 
     # The same recipe without dressing gives the home as it was drawn.
@@ -196,8 +196,8 @@ def _repair(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.prepare.finished_house import repaired_house
-    from pbrs_farm.prepare.read_source import house_of_source
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import resolve
     from pbrs_farm.repair import section_svg, summary_of_report
     from pbrs_farm.store.folder import FolderStore
 
@@ -211,7 +211,7 @@ def _repair(args: argparse.Namespace) -> int:
     for name, data in files.items():
         store.put(name, data)
     # Draw each level's walls before and after.
-    before = house_of_source(source, recipe.read)
+    before = read_house(source, recipe.read)
     cuts = {f"cut_{level.id}.svg": section_svg(before, house, level.id) for level in house.levels}
     for name, svg in cuts.items():
         store.put(name, svg.encode())
@@ -227,8 +227,8 @@ def _cameras(args: argparse.Namespace) -> int:
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
     from pbrs_farm.prepare.finished_house import repaired_house
+    from pbrs_farm.prepare.source import resolve
     from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.read.source import resolve
     from pbrs_farm.run.chosen_cameras import chosen_cameras
     from pbrs_farm.run.steps import camera_seed
     from pbrs_farm.store.folder import FolderStore

@@ -120,18 +120,20 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     """Furnish the user's own plan, once for each seed."""
     from pbrs_farm.core.catalogue import EMPTY
     from pbrs_farm.gallery.made_homes import write_home
-    from pbrs_farm.generate.plans.plan_files import Part, plan_from_file
+    from pbrs_farm.generate.plans.plan_files import plan_from_file
+    from pbrs_farm.generate.plans.plan_format import Part
+    from pbrs_farm.prepare.formats import PLAN, format_of_file
     from pbrs_farm.prepare.plan_house import made_of_file
-    from pbrs_farm.read.formats import PLAN, kind_of_file
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
     given = [f"--{k}" for k in ("rooms", "area", "storeys", "programme") if getattr(args, k)]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
-    if (kind := kind_of_file(args.plan)) not in ("", PLAN):
+    entry = format_of_file(args.plan)
+    if entry is not None and entry.kind != PLAN:
         hint = f"`pbrs-farm run {args.plan}` reads it"
-        raise BadInput(args.plan, "", f"is a house ({kind}), no floor plan", hint=hint)
+        raise BadInput(args.plan, "", f"is a house ({entry.kind}), no floor plan", hint=hint)
     own = plan_from_file(args.plan, Part(args.apartment, args.floor))
     for line in own.left_out:
         warn(f"left out: {line}")

@@ -175,10 +175,10 @@ def _home_classes(args: argparse.Namespace) -> int:
     """What a home's pieces are and why, without rendering it."""
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.gallery.class_statistics import class_decisions, decisions_text
-    from pbrs_farm.prepare.read_source import house_of_source
-    from pbrs_farm.read.source import resolve
+    from pbrs_farm.prepare.read_source import read_house
+    from pbrs_farm.prepare.source import resolve
 
-    house = house_of_source(resolve(args.folder, models=args.models), ReadFields())
+    house = read_house(resolve(args.folder, models=args.models), ReadFields())
     fields = ("kind", "nyu40", "name", "source_class", "tags")
     decisions = class_decisions({f: getattr(item, f) for f in fields} for item in house.items)
     if args.json:

@@ -70,16 +70,21 @@ def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
 
 
 def _inputs(args: argparse.Namespace) -> int:
-    from pbrs_farm.read.formats import formats
+    from pbrs_farm.prepare.formats import formats, formats_of_plugins, missing_library
 
+    rows = [*formats(), *formats_of_plugins()]
+    shown = ("kind", "title", "files", "brings", "needs", "where", "licence")
     if args.json:
-        echo_json([row._asdict() for row in formats()])
+        echo_json([{name: getattr(row, name) for name in shown} for row in rows])
         return 0
-    for row in formats():
+    for row in rows:
         echo(f"{row.title}: {row.files}")
         echo(f"    brings    {row.brings}")
         if row.needs:
-            echo(f"    needs     {row.needs}")
+            command = missing_library(row)
+            echo(
+                f"    needs     {row.needs}{f', not installed here: {command}' if command else ''}"
+            )
         echo(f"    from      {row.where}; {row.licence}")
     return 0
 

@@ -37,8 +37,8 @@ from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.installation import need, system_command
 
 if TYPE_CHECKING:
+    from pbrs_farm.prepare.source import SourceRef
     from pbrs_farm.read.objects.model_folders import ObjectModel
-    from pbrs_farm.read.source import SourceRef
     from pbrs_farm.run.local import Observer, Run
     from pbrs_farm.run.processes.render_task import Event
 
@@ -335,7 +335,7 @@ def _demo_dressing(args: argparse.Namespace) -> str | None:
 
 
 def _step(args: argparse.Namespace) -> int:
-    from pbrs_farm.read.source import resolve, variants
+    from pbrs_farm.prepare.source import resolve, variants
     from pbrs_farm.run.house_cache import HouseCache
     from pbrs_farm.run.plan import STEPS, needed_of_house
     from pbrs_farm.run.step_cache import Work
@@ -366,9 +366,9 @@ def _step(args: argparse.Namespace) -> int:
 
 
 def _objects(args: argparse.Namespace) -> int:
+    from pbrs_farm.prepare.source import object_source
     from pbrs_farm.read.common.source_files import SourceFiles
     from pbrs_farm.read.objects.model_folders import pick_models
-    from pbrs_farm.read.source import object_source
 
     if args.count < 1:
         raise BadInput("--count", str(args.count), "expected at least one model")

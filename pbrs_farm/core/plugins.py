@@ -85,7 +85,7 @@ def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
     """The marks of plugins in the order of their names: what they add to a digest.
 
     The one way in which a plugin becomes part of a digest, so that its next version makes anew what
-    it made: of `homes` and `readers` in the source (read/source.py), of `passes` in the house
+    it made: of `homes` and `readers` in the source (prepare/source.py), of `passes` in the house
     (prepare/passes.py), of `cameras`, `layers` and `pictures` in their steps (run/step_cache.py).
     Raises MachineFailed for a name that no installed plugin has.
     """

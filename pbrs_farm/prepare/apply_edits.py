@@ -42,9 +42,9 @@ from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.geometry.solids import sphere
+from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.objects.own_model import model_shape
-from pbrs_farm.read.source import SourceRef
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 
 

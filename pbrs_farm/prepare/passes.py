@@ -21,7 +21,7 @@ from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.prepare.source import SourceRef
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.dressing import Dressed
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
-
-FORMATS_WITH_BOX_ONLY_ITEMS: Final = frozenset({"plan", "scenestate", "front3d", "habitat"})
-"""Kinds of sources that may describe a thing by its class and box alone."""
 
 
 class FinishedHouse(NamedTuple):
@@ -109,7 +106,7 @@ def _is_home(source: SourceRef, _recipe: Recipe) -> bool:
 
 
 def _has_stand_ins(source: SourceRef, _recipe: Recipe) -> bool:
-    return source.kind in FORMATS_WITH_BOX_ONLY_ITEMS
+    return source.format is not None and source.format.tells_boxes
 
 
 def _is_furnished(source: SourceRef, recipe: Recipe) -> bool:
@@ -135,7 +132,7 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 
 def _read(work: Preparation) -> Preparation:
     """The house as its source gives it; of an object and of a plugin's home that is all there is."""
-    from pbrs_farm.prepare.read_source import house_of_plugin, house_of_source
+    from pbrs_farm.prepare.read_source import house_of_plugin, read_house
     from pbrs_farm.repair import RepairReport
 
     source, recipe = work.source, work.recipe
@@ -147,7 +144,7 @@ def _read(work: Preparation) -> Preparation:
             report=plugins_own.report,
             dressing=plugins_own.dressing,
         )
-    house = house_of_source(source, recipe.read)
+    house = read_house(source, recipe.read)
     # An object without context has no walls to close.
     is_whole = source.kind == "object"
     report = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None

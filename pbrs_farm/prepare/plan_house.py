@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -19,29 +18,25 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.made import Made, made_of_storeys
-from pbrs_farm.generate.plans.plan_files import (
-    PlanFile,
-    PlanStorey,
-    part_of,
-    plan_from_file,
-    upright,
-)
+from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
+from pbrs_farm.generate.plans.plan_format import part_of
+from pbrs_farm.prepare.formats import PLAN
 from pbrs_farm.prepare.stand_ins import with_stand_ins
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.told_items import told_item
-from pbrs_farm.read.source import SourceRef, check_unchanged, home_id
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
+from pbrs_farm.regular_files import digest_of_regular
 
 LEFT_OUT = "plan-left-out"
 """The kind of the notes of what a machine's plan holds and does not fit."""
 
 
-def house_of_plan(source: SourceRef, fields: ReadFields) -> House:
-    """The house of a plan, with its told things. Raises BadInput, naming the place in the file."""
-    check_unchanged(source)
-    path = Path(source.location)
-    file = upright(plan_from_file(path, part_of(source.part)))
-    notes = Notes(source.location, strict=fields.strict)
+def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
+    """The house of a plan, with an item for each thing that it names. Raises BadInput, naming the place."""
+    path = given.path
+    file = upright(plan_from_file(path, part_of(given.part)))
+    notes = Notes(str(path), strict=fields.strict)
     for line in file.left_out:
         notes.add(LEFT_OUT, "", line)
     house = _house(file, path.stem, fields)
@@ -51,9 +46,9 @@ def house_of_plan(source: SourceRef, fields: ReadFields) -> House:
         notes.add(
             "told-left-out", "", f"{n_lost} told things are not drawn: by their class, or no box"
         )
-    its_source = Source("plan", source.location, source.sha256)
+    its_source = Source(PLAN, str(path), digest_of_regular(path))
     return replace(
-        house, id=home_id(source), name=path.stem, source=its_source, cameras=(),
+        house, name=path.stem, source=its_source, cameras=(),
         items=(*house.items, *items), notes=(*house.notes, *notes.all()),
     )  # fmt: skip
 

@@ -18,8 +18,8 @@ from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import uses_catalogue
+from pbrs_farm.prepare.source import SourceRef, resolve, variants
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
 from pbrs_farm.run.output_root import claim_root, finish_root
 from pbrs_farm.run.plan import Wanted
@@ -263,7 +263,7 @@ Observer = Callable[[Event], None]
 class Run:
     """What is asked of a local run."""
 
-    homes: Sequence[str]  # words as read.source.resolve takes them
+    homes: Sequence[str]  # words as prepare.source.resolve takes them
     store_url: str
     recipe: Recipe
     want: Wanted = field(default_factory=Wanted)

@@ -24,7 +24,7 @@ from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.prepare import passes
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache

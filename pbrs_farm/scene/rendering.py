@@ -28,7 +28,7 @@ from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.apply_edits import apply_edits
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import FinishedHouse, cache_key, uses_catalogue
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done

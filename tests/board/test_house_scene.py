@@ -16,8 +16,8 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import resolve
 from pbrs_farm.run.steps import camera_seed
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.store import MemoryStore

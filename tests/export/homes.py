@@ -12,8 +12,8 @@ from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.export.home_pieces import exported_home
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.read.source import resolve
 
 
 @cache

@@ -19,8 +19,9 @@ from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hulls_of_parts
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.gltf.scene import read_gltf
-from pbrs_farm.read.source import read_house, resolve
 from tests.export.homes import differences, repaired_home, stored
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home, stored
 
 

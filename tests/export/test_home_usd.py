@@ -12,7 +12,8 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.export.forms.usd import write_usd
 from pbrs_farm.export.forms.usdz import write_usdz
 from pbrs_farm.export.home_pieces import exported_home
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home
 
 

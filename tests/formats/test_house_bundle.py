@@ -15,8 +15,9 @@ from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.read.source import read_house, resolve
 from tests.example_homes import example_homes
 from tests.read.small_houses import full_house
 

@@ -12,7 +12,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
 from pbrs_farm.generate.made import made_of_plan
-from pbrs_farm.generate.plans.plan_files import Part, PlanFile, plan_from_file
+from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file
+from pbrs_farm.generate.plans.plan_format import Part
 from pbrs_farm.read.sweethome3d.home import read_home
 
 COLUMNS = (

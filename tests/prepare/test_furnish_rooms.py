@@ -18,8 +18,8 @@ from pbrs_farm.generate.made import made
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.furnish_rooms import furnish_rooms
 from pbrs_farm.prepare.passes import step_depends, uses_catalogue
-from pbrs_farm.read.source import resolve
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.read.sweethome3d.home import read_home
 from tests.generate.furnish.shelves import plain_catalogue
 
 HOME = MadeHome(2, furniture=False)

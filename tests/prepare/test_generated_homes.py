@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.prepare.read_source import house_of_source
-from pbrs_farm.read.source import resolve, variants
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve, variants
 
 BARE = ",furniture=none"  # the package need not be there
 
 
 def test_the_house_of_a_seed_has_the_id_its_word_gave() -> None:
     source = resolve(f"made:5{BARE}")
-    house = house_of_source(source, Recipe().read)
+    house = read_house(source, Recipe().read)
     assert house.id == source.house_id
     assert house.id.startswith("made-5-")
     assert house.source.kind == "made"
@@ -24,7 +24,7 @@ def test_a_home_whose_digest_begins_with_a_d_keeps_its_id_when_it_is_dressed() -
     words = (f"made:{seed}{BARE}" for seed in range(1, 200))
     source = next(s for s in map(resolve, words) if "-d" in s.house_id)
     for one in (source, *variants(source, [3])):
-        assert house_of_source(one, Recipe().read).id == source.house_id
+        assert read_house(one, Recipe().read).id == source.house_id
 
 
 def test_a_made_home_is_repaired_without_leaks() -> None:

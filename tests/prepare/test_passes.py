@@ -9,7 +9,7 @@ from pbrs_farm.core.recipe import Recipe, field_paths, with_settings
 from pbrs_farm.prepare import finished_house as finishing
 from pbrs_farm.prepare.finished_house import HouseBeforeEdits, finished_house
 from pbrs_farm.prepare.passes import GROUPS, PASS, PASSES, cache_key
-from pbrs_farm.read.source import SourceRef, resolve, variants
+from pbrs_farm.prepare.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
 from workers.job import work_version
 

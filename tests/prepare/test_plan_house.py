@@ -13,10 +13,10 @@ from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.generate.plans.plan_files import plan_from_file
 from pbrs_farm.prepare.plan_house import made_of_file
-from pbrs_farm.prepare.read_source import house_of_source
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import SourceRef, home_id, resolve
 from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.source import SourceRef, home_id, read_house, resolve
 from pbrs_farm.repair import repair
 from pbrs_farm.store import MemoryStore
 from tests.prepare.test_furnish_rooms import boxes
@@ -28,7 +28,7 @@ formats = pytest.mark.parametrize("name", ["swiss", "procthor", "roomplan", "cub
 
 @formats
 def test_the_house_of_a_plan_is_closed_in_every_format(tmp_path: Path, name: str) -> None:
-    house = house_of_source(resolve(str(WRITERS[name](tmp_path))), ReadFields())
+    house = read_house(resolve(str(WRITERS[name](tmp_path))), ReadFields())
     assert (len(house.rooms), len(house.openings)) == (len(ROOMS), len(HOLES))
     repaired, report = repair(
         with_stand_ins(house, boxes(), "boxes"), Recipe().repair,
@@ -41,7 +41,7 @@ def test_the_house_of_a_plan_is_closed_in_every_format(tmp_path: Path, name: str
 
 @pytest.mark.parametrize("name", TELLING)
 def test_what_a_plan_tells_stands_in_its_room(tmp_path: Path, name: str) -> None:
-    house = house_of_source(resolve(str(WRITERS[name](tmp_path))), ReadFields())
+    house = read_house(resolve(str(WRITERS[name](tmp_path))), ReadFields())
     stood = with_stand_ins(house, boxes(), "pieces")
     things = [i for i in stood.items if STAND_IN in i.tags]
     assert len(things) >= 3
@@ -54,7 +54,7 @@ def test_what_a_plan_tells_stands_in_its_room(tmp_path: Path, name: str) -> None
 
 
 def test_storeys_lie_upon_each_other(tmp_path: Path) -> None:
-    house = house_of_source(resolve(str(write_zind(tmp_path, n_floors=3))), ReadFields())
+    house = read_house(resolve(str(write_zind(tmp_path, n_floors=3))), ReadFields())
     assert len(house.levels) == 3
     rises = np.diff(sorted(level.elevation for level in house.levels))
     np.testing.assert_allclose(rises, 2.6 + 0.26)
@@ -65,13 +65,13 @@ def test_a_part_of_a_file_is_a_house_of_its_own(tmp_path: Path) -> None:
     whole, upper = resolve(str(path)), resolve(f"{path}#floor=1")
     assert upper.house_id != whole.house_id
     assert (upper.word, upper.sha256) == (f"{path}#floor=1", whole.sha256)
-    assert len(house_of_source(upper, ReadFields()).levels) == 1
+    assert len(read_house(upper, ReadFields()).levels) == 1
     apartment = resolve(f"{write_swiss(tmp_path)}#apartment=a1")
-    assert house_of_source(apartment, ReadFields()).id == apartment.house_id
+    assert read_house(apartment, ReadFields()).id == apartment.house_id
     with pytest.raises(BadHouse, match="no floor plan"):
         resolve("builtin#floor=1")
     with pytest.raises(BadInput, match="no apartment"):
-        house_of_source(resolve(f"{path.parent / 'geometries.csv'}#apartment=zz"), ReadFields())
+        read_house(resolve(f"{path.parent / 'geometries.csv'}#apartment=zz"), ReadFields())
 
 
 def test_a_file_whose_name_has_a_hash_is_itself(tmp_path: Path) -> None:
@@ -85,17 +85,16 @@ def test_a_plan_that_changed_since_it_was_named_is_told(tmp_path: Path) -> None:
     source = resolve(str(path))
     (tmp_path / "asset-database.json").write_text("{}")
     with pytest.raises(BadHouse, match="changed since"):
-        house_of_source(source, ReadFields())
-    assert read_house is not house_of_source
+        read_house(source, ReadFields())
 
 
 def test_strictly_a_lost_opening_is_an_error(tmp_path: Path) -> None:
     path = WRITERS["spatiallm"](tmp_path)
     path.write_text(path.read_text() + "door_9=Door(wall_0,2.5,-2.0,5.9,0.9,2.05)\n")
-    notes = house_of_source(resolve(str(path)), ReadFields()).notes
+    notes = read_house(resolve(str(path)), ReadFields()).notes
     assert "plan-left-out" in {n.kind for n in notes}
     with pytest.raises(BadHouse, match="plan-left-out"):
-        house_of_source(resolve(str(path)), ReadFields(strict=True))
+        read_house(resolve(str(path)), ReadFields(strict=True))
 
 
 @pytest.mark.parametrize("name", ["own", "swiss", "spatiallm", "roomplan", "cubicasa"])

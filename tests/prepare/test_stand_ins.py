@@ -16,7 +16,7 @@ from pbrs_farm.generate.made import made_of_plan
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.told_items import told_item
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 
 BED, CHAIR, TABLE = 4, 5, 7
 

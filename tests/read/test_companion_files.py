@@ -13,9 +13,10 @@ from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.formats.glb import GlbWriter
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import SourceRef, object_source, resolve
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models
-from pbrs_farm.read.source import SourceRef, object_source, read_house, resolve
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.store.object_store import MemoryStore
@@ -187,17 +188,13 @@ def test_a_companion_that_changed_since_submission_is_told(tmp_path: Path) -> No
         picture_file.write_bytes(PNG + b"\n")
         with pytest.raises(BadHouse, match="changed since the run began"):
             read_house(source, ReadFields())
-        # A source named by an earlier version does not say what lay beside it.
-        read_house(source.model_copy(update={"companions": None}), ReadFields())
 
 
-def test_a_source_of_one_file_has_the_digest_it_always_had(tmp_path: Path) -> None:
+def test_a_source_of_one_file_has_the_digest_of_its_file(tmp_path: Path) -> None:
     path = tmp_path / "home.sh3d"
     path.write_bytes(sh3d(home_xml(piece("")), {"1": BOX_OBJ}))
     source = resolve(str(path))
     assert source.fingerprint == source.sha256
-    old = source.model_dump(exclude={"companions"})
-    assert SourceRef.model_validate(old).fingerprint == source.fingerprint
 
 
 def test_files_that_houses_share_are_read_once(

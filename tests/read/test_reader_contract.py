@@ -13,9 +13,10 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import SourceRef, resolve
 from pbrs_farm.read.common.material_library import MaterialLibrary, texture_from_bytes
 from pbrs_farm.read.common.notes import HARMLESS, Notes
-from pbrs_farm.read.source import SourceRef, read_house, resolve
 from tests.example_homes import example_homes
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, WALLS, home_xml, piece, sh3d
 from tests.read.textured_sources import FORMATS

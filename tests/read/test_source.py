@@ -8,7 +8,8 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.source import read_house, resolve, suncg_list
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve, suncg_list
 from tests.example_homes import example_homes
 
 

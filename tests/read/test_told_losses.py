@@ -8,8 +8,9 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.mesh.obj import parse_obj
-from pbrs_farm.read.source import read_house, resolve
 from tests.read.suncg.suncg_root import HOUSE, at, house_json, thing, write_root
 
 

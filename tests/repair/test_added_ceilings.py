@@ -13,7 +13,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair, summary_of_report
 from tests.read.sweethome3d.sh3d_source import WALLS, home_xml
 from tests.repair.wall_rooms import covers, house, room, walls_around

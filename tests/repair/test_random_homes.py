@@ -9,7 +9,8 @@ import pytest
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.repair import repair, summary_of_report
 from tests.repair.random_homes import random_home
 from tests.repair.shells import unpaired_edges

@@ -7,7 +7,7 @@ import pytest
 from pbrs_farm.assets import homes_package
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, RepairFields
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import RepairReport, repair
 from tests.example_homes import example_homes
 from tests.repair.embree import EmbreeOccluder

@@ -14,7 +14,7 @@ from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.report import Credit, DressReport, Gate, summary_of_dressing
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.read.source import resolve, variants
+from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.run.attributions import attribution_text, write_attribution
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.plan import PICTURE_GROUPS

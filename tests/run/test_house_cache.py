@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step

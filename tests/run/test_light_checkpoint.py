@@ -13,8 +13,8 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import StoreUnavailable
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.marker import Marker
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.variant import choose_variant
-from pbrs_farm.read.source import resolve
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.step_cache import LightCheckpoint, Work

@@ -11,7 +11,7 @@ import pytest
 _BEGIN = """
 import sys
 from pathlib import Path
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.run_task import make_light_handler
 from pbrs_farm.run.step_cache import Work

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run import run_task
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.child_process import Message

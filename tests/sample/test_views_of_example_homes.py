@@ -7,7 +7,7 @@ import pytest
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
 from tests.example_homes import example_homes

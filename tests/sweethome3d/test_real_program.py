@@ -19,7 +19,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.generate.made import made
 from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, has_furniture
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 
 pytestmark = pytest.mark.sweethome3d
 HOMES = {f"made-{seed}": MadeHome(seed) for seed in range(1, 9)} | {

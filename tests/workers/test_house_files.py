@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.assets import debian, furniture_package, homes_package
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.store import MemoryStore
 from workers.house_files import (
     entries_from_arguments,
@@ -114,10 +114,10 @@ def test_made_homes_put_no_file_into_the_store(cache: Path):
 
 def test_a_worker_makes_the_home_that_was_submitted(cache: Path, tmp_path: Path):
     from pbrs_farm.core.recipe import Recipe
-    from pbrs_farm.prepare.read_source import house_of_source
+    from pbrs_farm.prepare.read_source import read_house
 
     ((entry, ref),) = entries_from_arguments(["made:2,furniture=none"])
-    here = house_of_source(ref, Recipe().read)
-    there = house_of_source(SourceRef.model_validate_json(entry.source), Recipe().read)
+    here = read_house(ref, Recipe().read)
+    there = read_house(SourceRef.model_validate_json(entry.source), Recipe().read)
     assert there.id == here.id == entry.house_id
     assert [item.id for item in there.items] == [item.id for item in here.items]

@@ -22,7 +22,7 @@ from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import uses_catalogue
-from pbrs_farm.read.source import SourceRef
+from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.run.house_cache import HouseCache
@@ -36,7 +36,7 @@ from pbrs_farm.store.laid_out import LaidOutStore, one_task
 from pbrs_farm.store.object_store import get_or_none
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
-from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue, path_of
+from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue
 from workers.ids import (
     GEOMETRY,
     GL,
@@ -312,7 +312,7 @@ class HouseRunner:
         source = SourceRef.model_validate_json(text)
         if not source.location.startswith(FOLDER):
             # Not uploaded: this worker sees it at the path it was submitted by, or cannot do it.
-            if is_left_in_place(source) and not path_of(source).exists():
+            if is_left_in_place(source) and not source.given.path.exists():
                 raise MachineFailed(
                     f"this worker does not see {source.location}",
                     hint="such sources are not uploaded: mount them at the path they were submitted by",

@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,44 +14,37 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Room, Source
+from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.geometry.solids import boxes_surface
+from pbrs_farm.read.common.format import Format, GivenFile
 
 
-@dataclass(frozen=True)
-class RoomReader:
-    """What the entry point names: an object with these two methods."""
-
-    def recognises(self, path: Path) -> bool:
-        """Whether this reader reads what lies at path."""
-        return path.suffix == ".room"
-
-    def read(self, path: Path, _fields: Any) -> House:
-        """The house; BadHouse, naming file and place, where it cannot be read."""
-        try:
-            told = json.loads(path.read_text())
-            w, d, h = (float(told[name]) for name in ("width", "depth", "height"))
-        except (ValueError, KeyError, TypeError) as error:
-            raise BadHouse(path, "", f"is no room: {error}") from None
-        t = 0.1
-        walls = [
-            ((-t, 0, -t), (w + t, h, 0)), ((-t, 0, d), (w + t, h, d + t)),
-            ((-t, 0, 0), (0, h, d)), ((w, 0, 0), (w + t, h, d)),
-        ]  # fmt: skip
-        items = [_item(f"wall_{k}", ItemKind.WALL, "wall", box) for k, box in enumerate(walls)]
-        items.append(_item("floor", ItemKind.FLOOR, "floor", ((-t, -t, -t), (w + t, 0, d + t))))
-        items.append(
-            _item("ceiling", ItemKind.CEILING, "ceiling", ((-t, h, -t), (w + t, h + t, d + t)))
-        )
-        items.append(
-            _item("table", ItemKind.OBJECT, "table", ((w / 3, 0, d / 3), (w / 2, 0.7, d / 2)))
-        )
-        plan = np.array([[0, 0], [0, d], [w, d], [w, 0]], np.float64)
-        data = path.read_bytes()
-        return House(
-            id=path.stem, name=path.stem, source=Source("room", path.name, keys.sha256(data)),
-            levels=(Level("0", "", 0.0, h),), rooms=(Room("0_0", "Room", "0", plan, 0.0, h),),
-            items=tuple(items), materials=(Material("paint", diffuse=(0.8, 0.8, 0.75)),), textures={},
-        )  # fmt: skip
+def read_room(given: GivenFile, _fields: ReadFields) -> House:
+    """The house; BadHouse, naming file and place, where it cannot be read."""
+    path = given.path
+    try:
+        size = json.loads(path.read_text())
+        w, d, h = (float(size[name]) for name in ("width", "depth", "height"))
+    except (ValueError, KeyError, TypeError) as error:
+        raise BadHouse(path, "", f"is no room: {error}") from None
+    t = 0.1
+    walls = [
+        ((-t, 0, -t), (w + t, h, 0)), ((-t, 0, d), (w + t, h, d + t)),
+        ((-t, 0, 0), (0, h, d)), ((w, 0, 0), (w + t, h, d)),
+    ]  # fmt: skip
+    items = [_item(f"wall_{k}", ItemKind.WALL, "wall", box) for k, box in enumerate(walls)]
+    items.append(_item("floor", ItemKind.FLOOR, "floor", ((-t, -t, -t), (w + t, 0, d + t))))
+    items.append(
+        _item("ceiling", ItemKind.CEILING, "ceiling", ((-t, h, -t), (w + t, h + t, d + t)))
+    )
+    items.append(_item("table", ItemKind.OBJECT, "table", ((w / 3, 0, d / 3), (w / 2, 0.7, d / 2))))
+    plan = np.array([[0, 0], [0, d], [w, d], [w, 0]], np.float64)
+    data = path.read_bytes()
+    return House(
+        id=path.stem, name=path.stem, source=Source("room", path.name, keys.sha256(data)),
+        levels=(Level("0", "", 0.0, h),), rooms=(Room("0_0", "Room", "0", plan, 0.0, h),),
+        items=tuple(items), materials=(Material("paint", diffuse=(0.8, 0.8, 0.75)),), textures={},
+    )  # fmt: skip
 
 
 def _item(name: str, kind: ItemKind, label: str, box: Any) -> Item:
@@ -62,4 +53,8 @@ def _item(name: str, kind: ItemKind, label: str, box: Any) -> Item:
     return Item(name, name, kind, "0", (surface,), nyu40=NYU40_NAMES.index(label), room_id=room)
 
 
-READER = RoomReader()
+# What the entry point names: the same entry that each format of pbrs_farm ends with.
+FORMAT = Format(
+    kind="room", title="Room", files=".room", brings="a box-shaped room and a table",
+    where="written by hand", licence="yours", suffixes=(".room",), read=read_room,
+)  # fmt: skip

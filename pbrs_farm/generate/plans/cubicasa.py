@@ -24,6 +24,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import LEAST_M2, DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import (
     LeftOut,
@@ -239,3 +240,11 @@ def _opened(rooms: list[dict[str, Any]], left_out: LeftOut) -> list[dict[str, An
             rooms[into] = rooms[into] | {"polygon": [list(p) for p in joined.exterior.coords[:-1]]}
             left_out.add("two rooms without a wall between are one")
     return [rooms[k] for k in kept]
+
+
+FORMAT = PlanFormat(
+    title="CubiCasa5k", files="model.svg", order=150, brings="rooms, doors, windows, fixtures",
+    where="zenodo.org/records/2613548", licence="CC BY-NC-SA 4.0", suffixes=(".svg",),
+    shared_suffixes=frozenset({".svg"}), contains=re.compile(rb"class=[\"']Space\b"),
+    read=lambda path, _value, _part: plan_of_svg(path),
+)  # fmt: skip

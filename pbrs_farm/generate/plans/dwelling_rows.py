@@ -25,6 +25,7 @@ from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plan_walls import PARAPET_HEIGHT_M
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import (
     LeftOut,
@@ -269,3 +270,11 @@ def _things(row: _Row, height: float, floor: float | None, left_out: LeftOut) ->
         Thing("swiss-feature", row.subtype, b.x, b.z, low, b.width, b.depth, tall, b.turn_rad)
         for b in footprints(row.shape)
     ]  # fmt: skip
+
+
+FORMAT = PlanFormat(
+    title="Swiss Dwellings", files="geometries.csv and --apartment ID", order=110,
+    brings="rooms, doors, windows, fixtures", where="zenodo.org/records/7788422", licence="CC BY 4.0",
+    suffixes=(".csv",), shared_suffixes=frozenset({".csv"}), contains=re.compile(rb"\bapartment_id\b"),
+    read=lambda path, _value, part: plan_of_rows(path, part.apartment),
+)  # fmt: skip

@@ -10,32 +10,30 @@ A plan of one's own:
 GeoJSON says the same: polygons with the properties `type` and `name` are rooms, points with `kind`
 (door, entrance, passage, window, french_window) and the sizes are openings. x runs to the right and the
 second coordinate downwards on the page. Rooms may touch or leave room for the walls between. The other
-formats, a module each beside this one, are told by the file's suffix or by the keys of its JSON.
+formats have a module each beside this one, which ends with its entry FORMAT.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+import pkgutil
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
+from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate import plans
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan
 from pbrs_farm.generate.made import turned_by, upright_angle
-from pbrs_farm.generate.plans.cubicasa import plan_of_svg
-from pbrs_farm.generate.plans.dwelling_rows import plan_of_rows
+from pbrs_farm.generate.plans.plan_format import Part, PlanFormat
 from pbrs_farm.generate.plans.plan_value import plan_of_value
-from pbrs_farm.generate.plans.procthor import plan_of_procthor
-from pbrs_farm.generate.plans.react_planner import plan_of_react_planner
-from pbrs_farm.generate.plans.room_plan import plan_of_room_plan
-from pbrs_farm.generate.plans.spatial_lm import plan_of_layout
 from pbrs_farm.generate.plans.told_plan import MAX_THINGS, Thing, ToldPlan
-from pbrs_farm.generate.plans.zind import plan_of_zind
 from pbrs_farm.generate.programme import json_from_file
 
 
@@ -61,44 +59,13 @@ class PlanFile:
         return self.storeys[0].plan
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """Which part of a file is meant: an apartment of a table, a storey of the others."""
-
-    apartment: str = ""
-    floor: int | None = None  # from 0, the lowest; None = all
-
-    @property
-    def word(self) -> str:
-        """As it stands behind the # of a word of the command line; "" = the whole file."""
-        given = [f"apartment={self.apartment}"] * bool(self.apartment)
-        given += [f"floor={self.floor}"] * (self.floor is not None)
-        return ",".join(given)
-
-
-def part_of(word: str) -> Part:
-    """The part that a word names, `apartment=ID`, `floor=K`, both with a comma. Raises BadInput."""
-    part = Part()
-    for option in filter(None, word.split(",")):
-        key, _, value = option.partition("=")
-        if key == "apartment" and value:
-            part = replace(part, apartment=value)
-        elif key == "floor" and value.isascii() and value.isdigit() and len(value) < 5:
-            part = replace(part, floor=int(value))
-        else:
-            hint = "FILE#apartment=ID or FILE#floor=0"
-            raise BadInput(word, option, "names no part of a plan", hint=hint)
-    return part
-
-
-_Read = Callable[[Path, Any], ToldPlan]
-# Keys that tell a JSON plan of a machine by its uppermost names.
-_MACHINES: Final[tuple[tuple[frozenset[str], _Read], ...]] = (
-    (frozenset({"rooms", "walls", "objects", "doors"}), plan_of_procthor),
-    (frozenset({"walls", "objects"}), plan_of_room_plan),
-    (frozenset({"redraw"}), plan_of_zind),
-    (frozenset({"layers"}), plan_of_react_planner),
-)
+@cache
+def plan_formats() -> tuple[PlanFormat, ...]:
+    """The formats of plans, each at the end of its module beside this one, in their order."""
+    names = [module.name for module in pkgutil.iter_modules(plans.__path__)]
+    modules = [import_module(f"{plans.__name__}.{name}") for name in names]
+    found = [m.FORMAT for m in modules if isinstance(getattr(m, "FORMAT", None), PlanFormat)]
+    return tuple(sorted(found, key=lambda one: one.order))
 
 
 def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
@@ -110,20 +77,14 @@ def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
     suffix = path.suffix.lower()
     if part.apartment and suffix != ".csv":
         raise BadInput("--apartment", part.apartment, "names a row of a .csv", hint="leave it out")
-    if suffix == ".csv":
-        return _of_machine(path, plan_of_rows(path, part.apartment), part)
-    if suffix == ".svg":
-        return _of_machine(path, plan_of_svg(path), part)
-    if suffix == ".txt":
-        return _of_machine(path, plan_of_layout(path), part)
+    by_suffix = next((f for f in plan_formats() if suffix in f.suffixes), None)
+    if by_suffix is not None and by_suffix.read is not None:
+        return _of_machine(path, by_suffix.read(path, None, part), part)
     value = json_from_file(path)
-    names = frozenset(value) if isinstance(value, dict) else frozenset()
-    for keys, read in _MACHINES:
-        if keys <= names and not _is_own(value):
-            return _of_machine(path, read(path, value), part)
-    if names >= {"rooms"} and any(_has_walls(room) for room in _rows(value["rooms"])):
-        # A structure of several scans keeps the walls in its rooms alone.
-        return _of_machine(path, plan_of_room_plan(path, value), part)
+    if isinstance(value, dict) and not _is_own(value):
+        for one in plan_formats():
+            if one.read is not None and one.fits(value):
+                return _of_machine(path, one.read(path, value, part), part)
     if isinstance(value, dict) and value.get("type") == "FeatureCollection":
         value = _from_geojson(path, value)
     plan = plan_of_value(path, value)
@@ -132,10 +93,6 @@ def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
 
 def _rows(value: object) -> list[Any]:
     return value[:1] if isinstance(value, list) else []
-
-
-def _has_walls(room: object) -> bool:
-    return isinstance(room, dict) and "walls" in room and "objects" in room
 
 
 def _is_own(value: dict[str, Any]) -> bool:

@@ -28,6 +28,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.plan_walls import corners
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.told_plan import LeftOut, largest_part
 from pbrs_farm.generate.plans.walled_rooms import DrawnRoom, walled
 
@@ -305,3 +306,10 @@ class _Openings:
             kind, number, round(along, 4), width, tall, sill, beside[0], other_room,
             hinge_at_start=along < wall.length / 2,
         ))  # fmt: skip
+
+
+FORMAT = PlanFormat(
+    title="plan of one's own", files=".json or .geojson", order=180, brings="rooms, doors, windows",
+    where="written by hand or by a program", licence="yours", suffixes=(".geojson",),
+    keys=(("features",), ("rooms",)),
+)  # fmt: skip

@@ -17,6 +17,7 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 from pbrs_farm.generate.plans.usual_sizes import usual_size
@@ -187,3 +188,12 @@ def _assets(path: Path) -> dict[str, tuple[float, float, float]]:
             if len(size) == 3:
                 found[str(row.get("assetId"))] = (float(size[0]), float(size[1]), float(size[2]))
     return found
+
+
+FORMAT = PlanFormat(
+    title="ProcTHOR and Holodeck", files="*.json", order=120,
+    brings="rooms, doors, windows, objects as stand-ins", where="github.com/allenai/procthor-10k",
+    licence="Apache-2.0", keys=(("rooms", "walls", "objects"),), beside=(ASSETS,),
+    fits=lambda value: {"rooms", "walls", "objects", "doors"} <= set(value),
+    read=lambda path, value, _part: plan_of_procthor(path, value),
+)  # fmt: skip

@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import (
     LeftOut,
@@ -202,3 +203,11 @@ def _is_number(value: object) -> TypeGuard[int | float]:
         isinstance(value, int | float) and not isinstance(value, bool)
         and math.isfinite(value) and abs(value) < 1e9
     )  # fmt: skip
+
+
+FORMAT = PlanFormat(
+    title="react-planner", files="*.json", order=170, brings="rooms, doors, windows, fixtures",
+    where="react-planner's own export", licence="yours", keys=(("layers", "unit"),),
+    fits=lambda value: "layers" in value,
+    read=lambda path, value, _part: plan_of_react_planner(path, value),
+)  # fmt: skip

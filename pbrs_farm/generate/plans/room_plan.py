@@ -19,6 +19,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 
@@ -175,3 +176,18 @@ def _label(shape: Polygon, sections: list[_Section]) -> str:
     inside = (s for s in sections if shape.contains(Point(s.center[0], s.center[2])))
     found = next(inside, None)
     return str(found.label) if found else ""
+
+
+def _fits(value: dict[str, Any]) -> bool:
+    """A scan, or a structure of several scans, which keeps the walls in its rooms alone."""
+    rooms = value.get("rooms")
+    first = rooms[0] if isinstance(rooms, list) and rooms else None
+    has_scans = isinstance(first, dict) and {"walls", "objects"} <= set(first)
+    return {"walls", "objects"} <= set(value) or has_scans
+
+
+FORMAT = PlanFormat(
+    title="RoomPlan", files="*.json", order=140, brings="walls, doors, windows, boxes as stand-ins",
+    where="a phone's own scan", licence="yours", keys=(("walls", "doors", "windows", "objects"),),
+    fits=_fits, read=lambda path, value, _part: plan_of_room_plan(path, value),
+)  # fmt: skip

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 from pbrs_farm.regular_files import text_given
@@ -92,3 +93,11 @@ def _opening(kind: str, numbers: list[float], floor: float) -> dict[str, Any]:
     if kind == "Window":
         row["sill"] = max(z - height / 2 - floor, 0.0)
     return row
+
+
+FORMAT = PlanFormat(
+    title="SpatialLM", files="*.txt", order=130, brings="walls, doors, windows, boxes as stand-ins",
+    where="huggingface.co/manycore-research", licence="CC BY-NC 4.0", suffixes=(".txt",),
+    shared_suffixes=frozenset({".txt"}), contains=re.compile(rb"^\s*\w+\s*=\s*Wall\(", re.MULTILINE),
+    read=lambda path, _value, _part: plan_of_layout(path),
+)  # fmt: skip

@@ -15,6 +15,7 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.plan_value import MAX_ROOMS
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, ToldPlan, ToldStorey, value_of
@@ -104,3 +105,10 @@ def _opening(kind: str, a: tuple[float, float], b: tuple[float, float]) -> dict[
     if kind == "door":
         row["height"] = 2.05
     return row
+
+
+FORMAT = PlanFormat(
+    title="ZInD", files="zind_data.json", order=160, brings="rooms, doors, windows",
+    where="github.com/zillow/zind", licence="academic, on request", keys=(("redraw",),),
+    fits=lambda value: "redraw" in value, read=lambda path, value, _part: plan_of_zind(path, value),
+)  # fmt: skip

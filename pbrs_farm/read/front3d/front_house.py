@@ -33,6 +33,7 @@ from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import parted
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.json_values import NAME
@@ -69,8 +70,9 @@ _STOREY_M: Final = 2.7
 _LIGHT_BAND_LM: Final = 800.0
 
 
-def companions(path: Path, models: str, files: SourceFiles) -> str:
+def companions(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and textures that reading may open; "" where there is none."""
+    path, models = given.path, given.models
     try:
         data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
         house = front_file(data, path.name, Notes(path.name, strict=False))
@@ -89,11 +91,12 @@ def companions(path: Path, models: str, files: SourceFiles) -> str:
     return keys.digest(*found) if any(found) else ""
 
 
-def read(path: Path, fields: ReadFields, models: str) -> House:
+def read(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. models: 3D-FUTURE's folder, "" = beside or above the file.
 
     Raises BadHouse naming the entry that is wrong, and for a file without meshes or rooms.
     """
+    path, models = given.path, given.models
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
     if data is None:

@@ -21,16 +21,17 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_json, rooms_from_value
-from pbrs_farm.read.common.source_files import RootFolder
-from pbrs_farm.read.gltf.document import Fetch, gltf_document, note_unread, object_at
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.gltf.document import Fetch, files_of_gltf, gltf_document, note_unread, object_at
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene_items import items_of_scene
-from pbrs_farm.regular_files import MAX_SCENE_BYTES
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_given
 
 _SMALL_M, _LARGE_M = 0.3, 150.0  # a scene beyond is in other units than metres
 
@@ -42,6 +43,18 @@ class Beside:
     fetch: Fetch = lambda _name: None  # any other file by its relative name
     mapping: bytes | None = None  # JSON, None = no file
     rooms: bytes | None = None  # JSON, None = no file
+
+
+def read(given: GivenFile, fields: ReadFields) -> House:
+    """The House of the file, with the mapping and room files beside it; as read_gltf_file."""
+    return read_gltf_file(given.path, fields)
+
+
+def companions(given: GivenFile, files: SourceFiles) -> str:
+    """Digest of the mapping and room files, the buffers and the pictures of the scene."""
+    path = given.path
+    names = [*side_files(path), *files_of_gltf(read_given(path, error=BadHouse), path.name)]
+    return files.digest(RootFolder(path.parent), names)
 
 
 def read_gltf_file(path: Path, fields: ReadFields) -> House:

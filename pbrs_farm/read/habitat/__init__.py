@@ -1,1 +1,29 @@
-"""Habitat: how it is read."""
+"""Scenes of data sets in the layout of Habitat. No effects before `read`."""
+
+from __future__ import annotations
+
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.source_files import SourceFiles
+
+
+def _read(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.read.habitat import scene_instance
+
+    return scene_instance.read(given, fields)
+
+
+def _companions(given: GivenFile, files: SourceFiles) -> str:
+    from pbrs_farm.read.habitat import scene_instance
+
+    return scene_instance.companions(given, files)
+
+
+FORMAT = Format(
+    kind="habitat", title="Habitat", files="*.scene_instance.json", order=60,
+    brings="a stage, objects, regions", where="HSSD-hab, ReplicaCAD, ai2thor-hab",
+    licence="of each data set", needs="the extra gltf for compressed files",
+    keys=(("stage_instance",),), tells_boxes=True,
+    read=_read, companions=_companions,
+)  # fmt: skip

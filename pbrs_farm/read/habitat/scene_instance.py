@@ -26,6 +26,7 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.document import (
@@ -52,8 +53,9 @@ _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", 
                   "samplers", "nodes")  # fmt: skip
 
 
-def read(path: Path, fields: ReadFields, models: str) -> House:
+def read(given: GivenFile, fields: ReadFields) -> House:
     """The House of a scene instance. Raises BadHouse naming file and place."""
+    path, models = given.path, given.models
     dataset = _Dataset(path, models)
     scene = dataset.json(dataset.scene)
     notes = Notes(path.name, strict=fields.strict)
@@ -97,8 +99,9 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     )
 
 
-def companions(path: Path, models: str, files: SourceFiles) -> str:
+def companions(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the configs and models that the scene names; "" where there is none."""
+    path, models = given.path, given.models
     try:
         dataset = _Dataset(path, models)
         scene = dataset.json(dataset.scene)

@@ -1,1 +1,21 @@
-"""IFC: how it is read."""
+"""IFC buildings: .ifc, .ifczip. No effects before `read`."""
+
+from __future__ import annotations
+
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+
+
+def _read(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.read.ifc import building
+
+    return building.read(given, fields)
+
+
+FORMAT = Format(
+    kind="ifc", title="IFC", files=".ifc or .ifczip", order=80,
+    brings="storeys, spaces, walls, doors, windows, fittings", where="any BIM program exports it",
+    licence="of each building", needs="the extra ifc", library="ifcopenshell", suffixes=(".ifc", ".ifczip"),
+    read=_read,
+)  # fmt: skip

@@ -33,6 +33,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary, names_glass
@@ -42,7 +43,6 @@ from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import coverage, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors
-from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
@@ -62,15 +62,10 @@ _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
 _ROOF: Final = frozenset({"roof", "attic", "dach", "dachraum", "dachboden", "loft", "чердак"})
 
 
-def read(path: Path, fields: ReadFields, models: str) -> House:
+def read(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the place."""
     need("ifcopenshell")
-    return _Building(path, fields).house()
-
-
-def companions(path: Path, models: str, files: SourceFiles) -> str:
-    """Digest of what reading opens beside the file; "" where there is none."""
-    return ""
+    return _Building(given.path, fields).house()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,1 +1,28 @@
-"""sceneState: how it is read."""
+"""sceneState files: HSSD-200, Rent3D++, text-to-scene generators. No effects before `read`."""
+
+from __future__ import annotations
+
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.source_files import SourceFiles
+
+
+def _read(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.read.scenestate import scene_state
+
+    return scene_state.read(given, fields)
+
+
+def _companions(given: GivenFile, files: SourceFiles) -> str:
+    from pbrs_farm.read.scenestate import scene_state
+
+    return scene_state.companions(given, files)
+
+
+FORMAT = Format(
+    kind="scenestate", title="sceneState", files="*.scenestate.json or *.scene.json", order=40,
+    brings="walls, floors, holes, furniture by --models", where="HSSD-200: huggingface.co/datasets/hssd",
+    licence="CC BY-NC 4.0", keys=(("scene", "object", "arch"), ("format", "scene")), tells_boxes=True,
+    read=_read, companions=_companions,
+)  # fmt: skip

@@ -28,6 +28,7 @@ from pbrs_farm.read.common.arch_elements import (
     wall_surfaces,
 )
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.joinery import Hole, merged
 from pbrs_farm.read.common.notes import Notes
@@ -63,8 +64,9 @@ _LEAST_SILL_M: Final = 0.2  # a hole of no type that begins lower is a door's
 _AREA_M2: Final = 0.05  # of a floor that is one
 
 
-def companions(path: Path, models: str, files: SourceFiles) -> str:
+def companions(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and tables that reading may open; "" where there is none."""
+    path, models = given.path, given.models
     notes = Notes(path.name, strict=False)
     try:
         data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
@@ -76,11 +78,9 @@ def companions(path: Path, models: str, files: SourceFiles) -> str:
     return keys.digest(*digests) if any(digests) else ""
 
 
-def read(path: Path, fields: ReadFields, models: str) -> House:
-    """The House of the file. models: the folder of its models, "" = beside it.
-
-    Raises BadHouse naming the element that is wrong, and for a file without walls and floors.
-    """
+def read(given: GivenFile, fields: ReadFields) -> House:
+    """The House of the file. Raises BadHouse naming the element that is wrong, and for a file without walls and floors."""
+    path, models = given.path, given.models
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
     if data is None:

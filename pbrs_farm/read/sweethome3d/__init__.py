@@ -1,7 +1,31 @@
-"""Sweet Home 3D homes (.sh3d archives and bare Home.xml) -> House; no effects."""
+"""Sweet Home 3D homes: .sh3d archives and bare Home.xml. No effects before `read`."""
 
 from __future__ import annotations
 
-from pbrs_farm.read.sweethome3d.home import read_home
+import re
 
-__all__ = ["read_home"]
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.source_files import SourceFiles
+
+
+def _read(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.read.sweethome3d import packaged_home
+
+    return packaged_home.read(given, fields)
+
+
+def _companions(given: GivenFile, files: SourceFiles) -> str:
+    from pbrs_farm.read.sweethome3d import packaged_home
+
+    return packaged_home.companions(given, files)
+
+
+FORMAT = Format(
+    kind="sweethome3d", title="Sweet Home 3D", files=".sh3d or Home.xml", order=10,
+    brings="walls, rooms, furniture, lamps", where="sweethome3d.com, or your own",
+    licence="of each home", suffixes=(".sh3d", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
+    contains=re.compile(rb"\A\s*(<\?xml[^>]*>\s*)?<home\b|\APK.{28}(Home|ContentDigests)", re.DOTALL),
+    read=_read, companions=_companions, uses_packages=True,
+)  # fmt: skip

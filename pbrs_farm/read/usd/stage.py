@@ -21,6 +21,7 @@ from pbrs_farm.core.house import House, Item, Room, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.installation import is_installed, need
+from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
@@ -34,8 +35,9 @@ ROOMS_ATTRIBUTE: Final = "pbrs:rooms"
 """Of the default prim: JSON of the rooms, as our own exports say them."""
 
 
-def read(path: Path, fields: ReadFields, models: str) -> House:
+def read(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the place."""
+    path, models = given.path, given.models
     need("pxr")
     from pxr import UsdGeom
 
@@ -67,8 +69,9 @@ def read(path: Path, fields: ReadFields, models: str) -> House:
     return replace(house, rooms=tuple(_named(room, house.items) for room in house.rooms))
 
 
-def companions(path: Path, models: str, files: SourceFiles) -> str:
+def companions(given: GivenFile, files: SourceFiles) -> str:
     """Digest of what reading opens beside the file; "" where there is none."""
+    path, models = given.path, given.models
     if not is_installed("pxr"):
         return ""
     from pbrs_farm.read.usd.stage_files import StageFolder, files_of_stage, try_out

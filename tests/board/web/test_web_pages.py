@@ -16,7 +16,8 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.recipe_fields import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.images import array_from_png
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from tests.board.roots import HEIGHT, WIDTH, write_root, write_view
 from tests.board.served import served
 from tests.board.web.browser import until

@@ -25,7 +25,7 @@ from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.prepare.finished_house import finished_house
 from pbrs_farm.prepare.passes import PASS, Preparation
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.repair import repair
 from tests.repair.wall_rooms import Rect, covers, house, room, walls_around
 

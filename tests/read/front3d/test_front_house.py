@@ -17,8 +17,9 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import FRONT_TOLD, TOLD, House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.common.given_classes import given_class
-from pbrs_farm.read.source import read_house, resolve
 
 
 def read(path: Path, models: str = "") -> House:

@@ -12,7 +12,8 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 from tests.read.gltf.gltf_scenes import item, two_rooms
 from tests.read.habitat.habitat_sets import dataset
 

@@ -16,7 +16,8 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import TOLD, House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.read.source import read_house, resolve
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
 
 
 def written(folder: Path, scene: dict[str, Any]) -> Path:

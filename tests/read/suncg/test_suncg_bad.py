@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house
-from pbrs_farm.read.source import resolve
+from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE

@@ -18,7 +18,7 @@ from pbrs_farm.assets import homes_package
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from tests.example_homes import example_homes
 
 NAMES = [h.name for h in homes_package.example_homes()]

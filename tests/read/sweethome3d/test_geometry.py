@@ -11,7 +11,7 @@ import shapely
 import trimesh
 
 from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from tests.read.sweethome3d.sh3d_source import (
     BOX_OBJ,
     ROOM,

@@ -7,7 +7,7 @@ import pytest
 
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.recipe import ReadFields, Recipe
-from pbrs_farm.read.sweethome3d import read_home
+from pbrs_farm.read.sweethome3d.home import read_home
 from tests.read.sweethome3d.sh3d_source import home_xml, piece, sh3d
 
 WALL = "<wall id='w' xStart='0' yStart='0' xEnd='400' yEnd='0' thickness='10'/>"

@@ -1,0 +1,43 @@
+"""What a format of homes or plans says of itself: how its files are known, what they bring. No effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from re import Pattern
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DataFormat:
+    """An entry of the table that `pbrs-farm inputs` lists; a format's package ends with its own.
+
+    A file is of a format by its suffix; a .json by its keys. Where files of other kinds bear the
+    suffix, too (`shared_suffixes`), `contains` tells them apart: in a folder such a file is a home
+    only where its head matches. Named on a command line it is tried all the same, so that the
+    reader can say what is wrong with it.
+    """
+
+    title: str
+    files: str  # how its files are called, for a reader of the list
+    brings: str
+    where: str  # one gets the data
+    licence: str  # of the data
+    needs: str = ""  # what is installed for it, in words
+    library: str = ""  # the module without which it cannot be read
+    order: int = 500  # in which formats are asked and listed, lowest first
+    suffixes: tuple[str, ...] = ()
+    shared_suffixes: frozenset[str] = frozenset()
+    contains: Pattern[bytes] | None = None  # in the first megabytes of such a file
+    keys: tuple[tuple[str, ...], ...] = ()  # all names of one of these occur in its JSON
+    beside: tuple[str, ...] = ()  # patterns of names of files that lie beside one and are no homes
+
+    def is_sure_of(self, suffix: str, head: bytes) -> bool:
+        """Whether a file of this suffix (lower case) that begins with head is of this format."""
+        if suffix not in self.suffixes:
+            return False
+        return suffix not in self.shared_suffixes or (
+            self.contains is not None and self.contains.search(head) is not None
+        )
+
+    def has_keys(self, names: set[str]) -> bool:
+        """Whether a JSON file in which these names occur is of this format."""
+        return any(names.issuperset(keys) for keys in self.keys)

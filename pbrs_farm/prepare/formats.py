@@ -1,0 +1,178 @@
+"""The table of every format that is read: ours, floor plans, plugins'. Effects: reads the head of a file.
+
+Each package of read/ ends with its entry FORMAT, each module of generate/plans with one of a plan's.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+import re
+from collections.abc import Iterator
+from dataclasses import fields as fields_of
+from fnmatch import fnmatch
+from functools import cache, cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Final
+
+from pbrs_farm import read
+from pbrs_farm.core.data_format import DataFormat
+from pbrs_farm.core.errors import BadHouse, MachineFailed
+from pbrs_farm.core.house import House
+from pbrs_farm.core.plugins import plugin, plugins
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.installation import install_command, is_installed
+from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.regular_files import fault_of, open_regular
+
+PLAN: Final = "plan"
+"""The kind of sources that are floor plans, of whatever format."""
+
+_HEAD_BYTES: Final = 4 * 2**20
+_MOST_BYTES: Final = 2**40
+_NAMES: Final = re.compile(rb'"([A-Za-z_]{3,40})"\s*:')
+
+
+def formats() -> Iterator[Format]:
+    """Every format that is read, in the order in which files are asked.
+
+    A generator, as most words of a command line need none of the later ones, whose modules cost
+    time to import: packages of read/ first, then plans.
+    """
+    yield from _formats_of_packages()
+    yield from _formats_of_plans()
+
+
+def formats_of_plugins() -> tuple[Format, ...]:
+    """The entries that installed plugins bring."""
+    return tuple(format_of_plugin(name) for name in plugins("readers"))
+
+
+def format_of_kind(kind: str) -> Format | None:
+    """The format of the sources of a kind, the first of several; None for a kind without files."""
+    return next((one for one in formats() if one.kind == kind), None)
+
+
+def format_of_plugin(name: str) -> Format:
+    """The entry that a plugin brings; MachineFailed where none is installed, or it brings another thing."""
+    one = plugin("readers", name)
+    entry = one.load()
+    if not isinstance(entry, Format):
+        raise MachineFailed(f"plugin {one.mark} brings no Format", hint="docs/plugins.md")
+    return entry
+
+
+def plugin_of_file(path: Path) -> str | None:
+    """The name of the plugin that reads what lies at a path, where one does."""
+    names = plugins("readers")
+    if not names or not path.exists():
+        return None
+    look = _Look(path)
+    return next((name for name in names if look.is_of(format_of_plugin(name))), None)
+
+
+def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
+    """The format of a file or of the folder of a home; None where nothing here reads it.
+
+    surely: a suffix that files of other kinds bear, too, does not do. Raises BadHouse for a file
+    that cannot be opened.
+    """
+    look = _Look(path)
+    found = next((one for one in formats() if look.is_of(one)), None)
+    if found is None and not surely and path.is_file():
+        suffix = path.suffix.lower()
+        found = next((one for one in formats() if suffix in one.suffixes), None)
+    return found
+
+
+def is_beside_homes(path: Path) -> bool:
+    """Whether a file's name says that it belongs to a home that lies beside it."""
+    patterns = [pattern for one in formats() for pattern in one.beside]
+    return any(fnmatch(path.name.lower(), pattern) for pattern in patterns)
+
+
+def summary() -> str:
+    """All that is read, in one line: for hints."""
+    every = list(formats())
+    suffixes = dict.fromkeys(suffix for one in every for suffix in one.suffixes)
+    titles = dict.fromkeys(one.title for one in every if one.keys)
+    folders = [f"{one.files} of {one.title}" for one in every if one.main_file]
+    return f"{' '.join(suffixes)}, .json of {', '.join(titles)}, {', '.join(folders)}"
+
+
+def missing_library(entry: DataFormat) -> str:
+    """What to type for the library without which a format cannot be read; "" where it is there."""
+    if not entry.library or is_installed(entry.library):
+        return ""
+    return install_command(entry.needs.removeprefix("the extra "))
+
+
+class _Look:
+    """What lies at a path, its head read once, and only where a format asks for it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._suffix = path.suffix.lower()
+
+    def is_of(self, entry: Format) -> bool:
+        """Whether it is of a format, by its suffix, its keys or the file that makes it a home."""
+        if entry.main_file:
+            is_main = self._path.name == entry.main_file
+            return is_main or (self._path / entry.main_file).is_file()
+        if not self._path.is_file():
+            return False
+        if self._suffix == ".json":
+            return bool(entry.keys) and entry.has_keys(self._names)
+        is_shared = self._suffix in entry.shared_suffixes
+        return entry.is_sure_of(self._suffix, self._head if is_shared else b"")
+
+    @cached_property
+    def _names(self) -> set[str]:
+        return {name.decode("ascii") for name in _NAMES.findall(self._head)}
+
+    @cached_property
+    def _head(self) -> bytes:
+        try:
+            with open_regular(self._path, _MOST_BYTES) as file:
+                return file.read(_HEAD_BYTES)
+        except OSError as error:
+            raise BadHouse(self._path, "", fault_of(error)) from None
+
+
+@cache
+def _formats_of_packages() -> tuple[Format, ...]:
+    names = [module.name for module in pkgutil.iter_modules(read.__path__) if module.ispkg]
+    packages = [import_module(f"{read.__name__}.{name}") for name in names]
+    found = [p.FORMAT for p in packages if isinstance(getattr(p, "FORMAT", None), Format)]
+    return tuple(sorted(found, key=lambda one: one.order))
+
+
+@cache
+def _formats_of_plans() -> tuple[Format, ...]:
+    from pbrs_farm.generate.plans.plan_files import plan_formats
+
+    names = [one.name for one in fields_of(DataFormat)]
+    return tuple(
+        Format(
+            **{name: getattr(one, name) for name in names}, kind=PLAN, read=_read_plan,
+            companions=_companions_of_plan, has_parts=True, tells_boxes=True,
+        )
+        for one in plan_formats()
+    )  # fmt: skip
+
+
+def _read_plan(given: GivenFile, fields: ReadFields) -> House:
+    from pbrs_farm.prepare.plan_house import house_of_plan
+
+    return house_of_plan(given, fields)
+
+
+def _companions_of_plan(given: GivenFile, files: SourceFiles) -> str:
+    """Digest of the tables that lie beside a plan."""
+    if given.path.suffix.lower() != ".json":
+        return ""
+    folder = given.path.parent
+    names = dict.fromkeys(name for one in _formats_of_plans() for name in one.beside)
+    beside = [name for name in names if (folder / name).is_file()]
+    return files.digest(RootFolder(folder), beside) if beside else ""

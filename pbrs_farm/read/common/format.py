@@ -1,0 +1,53 @@
+"""The entry of a format that is read: what `FORMAT` of its package, or of a plugin, is. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from pbrs_farm.core.data_format import DataFormat
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.source_files import SourceFiles
+
+
+class GivenFile(NamedTuple):
+    """A file to read, or the folder of a format that has one a home, and what was said of it."""
+
+    path: Path
+    models: str = ""  # folder of the models that the file names, "" = where its format keeps them
+    part: str = ""  # what is meant of a plan's file; "" = the whole file
+
+
+def no_companions(_given: GivenFile, _files: SourceFiles) -> str:
+    """Of formats that read nothing beside their file."""
+    return ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format(DataFormat):
+    """A format whose files become houses.
+
+    The package of a format is imported to ask for this entry, so that it stays light: `read` and
+    `companions` import the reader when they are called.
+
+        def _read(given: GivenFile, fields: ReadFields) -> House:
+            from pbrs_farm.read.usd import stage
+
+            return stage.read(given, fields)
+
+        FORMAT = Format(kind="usd", title="OpenUSD", suffixes=(".usd", ".usda"), read=_read, ...)
+    """
+
+    kind: str  # of the SourceRef that names such a file
+    read: Callable[[GivenFile, ReadFields], House]
+    """The house, placed in the world: metres, y up. Raises BadHouse naming file and place."""
+    companions: Callable[[GivenFile, SourceFiles], str] = no_companions
+    """Digest of every other file that reading opens, "" where there is none. Never raises."""
+    main_file: str = ""  # that makes a folder a home; its id is then the folder's name
+    has_parts: bool = False  # FILE#part names a part of the file
+    tells_boxes: bool = False  # it may have things by class and box alone, without a mesh
+    travels: bool = True  # a file that has no companions goes to the store of a farm
+    uses_packages: bool = False  # its companions are Debian packages, which go there by themselves

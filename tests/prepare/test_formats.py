@@ -1,0 +1,184 @@
+"""The table of formats: each is known by its file, alone and in a folder, for `run` and `submit` alike."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from benchmarks.inputs.sound_files import sound_files
+from pbrs_farm.commands.arguments import home_arguments
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.prepare import formats as table
+from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.formats import PLAN, format_of_file, format_of_kind, formats, summary
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
+from pbrs_farm.store import MemoryStore
+from tests.read import textured_sources
+from workers.house_files import entries_from_arguments, is_left_in_place, upload
+
+_FEW_TRIANGLES: Final = 2_000
+_NO_PICTURE: Final = b""
+
+Write = Callable[[Path], Path]
+
+
+def _sweethome3d(folder: Path) -> Path:
+    return Path(textured_sources.sweethome3d(folder, _NO_PICTURE).location)
+
+
+def _suncg(folder: Path) -> Path:
+    return Path(textured_sources.suncg(folder, _NO_PICTURE).location)
+
+
+WRITERS: Final[dict[str, Write]] = {
+    title: sound.write for title, sound in sound_files(_FEW_TRIANGLES).items()
+} | {"Sweet Home 3D": _sweethome3d, "SUNCG": _suncg}
+
+each_format = pytest.mark.parametrize("title", [one.title for one in formats()])
+
+
+def test_every_format_of_the_table_is_tried_here() -> None:
+    assert {one.title for one in formats()} == set(WRITERS)
+
+
+@each_format
+def test_a_file_is_known_by_its_own_format_and_read(tmp_path: Path, title: str) -> None:
+    path = WRITERS[title](tmp_path)
+    entry = format_of_file(path)
+    assert entry is not None
+    (own,) = (one for one in formats() if one.title == title)
+    assert entry.kind == own.kind
+    source = resolve(str(path))
+    assert source.kind == own.kind
+    assert source.given.path == path.resolve()
+    assert read_house(source, ReadFields()).rooms
+
+
+@each_format
+def test_a_folder_names_its_homes_to_run_and_submit_alike(tmp_path: Path, title: str) -> None:
+    path = WRITERS[title](tmp_path)
+    folder = path.parent
+    (folder / "notes.txt").write_text("no home")
+    (folder / "plain.svg").write_text("<svg/>")
+    (folder / "table.csv").write_text("a,b\n1,2\n")
+    (folder / "home.rooms.json").write_text('{"rooms": []}')
+    (folder / ".hidden.sh3d").write_bytes(b"")
+    # Both verbs take a folder through one function; each word is a home that resolves.
+    words = home_arguments([str(folder)], None)
+    assert str(path) in words
+    assert words == words_of_homes(words), "a home stays what it is"
+    entries = entries_from_arguments([str(folder)])
+    assert [ref.word for _entry, ref in entries] == [resolve(word).word for word in words]
+
+
+@each_format
+def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str) -> None:
+    path = WRITERS[title](tmp_path)
+    ((entry, ref),) = entries_from_arguments([str(path)])
+    store = MemoryStore()
+    upload(store, [ref])
+    placed = SourceRef.model_validate_json(entry.source)
+    if is_left_in_place(ref):
+        own = ref.format
+        assert own is not None
+        assert placed == ref
+        assert ref.companions or not own.travels
+    else:
+        assert store.get(placed.location) == path.read_bytes()
+
+
+def test_a_range_and_a_folder_are_one_word_a_home(tmp_path: Path) -> None:
+    for name in ("b.glb", "a.sh3d"):
+        (tmp_path / name).write_bytes(b"")
+    found = words_of_homes(["builtin", "made:2..3", str(tmp_path)])
+    homes = [str(tmp_path / name) for name in ("a.sh3d", "b.glb")]
+    assert found == ["builtin", "made:2", "made:3", *homes]
+
+
+def test_a_folder_without_a_home_says_what_is_read(tmp_path: Path) -> None:
+    assert words_of_homes([str(tmp_path)]) == [str(tmp_path)]
+    with pytest.raises(BadHouse, match="no home file") as error:
+        resolve(str(tmp_path))
+    assert summary() in str(error.value)
+    for word in (".sh3d", ".usdz", ".ifc", "3D-FRONT", "RoomPlan", "ROOT/house/ID of SUNCG"):
+        assert word in summary()
+
+
+def test_a_folder_of_homes_is_no_home_where_one_is_looked_at(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(b"")
+    (tmp_path / "b.sh3d").write_bytes(b"")
+    with pytest.raises(BadHouse, match="is a folder of 2 homes"):
+        resolve(str(tmp_path))
+
+
+def test_a_file_that_is_not_there_is_missing_in_its_own_format(tmp_path: Path) -> None:
+    for name in ("a.usd", "a.glb", "a.sh3d", "a.thing"):
+        with pytest.raises(BadHouse, match="no such file"):
+            resolve(str(tmp_path / name))
+
+
+def test_kinds_without_files_have_no_format() -> None:
+    assert resolve("builtin").format is None
+    assert format_of_kind("nothing") is None
+    plan = format_of_kind(PLAN)
+    assert plan is not None
+    assert plan.tells_boxes
+
+
+_LIDAR = '''"""A .lidar file: the width and depth of a room, metres."""
+
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import Format, GivenFile
+
+
+def _read(given: GivenFile, fields: ReadFields) -> House:
+    from dataclasses import replace
+
+    from pbrs_farm.read.builtin.builtin_home import builtin_home
+
+    return replace(builtin_home(), name=given.path.read_text())
+
+
+FORMAT = Format(
+    kind="lidar", title="Lidar", files=".lidar", brings="rooms", where="a scanner", licence="yours",
+    suffixes=(".lidar",), read=_read,
+)
+'''
+
+
+@pytest.fixture
+def with_lidar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A format that is one more folder in read/, of one file."""
+    from pbrs_farm import read
+
+    (tmp_path / "packages/lidar").mkdir(parents=True)
+    (tmp_path / "packages/lidar/__init__.py").write_text(_LIDAR)
+    monkeypatch.setattr(read, "__path__", [*read.__path__, str(tmp_path / "packages")])
+    table._formats_of_packages.cache_clear()
+    yield
+    table._formats_of_packages.cache_clear()
+    sys.modules.pop("pbrs_farm.read.lidar", None)
+
+
+@pytest.mark.kinds("format")
+@pytest.mark.usefixtures("with_lidar")
+def test_a_format_is_added_in_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "flat.lidar"
+    path.write_text("Scanned")
+    source = resolve(str(path))
+    house, _report = repaired_house(source, Recipe())
+    assert (source.kind, house.name, house.is_repaired) == ("lidar", "Scanned", True)
+    assert words_of_homes([str(tmp_path)]) == [str(path)]
+    assert ".lidar" in summary()
+    # It travels to a farm as any other file.
+    ((entry, ref),) = entries_from_arguments([str(path)])
+    store = MemoryStore()
+    upload(store, [ref])
+    assert store.get(SourceRef.model_validate_json(entry.source).location) == b"Scanned"
