@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+from pbrs_farm.check.pixel_checks import RAY_LAYERS
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.layers import LAYERS
+from pbrs_farm.core.layers import LAYER, LAYERS
 
 RAYS = "recomputed by rays"
 FORMULA = "recomputed from other layers"
@@ -19,9 +20,7 @@ _NOISE = "each value within its noise, mean and spread by their statistics"
 
 # File -> how it is looked at.
 HOW: dict[str, str] = {
-    "instance.png": RAYS, "semantic.png": RAYS, "depth.png": RAYS, "normal.png": RAYS,
-    "valid.png": RAYS, "depth_z.exr": RAYS, "position.exr": RAYS, "normal_world.png": RAYS,
-    "material.png": RAYS, "glass.png": RAYS, "nocs.png": RAYS, "albedo.png": RAYS,
+    **{LAYER[name].file: RAYS for name in RAY_LAYERS},
     "boundary.png": FORMULA, "boundary_semantic.png": FORMULA, "nyu13.png": FORMULA,
     "class_source.png": FORMULA, "hha.png": FORMULA, "histogram.json": FORMULA,
     "depth_sensor.png": _NOISE, "depth_sensor_tof.png": _NOISE, "depth_sensor_stereo.png": _NOISE,

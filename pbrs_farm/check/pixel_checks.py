@@ -9,9 +9,9 @@ two parallel surfaces within 0.1 mm is the source's own: a window frame in the p
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,6 @@ from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
 Labels = dict[str, NDArray[Any]]  # layer -> what is stored at N pixels: (N,) or (N, 3)
-
-RAY_LAYERS = (
-    "instance", "semantic", "depth", "normal", "valid",
-    "depth_z", "position", "normal_world", "material", "glass", "nocs",
-    "albedo",
-)  # fmt: skip
-"""Layers that a ray through the pixel's centre decides."""
 
 ROUNDING_MM = 0.505  # of depth stored in whole mm
 # Per metre of depth, over the cosine: rays with float32 directions, magnified by a slanting face.
@@ -133,42 +126,60 @@ def _explained(
 ) -> dict[str, Bools]:
     """Per layer whether hitting these faces explains what is stored."""
     triangles, rays = scene
-    hit = face >= 0
-    instance = _of_face(triangles.instance, face)
-    z = rays.distance(face, view.world_from_camera[:3, 3], directions)
-    normal = rays.normal(face, directions)
     classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
     classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
-    # What depth, position and error of the ray would be for a hit there.
-    mm = np.clip(z * 1000, 0.5, 65535)
-    point = view.world_from_camera[:3, 3] + directions * z[:, None]
-    cosine = np.abs(np.einsum("ni,ni->n", normal, directions))
-    slant_mm = RAY_ERROR_MM * z / np.maximum(cosine, 1e-9)
-    tolerance_mm = ROUNDING_MM + np.minimum(slant_mm, MAX_RAY_ERROR_MM)
-
-    checks: dict[str, Callable[[NDArray[Any]], Any]] = {
-        "instance": lambda stored: stored == instance,
-        "semantic": lambda stored: stored == classes[instance],
-        "depth": lambda stored: np.where(hit, np.abs(stored - mm) <= tolerance_mm, stored == 0),
-        "normal": lambda stored: normal_is_right(stored, published_axes(normal, view)),
-        "valid": lambda stored: stored == np.where(hit, 255, 0),
-        "depth_z": lambda stored: np.where(hit, np.abs(stored - z) <= METRES, stored == 0),
-        "position": lambda stored: np.where(
-            hit, np.abs(stored - point).max(axis=1) <= METRES, ~stored.any(axis=1)
-        ),
-        "normal_world": lambda stored: normal_is_right(stored, normal),
-        "material": lambda stored: (
-            stored == np.where(hit, _of_face(triangles.material, face) + 1, 0)
-        ),
-        "glass": lambda stored: (
-            stored == np.where(hit & _of_face(triangles.see_through, face), 255, 0)
-        ),
-        "nocs": lambda stored: _nocs_is_right(view, stored, instance, point, triangles),
-        "albedo": lambda stored: (
-            np.abs(stored - _albedo(view, face, point, triangles)).max(axis=1) <= ALBEDO_STEPS + 0.5
-        ),
+    z = rays.distance(face, view.world_from_camera[:3, 3], directions)
+    pierced = _Pierced(view, triangles, classes, face, z, rays.normal(face, directions), directions)
+    return {
+        name: np.asarray(_CHECKS[name](stored, pierced), bool) for name, stored in labels.items()
     }
-    return {name: np.asarray(checks[name](stored), bool) for name, stored in labels.items()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pierced:
+    """N pixels and the faces that their rays are taken to meet."""
+
+    view: StoredView
+    triangles: Triangles
+    classes: NDArray[np.int64]  # instance -> NYU40
+    face: Faces  # (N,), -1 = nothing
+    z: Floats  # (N,) metres along the ray, in units of directions
+    normal: Floats  # (N, 3) of the face, world
+    directions: Floats  # (N, 3)
+
+    @property
+    def hit(self) -> Bools:
+        return self.face >= 0
+
+    @property
+    def instance(self) -> NDArray[np.int64]:
+        return _of_face(self.triangles.instance, self.face)
+
+    @property
+    def point(self) -> Floats:
+        return np.asarray(self.view.world_from_camera[:3, 3] + self.directions * self.z[:, None])
+
+    @property
+    def depth_error_mm(self) -> Floats:
+        """(N,) by which a depth in whole mm may differ: rounding, and what the ray loses on a slant."""
+        cosine = np.abs(np.einsum("ni,ni->n", self.normal, self.directions))
+        slant_mm = RAY_ERROR_MM * self.z / np.maximum(cosine, 1e-9)
+        return np.asarray(ROUNDING_MM + np.minimum(slant_mm, MAX_RAY_ERROR_MM))
+
+
+def _depth_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    mm = np.clip(at.z * 1000, 0.5, 65535)
+    return np.where(at.hit, np.abs(stored - mm) <= at.depth_error_mm, stored == 0)
+
+
+def _position_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    near = np.abs(stored - at.point).max(axis=1) <= METRES
+    return np.where(at.hit, near, ~stored.any(axis=1))
+
+
+def _albedo_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    expected = _albedo(at.view, at.face, at.point, at.triangles)
+    return np.asarray(np.abs(stored - expected).max(axis=1) <= ALBEDO_STEPS + 0.5)
 
 
 def _albedo(view: StoredView, face: Faces, point: Floats, triangles: Triangles) -> Floats:
@@ -191,16 +202,11 @@ def _albedo(view: StoredView, face: Faces, point: Floats, triangles: Triangles) 
     return found
 
 
-def _nocs_is_right(
-    view: StoredView,
-    stored: NDArray[np.int64],
-    instance: NDArray[np.int64],
-    point: Floats,
-    triangles: Triangles,
-) -> Bools:
+def _nocs_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
     """(N,) stored model coordinates are those of points (N, 3); of what is no placed model, 0."""
+    triangles, instance, point = at.triangles, at.instance, at.point
     right = np.asarray(~stored.any(axis=1), bool)
-    for row in view.table["instances"]:
+    for row in at.view.table["instances"]:
         own = instance == int(row["id"])
         if "world_from_model" not in row or not own.any():
             continue
@@ -285,3 +291,27 @@ def _pierced(triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: 
         t = np.einsum("fi,fi->f", e2, q) * inverse
         inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
     return np.where(inside, t, np.inf)
+
+
+# Layer -> what is right of its stored values at the pixels.
+_CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
+    "instance": lambda stored, at: stored == at.instance,
+    "semantic": lambda stored, at: stored == at.classes[at.instance],
+    "depth": _depth_is_right,
+    "normal": lambda stored, at: normal_is_right(stored, published_axes(at.normal, at.view)),
+    "valid": lambda stored, at: stored == np.where(at.hit, 255, 0),
+    "depth_z": lambda stored, at: np.where(at.hit, np.abs(stored - at.z) <= METRES, stored == 0),
+    "position": _position_is_right,
+    "normal_world": lambda stored, at: normal_is_right(stored, at.normal),
+    "material": lambda stored, at: (
+        stored == np.where(at.hit, _of_face(at.triangles.material, at.face) + 1, 0)
+    ),
+    "glass": lambda stored, at: (
+        stored == np.where(at.hit & _of_face(at.triangles.see_through, at.face), 255, 0)
+    ),
+    "nocs": _nocs_is_right,
+    "albedo": _albedo_is_right,
+}
+
+RAY_LAYERS: Final = tuple(_CHECKS)
+"""Layers that a ray through the pixel's centre decides."""

@@ -6,16 +6,34 @@ No effects. The table of docs/formats.md is printed from it (`python -m pbrs_far
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Final, Literal, TypeAlias
 
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.plugins import plugins
 
+# How pages and films draw a layer. "picture": as it is. "classes": NYU40's colours. "ids": a colour
+# an id. "mask": light on dark. "depth": a ramp of depth in mm, "depth_m" in metres, "disparity" the
+# inverse. "flow", "flow_kitti": hue by direction. "high_byte": of 16 bits a channel. "range": each
+# channel scaled to what the picture has of it. "": it is no picture.
+ShownAs: TypeAlias = Literal[
+    "", "picture", "classes", "ids", "mask", "depth", "depth_m", "disparity", "flow", "flow_kitti",
+    "high_byte", "range",
+]  # fmt: skip
+
+# How an export changes its size: by the nearest pixel, by area, lines kept whole, and what measures
+# pixels of the picture itself in those of the new size.
+Resized: TypeAlias = Literal["nearest", "area", "lines", "pixels"]
+
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One file of a view."""
+    """One file of a view.
+
+    The table of these is the only list of layers: files, `--layers`, what a lens must have, digests,
+    pages, films, exports and `verify` read it.
+    """
 
     name: str
     file: str  # below the view's folder
@@ -29,14 +47,52 @@ class Layer:
     partner: str = ""
     # What a lens must have: "planar depth" along its axis, "rows" that correspond in a pair.
     needs: str = ""
+    shown_as: ShownAs = ""
+    resized: Resized = "nearest"
+    title: str = ""  # in menus and above tiles; "" = the name's words
+    # Raised when its pixels change while the step's version stays: views that have it are made anew.
+    version: int = 1
+    # Its pixels show the albedo, which the recipe's materials hold to a limit.
+    shows_albedo: bool = False
+
+    @property
+    def is_label(self) -> bool:
+        """Whether neighbouring values must not be mixed when the picture is scaled."""
+        return self.shown_as in ("classes", "ids", "mask")
+
+    @property
+    def is_photo(self) -> bool:
+        """Whether it is a picture in a light, shown as its own file."""
+        return self.shown_as == "picture" and self.step != "truth"
+
+    @property
+    def shown_title(self) -> str:
+        """What menus call it."""
+        return self.title or self.name.replace("_", " ").capitalize()
 
 
-def _picture(name: str, step: str, *, optional: bool = False) -> Layer:
-    return Layer(name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional)
+def _picture(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
+    return Layer(
+        name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional,
+        shown_as="picture", resized="area", title=title,
+    )  # fmt: skip
 
 
-def _label(name: str, channels: str, dtype: str, unit: str, nodata: str = "0") -> Layer:
-    return Layer(name, f"{name}.png", channels, dtype, unit, nodata, "truth")
+def _label(
+    name: str,
+    channels: str,
+    dtype: str,
+    unit: str,
+    nodata: str = "0",
+    *,
+    shown_as: ShownAs,
+    resized: Resized = "nearest",
+    title: str = "",
+) -> Layer:
+    return Layer(
+        name, f"{name}.png", channels, dtype, unit, nodata, "truth",
+        shown_as=shown_as, resized=resized, title=title,
+    )  # fmt: skip
 
 
 def optional_layer(
@@ -47,14 +103,29 @@ def optional_layer(
     nodata: str = "0",
     file: str = "",
     needs: str = "",
+    *,
+    shown_as: ShownAs = "",
+    resized: Resized = "nearest",
 ) -> Layer:
-    """A label that the step `truth` writes when --layers names it, a plugin's too."""
+    """A label that the step `truth` writes when --layers names it, a plugin's too.
+
+    shown_as: "" is "picture" for uint8 and "range" for all else.
+
+        >>> optional_layer("height", "Y", "uint16", "mm above the lowest floor").file
+        'height.png'
+    """
     file = file or f"{name}.png"
-    return Layer(name, file, channels, dtype, unit, nodata, "truth", optional=True, needs=needs)
+    shown_as = shown_as or ("picture" if dtype == "uint8" else "range")
+    return Layer(
+        name, file, channels, dtype, unit, nodata, "truth", optional=True, needs=needs,
+        shown_as=shown_as, resized=resized,
+    )  # fmt: skip
 
 
-def _along_axis(name: str, channels: str, dtype: str, unit: str) -> Layer:
-    return optional_layer(name, channels, dtype, unit, needs="planar depth")
+def _along_axis(
+    name: str, channels: str, dtype: str, unit: str, *, shown_as: ShownAs = ""
+) -> Layer:
+    return optional_layer(name, channels, dtype, unit, needs="planar depth", shown_as=shown_as)
 
 
 def _between(
@@ -66,36 +137,47 @@ def _between(
     nodata: str = "0",
     ending: str = "png",
     needs: str = "",
+    *,
+    shown_as: ShownAs,
+    resized: Resized = "nearest",
 ) -> Layer:
     file = f"{name}.{ending}"
-    return Layer(name, file, channels, dtype, unit, nodata, "truth", True, partner, needs)
+    return Layer(
+        name, file, channels, dtype, unit, nodata, "truth", True, partner, needs,
+        shown_as=shown_as, resized=resized,
+    )  # fmt: skip
 
 
 def _flow(name: str, partner: str) -> tuple[Layer, ...]:
     unit = f"px right, px down, to the {partner} frame"
     kitti = "64 x + 2^15, 64 y + 2^15, 1 = seen there (KITTI)"
     return (
-        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", "exr"),
-        _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three"),
-        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128"),
-    )
+        _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", "exr",
+                 shown_as="flow", resized="pixels"),
+        _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three",
+                 shown_as="flow_kitti", resized="pixels"),
+        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128", shown_as="mask"),
+    )  # fmt: skip
 
 
 _SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hidden"
 
 
-def _behind_glass(name: str, channels: str, dtype: str, nodata: str = "0") -> Layer:
+def _behind_glass(
+    name: str, channels: str, dtype: str, nodata: str = "0", *, shown_as: ShownAs
+) -> Layer:
     unit, file = f"as {name}, first hit that is no glass", f"behind_glass/{name}.png"
-    return optional_layer(f"behind_glass_{name}", channels, dtype, unit, nodata, file)
+    name = f"behind_glass_{name}"
+    return optional_layer(name, channels, dtype, unit, nodata, file, shown_as=shown_as)
 
 
 # Layers that every view has, and (optional) those written when --layers names them.
 OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
-    _picture("opengl_dl", "opengl_dl"),
-    _picture("opengl_il", "opengl_il"),
-    _picture("mlt_ol", "develop"),
-    _picture("mlt_il_ol", "develop"),
+    _picture("opengl_dl", "opengl_dl", "OpenGL, directional"),
+    _picture("opengl_il", "opengl_il", "OpenGL, indoor"),
+    _picture("mlt_ol", "develop", "Physical, outdoor"),
+    _picture("mlt_il_ol", "develop", "Physical, indoor + outdoor"),
     Layer(
         "radiance",
         "radiance.exr",
@@ -106,57 +188,69 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         "light",
     ),
     # Labels of every view, all from one hit record.
-    _label("depth", "Y", "uint16", "planar z, mm"),
+    _label("depth", "Y", "uint16", "planar z, mm", shown_as="depth"),
     _label(
         "normal", "RGB", "uint16", "camera frame x right, y forward, z up; round((n + 1) 65535 / 2)",
-        "32768 in all three, valid = 0",
+        "32768 in all three, valid = 0", shown_as="high_byte", title="Normals",
     ),
-    _label("valid", "Y", "uint8", "0 / 255"),
-    _label("semantic", "Y", "uint8", "NYU40 id"),
-    _label("instance", "Y", "uint16", "instance id"),
-    _label("boundary", "Y", "uint8", "0 / 255"),
+    _label("valid", "Y", "uint8", "0 / 255", shown_as="mask"),
+    _label("semantic", "Y", "uint8", "NYU40 id", shown_as="classes", title="Classes"),
+    _label("instance", "Y", "uint16", "instance id", shown_as="ids", title="Instances"),
+    _label("boundary", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines", title="Boundaries"),
     # Labels that --layers asks for.
-    optional_layer("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr"),
-    optional_layer("position", "X Y Z", "float32", "world, m", file="position.exr"),
-    optional_layer("normal_shading", "RGB", "uint16", "as normal", "as normal"),
+    optional_layer("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr", shown_as="depth_m"),
+    optional_layer("position", "X Y Z", "float32", "world, m", file="position.exr", shown_as="range"),
+    optional_layer("normal_shading", "RGB", "uint16", "as normal", "as normal", shown_as="high_byte"),
     optional_layer(
-        "normal_world", "RGB", "uint16", "world frame x, y up, z; round((n + 1) 65535 / 2)", "as normal"
+        "normal_world", "RGB", "uint16", "world frame x, y up, z; round((n + 1) 65535 / 2)", "as normal",
+        shown_as="high_byte",
     ),
-    optional_layer("albedo", "RGB", "uint8", "sRGB, diffuse colour"),
+    replace(
+        optional_layer("albedo", "RGB", "uint8", "sRGB, diffuse colour", resized="area"),
+        shows_albedo=True,
+    ),
     optional_layer(
         "nocs", "RGB", "uint16",
         "point of a placed model in its own box, round(65535 c), box centre .5, diagonal 1 (Wang et al. 2019)",
-        "0 in all three",
+        "0 in all three", shown_as="high_byte",
     ),
-    optional_layer("material", "Y", "uint16", "material id, table in view.json"),
-    optional_layer("nyu13", "Y", "uint8", "NYU13 id"),
-    optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json"),
+    optional_layer("material", "Y", "uint16", "material id, table in view.json", shown_as="ids"),
+    optional_layer("nyu13", "Y", "uint8", "NYU13 id", shown_as="ids"),
+    optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json", shown_as="ids"),
     # What lies behind panes and glass objects.
-    optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first"),
-    _behind_glass("depth", "Y", "uint16"),
-    _behind_glass("normal", "RGB", "uint16", "as normal"),
-    _behind_glass("semantic", "Y", "uint8"),
-    _behind_glass("instance", "Y", "uint16"),
+    optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first", shown_as="mask"),
+    _behind_glass("depth", "Y", "uint16", shown_as="depth"),
+    _behind_glass("normal", "RGB", "uint16", "as normal", shown_as="high_byte"),
+    _behind_glass("semantic", "Y", "uint8", shown_as="classes"),
+    _behind_glass("instance", "Y", "uint16", shown_as="ids"),
     # Boundaries by their kind.
     optional_layer(
         "boundary_occlusion", "Y", "uint8",
         "255 = edge of the nearer surface, 128 = beside it on the farther",
+        shown_as="mask", resized="lines",
     ),
-    optional_layer("boundary_semantic", "Y", "uint8", "0 / 255"),
+    optional_layer("boundary_semantic", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines"),
     optional_layer(
-        "boundary_crease", "Y", "uint8", "255 = normals turn by more than 30 degrees, no depth gap"
+        "boundary_crease", "Y", "uint8", "255 = normals turn by more than 30 degrees, no depth gap",
+        shown_as="mask", resized="lines",
     ),
     # Depth as other works encode or measure it.
     _along_axis("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
-    _along_axis("projector", "Y", "uint8", "dots of an infrared projector beside the camera, or amid a pair"),
-    _along_axis("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it"),
-    _along_axis("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)"),
-    _along_axis("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it"),
+    replace(
+        _along_axis("projector", "Y", "uint8", "dots of an infrared projector beside the camera, or amid a pair"),
+        shows_albedo=True,
+    ),
+    replace(
+        _along_axis("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it", shown_as="depth"),
+        version=2,  # its noise is the same over patches of pixels
+    ),
+    _along_axis("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)", shown_as="depth"),
+    _along_axis("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it", shown_as="depth"),
     # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
     *_flow("forward", "next"),
     *_flow("backward", "previous"),
-    _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows"),
-    _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128"),
+    _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows", shown_as="disparity", resized="pixels"),
+    _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask"),
 )  # fmt: skip
 
 
@@ -185,6 +279,16 @@ LAYER: Final = {layer.name: layer for layer in LAYERS}
 
 OPTIONAL: Final = tuple(x.name for x in LAYERS if x.optional and x.step == "truth")
 """The names that --layers takes."""
+
+
+def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
+    """What the digest of the step `truth` knows of these layers beside their names and plugins.
+
+    max_albedo: what the recipe's materials hold the albedo to. A layer of version 1 adds nothing.
+    """
+    known = [layer for layer in LAYERS if layer.name in set(names)]
+    shown = [f"{layer.name} {max_albedo}" for layer in known if layer.shows_albedo]
+    return [*shown, *(f"{layer.name} {layer.version}" for layer in known if layer.version > 1)]
 
 
 def table() -> str:

@@ -32,13 +32,10 @@ PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 
 _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: only when it is named
-_BY_AREA: Final = (*_MODES, "albedo")
-_IN_PIXELS: Final = ("flow_", "disparity")  # what measures the picture's own pixels
 _NEEDED: Final = ("width_px", "height_px", "instances")  # of view.json, by every export
 _CLASSES: Final = "semantic"  # the layer that a user's own classes replace
 # Classes of NYU40 that are parts of the building; all others are objects.
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
-_LINES: Final = tuple(layer.name for layer in LAYERS if layer.name.startswith("boundary"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,12 +216,13 @@ def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
-    """A layer on another grid: pictures by area, lines kept whole, all else the nearest pixel."""
-    if name in _BY_AREA:
+    """A layer on another grid: as the table of layers says (Layer.resized)."""
+    layer = LAYER[name]
+    if layer.resized == "area":
         return resized_by_area(array, width, height)
-    if name.startswith(_IN_PIXELS):
-        return _with_scaled_pixels(name, resized_nearest(array, width, height), array.shape)
-    if name not in _LINES:
+    if layer.resized == "pixels":
+        return _with_scaled_pixels(layer, resized_nearest(array, width, height), array.shape)
+    if layer.resized == "nearest":
         return resized_nearest(array, width, height)
     # A line's stronger value wins.
     lines = np.zeros((height, width), np.uint8)
@@ -233,10 +231,12 @@ def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> ND
     return lines
 
 
-def _with_scaled_pixels(name: str, resized: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+def _with_scaled_pixels(
+    layer: Layer, resized: NDArray[Any], shape: tuple[int, ...]
+) -> NDArray[Any]:
     """Flow or disparity on another grid than that of shape (H, W ...), in the new grid's pixels."""
     scale = np.array([resized.shape[1] / shape[1], resized.shape[0] / shape[0]])
-    if name.endswith("_kitti"):
+    if layer.shown_as == "flow_kitti":
         valid = resized[..., 2:] > 0
         steps = np.rint((resized[..., :2] - 2.0**15) * scale) + 2**15
         flow = np.where(valid, np.clip(steps, 0, 65535), 0)

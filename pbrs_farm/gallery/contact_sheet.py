@@ -252,7 +252,7 @@ def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown:
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))
     for i, kind in enumerate(TILES):
-        draw.text((_MARGIN_PX + i * (TILE_PX + _GAP_PX), 80), kind.title, INK, _font(15))
+        draw.text((_MARGIN_PX + i * (TILE_PX + _GAP_PX), 80), kind.shown_title, INK, _font(15))
 
 
 def _draw_row(

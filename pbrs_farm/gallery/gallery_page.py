@@ -213,7 +213,7 @@ def _tile_url(tile: Tile) -> str:
     if tile.pixels is None:
         return ""
     # Flat colours stay exact as a PNG with a palette, where that is small enough.
-    if tile.kind.is_flat:
+    if tile.kind.is_label:
         data = _palette_png(tile.pixels)
         if len(data) <= MAX_TILE_BYTES:
             return data_url(data, "png")

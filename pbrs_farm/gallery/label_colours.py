@@ -1,7 +1,8 @@
-"""Label layers as colours: depth, normals, classes, instances, boundaries; no effects."""
+"""Layers as colours that a person can read, each as the table of layers says it is shown; no effects."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.classes import NYU40_COLOURS
+from pbrs_farm.core.layers import Layer, ShownAs
 
 _NEAR_TO_FAR: Final = np.array(
     [[253, 246, 214], [164, 216, 172], [64, 172, 172], [34, 112, 162], [42, 54, 122], [18, 14, 42]],
@@ -91,3 +93,53 @@ def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:
     """(H, W, 3): boundaries are light on dark."""
     table = np.array([[20, 22, 28], [244, 236, 214]], np.uint8)
     return np.asarray(table[(boundary > 0).astype(np.intp)])
+
+
+def shown_colours(layer: Layer, stored: NDArray[Any]) -> Srgb8Image:
+    """(H, W, 3) uint8 sRGB of a layer's array as it is stored, drawn as layer.shown_as says.
+
+    Raises KeyError for a layer that is no picture (radiance).
+    """
+    return _SHOWN[layer.shown_as](stored)
+
+
+def _picture_colours(stored: NDArray[Any]) -> Srgb8Image:
+    if stored.dtype != np.uint8:
+        stored = (stored >> 8).astype(np.uint8)
+    return np.repeat(stored[..., None], 3, axis=2) if stored.ndim == 2 else stored[..., :3]
+
+
+def _depth_m_colours(metres: NDArray[Any]) -> Srgb8Image:
+    return depth_colours(np.rint(np.nan_to_num(metres) * 1000).astype(np.int64))
+
+
+def _disparity_colours(disparity: NDArray[Any]) -> Srgb8Image:
+    # What is near is large: turn it round.
+    steps = disparity.astype(np.int64)
+    return depth_colours(np.where(steps > 0, 4_000_000 // np.maximum(steps, 1), 0))
+
+
+def _kitti_colours(flow: NDArray[Any]) -> Srgb8Image:
+    return flow_colours(np.where(flow[..., 2:] > 0, flow[..., :2] / 64 - 512, 0))
+
+
+def _range_colours(stored: NDArray[Any]) -> Srgb8Image:
+    values = np.nan_to_num(np.asarray(stored, np.float64))
+    low, high = values.min((0, 1)), values.max((0, 1))
+    scaled = np.rint(255 * (values - low) / np.maximum(high - low, 1e-6)).astype(np.uint8)
+    return np.repeat(scaled[..., None], 3, axis=2) if scaled.ndim == 2 else scaled[..., :3]
+
+
+_SHOWN: Final[Mapping[ShownAs, Callable[[NDArray[Any]], Srgb8Image]]] = {
+    "picture": _picture_colours,
+    "classes": semantic_colours,
+    "ids": instance_colours,
+    "mask": boundary_colours,
+    "depth": depth_colours,
+    "depth_m": _depth_m_colours,
+    "disparity": _disparity_colours,
+    "flow": flow_colours,
+    "flow_kitti": _kitti_colours,
+    "high_byte": normal_colours,
+    "range": _range_colours,
+}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,52 +12,26 @@ from pbrs_farm import images
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER, Layer
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.regular_files import read_regular
 
-
-@dataclass(frozen=True, slots=True)
-class TileKind:
-    """A column of the sheet."""
-
-    layer: str
-    title: str
-    is_photo: bool = False  # a picture as it is; else numbers shown as colours
-    is_flat: bool = False  # areas of one value, shown unblurred
-
-    @property
-    def file(self) -> str:
-        """Name of the layer's file."""
-        return f"{self.layer}.png"
-
-
-TILES: Final = (
-    TileKind("opengl_dl", "OpenGL, directional", is_photo=True),
-    TileKind("opengl_il", "OpenGL, indoor", is_photo=True),
-    TileKind("mlt_ol", "Physical, outdoor", is_photo=True),
-    TileKind("mlt_il_ol", "Physical, indoor + outdoor", is_photo=True),
-    TileKind("depth", "Depth"),
-    TileKind("normal", "Normals"),
-    TileKind("semantic", "Classes", is_flat=True),
-    TileKind("instance", "Instances", is_flat=True),
-    TileKind("boundary", "Boundaries", is_flat=True),
-)
-
-_COLOURS: Final[dict[str, Callable[[NDArray[Any]], Srgb8Image]]] = {
-    "depth": colours.depth_colours,
-    "normal": colours.normal_colours,
-    "semantic": colours.semantic_colours,
-    "instance": colours.instance_colours,
-    "boundary": colours.boundary_colours,
-}
+TILES: Final = tuple(
+    LAYER[name]
+    for name in (
+        "opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol",
+        "depth", "normal", "semantic", "instance", "boundary",
+    )
+)  # fmt: skip
+"""The layers of a sheet, a column each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tile:
     """A tile of a view."""
 
-    kind: TileKind
+    kind: Layer
     pixels: Srgb8Image | None  # (H, W, 3), None where the layer is missing
     missing: str = ""  # why it is
     note: str = ""  # what a reader needs with it ("0.8 to 5.4 m")
@@ -68,7 +41,7 @@ class Tile:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Layer:
     # A layer as it is shown, at its full size.
-    kind: TileKind
+    kind: Layer
     pixels: Srgb8Image | None = None
     missing: str = ""
     note: str = ""
@@ -76,7 +49,7 @@ class _Layer:
 
     def tile(self, max_edge_px: int) -> Tile:
         # Labels keep their values: the nearest pixel, but photographs and smooth layers are averaged.
-        nearest, pixels = self.kind.layer in ("semantic", "instance"), self.pixels
+        nearest, pixels = self.kind.shown_as in ("classes", "ids"), self.pixels
         if pixels is not None:
             pixels = images.thumbnail(pixels, max_edge_px=max_edge_px, nearest=nearest)
         return Tile(self.kind, pixels, self.missing, self.note, self.classes)
@@ -94,39 +67,33 @@ def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]
     return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]
 
 
-def _layer(view: ViewEntry, kind: TileKind) -> _Layer:
+def _layer(view: ViewEntry, kind: Layer) -> _Layer:
     path = view.file(kind.file)
     if path is None:
         return _Layer(kind, missing="not rendered")
     try:
         stored = images.array_from_png(read_regular(path), str(path))
         if kind.is_photo:
-            photo = _photo(stored)
-            dark = "no daylight" if kind.layer == "mlt_ol" else "no light"
+            photo = colours.shown_colours(kind, stored)
+            dark = "no daylight" if kind.name == "mlt_ol" else "no light"
             return _Layer(kind, photo, note="" if photo.any() else dark)
-        pixels = _COLOURS[kind.layer](stored)
+        pixels = colours.shown_colours(kind, stored)
     except (BadInput, OSError, ValueError, IndexError):
         return _Layer(kind, missing="cannot be read")
     return _Layer(kind, pixels, note=_note(kind, stored), classes=_classes(kind, stored))
 
 
-def _photo(stored: NDArray[Any]) -> Srgb8Image:
-    if stored.dtype != np.uint8:
-        stored = (stored >> 8).astype(np.uint8)
-    return np.repeat(stored[..., None], 3, axis=2) if stored.ndim == 2 else stored[..., :3]
-
-
-def _note(kind: TileKind, stored: NDArray[Any]) -> str:
-    if kind.layer == "depth":
+def _note(kind: Layer, stored: NDArray[Any]) -> str:
+    if kind.name == "depth":
         near, far = colours.depth_range_m(stored)
         return f"{near:.1f} to {far:.1f} m"
-    if kind.layer == "instance":
+    if kind.name == "instance":
         return f"{len(np.unique(stored[stored > 0]))} instances"
     return ""
 
 
-def _classes(kind: TileKind, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
-    if kind.layer != "semantic":
+def _classes(kind: Layer, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
+    if kind.name != "semantic":
         return ()
     # Count the pixels of each class, largest first.
     counts = np.bincount(stored.reshape(-1), minlength=len(NYU40_NAMES))[: len(NYU40_NAMES)]

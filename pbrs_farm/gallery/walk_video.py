@@ -126,12 +126,9 @@ def _beside(frame: ViewEntry, mode: str, depth_m: tuple[float, float]) -> Srgb8I
 
 
 def _shown(name: str, stored: Any, depth_m: tuple[float, float]) -> Srgb8Image:
-    if name == "depth":
+    # One scale for the whole film, so that it does not flicker.
+    if LAYER[name].shown_as == "depth":
         return colours.depth_colours(stored, *depth_m)
-    if name == "normal":
-        return colours.normal_colours(stored)
-    if name == "semantic":
-        return colours.semantic_colours(stored)
-    if name == "instance":
-        return colours.instance_colours(stored)
-    return colours.flow_colours(stored, 0.02 * stored.shape[1])
+    if LAYER[name].shown_as == "flow":
+        return colours.flow_colours(stored, 0.02 * stored.shape[1])
+    return colours.shown_colours(LAYER[name], stored)

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, StoreFailed
-from pbrs_farm.core.layers import LAYER, LAYERS, OPTIONAL
+from pbrs_farm.core.layers import LAYER, LAYERS, OPTIONAL, layers_in_digest
 from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.checkpoint_npz import KeptParts, checkpoint_from_npz, checkpoint_npz
@@ -169,10 +169,7 @@ def _extra(name: str, work: Work) -> object:
     if name == "truth":
         others = [layer for layer in work.layers if layer in plugins("layers")]
         known = [*work.layers, *marks_in_digest("layers", others)]
-        # The albedo is that of the light, whose preset holds it to its own limit.
-        # Layers whose pixels changed are made anew where a view has them.
-        changed = {"albedo": f"albedo {max_albedo(work.recipe)}", "depth_sensor": "patchy noise"}
-        return [*known, *(what for name, what in changed.items() if name in work.layers)]
+        return [*known, *layers_in_digest(work.layers, max_albedo(work.recipe))]
     if name == "develop" and work.recipe.tone.pictures:
         return marks_in_digest("pictures", filter(None, work.recipe.tone.pictures.split(":")))
     preset = work.recipe.cameras.preset

@@ -194,7 +194,7 @@ def test_a_black_picture_says_that_no_light_came(root: Path) -> None:
     for mode in ("mlt_ol", "mlt_il_ol"):
         (folder / f"{mode}.png").write_bytes(black)
     one, other = (view_tiles.tiles_of(view) for view in views_of(root)[:2])
-    notes = [{t.kind.layer: t.note for t in tiles if t.kind.is_photo} for tiles in (one, other)]
+    notes = [{t.kind.name: t.note for t in tiles if t.kind.is_photo} for tiles in (one, other)]
     dark = {"mlt_ol": "no daylight", "mlt_il_ol": "no light"}
     assert notes == [dict.fromkeys(notes[1], "") | dark, dict.fromkeys(notes[1], "")]
 

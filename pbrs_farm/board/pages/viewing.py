@@ -20,15 +20,7 @@ from starlette.responses import Response, StreamingResponse
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
 from pbrs_farm.board.pages.rendering import page
-from pbrs_farm.board.pictures import (
-    PLANES,
-    is_label,
-    is_photo,
-    packet,
-    shown_png,
-    thumbnail_jpeg,
-    title_of,
-)
+from pbrs_farm.board.pictures import PLANES, packet, shown_png, thumbnail_jpeg
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput, BadRecipe, PbrsError
@@ -88,9 +80,9 @@ def view(request: Request) -> Response:
     facts = board.reader.json_object(keys.view_key(found.house, found.id, "view.json"))
     # Light is no picture: it is shown by relighting.
     layers = [
-        {"name": x.name, "title": title_of(x.name), "label": is_label(x.name), "unit": x.unit}
+        {"name": x.name, "title": x.shown_title, "label": x.is_label, "unit": x.unit}
         for x in LAYERS
-        if found.has(x.name) and x.name != "radiance"
+        if found.has(x.name) and x.shown_as
     ]
     before, after = board.queries.neighbours(found.house, found.id)
     return page(
@@ -129,7 +121,7 @@ def shown(request: Request) -> Response:
         return shown_png(layer, *_stored(board_of(request).reader, found, layer))
 
     # A photograph is its own file.
-    if is_photo(layer):
+    if LAYER[layer].is_photo:
         data, _key = _stored(board_of(request).reader, found, layer)
         return Response(data, media_type="image/png", headers={"Cache-Control": FOREVER})
     return _picture(request, found, ("shown", layer), "png", make)
