@@ -66,7 +66,7 @@ def _rows_of(seed: int) -> list[Row]:
 def _things(seed: int) -> Iterator[Row]:
     """Every thing of a made home, dressed: its class, its model and whether dressing added it."""
     from pbrs_farm.dress.dressing import dress
-    from pbrs_farm.dress.swap import pieces_by_plain_id, plain_id
+    from pbrs_farm.dress.old_place import pieces_by_plain_id, plain_id
     from pbrs_farm.prepare.dress_catalogue import catalogue_of
     from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.prepare.source import resolve

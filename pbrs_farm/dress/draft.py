@@ -6,12 +6,8 @@ Effects: a thread paints materials.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cached_property
-from threading import Lock
-from typing import NamedTuple, overload
 
 import numpy as np
 
@@ -20,103 +16,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
-
-# The materials and textures of a draft, some of them painted beside what follows.
-# Effects: a thread paints; each draft has its own, until close().
-
-
-class Painted(NamedTuple):
-    """A material that was painted."""
-
-    material: Material
-    textures: tuple[Texture, ...]  # those that the material names
-    mean_rgb: tuple[float, float, float]  # mean linear colour
-
-
-class Painting:
-    """Something that is painted once, by whoever comes first: the thread, or who needs it."""
-
-    def __init__(self, paint: Callable[[], Painted]) -> None:
-        self._paint = paint
-        self._lock = Lock()
-        self._painted: Painted | None = None
-
-    def painted(self) -> Painted:
-        """What was painted, painted now or waited for where it is not ready. Raises its error."""
-        with self._lock:
-            if self._painted is None:
-                self._painted = self._paint()
-            return self._painted
-
-
-class DraftMaterials(Sequence[Material]):
-    """Materials by number; reading one that is not painted yet waits for it, and raises its error."""
-
-    def __init__(self, materials: Iterable[Material], textures: Mapping[str, Texture]) -> None:
-        self._all: list[Material | Painting] = list(materials)
-        # In the order in which they came, repeated ones too.
-        self._textures: list[tuple[str, Texture] | Painting] = list(textures.items())
-        self._number = {m: i for i, m in reversed(list(enumerate(self)))}
-
-    def __len__(self) -> int:
-        return len(self._all)
-
-    @overload
-    def __getitem__(self, number: int) -> Material: ...
-    @overload
-    def __getitem__(self, number: slice) -> Sequence[Material]: ...
-    def __getitem__(self, number: int | slice) -> Material | Sequence[Material]:
-        if isinstance(number, slice):
-            return [self[k] for k in range(*number.indices(len(self)))]
-        made = self._all[number]
-        if not isinstance(made, Painting):
-            return made
-        # From now on an equal one that is added has this number.
-        material = made.painted().material
-        self._number.setdefault(material, number % len(self._all))
-        return material
-
-    def add(self, material: Material, textures: Iterable[Texture]) -> int:
-        """The number of a material; textures: those that it names.
-
-        The same for equal ones, painted ones that were read included.
-        """
-        self._textures += ((t.id, t) for t in textures)
-        if material not in self._number:
-            self._number[material] = len(self._all)
-            self._all.append(material)
-        return self._number[material]
-
-    def paint(self, paint: Callable[[], Painted]) -> tuple[int, Painting]:
-        """The number of a new material and its painting, which a thread begins after the others."""
-        painting = Painting(paint)
-        self._thread.submit(painting.painted)
-        self._textures.append(painting)
-        self._all.append(painting)
-        return len(self._all) - 1, painting
-
-    def close(self) -> None:
-        """End the thread after what it paints now; nothing is painted beside any more."""
-        if "_thread" in self.__dict__:
-            self._thread.shutdown(wait=False, cancel_futures=True)
-
-    def textures(self) -> dict[str, Texture]:
-        """All textures by id, in the order in which they came; waits for what is not painted yet."""
-        found: dict[str, Texture] = {}
-        for row in self._textures:
-            if isinstance(row, Painting):
-                found.update((t.id, t) for t in row.painted().textures)
-            else:
-                found[row[0]] = row[1]
-        return found
-
-    @cached_property
-    def _thread(self) -> ThreadPoolExecutor:
-        return ThreadPoolExecutor(1, "paint")
-
-
-# A house while it is dressed.
-
+from pbrs_farm.dress.draft_materials import DraftMaterials
 
 ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
 CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source

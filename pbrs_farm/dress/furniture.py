@@ -7,208 +7,43 @@ and leaves most of the floor and a good part of the wall free.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import shapely
 from pydantic import model_validator
-from shapely.geometry.base import BaseGeometry
 
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
-from pbrs_farm.core.house import Material
 from pbrs_farm.core.record import Nyu40, Record, read_toml
-from pbrs_farm.core.walkable import CELL_M, FloorGrid
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finishes import box_mapped, grain_pattern
-from pbrs_farm.dress.space import FloorBitmap, HouseSpace, RoomSpace, WallFace, house_space
-from pbrs_farm.dress.space.floor_bitmaps import (
-    doors_are_joined,
-    flights_of,
-    floor_bitmap,
-    with_body,
-)
-from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
-from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix, room_style
-from pbrs_farm.dress.textures.families import pattern_material, photographed
+from pbrs_farm.dress.furniture_look import Look, grained, look_of
+from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
+from pbrs_farm.dress.space import RoomSpace, house_space
+from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.things import case_goods
 from pbrs_farm.dress.things.assembly import Made
-from pbrs_farm.dress.things.case_goods import CASE_GOODS, Boards
-from pbrs_farm.dress.things.materials import plain
-from pbrs_farm.dress.walls.hanging import Hanging, next_id
+from pbrs_farm.dress.things.case_goods import CASE_GOODS
+from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
-# What added furniture is made of: wood of the home, white or painted boards but on the draft.
-
-
-_WHITE: Rgb = (0.9, 0.9, 0.88)
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """Boards, and of materials that show a picture how large one repeat of it is."""
-
-    style: Style
-    boards: Boards
-    size_m: Mapping[Material, tuple[float, float]]
-
-
-def look_of(draft: Draft, catalogue: Catalogue, style: Style, rng: np.random.Generator) -> Look:
-    """What the added furniture of a room is made of."""
-    pattern = photographed(draft, catalogue, grain_pattern(draft, style.wood))
-    grain = pattern_material(draft, pattern)
-    wood = draft.materials[grain.number]
-    kind, tone = rng.random(), float(rng.uniform(0.3, 0.45))
-    white = plain("board white", _WHITE, tone)
-    colour = COLOURS["boards"][int(rng.integers(len(COLOURS["boards"])))]
-    painted = plain("board painted", mix(colour, style.palette[4], 0.25), tone)
-    # Half of it is of wood; white and painted carcasses may have tops or fronts of wood.
-    if kind < 0.5:
-        body, front, top = wood, wood, wood
-    elif kind < 0.62:
-        body, front, top = wood, white, wood
-    elif kind < 0.75:
-        body, front, top = white, white, wood
-    elif kind < 0.88:
-        body, front, top = white, white, white
-    else:
-        body, front, top = painted, painted, wood
-    cloth = style.textiles[int(rng.integers(len(style.textiles)))]
-    return Look(style, Boards(body, front, top, cloth), {wood: grain.size_m})
-
-
-def grained(made: Made, look: Look) -> Made:
-    """The piece with the grain of its wood along each board."""
-    piece, shape = made
-    surfaces = []
-    for surface in shape.surfaces:
-        size_m = look.size_m.get(shape.materials[surface.material])
-        surfaces.append(box_mapped(surface, np.eye(3), size_m) if size_m else surface)
-    return piece, replace(shape, surfaces=tuple(surfaces))
-
-
-# A room's floor and walls while furniture is put there; state: what was put.
-
-
-OUT_M = 0.015  # from a wall to a back: skirting boards are between
-LOWER_M = 0.1  # above the floor, where a free wall begins
-
-_MOST_COVERED = 0.58  # of a floor
-_WALL_SHARE = 0.75  # of the free wall that may be stood at
-_WAYS_KEPT = 0.6  # of the floor that one could walk on
-_DOOR_MARGIN_M = 0.05
-_FRENCH_M = 0.4  # a window whose sill is lower is walked through
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FloorSpot:
-    """A place at a wall."""
-
-    face: WallFace
-    s: float  # of the thing's middle, along the face
-    depth: float  # of the thing, metres
-    body: BaseGeometry  # the plan area it takes
-    front: BaseGeometry  # and the floor before it
-
-
-def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: float) -> FloorSpot:
-    """The place of a thing (width, depth) at s on a face, with before_m of free floor."""
-
-    def area(z0: float, z1: float) -> BaseGeometry:
-        ends = [(s - width / 2, z0), (s + width / 2, z0), (s + width / 2, z1), (s - width / 2, z1)]
-        return shapely.Polygon([face.point(x, 0.0, z)[[0, 2]] for x, z in ends])
-
-    end = OUT_M + depth
-    return FloorSpot(face, s, depth, area(OUT_M, end), area(end, end + before_m))
-
-
-@dataclass(slots=True)
-class RoomFloor:
-    """What is left of a room's floor and walls."""
-
-    space: HouseSpace
-    room: RoomSpace
-    faces: Sequence[WallFace]
-    bitmap: FloorBitmap
-    free: BaseGeometry  # its floor without walls
-    kept: BaseGeometry  # doors' swings, and where one stands before doors and windows
-    has_ways: bool  # one way joins its doors
-    walkable: int  # cells of its largest way, before anything was put
-    wall_m: float  # of wall that may still be stood at
-    bodies: list[BaseGeometry] = field(default_factory=list)  # of what was put
-    fronts: list[BaseGeometry] = field(default_factory=list)  # the floor before it
-
-    @classmethod
-    def of(cls, draft: Draft, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
-        """The room as it is; None where it has no floor or no walls."""
-        bitmap = floor_bitmap(space, room)
-        if not bitmap.inside.any() or not room.faces:
-            return None
-        zones = []
-        for passage in (*room.doors, *room.windows):
-            side = passage.side_of(room.room.id)
-            is_walked = not passage.is_window or passage.bottom_y < room.room.floor_y + _FRENCH_M
-            if side is not None and is_walked:
-                zones.append(passage.before(side))
-                zones += [] if passage.is_window else [passage.swing(side)]
-        flights = flights_of(draft, room.room, room.area)
-        zones += [flights.under, flights.before]
-        # Count the wall before which one could stand something.
-        faces = Hanging(draft, room, "furniture").faces
-        low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9
-        free_m = sum(len(face.starts(WALL_CELL_M, low, high, 0.5)) for face in faces) * WALL_CELL_M
-        return cls(
-            space, room, faces, bitmap, shapely.difference(room.area, room.walls),
-            shapely.union_all(zones).buffer(_DOOR_MARGIN_M), doors_are_joined(bitmap, room),
-            _largest_way(bitmap), _WALL_SHARE * free_m,
-        )  # fmt: skip
-
-    def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
-        """Whether a thing may stand there, with the floor before it free."""
-        is_there = shapely.contains(self.free, body) and not shapely.intersects(self.kept, body)
-        if not is_there or any(shapely.intersects(body, area) for area in self.fronts):
-            return False
-        if any(
-            shapely.intersects(area, body) or shapely.intersects(area, front)
-            for area in self.bodies
-        ):
-            return False
-        return self._keeps_ways(self._cells(body))
-
-    def take(self, body: BaseGeometry, front: BaseGeometry) -> None:
-        """A thing stands there now."""
-        self.bodies.append(body)
-        self.fronts.append(front)
-        self.bitmap = with_body(self.bitmap, self._cells(body))
-
-    def is_too_full(self, area_m2: float) -> bool:
-        """Whether furniture would cover more of the floor than people let it with so much more."""
-        inside, covered = self.bitmap.inside, self.bitmap.occupied & self.bitmap.inside
-        covered_m2 = float(covered.sum()) * CELL_M**2 + area_m2
-        return covered_m2 > _MOST_COVERED * float(inside.sum()) * CELL_M**2
-
-    def _keeps_ways(self, cells: Bools) -> bool:
-        after = with_body(self.bitmap, cells)
-        if _largest_way(after) < _WAYS_KEPT * self.walkable:
-            return False
-        return not self.has_ways or doors_are_joined(after, self.room)
-
-    def _cells(self, area: BaseGeometry) -> Bools:
-        x, z = FloorGrid(self.bitmap.origin, self.bitmap.inside.shape).middles
-        return np.asarray(shapely.contains_xy(area.buffer(CELL_M / 2), x, z))
-
-
-def _largest_way(bitmap: FloorBitmap) -> int:
-    return int(np.bincount(bitmap.ways.reshape(-1))[1:].max(initial=0))
-
-
-# What furniture rooms usually have beside the largest pieces, and of which sizes: furniture.toml.
-
-
 Range = tuple[float, float]
+PART = "furniture"
+_LEAST_M2 = 3.0  # of a room
+_SIDE_M = 0.03  # to what stands beside it
+_LIFT_M = 0.0001  # above the floor, so that no faces coincide
+_FREE_BEFORE_M = 1.19  # of a wall, at most: no more is measured
+_TRIES = 8  # places of one thing
+_MOST_FACES = 12_000  # of a model of the catalogue
+_FROM_CATALOGUE = 0.35  # of what both have
+_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
+_FROM_KITCHEN_M = 1.0  # that bookcases keep from worktops, cookers, fridges
+_BESIDE_M = 0.15  # from a bed to its nightstand
+_END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
+_FILLED = ("full", "filled")  # in names of models that hold things of their own
+_LOOKS = 3  # of a home's added furniture
 
 
 class WantedKind(Record):
@@ -240,26 +75,6 @@ class _Furniture(Record):
 _FILE: Final = read_toml(Path(__file__).with_name("furniture.toml"), _Furniture)
 KINDS: Final[Mapping[str, WantedKind]] = _FILE.kinds
 WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = _FILE.wanted
-
-
-# The part `furniture` of dressing.
-
-
-PART = "furniture"
-
-_LEAST_M2 = 3.0  # of a room
-_SIDE_M = 0.03  # to what stands beside it
-_LIFT_M = 0.0001  # above the floor, so that no faces coincide
-_FREE_BEFORE_M = 1.19  # of a wall, at most: no more is measured
-_TRIES = 8  # places of one thing
-_MOST_FACES = 12_000  # of a model of the catalogue
-_FROM_CATALOGUE = 0.35  # of what both have
-_ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
-_FROM_KITCHEN_M = 1.0  # that bookcases keep from worktops, cookers, fridges
-_BESIDE_M = 0.15  # from a bed to its nightstand
-_END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
-_FILLED = ("full", "filled")  # in names of models that hold things of their own
-_LOOKS = 3  # of a home's added furniture
 
 
 def furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:

@@ -17,9 +17,10 @@ from pbrs_farm.core.classes import CHAIR, DESK, PICTURE, TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft, moved_item
+from pbrs_farm.dress.neighbours import PieceSurroundings, things_on
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space, item_footprint
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.swap import FREE_CUBES, PieceSurroundings, things_on
+from pbrs_farm.dress.swap import FREE_CUBES
 
 PART: Final = "mess"
 _WIDEST_M: Final = 0.72  # of a chair; wider ones are armchairs

@@ -15,17 +15,11 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface, Texture
 from pbrs_farm.core.mesh import face_areas, triangle_corners
+from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finishes import box_mapped
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.textures.maps import (
-    blurred,
-    noise,
-    normals_from_height,
-    roughness_bytes,
-    smoothstep,
-    texture_from_pixels,
-)
+from pbrs_farm.dress.textures.maps import normals_from_height, roughness_bytes, texture_from_pixels
+from pbrs_farm.dress.textures.noise import blurred, noise, smoothstep
 
 PART: Final = "parts"
 SIZE_M: Final = (0.6, 0.6)  # of one repeat

@@ -9,7 +9,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
-from pbrs_farm.dress.finishes import box_mapped
+from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.geometry.solids import box
 
 

@@ -9,9 +9,10 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import DressFields
-from pbrs_farm.dress.built_in import joinery, joinery_scheme
+from pbrs_farm.dress.built_in import joinery
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.dressing import dress
+from pbrs_farm.dress.finish_scheme import joinery_scheme
 from pbrs_farm.dress.gates.bodies import bodies_of, has_same_mesh
 from pbrs_farm.dress.style import style_for
 from tests.builders import builtin_home

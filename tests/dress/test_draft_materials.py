@@ -5,7 +5,7 @@ from threading import Event
 import pytest
 
 from pbrs_farm.core.house import Material, Texture
-from pbrs_farm.dress.draft import DraftMaterials, Painted
+from pbrs_farm.dress.draft_materials import DraftMaterials, Painted
 
 PLAIN = Material("plain")
 

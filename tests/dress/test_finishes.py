@@ -11,7 +11,8 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Item, Material, MaterialKind
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finishes import is_brown, is_dark, is_white, kind_by_name, parts
+from pbrs_farm.dress.finishes import parts
+from pbrs_farm.dress.part_kinds import is_brown, is_dark, is_white, kind_by_name
 from pbrs_farm.dress.style import Rgb, style_for
 from pbrs_farm.dress.textures.families import PatternMaterial
 from tests.dress.furniture import boards, house, solid

@@ -10,7 +10,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
-from pbrs_farm.dress import lamps as made
+from pbrs_farm.dress import made_lamps as made
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps import lamps
 from pbrs_farm.dress.space import house_space

@@ -12,8 +12,9 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.dress.old_place import OldPlace, before_boards
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.swap import OldPlace, before_boards, swap
+from pbrs_farm.dress.swap import swap
 from pbrs_farm.geometry.solids import box
 from tests.dress.furniture import house, solid
 

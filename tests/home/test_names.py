@@ -7,7 +7,7 @@ import pytest
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.walls.fittings import wants_radiators
+from pbrs_farm.dress.walls.radiators import wants_radiators
 from pbrs_farm.home.names import words_of
 from pbrs_farm.home.room_use import is_cooked_in
 from tests.dress.furniture import house, solid

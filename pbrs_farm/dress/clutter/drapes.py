@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
-from pbrs_farm.dress.textiles.curtains import solid_sheet
+from pbrs_farm.dress.textiles.hanging_cloth import solid_sheet
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over
 
 CELL_M: Final = 0.0125  # of the heights that cloth falls on

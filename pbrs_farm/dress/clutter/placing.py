@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
-from pbrs_farm.dress.clutter.stock import Stock
+from pbrs_farm.dress.clutter.stock import CLUTTER, Stock
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things.assembly import Made
@@ -23,6 +23,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 PART = "clutter"
 _NEAR_M = 0.06
+_MOST_IN_ROOM = 4
 
 
 def apart(made: Made, rng: np.random.Generator, mess: float) -> Made:
@@ -144,4 +145,13 @@ class Placing:
         return True
 
 
-# What a support is to who lives there: receptacles.csv says what it is, shares.csv what lies there.
+def take_for_room(placing: Placing, kind: str) -> Made | None:
+    """A thing of that kind; None, with its reason counted, where the room has enough of them."""
+    if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
+        placing.refuse(f"enough of {kind} in the room")
+        return None
+    made = placing.stock.take(placing.rng, kind, placing.style)
+    if made is None:
+        placing.refuse(f"no {kind} in the catalogue")
+    placing.taken[kind] += made is not None
+    return made

@@ -10,11 +10,12 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.core.record import Record, Several, read_csv
+from pbrs_farm.core.record import Record, Several, read_csv, read_toml
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_books
 from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.home.room_use import RoomKind
 
 _MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
 _MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
@@ -118,3 +119,20 @@ def _is_usable(shape: Shape, kind: ThingKind) -> bool:
         return False
     low, high = shape.bounds
     return bool(np.isfinite([low, high]).all() and (high - low).max() <= kind.most_m + 0.05)
+
+
+KindShares = tuple[tuple[str, float], ...]
+
+
+class ClutterTable(Record):
+    # The file clutter.toml.
+    in_front: tuple[str, ...]
+    at_walls: tuple[str, ...]
+    most_on_one: dict[str, int]
+    most_in_room: dict[str, int]
+    usual_m2: dict[str, float]
+    floors: dict[RoomKind, KindShares]
+    shelves: dict[str, KindShares]
+
+
+CLUTTER: Final = read_toml(Path(__file__).with_name("clutter.toml"), ClutterTable)

@@ -20,8 +20,10 @@ from pbrs_farm.core.mesh import boxes_meeting
 from pbrs_farm.dress.draft import Draft, moved_item
 from pbrs_farm.dress.gates.bodies import Body, bodies_of, boxes_of
 from pbrs_farm.dress.gates.keep_gates import CONTACT, keep_gates
-from pbrs_farm.dress.gates.penetration import MOST_M, Solids, near_pairs, penetration_m
-from pbrs_farm.dress.gates.support import Plumb, held
+from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
+from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.dress.gates.shells import Solids
+from pbrs_farm.dress.gates.support import held
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.walls.hanging import GAP_M
 from pbrs_farm.geometry.heights import highest_below

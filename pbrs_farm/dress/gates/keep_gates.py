@@ -17,9 +17,11 @@ from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates.bodies import Body, bodies_of, piece_id
-from pbrs_farm.dress.gates.penetration import MOST_M, Solids, near_pairs, penetration_m
+from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
+from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.dress.gates.shells import Solids
 from pbrs_farm.dress.gates.support import MOST_M as SUPPORT_M
-from pbrs_farm.dress.gates.support import Plumb, held, held_as_drawn
+from pbrs_farm.dress.gates.support import held, held_as_drawn
 from pbrs_farm.dress.gates.ways import blocked_doors, closed_ways, covered_windows
 from pbrs_farm.dress.report import Gate
 from pbrs_farm.dress.space import HouseSpace, floor_space

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy import ndimage
-from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F64, Bools
-from pbrs_farm.core.house import ItemKind, Room
-from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.core.walkable import CELL_M, HEAD_M, STEP_M, WALK_M, FloorGrid, connected_ways
-from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space.footprints import plan_area
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
-from pbrs_farm.geometry.surface_points import item_triangles
 
 _DOOR_REACH_M = 0.15  # beyond half the way's width, in front of a door
 
@@ -93,50 +86,3 @@ def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
 
 
 # Where stairs stand and where one steps on or off them, in the plan of a room.
-
-
-_STEP_M: Final = 0.45  # from a floor to the treads that one reaches from it
-_BEFORE_M: Final = 0.85  # that is kept before them
-_FLAT: Final = 0.9  # cosine to the vertical of treads
-_COARSE_M: Final = 0.02  # outlines of stairs are drawn so roughly
-_REACH_M: Final = 0.4  # stairs are taken for a room's own so far outside it
-
-
-@dataclass(frozen=True, slots=True)
-class Flights:
-    """Plan areas of the stairs of a room, empty where there are none."""
-
-    under: BaseGeometry  # the stairs themselves
-    before: BaseGeometry  # where one steps on and off
-
-
-def flights_of(draft: Draft, room: Room, area: BaseGeometry) -> Flights:
-    """The draft's stairs that stand in a room or arrive in it. area: the room's plan."""
-    under, before = [], []
-    near = area.buffer(_REACH_M)
-    for treads, plan in _stairs(draft):
-        low, high = float(treads[..., 1].min()), float(treads[..., 1].max())
-        if high < room.floor_y - _STEP_M or low > room.ceiling_y or not plan.intersects(near):
-            continue
-        if high > room.floor_y + _STEP_M:
-            under.append(plan)
-        reached = np.abs(treads[..., 1] - room.floor_y).max(1) < _STEP_M
-        ends = plan_area(treads[reached], upright=False)
-        before.append(ends.buffer(_BEFORE_M, join_style="mitre"))
-    return Flights(shapely.union_all(under), shapely.union_all(before))
-
-
-def _stairs(draft: Draft) -> list[tuple[F64, BaseGeometry]]:
-    """Level triangles (F, 3, 3) of each stairs of the source, and their plan; found once a draft."""
-    kept = draft.kept.get("stairs")
-    if isinstance(kept, list):
-        return kept
-    found: list[tuple[F64, BaseGeometry]] = []
-    for item in draft.source.items:
-        if item.kind is ItemKind.STAIRS and item.n_faces:
-            corners = item_triangles(item)
-            treads = corners[np.abs(unit_normals(corners)[:, 1]) > _FLAT]
-            if len(treads):
-                found.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
-    draft.kept["stairs"] = found
-    return found

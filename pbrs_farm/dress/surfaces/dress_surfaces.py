@@ -5,9 +5,8 @@ Effects: on the draft.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -17,39 +16,33 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.dress.built_in import (
-    Coat,
-    JoineryScheme,
-    aged,
-    coated,
-    coated_item,
-    is_plain,
-    joinery_scheme,
-    plain_material,
-)
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.finish_scheme import JoineryScheme, joinery_scheme
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
-from pbrs_farm.dress.style import COLOURS, WOODS, WOODS_FOR, Rgb, Style, mix, rgb, room_style
-from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
-from pbrs_farm.dress.surfaces.wall_materials import (
-    REVEAL,
-    RestOfWall,
-    RoomFinder,
-    RoomWalls,
-    SidedWall,
-    painted_wall,
-    sided_wall,
+from pbrs_farm.dress.style import Style, room_style
+from pbrs_farm.dress.surface_finishes import Coat, coated, coated_item, is_plain, plain_material
+from pbrs_farm.dress.surfaces.home_finish import (
+    WOOD_FLOORS,
+    Floor,
+    HomeFinish,
+    WallFinish,
+    floor_of,
+    home_finish,
+    walls_of,
 )
+from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, SidedWall, sided_wall
+from pbrs_farm.dress.surfaces.skirting import BASEBOARD, has_boards, skirting_board, wall_plans
+from pbrs_farm.dress.surfaces.wall_materials import REVEAL, RestOfWall, RoomWalls, painted_wall
 from pbrs_farm.dress.textures.families import (
     Pattern,
     PatternMaterial,
     pattern_material,
     photographed,
 )
-from pbrs_farm.dress.textures.wallpaper import inks
 from pbrs_farm.home.room_use import RoomKind
 
-# Floors and ceilings with the materials of their rooms, laid along the walls.
+PART = "surfaces"
+_KEPT_SHARE = 0.1  # of photographed floors and walls that stay
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:
@@ -84,253 +77,6 @@ def _laid(surface: Surface, material: PatternMaterial, origin: F64, axes: F64) -
     # Seen from above x runs right and z towards the viewer: v grows away, against z.
     uvs = np.stack([u, -v], -1).astype(np.float32)
     return replace(surface, uvs=uvs, material=material.number)
-
-
-# What floors, walls, ceilings and skirting boards of a home are made of, by style.
-# The shares are suggestions of ours for European homes; each room draws from a stream of its own.
-
-
-_T = TypeVar("_T")
-_TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
-WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
-_MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
-_DIRT = rgb("b9b5ac")
-
-
-@dataclass(frozen=True, slots=True)
-class Floor:
-    """A floor: its pattern and how it is turned against the room's longer side."""
-
-    pattern: Pattern
-    turn_rad: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class WallFinish:
-    """What a room's walls show."""
-
-    main: Pattern
-    accent: Pattern | None = None  # of one wall of the room
-    low: Pattern | None = None  # tiles or a dado up to low_m, where main begins
-    low_m: float = 0.0
-
-    @property
-    def is_tiled(self) -> bool:
-        """Whether the walls' foot is of tiles: they have no skirting board."""
-        return (self.low or self.main).family in ("tiles", "marble")
-
-
-@dataclass(frozen=True, slots=True)
-class HomeFinish:
-    """What all rooms of a home share."""
-
-    dry_floors: tuple[Floor, Floor]  # the usual one, and the one of some rooms
-    wet_floor: Floor
-    ceiling: Pattern
-    wall: Rgb  # the paint of most walls
-    has_floor_boards: bool  # skirting boards of the floor's wood, not of the doors'
-    board_m: float  # height of the boards that are added
-
-
-def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
-    """What the home's builder chose."""
-    wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
-    usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _one(rng, wood))
-    second = _dry_floor(rng, style, RoomKind.OTHER)
-    white = aged(rng, _one(rng, COLOURS["wall_whites"]))
-    ceiling = Pattern("smooth plaster", _seed(rng), (white,))
-    if rng.random() < 0.06 and style.name in ("country", "warm wood", "nordic"):
-        ceiling = replace(_wood_floor(rng, style, "planks").pattern, darkness=-0.4)
-    wall = white if rng.random() < 0.45 else style.palette[int(rng.integers(2))]
-    return HomeFinish(
-        dry_floors=(usual, second),
-        wet_floor=_tile_floor(rng, style),
-        ceiling=ceiling,
-        wall=wall,
-        has_floor_boards=bool(rng.random() < 0.25),
-        board_m=float(rng.choice([0.06, 0.07, 0.08, 0.10])),
-    )
-
-
-def floor_of(
-    rng: np.random.Generator, style: Style, home: HomeFinish, kind: RoomKind
-) -> Floor | None:
-    """The floor of a room of that kind; None leaves it as the source has it."""
-    if kind is RoomKind.OUTDOOR:
-        return _outdoor_floor(rng) if rng.random() < 0.8 else None
-    if kind is RoomKind.STORE:
-        return Floor(Pattern("concrete", _seed(rng), (_one(rng, COLOURS["concretes"]),)))
-    if kind in _TILED_FLOORS:
-        if rng.random() < 0.85:
-            return home.wet_floor if rng.random() < 0.4 else _tile_floor(rng, style)
-        return home.dry_floors[0]
-    if kind is RoomKind.HALL and rng.random() < 0.3:
-        return home.wet_floor
-    if kind is RoomKind.BEDROOM and rng.random() < 0.25:
-        return _carpet(rng, style)
-    # Most dry rooms have one floor, laid at once.
-    draw = rng.random()
-    if draw < 0.65:
-        return home.dry_floors[0]
-    return home.dry_floors[1] if draw < 0.92 else _dry_floor(rng, style, kind)
-
-
-def walls_of(
-    rng: np.random.Generator, style: Style, home: HomeFinish, kind: RoomKind
-) -> WallFinish | None:
-    """The walls of a room of that kind; None leaves them as the source has them."""
-    if kind is RoomKind.OUTDOOR:
-        return None
-    if kind is RoomKind.STORE:
-        return WallFinish(Pattern("plaster", _seed(rng), (_one(rng, COLOURS["wall_whites"]),)))
-    paint = _paint(rng, style, home)
-    if kind is RoomKind.BATHROOM:
-        return _bathroom_walls(rng, style)
-    if kind is RoomKind.KITCHEN:
-        if rng.random() < 0.2:
-            tiles, height = _wall_tiles(rng, style, 1.5)
-            return WallFinish(paint, low=tiles, low_m=height)
-        return WallFinish(paint)
-    # Paint most rooms; paper, brick and rough plaster by the style.
-    draw = rng.random()
-    paper_share = 0.38 if style.walls[0] == "wallpaper" else 0.25 if "wallpaper" in style.walls else 0.05  # fmt: skip
-    if draw < paper_share:
-        paper = _wallpaper(rng, style, paint.tints[0])
-        if rng.random() < 0.4:
-            return WallFinish(paint, accent=paper)
-        return WallFinish(paper)
-    if draw < paper_share + 0.05 and "brick" in style.walls:
-        return WallFinish(_brick(rng, style))
-    if draw < paper_share + 0.20 and "plaster" in style.walls:
-        return WallFinish(replace(paint, family="plaster"))
-    if draw < paper_share + 0.32:
-        return WallFinish(paint, accent=_accent(rng, style))
-    if draw < paper_share + 0.36 and kind is RoomKind.HALL:
-        dado = Pattern("paint", _seed(rng), (mix(paint.tints[0], style.palette[2], 0.45),))
-        return WallFinish(paint, low=dado, low_m=float(rng.choice([0.95, 1.1, 1.25])))
-    return WallFinish(paint)
-
-
-def _paint(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
-    draw = rng.random()
-    if draw < 0.38:
-        tint = home.wall
-    elif draw < 0.65:
-        tint = style.palette[int(rng.integers(2))]
-    elif draw < 0.85:
-        tint = mix(style.palette[2], (0.95, 0.94, 0.92), float(rng.uniform(0.3, 0.65)))
-    else:
-        tint = _one(rng, COLOURS["soft_tints"])
-    return Pattern("paint", _seed(rng, 3), (tint,))
-
-
-def _accent(rng: np.random.Generator, style: Style) -> Pattern:
-    if "brick" in style.walls and rng.random() < 0.5:
-        return _brick(rng, style)
-    return Pattern("paint", _seed(rng, 3), (style.palette[2],))
-
-
-def _brick(rng: np.random.Generator, style: Style) -> Pattern:
-    if rng.random() < 0.5:
-        return Pattern("painted brick", _seed(rng), (mix(style.palette[0], (1, 1, 1), 0.3),))
-    return Pattern("brick", _seed(rng), (_one(rng, COLOURS["bricks"]),))
-
-
-def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
-    tint, accent = inks(rng, ground, mix(style.palette[2], style.accent, 0.25))
-    return Pattern("wallpaper", _seed(rng), (ground, tint, accent), variant=_one(rng, style.papers))
-
-
-def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tuple[Pattern, float]:
-    """Wall tiles, and the height near height_m that is a whole number of them."""
-    laid, tile_m = _one(rng, (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)))  # fmt: skip
-    tint = _one(rng, COLOURS["wall_tiles"])
-    if rng.random() < 0.12:
-        tint = mix(style.palette[2], (0.95, 0.95, 0.94), 0.3)
-    grout = mix(tint, _DIRT, 0.55)
-    return Pattern("tiles", _seed(rng), (tint, grout), variant=laid), round(height_m / tile_m) * tile_m  # fmt: skip
-
-
-def _bathroom_walls(rng: np.random.Generator, style: Style) -> WallFinish:
-    above = Pattern("paint", _seed(rng, 3), (_one(rng, COLOURS["wall_whites"]),))
-    draw = rng.random()
-    if draw < 0.12:
-        light, vein = _one(rng, _MARBLES[:2])
-        return WallFinish(Pattern("marble", _seed(rng), (light, vein)))
-    if draw < 0.45:
-        tiles, _height = _wall_tiles(rng, style, 2.5)
-        return WallFinish(tiles)
-    tiles, height = _wall_tiles(rng, style, 2.0 if draw < 0.85 else 1.3)
-    return WallFinish(above, low=tiles, low_m=height)
-
-
-def _dry_floor(rng: np.random.Generator, style: Style, kind: RoomKind) -> Floor:
-    # The style's floors, liked most first; carpet only where people sleep or sit.
-    liked = [f for f in style.floors if f != "carpet" or kind is not RoomKind.HALL]
-    weights = np.array([1.0 / (k + 1) for k in range(len(liked))])
-    name = liked[int(rng.choice(len(liked), p=weights / weights.sum()))]
-    if name == "carpet":
-        return _carpet(rng, style)
-    if name == "terracotta":
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
-    return _tile_floor(rng, style) if name == "tiles" else _wood_floor(rng, style, name)
-
-
-def _wood_floor(rng: np.random.Generator, style: Style, name: str) -> Floor:
-    # Floors are seldom of the furniture's own wood.
-    wood = style.wood if rng.random() < 0.45 else WOODS[_one(rng, WOODS_FOR.floors)]
-    pattern = Pattern(name, _seed(rng), wood=wood, darkness=round(style.darkness, 3))
-    return Floor(pattern, np.pi / 4 if name == "herringbone" else 0.0)
-
-
-def _carpet(rng: np.random.Generator, style: Style) -> Floor:
-    tint = mix(style.textiles[int(rng.integers(2))], rgb("a89c8a"), 0.45)
-    return Floor(Pattern(_one(rng, ("carpet", "carpet", "loop carpet")), _seed(rng), (tint,)))
-
-
-def _tile_floor(rng: np.random.Generator, style: Style) -> Floor:
-    draw = rng.random()
-    turn = np.pi / 4 if rng.random() < 0.12 else 0.0
-    if draw < 0.08:
-        light, vein = _one(rng, _MARBLES)
-        return Floor(Pattern("marble", _seed(rng), (light, vein)), turn)
-    if draw < 0.16 or (style.floors[0] == "terracotta" and draw < 0.4):
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)), turn)
-    if draw < 0.25:
-        dark = _one(rng, COLOURS["checkers"])
-        tints = (rgb("e6e3db"), dark, mix(dark, _DIRT, 0.5))
-        return Floor(Pattern("tiles", _seed(rng), tints, variant=_one(rng, ("15", "20", "30")) + "-checker"), turn)  # fmt: skip
-    body = _one(rng, COLOURS["floor_tiles"])
-    stone = "-stone" if rng.random() < 0.55 else ""
-    laid = _one(rng, ("30", "30", "45", "60", "30x60"))
-    return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant=laid + stone), turn)  # fmt: skip
-
-
-def _outdoor_floor(rng: np.random.Generator) -> Floor:
-    draw = rng.random()
-    if draw < 0.35:
-        return Floor(Pattern("planks", _seed(rng), wood=WOODS["teak"], darkness=0.1))
-    if draw < 0.6:
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
-    body = _one(rng, COLOURS["floor_tiles"][2:8])
-    return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant="45-stone"))
-
-
-def _one(rng: np.random.Generator, choices: Sequence[_T]) -> _T:
-    return choices[int(rng.integers(len(choices)))]
-
-
-def _seed(rng: np.random.Generator, most: int = 2**31) -> int:
-    # Few seeds where pictures hardly differ: equal ones are made once.
-    return int(rng.integers(most))
-
-
-# The part of dressing that gives every room its floor, walls, ceiling and skirting boards.
-
-
-PART = "surfaces"
-
-_KEPT_SHARE = 0.1  # of photographed floors and walls that stay
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.dress.surroundings.scenery import Look, Rgb, Scenery, lit, mottled, paved
-from pbrs_farm.dress.textures.maps import noise
+from pbrs_farm.dress.textures.noise import noise
 
 STOREY_M: Final = 3.0
 _PX: Final = 512  # of a facade's picture, which shows two bays by two storeys

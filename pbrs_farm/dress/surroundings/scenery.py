@@ -17,7 +17,8 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import LIT, OUTSIDE, Item, ItemKind, Material, Surface, Texture
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
-from pbrs_farm.dress.textures.maps import colour_bytes, noise, texture_from_pixels
+from pbrs_farm.dress.textures.maps import colour_bytes, texture_from_pixels
+from pbrs_farm.dress.textures.noise import noise
 from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.geometry.solids import quads_surface
 
@@ -129,9 +130,6 @@ def _surface(look: Look, rows: list[tuple[F64, F64 | None]], material: int) -> S
     return Surface(
         made.name, made.positions, faces, material, own.reshape(-1, 2).astype(np.float32)
     )
-
-
-# Pictures that repeat.
 
 
 def mottled(

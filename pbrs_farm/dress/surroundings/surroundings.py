@@ -48,6 +48,10 @@ _FRENCH_SILL_M, _FRENCH_HEIGHT_M = 0.25, 1.7  # of a window that one can walk th
 _MOST_ROOMS: Final = 500
 
 KINDS: Final = ("street", "garden", "court", "blocks", "hills")
+_N_RING: Final = 220
+_ROAD: Final = (5.0, 11.5)  # away from the home's side
+_PAVEMENT_M: Final = 2.0
+_PATH_M: Final = 1.2  # of slabs about a house
 
 
 class _Side(NamedTuple):
@@ -165,14 +169,6 @@ def _kinds(rng: np.random.Generator, kind: str, *, is_flat: bool) -> list[str]:
     return [drawn.get(k, str(aside)) for k in range(4)]
 
 
-# The ground, in zones.
-
-
-_ROAD: Final = (5.0, 11.5)  # away from the home's side
-_PAVEMENT_M: Final = 2.0
-_PATH_M: Final = 1.2  # of slabs about a house
-
-
 def _strip(side: _Side, near: float, far: float, wide: float = 0.0) -> BaseGeometry:
     """The plan area between two distances of a side, as long as the surroundings reach."""
     half = wide or side.half + _REACH_M
@@ -209,9 +205,6 @@ def _lay_ground(
         free = free.difference(area)
         place.scenery.lay("ground", place.ground[name], own, y + above)
     place.scenery.lay("ground", place.ground["lawn"], free, y)
-
-
-# What stands on each side.
 
 
 def _street(place: _Place, side: _Side, number: int) -> None:
@@ -326,12 +319,6 @@ def _trees(
             place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), place.leaves[kind], place.trunk,
             is_fir=kind == FIR, n=340 if away[0] < 8.0 else 170,
         )  # fmt: skip
-
-
-# What closes the horizon, and railings before windows that one could step out of.
-
-
-_N_RING: Final = 220
 
 
 def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: list[str]) -> None:

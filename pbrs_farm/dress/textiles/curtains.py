@@ -15,129 +15,13 @@ from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
+from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import hung
 from pbrs_farm.dress.things.materials import metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
-from pbrs_farm.geometry.solids import box, lathe, sphere
+from pbrs_farm.geometry.solids import box, sphere
 from pbrs_farm.home.names import RADIATORS, words_of_item
-
-# Hanging cloth as closed thin bodies: pleated panels, blinds, towels over a bar.
-# Shapes have their back towards the wall, z = 0, and grow to +z; y is up from their lower edge.
-
-
-_THICK_M = 0.003
-_COLUMNS_PER_FOLD = 10
-_ROWS = 9
-# Turns what stands upright so that it lies along +x.
-_ALONG_X = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
-
-
-@dataclass(frozen=True, slots=True)
-class Folds:
-    """How a panel is pleated."""
-
-    length_m: float  # of one fold across
-    depth_m: float  # from the middle of the folds to their crests, at the lower edge
-    phase: float = 0.0
-    sway: float = 0.3  # how far folds wander from top to bottom, radians
-
-    def depths(self, x: F64, v: F64) -> F64:
-        """Offset from the middle plane at x metres across and v from 0 (bottom) to 1 (top)."""
-        across = 2 * np.pi * x / self.length_m + self.phase + self.sway * np.sin(2.2 * (1 - v))
-        # Pleats are pinched above and open below; crests are rounder than a sine.
-        wave = np.sin(across + 0.35 * np.sin(across))
-        second = 0.22 * np.sin(0.53 * across + 1.3 * self.phase) * (1 - v)
-        return np.asarray(self.depth_m * (0.62 + 0.38 * (1 - v)) * (wave + second), np.float64)
-
-
-def panel(name: str, width: float, height: float, z: float, folds: Folds, tile_m: float) -> Surface:
-    """A pleated panel with its lower left corner at x = 0, y = 0, its middle plane at z."""
-    n = max(int(np.ceil(width / folds.length_m * _COLUMNS_PER_FOLD)), 8)
-    x, v = np.meshgrid(np.linspace(0, width, n + 1), np.linspace(0, 1, _ROWS + 1))
-    depth = folds.depths(x, v)
-    # The cloth is longer than the panel is wide: texture runs along it.
-    steps = np.hypot(np.diff(x, axis=1), np.diff(depth, axis=1))
-    run = np.concatenate([np.zeros((_ROWS + 1, 1)), np.cumsum(steps, 1)], 1)
-    middle = np.stack([x, v * height, z + depth], -1)
-    return solid_sheet(name, middle, np.stack([run, v * height], -1) / tile_m)
-
-
-def solid_sheet(name: str, middle: F64, uv: F64, thick_m: float = _THICK_M) -> Surface:
-    """A closed body around a sheet of points (R, C, 3), its front towards +z where it is flat."""
-    rows, columns = middle.shape[:2]
-    across, up = np.gradient(middle, axis=1), np.gradient(middle, axis=0)
-    normal = np.cross(across, up)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    front, back = middle + normal * thick_m / 2, middle - normal * thick_m / 2
-    n = rows * columns
-    index = np.arange(n).reshape(rows, columns)
-    a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-    faces = np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-    # Close the rim with vertices of its own, so that the sheet's shading stays smooth.
-    rim = np.concatenate([index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]])
-    after = np.roll(rim, -1)
-    rim_points = np.concatenate([front.reshape(-1, 3)[rim], back.reshape(-1, 3)[rim]])
-    k = np.arange(len(rim))
-    nxt = np.roll(k, -1)
-    f, g = 2 * n, 2 * n + len(rim)
-    rim_faces = np.concatenate(
-        [np.stack([f + k, g + k, g + nxt], -1), np.stack([f + k, g + nxt, f + nxt], -1)]
-    )
-    outward = np.cross(
-        front.reshape(-1, 3)[after] - front.reshape(-1, 3)[rim], normal.reshape(-1, 3)[rim]
-    )
-    outward = outward / np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
-    positions = np.concatenate([front.reshape(-1, 3), back.reshape(-1, 3), rim_points])
-    normals = np.concatenate([normal.reshape(-1, 3), -normal.reshape(-1, 3), outward, outward])
-    flat_uv = uv.reshape(-1, 2)
-    return Surface(
-        name,
-        positions.astype(np.float32),
-        np.concatenate([faces, faces[:, ::-1] + n, rim_faces]).astype(np.int32),
-        0,
-        np.concatenate([flat_uv, flat_uv, flat_uv[rim], flat_uv[rim]]).astype(np.float32),
-        normals.astype(np.float32),
-    )
-
-
-def bar(name: str, x0: float, x1: float, y: float, z: float, radius: float) -> Surface:
-    """A round bar along x with closed ends."""
-    profile = np.array([[0, x0], [radius, x0], [radius, x1], [0, x1]])
-    upright = lathe(name, profile, np.zeros(3), 0, n=12)
-    normals = upright.normals
-    assert normals is not None
-    turn = _ALONG_X.astype(np.float32)
-    moved = upright.positions @ turn.T + np.array([0, y, z], np.float32)
-    return replace(
-        upright, positions=moved.astype(np.float32), normals=(normals @ turn.T).astype(np.float32)
-    )
-
-
-def towel_over_bar(width: float, drop: float, z: float, rng: np.random.Generator) -> Surface:
-    """A towel folded over a bar at height drop, both halves hanging, gently waved."""
-    n_side, columns = 8, 14
-    short = drop * float(rng.uniform(0.55, 0.9))
-    radius = 0.014
-    # Go up the back, over the bar, down the front.
-    back = [(drop - short * (1 - t), -radius) for t in np.linspace(0, 1, n_side)]
-    over = [
-        (drop + radius * np.sin(a), -radius * np.cos(a)) for a in np.linspace(0, np.pi, 7)[1:-1]
-    ]
-    front = [(drop * (1 - t), radius) for t in np.linspace(0, 1, n_side)]
-    path = np.array([*back, *over, *front])[::-1]
-    x, along = np.meshgrid(np.linspace(-width / 2, width / 2, columns), np.arange(len(path)))
-    y, depth = path[along, 0], path[along, 1]
-    wave = (
-        0.004 * np.sin(2 * np.pi * x / width * 1.5 + float(rng.uniform(0, 6))) * (drop - y) / drop
-    )
-    middle = np.stack([x, y, z + depth + np.where(depth > 0, wave + 0.004, -0.2 * wave)], -1)
-    run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    return solid_sheet("towel", middle, np.stack([x, run[along]], -1) / 0.25, 0.006)
-
-
-# Curtains and blinds at a window, made to its size.
-
 
 PART = "textiles"
 _FROM_FLOOR_M = 0.015

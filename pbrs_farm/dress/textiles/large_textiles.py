@@ -10,14 +10,8 @@ from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, mix, room_style
-from pbrs_farm.dress.textiles.curtains import (
-    bar,
-    hang_blind,
-    hang_curtains,
-    room_cloth,
-    towel_over_bar,
-    window_side,
-)
+from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
+from pbrs_farm.dress.textiles.hanging_cloth import bar, towel_over_bar
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import Made, hung
@@ -25,9 +19,6 @@ from pbrs_farm.dress.things.materials import metal
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
-
-# Hangs towels near washbasins: on a rail of the catalogue, or on one made here.
-
 
 PART = "textiles"
 _RAIL_M = 1.25  # above the floor
@@ -98,9 +89,6 @@ def _nearest(
             if away < _FAR_M and (best is None or away < best[0]):
                 best = (away, k, float(s) + 0.03)
     return None if best is None else (best[1], best[2])
-
-
-# The part `textiles_large` of dressing.
 
 
 def textiles_large(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:

@@ -33,6 +33,7 @@ _RUG_FORMS = ("sharp", "sharp", "rounded", "fringed", "oval")
 _MAT_FORMS = ("sharp", "rounded", "oval")
 _GAP_M = 0.0005  # between the floor and the rug's back
 _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
+_LEAST_M, _MOST_M = 0.3, 6.0  # of a rug's sides
 
 
 def rug(
@@ -317,12 +318,6 @@ def _is_bare(space: HouseSpace, room: RoomSpace, area: BaseGeometry) -> bool:
     low = np.array([x0, room.room.floor_y + 0.002, z0])
     high = np.array([x1, room.room.floor_y + 0.1, z1])
     return space.is_free(low, high)
-
-
-# Rugs that were drawn in one colour get a pattern and pile but on the draft.
-
-
-_LEAST_M, _MOST_M = 0.3, 6.0  # of a rug's sides
 
 
 def cover_drawn_rugs(draft: Draft, style: Style, share: float) -> None:

@@ -9,16 +9,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.dress.textures.maps import (
-    Shape2,
-    SurfaceMaps,
-    coverage,
-    noise,
-    ramp,
-    sampled,
-    smoothstep,
-    surface_maps,
-)
+from pbrs_farm.dress.textures.maps import SurfaceMaps, ramp, surface_maps
+from pbrs_farm.dress.textures.noise import Shape2, coverage, noise, sampled, smoothstep
 
 _INTS = NDArray[np.int64]
 

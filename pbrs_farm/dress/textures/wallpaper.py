@@ -9,7 +9,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.dress.textures.maps import Shape2, SurfaceMaps, noise, smoothstep, surface_maps
+from pbrs_farm.dress.textures.maps import SurfaceMaps, surface_maps
+from pbrs_farm.dress.textures.noise import Shape2, noise, smoothstep
 
 WIDTH_M = 0.53  # of a roll
 

@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
-
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
-from pbrs_farm.core.classes import MIRROR, OTHERPROP, SINK
-from pbrs_farm.core.house import Material
-from pbrs_farm.dress.built_in import coat_material, joinery_scheme
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.core.classes import MIRROR, SINK
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.textiles.rug_patterns import RUGS, rug_pixels
 from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things import radiators
-from pbrs_farm.dress.things.assembly import Made, Part, hung, transformed
-from pbrs_farm.dress.things.bodies import turned
-from pbrs_farm.dress.things.materials import plain
-from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
-    CUPBOARD_FORMS,
     SWITCH_FORMS,
     clock,
-    faced_slab,
     frame_material,
     jpeg_texture,
     mirror,
 )
-from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
@@ -197,166 +184,3 @@ def _beside(
                 hanging.hang(piece, shape, k, s, low, margin_m=0.02)
                 return True
     return False
-
-
-# Panel radiators below the windows of a home that has none but on the draft.
-
-
-_HEATED: Final = 0.75  # of homes without any, that are heated so
-_LOW_M, _SPACE_M = 0.12, 0.1  # above the floor; below the sill
-_LEAST_SILL_M: Final = 0.6
-_OTHER_HEAT: Final = frozenset({"fireplace", "stove"})
-_UNHEATED = (RoomKind.STORE, RoomKind.OUTDOOR)
-
-
-def wants_radiators(draft: Draft) -> bool:
-    """Whether the home is heated neither by what was drawn nor from its floors."""
-    drawn = any(words_of_item(item) & (RADIATORS | _OTHER_HEAT) for item in draft.source.items)
-    return not drawn and float(draft.rng("radiators").random()) < _HEATED
-
-
-def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
-    """A radiator below each window of the room whose wall is free there, in the home's scheme."""
-    room, rng = hanging.room, hanging.draft.rng("radiators", hanging.room.room.id)
-    if room.kind in _UNHEATED or rng.random() >= share:
-        return
-    paint = coat_material(joinery_scheme(hanging.draft, style).radiator)
-
-    def make(wide: float, high: float) -> Made:
-        return radiators.wall_radiator.make(rng, style, wide, high, paint)
-
-    for window in room.windows:
-        side = window.side_of(room.room.id)
-        sill = window.bottom_y - hanging.floor_y
-        if side is None or not _LEAST_SILL_M <= sill <= 1.4:
-            continue
-        height = min(sill - _LOW_M - _SPACE_M, 0.6)
-        at = window.face_point(side)
-        for k, face in enumerate(hanging.faces):
-            if face.normal @ window.inward(side) < 0.99 or abs(face.out_of(at[None])[0]) > 0.03:
-                continue
-            s, width = float(face.s_of(at[None])[0]), window.width
-            if _hang_below(hanging, k, s, (width, height), make):
-                break
-
-
-def _hang_below(
-    hanging: Hanging,
-    face: int,
-    s: float,
-    size: tuple[float, float],
-    make: Callable[[float, float], Made],
-) -> bool:
-    width, height = size
-    low = hanging.floor_y + _LOW_M
-    for factor in (0.85, 0.6, 0.45):
-        wide = round(min(width * factor, 1.6) / 0.1) * 0.1
-        half = wide / 2 + 0.08
-        if wide < 0.4:
-            return False
-        if (
-            hanging.faces[face].free_m(s - half, s + half, hanging.floor_y + 0.05, low + height)
-            > 0.3
-        ):
-            made = make(wide, height)
-            hanging.hang(*made, face, s, low, margin_m=0.02)
-            return True
-    return False
-
-
-# Shelves, boxes and cupboards on walls, towel radiators and woven cloth.
-
-
-_RADIATORS: Final = 0.65  # of bathrooms
-_LADDER_M: Final = 0.45  # of a towel radiator's foot above the floor
-_ABOVE_M: Final = 0.32  # free over the highest board: things stand there
-_BEFORE_M: Final = 0.3  # free before it
-
-
-def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
-    """Boards, open boxes and cupboards: the clutter that follows fills them. A bath's towel radiator."""
-    kind = hanging.room.kind
-    rng = hanging.draft.rng("shelf", hanging.room.room.id)
-    low, high = WANTS[kind].shelves, WANTS[kind].most_shelves
-    wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
-    is_bath = kind is RoomKind.BATHROOM
-    if is_bath and rng.random() < _RADIATORS * share:
-        hang_anywhere(hanging, radiators.towel_radiator.make(rng, style), _LADDER_M, 0.2, rng)
-    wood = plain(f"shelf {style.wood.name}", style.wood.mean, 0.4)
-    board = wood if rng.random() < 0.6 else plain("shelf white", (0.9, 0.9, 0.88), 0.4)
-    # What hangs in one room is of one make, of several widths.
-    for _ in range(wanted):
-        longest = 0.7 if is_bath else 1.7
-        width = float(rng.uniform(0.35 if is_bath else 0.6, longest))
-        own = int(rng.integers(1 << 30))
-        for factor in (1.0, 0.65, 0.45):
-            made, low_m, above_m = _shelf(
-                np.random.default_rng(own), style, board, width * factor, is_bath=is_bath
-            )
-            depth = float(made[1].bounds[1, 2])
-            if hang_anywhere(
-                hanging, made, low_m, depth + _BEFORE_M, rng, above_m=above_m, tags=("support",)
-            ):
-                break
-
-
-def _shelf(
-    rng: np.random.Generator, style: Style, board: Material, width: float, *, is_bath: bool
-) -> tuple[Made, float, float]:
-    """Something with shelves, how high above the floor its lower edge hangs, and what stays free above it."""
-    depth = float(rng.uniform(0.14, 0.18) if is_bath else rng.uniform(0.19, 0.27))
-    kind = rng.random()
-    if kind < 0.5:
-        boards = int(rng.choice([1, 2, 2, 3]))
-        return (
-            hung_furniture.wall_shelf.make(rng, style, width, depth, boards, board),
-            1.5 if boards == 1 else 1.38,
-            _ABOVE_M,
-        )
-    if kind < 0.75:
-        height = float(rng.choice([0.34, 0.34, 0.62]))
-        made = hung_furniture.open_cupboard.make(rng, style, board, width, height, depth)
-        return made, float(rng.uniform(1.35, 1.55)), _ABOVE_M
-    n_doors = max(1, round(width / 0.45))
-    height = float(rng.uniform(0.38, 0.6))
-    given = (board, board, width, height, depth + 0.06, n_doors, int(rng.integers(CUPBOARD_FORMS)))
-    made = hung_furniture.wall_cupboard.make(rng, style, *given)
-    return made, float(rng.uniform(1.4, 1.6)), 0.05
-
-
-def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
-    """A woven cloth on a rod, in some rooms."""
-    rng = hanging.draft.rng("wall cloth", hanging.room.room.id)
-    if rng.random() >= WANTS[hanging.room.kind].cloth * share:
-        return
-    width, height = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.6, 1.1))
-    hang_anywhere(hanging, wall_cloth(rng, style, width, height), 1.6 - height / 2, IN_FRONT_M, rng)
-
-
-def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
-    """A patterned cloth that hangs from a rod, a fringe at its foot."""
-    fringe, rod = 0.09, 0.009
-    pixels = rug_pixels(rng, width, height, style, str(rng.choice(list(RUGS))))
-    texture = jpeg_texture("wall cloth", pixels)
-    shown = Material(f"cloth {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
-    r, g, b = (float(c) / 255 for c in pixels.reshape(-1, 3).mean(0))
-    yarn = plain("yarn", (r, g, b), 1.0)
-    low, high = np.array([-width / 2, fringe]), np.array([width / 2, height])
-    face, back = faced_slab("cloth", low, high, (0.002, 0.008))
-    parts: list[Part] = [(face, shown), (back, yarn)]
-    for x in np.arange(-width / 2 + 0.01, width / 2 - 0.01, 0.02):
-        ends = (
-            np.array([float(x), float(rng.uniform(0.0, 0.015))]),
-            np.array([float(x) + 0.012, fringe]),
-        )
-        parts += [(part, yarn) for part in faced_slab("fringe", *ends, (0.003, 0.007))]
-    along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    long = width + 0.1
-    stick = turned([(0.0, 0.0), (rod, 0.0), (rod, long), (0.0, long)], n=12)
-    parts.append(
-        (
-            transformed(stick, along, (-long / 2, height + rod, rod)),
-            plain("rod", style.wood.mean, 0.5),
-        )
-    )
-    return hung("wall_cloth", "wall_cloth", OTHERPROP, parts, [texture])

@@ -9,140 +9,23 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.classes import BED, CABINET, COUNTER, OTHERFURNITURE, SHELVES, SINK
+from pbrs_farm.core.classes import BED
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
-from pbrs_farm.dress.style import Style, mix
+from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.materials import plain
-from pbrs_farm.dress.walls.fittings import (
-    fit_switches,
-    hang_clock,
-    hang_cloth,
-    hang_mirrors,
-    hang_radiators,
-    hang_shelves,
-    wants_radiators,
-)
-from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
-from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS
+from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors
+from pbrs_farm.dress.walls.hanging import WANTS, Hanging
+from pbrs_farm.dress.walls.kitchens import hang_kitchen
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
-from pbrs_farm.home.names import words_of_item
+from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
+from pbrs_farm.dress.walls.wall_shelves import hang_cloth, hang_shelves
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
-
-# Cupboards, open boxes and rails over the worktops of kitchens that have none but on the draft.
-
-
-_WORKTOPS: Final = frozenset({CABINET, COUNTER, OTHERFURNITURE, SINK})
-_TOP_M: Final = (0.7, 1.15)  # heights of worktops
-_OVER_M: Final = 1.42  # above the floor: the lower edge of cupboards
-_BEFORE_M: Final = 0.38
-_HOT: Final = frozenset({"cooker", "stove", "hob", "oven"})  # nothing hangs over them
-_CHANCE, _RAIL, _OPEN = 0.75, 0.6, 0.3
-_LEAST_M: Final = 0.35
-_DEEP_M: Final = 0.32  # of cupboards; open ones are 4 cm less
-
-
-def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
-    """Cupboards over a kitchen's worktops, as far as the wall is free, and a rail below or instead."""
-    rng = hanging.draft.rng("kitchen wall", hanging.room.room.id)
-    if hanging.room.kind is not RoomKind.KITCHEN or rng.random() >= share:
-        return
-    runs = _runs(hanging, space)
-    if not _has_cupboards(hanging, space) and rng.random() < _CHANCE:
-        _hang_cupboards(hanging, runs, style, rng)
-    if rng.random() < _RAIL:
-        _hang_rail(hanging, runs, style, rng)
-
-
-def _has_cupboards(hanging: Hanging, space: HouseSpace) -> bool:
-    return any(
-        hanging.draft.items[n].nyu40 in (CABINET, SHELVES)
-        and space.bounds[n][0, 1] > hanging.floor_y + 1.2
-        for n in hanging.room.items
-    )
-
-
-def _runs(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float, float]]:
-    """(face, s0, s1) of the wall behind each stretch of worktops that join."""
-    pieces: dict[int, list[tuple[float, float]]] = {}
-    for number in hanging.room.items:
-        item, (low, high) = hanging.draft.items[number], space.bounds[number]
-        is_top = _TOP_M[0] < high[1] - hanging.floor_y < _TOP_M[1] and item.nyu40 in _WORKTOPS
-        if is_top and not words_of_item(item) & _HOT:
-            for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]:
-                pieces.setdefault(k, []).append((s0, s1))
-    runs: list[tuple[int, float, float]] = []
-    for k in sorted(pieces):
-        # Join what stands side by side.
-        for s0, s1 in sorted(pieces[k]):
-            if runs and runs[-1][0] == k and s0 < runs[-1][2] + 0.05:
-                runs[-1] = (k, runs[-1][1], max(s1, runs[-1][2]))
-            else:
-                runs.append((k, s0, s1))
-    return runs
-
-
-def _hang_cupboards(
-    hanging: Hanging, runs: list[tuple[int, float, float]], style: Style, rng: np.random.Generator
-) -> None:
-    height, low = float(rng.uniform(0.58, 0.74)), hanging.floor_y + _OVER_M
-    tone = mix((0.9, 0.9, 0.88), style.palette[2], float(rng.choice([0.0, 0.0, 0.5])))
-    white = plain("kitchen front", tone, 0.35)
-    wood = plain(f"kitchen {style.wood.name}", style.wood.mean, 0.45)
-    front = wood if rng.random() < 0.35 else white
-    body = white if rng.random() < 0.6 else front
-    form = int(rng.integers(CUPBOARD_FORMS))
-    for k, s0, s1 in runs:
-        face, s = hanging.faces[k], max(s0, 0.0)
-        width = float(rng.choice([0.45, 0.5, 0.6, 0.8]))
-        while s < min(s1, face.length) - _LEAST_M:
-            w = min(width, min(s1, face.length) - s - 0.004)
-            # Go on in small steps where something is in the way.
-            if face.free_m(s, s + w, low - 0.02, low + height + 0.02) < _BEFORE_M:
-                s += 0.05
-                continue
-            is_open = rng.random() < _OPEN
-            if is_open:
-                made = hung_furniture.open_cupboard.make(
-                    rng, style, body, w, height, _DEEP_M - 0.04
-                )
-            else:
-                given = (body, front, w, height, _DEEP_M, 2 if w > 0.62 else 1, form)
-                made = hung_furniture.wall_cupboard.make(rng, style, *given)
-            tags = ("support",) if is_open else ()
-            hanging.hang(*made, k, s + w / 2, low, margin_m=0.0, tags=tags)
-            s += w + 0.001
-
-
-def _hang_rail(
-    hanging: Hanging, runs: list[tuple[int, float, float]], style: Style, rng: np.random.Generator
-) -> None:
-    width = float(rng.uniform(0.55, 0.95))
-    piece, shape = hung_furniture.tool_rail.make(rng, style, width)
-    bottom = float(shape.bounds[0, 1])
-    low = hanging.floor_y + 0.97 - bottom
-    for k, s0, s1 in runs:
-        middle = (s0 + s1) / 2
-        for shift in (0.0, 0.3, -0.3, 0.6, -0.6):
-            s = middle + shift
-            is_there = s0 - 0.05 < s - width / 2 and s + width / 2 < s1 + 0.05
-            top = low + float(shape.bounds[1, 1]) + 0.02
-            if (
-                is_there
-                and hanging.faces[k].free_m(s - width / 2, s + width / 2, low + bottom, top) > 0.15
-            ):
-                hanging.hang(piece, shape, k, s, low)
-                return
-    hanging.draft.refused["walls: no free wall for a kitchen rail"] += 1
-
-
-# Rows of hooks with coats, bags and bathrobes on them but on the draft.
-
 
 _HOOKS_M: Final = 1.68  # of the board's lower edge above the floor
 _RACK_BEFORE_M: Final = 0.55
 _FROM_BED_M: Final = 0.6  # nobody sleeps below coats or against them
+PART = "walls"
 
 
 def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
@@ -181,12 +64,6 @@ def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) ->
     return any(
         bool((bed[0, plan] < high[plan]).all() and (bed[1, plan] > low[plan]).all()) for bed in beds
     )
-
-
-# The part `walls` of dressing.
-
-
-PART = "walls"
 
 
 def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:

@@ -17,7 +17,7 @@ from pbrs_farm.core.house import Item
 from pbrs_farm.core.record import Record, read_csv
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import RoomSpace, WallFace
-from pbrs_farm.dress.space.floor_bitmaps import flights_of
+from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
 from pbrs_farm.home.room_use import RoomKind
 

@@ -36,6 +36,7 @@ _BENEATH = {
     CHAIR: 0.3,
 }  # fmt: skip
 _LOWEST_M, _TALLEST_BENEATH_M = 0.35, 1.25
+_LOW_M: Final = 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,12 +262,6 @@ def _picture(
     if kind == "poster":
         return poster(width, height, shown.texture)
     return framed(rng, style, width, height, shown.texture, frame)
-
-
-# Boards of cork with what a household pins to them but on the draft.
-
-
-_LOW_M: Final = 1.2
 
 
 def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:

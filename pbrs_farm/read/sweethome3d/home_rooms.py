@@ -11,7 +11,8 @@ import shapely
 from pbrs_farm.core.arrays import F64, Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
-from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal, level_or_sloped
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
+from pbrs_farm.geometry.roofs import level_or_sloped
 from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,

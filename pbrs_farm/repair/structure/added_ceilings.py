@@ -28,7 +28,8 @@ from pbrs_farm.core.house import (
     part_of,
 )
 from pbrs_farm.core.mesh import unit_normals
-from pbrs_farm.geometry.plan_surfaces import counter_clockwise, level_or_sloped
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise
+from pbrs_farm.geometry.roofs import level_or_sloped
 from pbrs_farm.home.room_use import is_outdoors
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from itertools import combinations
 
@@ -14,7 +13,7 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter import clutter, table_tops
 from pbrs_farm.dress.clutter.receptacles import Row, receptacle_of, shares
 from pbrs_farm.dress.clutter.stock import Stock, is_known
 from pbrs_farm.dress.draft import Draft
@@ -138,7 +137,7 @@ def test_a_room_has_no_more_of_a_kind_than_people_keep(monkeypatch: pytest.Monke
     catalogue = Catalogue((piece,), lambda _p: Shape((surface,), (Material("m"),)), "test")
     tables = [solid(f"Table {k}", [k, 0, 0], [k + 0.9, 0.45, 0.9], 7) for k in range(4)]
     rows = {"coffee_table": (Row(receptacle="coffee_table", kind="box", share=1.0, source="own"),)}
-    monkeypatch.setattr(sys.modules[clutter.__module__], "shares", lambda: rows)
+    monkeypatch.setattr(table_tops, "shares", lambda: rows)
     draft = Draft(house(*tables), 1)
     clutter(draft, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
     on_tables = [i for i in _added(draft) if i.bounds[0, 1] > 0.4]

@@ -10,7 +10,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import clutter
-from pbrs_farm.dress.clutter.cushions import find_seat, lying_place
+from pbrs_farm.dress.clutter.beds import lying_place
+from pbrs_farm.dress.clutter.cushions import find_seat
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.geometry.heights import highest_below

@@ -8,8 +8,9 @@ import pytest
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.gates.bodies import Body, shells_of
-from pbrs_farm.dress.gates.penetration import Solids, depths_inside, penetration_m, thickness
-from pbrs_farm.dress.gates.support import Plumb
+from pbrs_farm.dress.gates.penetration import penetration_m
+from pbrs_farm.dress.gates.plumb import Plumb
+from pbrs_farm.dress.gates.shells import Solids, depths_inside, thickness
 from pbrs_farm.geometry.solids import box_quads, lathe, quads_surface, sphere
 from pbrs_farm.geometry.surface_points import item_triangles
 from tests.dress.furniture import boards, bookcase, solid

@@ -6,7 +6,7 @@ import shapely
 
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.space.floor_bitmaps import Flights, flights_of
+from pbrs_farm.dress.space.flights import Flights, flights_of
 from tests.dress.furniture import boards, house, room
 
 STEPS = 10

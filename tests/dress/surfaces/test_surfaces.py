@@ -13,8 +13,9 @@ from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.surfaces import surfaces
+from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
 from pbrs_farm.dress.surfaces.dress_surfaces import room_frame
-from pbrs_farm.dress.surfaces.wall_materials import RoomFinder, cut_triangles, sided_wall
+from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, sided_wall
 from pbrs_farm.geometry.solids import wall_prism
 from pbrs_farm.repair import repair
 from tests.builders import builtin_home

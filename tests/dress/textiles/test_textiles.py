@@ -16,7 +16,8 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import textiles_large
-from pbrs_farm.dress.textiles.curtains import Folds, WindowSide, bar, is_flat, panel, towel_over_bar
+from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
+from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel, towel_over_bar
 from pbrs_farm.dress.textiles.large_textiles import towel_rail
 from pbrs_farm.dress.textiles.rug_patterns import PATTERNS, inks_of, rug_pixels
 from pbrs_farm.dress.textiles.rugs import rug

@@ -9,7 +9,8 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import WOODS
 from pbrs_farm.dress.textures import families
 from pbrs_farm.dress.textures.families import FAMILIES, Pattern, pattern_material, size_of
-from pbrs_farm.dress.textures.maps import blurred, noise, normals_from_height
+from pbrs_farm.dress.textures.maps import normals_from_height
+from pbrs_farm.dress.textures.noise import blurred, noise
 from pbrs_farm.dress.textures.wallpaper import PATTERNS
 from tests.builders import builtin_home
 

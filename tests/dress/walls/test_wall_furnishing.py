@@ -11,16 +11,17 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import BED
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.built_in import coat_material, joinery_scheme
 from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.finish_scheme import joinery_scheme
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
+from pbrs_farm.dress.surface_finishes import coat_material
 from pbrs_farm.dress.things import hung, radiators
 from pbrs_farm.dress.things.maker import Thing
 from pbrs_farm.dress.walls import walls
-from pbrs_farm.dress.walls.fittings import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
+from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.home.room_use import RoomKind
 from tests.builders import builtin_home
 from tests.dress.furniture import solid

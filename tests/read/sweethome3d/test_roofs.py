@@ -10,7 +10,7 @@ import shapely
 import trimesh
 
 from pbrs_farm.core.house import House, ItemKind
-from pbrs_farm.geometry.plan_surfaces import roof_over
+from pbrs_farm.geometry.roofs import roof_over
 from pbrs_farm.read.sweethome3d.home import read_home
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, home_xml, piece, sh3d
 

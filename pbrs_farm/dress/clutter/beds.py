@@ -1,0 +1,220 @@
+"""Lays pillows, cushions and a folded blanket on beds; they take the shape of what they lie on. Effects: on the draft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from shapely import Polygon, contains_xy
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Shape
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Room
+from pbrs_farm.dress.clutter.cloths import drop_clothes, lay_duvet
+from pbrs_farm.dress.clutter.cushions import (
+    CELL_M,
+    LEAST_AIR_M,
+    TOUCH_M,
+    around_thing,
+    put_as_it_is,
+)
+from pbrs_farm.dress.clutter.placing import Placing
+from pbrs_farm.dress.supports import plan_turn
+from pbrs_farm.dress.things import soft
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.bodies import smooth
+from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+
+_DOUBLE_M = 1.08  # from which a mattress is wide enough for two pillows
+_PILLOW_UP_M = 0.06  # what rises so far above the mattress is a pillow, or a board
+_PILLOW_SUNK = 0.45  # of its half thickness that a pillow's middle stands above what it lies on
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lying:
+    """The flat part of a bed, seen from above, its head at the grid's back."""
+
+    grid: PlanGrid
+    tops: F64  # (rows, columns) heights; -inf = nothing
+    level: float  # world y of the mattress
+    rows: tuple[int, int]  # from the head to the foot, on the mattress
+    columns: tuple[int, int]
+
+    @property
+    def width(self) -> float:
+        """Across, metres."""
+        return (self.columns[1] - self.columns[0]) * self.grid.cell_m
+
+    @property
+    def length(self) -> float:
+        """From head to foot, metres."""
+        return (self.rows[1] - self.rows[0]) * self.grid.cell_m
+
+
+def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
+    """Put pillows, and now and then a cushion and a blanket, on items[index]; how many."""
+    bed = lying_place(scene, index, placing.room)
+    if bed is None or bed.width < 0.6 or bed.length < 1.2:
+        placing.refuse("no place to lie found")
+        return 0
+    rng, n = placing.rng, 0
+    if not _has_pillows(bed) and rng.random() < 0.95 * placing.share:
+        # Both pillows of a bed are alike.
+        own = int(rng.integers(1 << 30))
+        made = soft.bed_pillow.make(np.random.default_rng(own), placing.style)
+        is_double = bed.width > _DOUBLE_M
+        most = (bed.width + 0.04) / 2 - 0.02 if is_double else bed.width
+        if made[0].size[0] > most:
+            made = _narrowed(made, most / made[0].size[0])
+        apart = max(0.46, (made[0].size[0] + 0.02) / bed.width)
+        for at in (0.5 - apart / 2, 0.5 + apart / 2) if is_double else (0.5,):
+            n += lay_down(placing, scene, index, made, *_place(bed, at, 0.06, made), bed.level)
+        # Who sleeps there has a duvet, below the pillows.
+        first = bed.rows[0] * bed.grid.cell_m + 0.06 + made[0].size[1] + 0.08
+        sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
+        rows = first, bed.rows[1] * bed.grid.cell_m
+        duvet = lay_duvet(placing, scene, index, bed.grid, sides, rows, bed.level)
+        if rng.random() < placing.draft.mess:
+            _drop_on(placing, scene, duvet)
+        return n + 1
+    if rng.random() < 0.45 * placing.share:
+        # A cushion leans where the pillows end, not across the bed's middle.
+        made = soft.cushion.make(rng, placing.style)
+        at = float(rng.uniform(0.35, 0.65))
+        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.56, made), bed.level)
+    if rng.random() < 0.65 * placing.share:
+        # A folded blanket across the foot.
+        made = soft.folded_blanket.make(rng, placing.style)
+        at = float(rng.uniform(0.35, 0.65))
+        from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
+        n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)
+    return n
+
+
+def _narrowed(made: Made, factor: float) -> Made:
+    """The thing with its width scaled."""
+    piece, shape = made
+    scale = np.array([factor, 1.0, 1.0])
+    surfaces = tuple(
+        smooth(s.name, s.positions.astype(np.float64) * scale, s.faces) for s in shape.surfaces
+    )
+    surfaces = tuple(
+        replace(s, material=old.material) for s, old in zip(surfaces, shape.surfaces, strict=True)
+    )
+    size = (piece.size[0] * factor, *piece.size[1:])
+    return replace(piece, size=size), Shape(surfaces, shape.materials, shape.textures)
+
+
+def _drop_on(placing: Placing, scene: SceneTriangles, corners: F64) -> None:
+    """Drop a garment somewhere on cloth that was laid, given by its triangles."""
+    low, high = corners.min((0, 1)), corners.max((0, 1))
+    at = low + (high - low) * placing.rng.uniform(0.3, 0.7, 3)
+    drop_clothes(placing, scene, at[[0, 2]], float(high[1]))
+
+
+def lying_place(scene: SceneTriangles, index: int, room: Room) -> Lying | None:
+    """The mattress of a bed: the height that most of it has, between head and foot boards."""
+    corners = scene.of_item(index)
+    points = corners.reshape(-1, 3)
+    if not len(points):
+        return None
+    turn = plan_turn(scene.items[index], points)
+    grid = PlanGrid.around(points[:, [0, 2]], turn, CELL_M, 0.0)
+    # Turn it so that rows run along it, from the head.
+    quarter = 0 if grid.shape[0] >= grid.shape[1] else 1
+    if _foot_first(
+        PlanGrid.around(points[:, [0, 2]], turn + quarter * np.pi / 2, CELL_M, 0.0), corners, room
+    ):
+        quarter += 2
+    grid = PlanGrid.around(points[:, [0, 2]], turn + quarter * np.pi / 2, CELL_M, 0.0)
+    tops = top_heights(grid, corners)
+    level = _usual(tops[np.isfinite(tops)])
+    flat = np.abs(tops - level) < 0.05
+    rows = np.flatnonzero(flat.mean(1) > 0.4)
+    columns = np.flatnonzero(flat.mean(0) > 0.4)
+    if not len(rows) or not len(columns) or room.ceiling_y - level < LEAST_AIR_M:
+        return None
+    return Lying(
+        grid, tops, level, (int(rows[0]), int(rows[-1]) + 1), (int(columns[0]), int(columns[-1]) + 1)
+    )  # fmt: skip
+
+
+def _usual(heights: F64) -> float:
+    # The middle of the two centimetres that hold most of the heights.
+    if not len(heights):
+        return 0.0
+    bins = np.round(heights / 0.02).astype(np.int64)
+    values, counts = np.unique(bins, return_counts=True)
+    best = values[int(np.argmax(counts))]
+    return float(np.median(heights[bins == best]))
+
+
+def _foot_first(grid: PlanGrid, corners: F64, room: Room) -> bool:
+    # The head is the higher end; else the one at the wall.
+    tops = top_heights(grid, corners)
+    tops = np.where(np.isfinite(tops), tops, tops[np.isfinite(tops)].min(initial=0.0))
+    end = max(2, round(0.25 / grid.cell_m))
+    back, front = float(tops[:end].max()), float(tops[-end:].max())
+    if abs(back - front) > 0.05:
+        return front > back
+    middle = grid.shape[1] / 2
+    behind = grid.plan_of(middle, -0.3 / grid.cell_m)
+    ahead = grid.plan_of(middle, grid.shape[0] + 0.3 / grid.cell_m)
+    area = Polygon(room.polygon)
+    return bool(contains_xy(area, *behind) and not contains_xy(area, *ahead))
+
+
+def _has_pillows(bed: Lying) -> bool:
+    # Something on the mattress near the head is higher than it.
+    first = bed.rows[0] + round(0.1 / bed.grid.cell_m)
+    part = bed.tops[first : first + round(0.3 / bed.grid.cell_m), bed.columns[0] : bed.columns[1]]
+    return bool((part > bed.level + 0.03).mean() > 0.15)
+
+
+def _place(bed: Lying, across: float, from_head_m: float, made: Made) -> tuple[F64, float]:
+    # World (x, z) of a thing that lies so far from the head, and its turn.
+    depth = made[0].size[1]
+    row = bed.rows[0] + (from_head_m + depth / 2) / bed.grid.cell_m
+    column = bed.columns[0] + across * (bed.columns[1] - bed.columns[0])
+    return bed.grid.plan_of(column, row), bed.grid.turn_rad
+
+
+def lay_down(
+    placing: Placing, scene: SceneTriangles, index: int, made: Made, plan: F64, turn_rad: float,
+    level: float,
+) -> bool:  # fmt: skip
+    """Lay a soft thing down at a plan place (2,) on items[index]; False where something is there.
+
+    It is pressed flat below: no point of it is lower than what it lies on.
+    """
+    piece, shape = made
+    turn = rotation_y(turn_rad + float(placing.rng.normal(0, 0.05)))
+    half = piece.size[2] / 2
+    corners, others = around_thing(scene, index, plan, turn, np.asarray(piece.size), level)
+    if others:
+        placing.refuse("something lies on the bed or seat")
+        return False
+    # What is folded lies flat already; a cushion's middle sinks in, and what would be lower than
+    # the surface is pressed up to it.
+    sunk = 1.0 if piece.group == "blanket" else _PILLOW_SUNK
+    pressed, gap = [], np.inf
+    for surface in shape.surfaces:
+        points = (surface.positions - [0, half, 0]) @ turn.T + [plan[0], 0, plan[1]]
+        ground = highest_below(points[:, [0, 2]], corners, level + 0.12)
+        points[:, 1] = np.maximum(points[:, 1] + level + sunk * half, ground + TOUCH_M)
+        gap = min(gap, float((points[:, 1] - ground).min()))
+        pressed.append(points)
+    if not np.isfinite(gap):
+        placing.refuse("nothing to lie on")
+        return False
+    # Lower it to contact where the bed is not flat.
+    fall = np.array([0.0, gap - TOUCH_M, 0.0])
+    surfaces = [
+        smooth(s.name, points - fall, s.faces)
+        for s, points in zip(shape.surfaces, pressed, strict=True)
+    ]
+    put_as_it_is(placing, made, surfaces)
+    return True

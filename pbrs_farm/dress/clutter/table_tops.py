@@ -1,0 +1,95 @@
+"""Puts things on tables, desks, counters and chests, as the table of shares says, the largest first. Effects: on the draft."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.dress.clutter.cloths import drop_clothes
+from pbrs_farm.dress.clutter.placing import Placing, take_for_room
+from pbrs_farm.dress.clutter.receptacles import shares
+from pbrs_farm.dress.clutter.stock import CLUTTER, is_round
+from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.worktop import Worktop
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+
+_MOST_OF_A_KIND = 3  # on one surface
+_ANOTHER = 0.35  # chance of one more of the kind
+_FULL = 0.45  # no more is put where less than this share of the surface is free
+_MOST_FACTOR = 1.6
+_LEFT_M, _NAPKINS, _NAPKIN_M = 0.025, 0.6, 0.12  # after a meal: how far aside; napkins
+_CHAIR_M = 0.6  # from a chair's middle to the table it belongs to
+
+_USUAL_M2 = 0.4  # of receptacles that the file does not name
+
+
+def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[str] = ()) -> int:
+    """Put things on the worktop as the table says; how many were put there.
+
+    there: kinds that the home has there already.
+    """
+    rng = placing.rng
+    factor = min(top.support.area / CLUTTER.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
+    wanted: list[str] = []
+    most = CLUTTER.most_on_one | dict.fromkeys(there, 0)
+    for row in shares().get(receptacle, ()):
+        chance = np.clip((row.share + placing.bias * row.share**0.5) * factor, 0, 0.98)
+        left = most.get(row.kind, _MOST_OF_A_KIND) - wanted.count(row.kind)
+        while left > 0 and rng.random() < chance * placing.share:
+            wanted.append(row.kind)
+            left, chance = left - 1, _ANOTHER * chance
+    return put_all(placing, top, wanted)
+
+
+def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: SceneTriangles) -> int:
+    """Lay a place before each chair (plan points (2,)): a plate, a glass to its right; how many.
+
+    After a meal things stand where hands left them, and a napkin lies beside a plate.
+    """
+    rng, is_eaten = placing.rng, placing.rng.random() < placing.draft.mess
+    plate = placing.stock.take(placing.rng, "one_plate", placing.style)
+    glass = placing.stock.take(placing.rng, "glass", placing.style)
+    if plate is None or glass is None:
+        return 0
+    rows, columns = np.nonzero(top.support.mask)
+    cells = top.grid.plan_of(columns + 0.5, rows + 0.5)
+    middle, n = cells.mean(0), 0
+    for chair in chairs:
+        # Go in from the table's edge that is nearest to the chair.
+        edge = cells[int(np.argmin(((cells - chair) ** 2).sum(1)))]
+        inward = middle - edge
+        if np.linalg.norm(chair - edge) > _CHAIR_M or np.linalg.norm(inward) < 0.2:
+            continue
+        inward = inward / np.linalg.norm(inward)
+        right = np.array([-inward[1], inward[0]])
+        at = edge + inward * (plate[0].size[0] / 2 + 0.03)
+        aside = rng.normal(0, _LEFT_M, (2, 2)) if is_eaten else np.zeros((2, 2))
+        turned = float(rng.normal(0, 0.6)) if is_eaten else 0.0
+        n += placing.drop_near(top, plate, at + aside[0], turn_rad=turned)
+        n += placing.drop_near(top, glass, at + inward * 0.1 + right * 0.17 + aside[1])
+        if is_eaten and rng.random() < _NAPKINS:
+            place = at - right * 0.22 + inward * 0.02
+            if top.is_free(place, _NAPKIN_M):
+                drop_clothes(placing, scene, place, top.height, napkin=True)
+                n += 1
+    return n
+
+
+def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
+    """Put a thing of each of the kinds on the worktop, the largest first."""
+    things: list[tuple[str, Made]] = []
+    for kind in kinds:
+        made = take_for_room(placing, kind)
+        if made is not None:
+            things.append((kind, made))
+    things.sort(key=lambda thing: -thing[1][0].size[0] * thing[1][0].size[1])
+    n = 0
+    for kind, made in things:
+        if top.free_share() < _FULL and n:
+            placing.refuse("surface full")
+            continue
+        pull = -3.0 if kind in CLUTTER.in_front else 5.0 + 12.0 * made[0].size[2]
+        n += placing.drop(top, made, faces_anywhere=is_round(kind), depth_pull=pull)
+    return n

@@ -1,0 +1,67 @@
+"""Which pieces of the catalogue fit an old place, and at which scale; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from pbrs_farm.core.catalogue import Piece
+from pbrs_farm.core.house import Item
+from pbrs_farm.dress.old_place import OldPlace
+
+LEAST_SIDE: Final = 0.75  # of the old footprint's sides
+HEIGHT: Final = 0.15  # how far the height may differ
+SCALE: Final = (0.8, 1.25)  # models are of their true size
+STRETCH: Final = 1.2
+ALIKE: Final = 0.93
+MADE_OF_BOARDS: Final = frozenset(
+    {"bed", "desk", "nightstand", "tv_stand", "bookcase", "shelves", "wardrobe", "dresser",
+     "cabinet", "dining_table", "coffee_table", "fridge", "washer"}
+)  # fmt: skip
+
+Scale = tuple[float, float, float]  # along a piece's width, height, depth
+
+
+def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
+    """The scale at which a piece fills the old footprint; None where it does not fit.
+
+    Each side is 75 to 100 % of the old one, the height within 15 %. What is made of boards may be
+    up to STRETCH longer along one axis than along another, all else keeps its proportions.
+    """
+    width, depth, height = piece.size
+    old_width, old_depth, old_height = place.size
+    if min(width, depth, height) <= 0:
+        return None
+    # Along x, y, z: how much larger the piece may become.
+    room = (old_width / width, (1 + HEIGHT) * old_height / height, old_depth / depth)
+    least = min(room)
+    most = STRETCH * least if piece.group in MADE_OF_BOARDS else least
+    across, up, along = (min(r, most) for r in room)
+    up = min(up, max(old_height / height, least))
+    fits = (
+        SCALE[0] <= least
+        and max(across, up, along) <= SCALE[1]
+        and across * width >= LEAST_SIDE * old_width
+        and along * depth >= LEAST_SIDE * old_depth
+        and up * height >= (1 - HEIGHT) * old_height
+    )
+    return (across, up, along) if fits else None
+
+
+def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
+    """The scale at which a piece fits every place of a set; None where it fits not all.
+
+    A set's members are of one size, or nearly so.
+    """
+    scales = [scale_of(piece, place) for place in places]
+    known = [s for s in scales if s is not None]
+    if len(known) < len(places):
+        return None
+    least = (min(s[0] for s in known), min(s[1] for s in known), min(s[2] for s in known))
+    is_alike = all(least[k] >= ALIKE * s[k] for s in known for k in range(3))
+    return least if is_alike else None
+
+
+def is_lit_alike(piece_has_lights: bool, items: Sequence[Item]) -> bool:
+    """Whether a piece can carry the lights of the items: a lamp that is on needs a light source."""
+    return piece_has_lights or not any(item.lights for item in items)

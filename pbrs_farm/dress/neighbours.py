@@ -1,0 +1,178 @@
+"""The items round a thing: where its surface reaches into theirs, what stands on it, and what holds it.
+
+State: bounds, triangles and cubes of the items that were asked for are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
+from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.old_place import HELD, HeldBy
+from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.surface_points import item_triangles, surface_points
+
+CUBE_M: Final = 0.02
+_BITS: Final = 21  # of a cube's number along each axis
+
+Cubes = NDArray[np.int64]
+
+
+class PieceSurroundings:
+    """The items of a draft, as they are when they are asked for."""
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self.items = items
+        self._kept: dict[int, tuple[Item, F64]] = {}  # by id, with the item so that it lives
+        self._triangles: dict[int, tuple[Item, F64]] = {}
+
+    def bounds(self) -> F64:
+        """(I, 2, 3) of all items, NaN for those without vertices."""
+        for item in self.items:
+            if id(item) not in self._kept:
+                self._kept[id(item)] = (item, item.bounds)
+        return np.array([self._kept[id(item)][1] for item in self.items]).reshape(-1, 2, 3)
+
+    def triangles(self, item: Item) -> F64:
+        """(F, 3, 3) an item's triangles, metres."""
+        if id(item) not in self._triangles:
+            self._triangles[id(item)] = (item, item_triangles(item))
+        return self._triangles[id(item)][1]
+
+    def near(self, low: F64, high: F64) -> list[int]:
+        """Places of the items that are no structure and whose bounds meet the box low..high (3,)."""
+        bounds = self.bounds()
+        meets = ((bounds[:, 1] >= low) & (bounds[:, 0] <= high)).all(1)
+        return [int(k) for k in np.flatnonzero(meets) if not self.items[int(k)].kind.is_structure]
+
+    def n_shared(self, item: Item, without: Collection[int]) -> int:
+        """Cubes of 2 cm that an item's surface shares with others'; without: places left out."""
+        low, high = item.bounds
+        own = _cubes(self.triangles(item))
+        count = 0
+        for k in self.near(low, high):
+            if k not in without:
+                corners = self.triangles(self.items[k])
+                least, most = triangle_bounds(corners)
+                meets = ((most >= low) & (least <= high)).all(1)
+                count += len(np.intersect1d(own, _cubes(corners[meets]), assume_unique=True))
+        return count
+
+
+def _cubes(corners: F64) -> Cubes:
+    if not len(corners):
+        return np.zeros(0, np.int64)
+    points = surface_points(corners, CUBE_M)
+    cube = np.floor(points / CUBE_M).astype(np.int64) + (1 << (_BITS - 1))
+    return np.unique((cube[:, 0] << 2 * _BITS) | (cube[:, 1] << _BITS) | cube[:, 2])
+
+
+_ROUNDING_M: Final = 1e-3  # of the bounds
+_CONTACT_M: Final = 0.015  # how far a thing may hang above or sink into what it stands on
+_LOW_PART_M: Final = 0.05  # of a thing, at its bottom: what can touch
+_FLAT_M: Final = 0.06  # rugs and mats lie under everything
+_LEFT_ALONE: Final = frozenset(
+    {ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS}
+)  # fmt: skip
+
+
+def things_on(around: PieceSurroundings, index: int) -> tuple[list[int], list[int]]:
+    """(what stands on an item, what stands in it or under it), by place; index: the item's.
+
+    Structure, doors and windows, and what lies flat below it, are neither.
+    """
+    bounds = around.bounds()
+    (low, high), corners = bounds[index], around.triangles(around.items[index])
+    on: list[int] = []
+    inside: list[int] = []
+    for k in around.near(low - _CONTACT_M, high + _CONTACT_M):
+        item, (own_low, own_high) = around.items[k], bounds[k]
+        middle = (own_low + own_high) / 2
+        is_over = (low[[0, 2]] < middle[[0, 2]]).all() and (middle[[0, 2]] < high[[0, 2]]).all()
+        if k == index or item.kind in _LEFT_ALONE or not is_over or not item.n_faces:
+            continue
+        if own_high[1] < low[1] + _FLAT_M:
+            continue
+        (on if _stands_on(item, corners, float(high[1])) else inside).append(k)
+    return on, inside
+
+
+def _stands_on(item: Item, corners: F64, top_y: float) -> bool:
+    # Its foot is where the furniture seen from above is.
+    points = lowest_points(item)
+    height = highest_below(points[:, [0, 2]], corners, top_y + _ROUNDING_M)
+    gap = points[:, 1] - height
+    return bool(np.isfinite(height).any() and abs(float(gap.min())) <= _CONTACT_M)
+
+
+_STANDS_M: Final = 0.03  # above the floor, at most
+ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
+    Place.FLOOR: frozenset({Place.FLOOR, Place.KITCHEN, Place.SURFACE}),
+    Place.SURFACE: frozenset({Place.FLOOR, Place.SURFACE}),
+    Place.WALL: frozenset({Place.WALL}),
+    Place.CEILING: frozenset({Place.CEILING}),
+}
+"""By what holds a thing, the places of the models that may be held so."""
+
+
+def held_by(draft: Draft, around: PieceSurroundings, index: int, group: str) -> Place:
+    """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling."""
+    if HELD.get(group) is HeldBy.TOP:
+        return Place.CEILING
+    item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
+    if height_above_floor(draft, item, low_y) <= _STANDS_M:
+        return Place.FLOOR
+    # What stands on a piece, a step or a platform does not hang.
+    (low, high), all_bounds = around.bounds()[index], around.bounds()
+    below = boxes_meeting(all_bounds[:, 0], all_bounds[:, 1], low - _CONTACT_M, high)
+    others = [around.items[int(k)] for k in np.flatnonzero(below) if k != index]
+    stands = any(
+        other.kind is not ItemKind.WALL
+        and other.n_faces
+        and _stands_on(item, around.triangles(other), low_y + _CONTACT_M)
+        for other in others
+    )
+    return Place.SURFACE if stands else Place.WALL
+
+
+def height_above_floor(draft: Draft, item: Item, low_y: float) -> float:
+    """How far a height lies above the floor of the item's room, or of its storey."""
+    floors = [room.floor_y for room in draft.source.rooms if room.id == item.room_id]
+    floors += [lv.elevation for lv in draft.source.levels if lv.id == item.level_id]
+    return low_y - floors[0] if floors else 0.0
+
+
+def lowest_points(item: Item) -> F64:
+    """(N, 3) vertices within 5 cm of the item's bottom; every few of them where they are many."""
+    points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
+    points = points[points[:, 1] <= points[:, 1].min() + _LOW_PART_M]
+    return np.asarray(points[:: max(1, len(points) // 600)])
+
+
+def drop_onto(item: Item, corners: F64) -> float | None:
+    """How far (m, upwards) an item goes to stand on triangles (F, 3, 3) seen from above.
+
+    None where less than most of its foot would find something to stand on.
+    """
+    points = lowest_points(item)
+    height = highest_below(points[:, [0, 2]], corners)
+    gap = points[:, 1] - height
+    if not np.isfinite(height).any():
+        return None
+    drop = float(gap[np.isfinite(gap)].min())
+    # Its foot must be held on both sides of its middle, each way.
+    foot = points[points[:, 1] < points[:, 1].min() + 0.01]
+    held = foot[foot[:, 1] - drop - highest_below(foot[:, [0, 2]], corners) < _CONTACT_M]
+    middle = (foot.min(0) + foot.max(0))[[0, 2]] / 2
+    plan = held[:, [0, 2]]
+    if len(plan) == 0 or not ((plan.min(0) <= middle).all() and (plan.max(0) >= middle).all()):
+        return None
+    return -drop
