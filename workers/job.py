@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cache
+from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
+from pbrs_farm.run.request import ModelsOption, Request, Wanted, option
 from pbrs_farm.store import laid_out
 from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 
@@ -51,29 +53,72 @@ class JobRules(Record):
     shard_size: int = Field(500, ge=1, description="houses merged by one task")
 
 
-class JobSpec(BaseModel):
+class FarmOptions(Record):
+    """How the farm does a job: options of `submit`, entries of job.toml, fields of its JobSpec."""
+
+    gpu: bool = option(False, "light goes to the queue light.gpu")
+    priority: int = option(
+        DEFAULT_PRIORITY, f"0 goes first, {LEAST_URGENT} last", ge=0, le=LEAST_URGENT,
+        choices=tuple(range(LEAST_URGENT + 1)),
+    )  # fmt: skip
+    max_slots: int = option(
+        0, "tasks of it in flight at once, at most (0: as many as there are slots)", ge=0,
+        metavar="N", least=0,
+    )  # fmt: skip
+    budget_h: float = option(
+        0.0, "slot-hours after which it pauses itself (0: none)", ge=0,
+        name="budget", metavar="HOURS", least=0, expected="slot-hours, 0 or more",
+    )  # fmt: skip
+    after: tuple[str, ...] = option((), "begin when this job is done, repeatable", metavar="JOB")
+    preempt: bool = option(
+        False, "urgent: running tasks of other jobs make room, and keep what they have rendered"
+    )
+
+
+class FarmAccess(Record):
+    """What submit takes as every verb of the farm does (commands/arguments.py:add_farm)."""
+
+    store: str = option("", "default: $PBRS_STORE", metavar="URL")
+    as_json: bool = option(False, "for machines", name="json")
+
+
+class _HousesOption(Record):
+    houses: str | None = option(
+        None, "file with a SUNCG house id a line (HOME: root)", metavar="LIST"
+    )
+
+
+class _ReferenceOption(Record):
+    reference: Path | None = option(None, "reference file: select when the job ends")
+
+
+class SubmitRequest(
+    FarmOptions, _ReferenceOption, Request, ModelsOption, _HousesOption, FarmAccess
+):
+    """What `submit` takes beside the words of homes, from its options or a job's file."""
+
+    like: str = option(
+        "",
+        "a job.toml as a template: its options, for the homes that are named here",
+        metavar="FILE",
+    )
+    update: bool = option(False, "give the store this recipe")
+    dry_run: bool = option(False, "print tasks, hours, storage; do nothing")
+    slots: int = option(2, "for --dry-run: tasks at once", least=1)
+
+
+class JobSpec(FarmOptions, Wanted):
     """Everything a job is made with except its houses; stored as jobs/<id>/job.json.
 
     A batch is some views of a house that one task makes; job.json calls it a group.
     """
 
-    model_config = ConfigDict(
-        frozen=True, extra="forbid", validate_by_name=True, serialize_by_alias=True
-    )
+    model_config = ConfigDict(validate_by_name=True, serialize_by_alias=True)
     job_id: str
     version: str  # work_version of who submitted or adopted it
     versions_before: tuple[str, ...] = ()  # by which it was worked on before it was adopted
     recipe: Recipe
-    modes: tuple[str, ...] = ()
-    layers: tuple[str, ...] = ()
-    n_views: int = 0
-    gpu: bool = False
-    priority: int = Field(DEFAULT_PRIORITY, ge=0, le=LEAST_URGENT, description="0 goes first")
-    max_slots: int = Field(0, ge=0, description="tasks in flight at once; 0 = as there are slots")
-    budget_h: float = Field(0.0, ge=0, description="slot-hours, then it pauses itself; 0 = none")
-    after: tuple[str, ...] = Field((), description="jobs that must be done before it begins")
     user: str = Field("", description="whose job it is; nobody's on a farm without users")
-    preempt: bool = Field(False, description="urgent: running tasks of other jobs make room for it")
     batch_stages: tuple[str, ...] = Field((GL, LIGHT), alias="group_stages")
     seconds_per_view: float = Field(20.0, gt=0, description="of light, expected; sizes the batches")
     min_batches: int = Field(

@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import (
     Verb,
-    add_cameras,
-    add_catalogue,
-    add_fields,
     add_home,
-    add_recipe,
     at_least,
     counted,
     dress_seeds,
@@ -24,6 +20,7 @@ from pbrs_farm.commands.arguments import (
     recipe_of,
     warn,
 )
+from pbrs_farm.commands.options import add_options
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.installation import need
@@ -44,6 +41,13 @@ _SHARE_OF_HOUSE: Final = 0.65
 
 def add_verbs(verb: Verb) -> None:
     """Add dress, catalogue, repair and cameras."""
+    from pbrs_farm.run.request import (
+        CameraOptions,
+        LibraryOptions,
+        RecipeOptions,
+        SeededRecipeOptions,
+    )
+
     text = "make a home look lived in: before and after, the bundle, a report in plain words"
     p = verb("dress", _dress, text)
     add_home(p)
@@ -54,8 +58,8 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, required=True, help=text)
     text = "pictures of before and after, a room each (default 1; 0 = none)"
     add("--views", type=int, default=1, metavar="N", help=text)
-    add_catalogue(p)
-    add_fields(p)
+    add_options(p, LibraryOptions)
+    add_options(p, RecipeOptions)
 
     text = "what furniture of your own is used for, and what of it is refused and why"
     p = verb("catalogue", _catalogue, text)
@@ -70,7 +74,7 @@ def add_verbs(verb: Verb) -> None:
     add_home(p)
     text = "folder for house.glb, house.json, repair.json, cut_<level>.svg"
     p.add_argument("--out", type=Path, required=True, help=text)
-    add_recipe(p)
+    add_options(p, SeededRecipeOptions)
 
     p = verb("cameras", _cameras, "choose views and say why every other candidate was rejected")
     add_home(p)
@@ -80,9 +84,9 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, metavar="FILE", help="write the views to FILE (cameras.json)")
     add("--per-sector", type=int, metavar="K", help="K diverse views a sector")
     add("--exact", action="store_true", help="score every candidate at full size")
-    add_cameras(p)
+    add_options(p, CameraOptions)
     add("--json", action="store_true", help="views and report as JSON")
-    add_recipe(p)
+    add_options(p, SeededRecipeOptions)
 
 
 def _catalogue(args: argparse.Namespace) -> int:

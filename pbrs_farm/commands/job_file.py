@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pbrs_farm.commands.options import flag, values_of_table
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.regular_files import text_given
@@ -58,41 +59,32 @@ def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
     return job
 
 
-def submit_words(job: Mapping[str, Any], parser: argparse.ArgumentParser, file: str) -> list[str]:
-    """The words of submit that the job's homes and tables render and select stand for."""
-    options = option_words({**job.get("render", {}), **job.get("select", {})}, file, parser)
-    return [*options, "--", *job["homes"]]
-
-
 def submit_arguments(
     job: Mapping[str, Any], given: argparse.Namespace, parser: argparse.ArgumentParser, file: str
 ) -> argparse.Namespace:
-    """The arguments of submit that the job stands for; what was given beside its file counts before it."""
-    chosen = parser.parse_args(submit_words(job, parser, file))
-    for name, value in vars(given).items():
-        if name not in ("homes", "parser") and value != parser.get_default(name):
+    """The arguments of submit that the job stands for; what was given beside its file counts before it.
+
+    Raises BadInput for an entry that is no option of submit, or does not fit, naming file and entry.
+    """
+    from workers.job import SubmitRequest
+
+    table = {**job.get("render", {}), **job.get("select", {})}
+    chosen = argparse.Namespace(**{**vars(given), "homes": list(job["homes"])})
+    for name, value in values_of_table(table, SubmitRequest, file).items():
+        if getattr(given, name) == parser.get_default(name):
             setattr(chosen, name, value)
     return chosen
 
 
-def option_words(
-    table: Mapping[str, Any], file: str, parser: argparse.ArgumentParser | None = None
-) -> list[str]:
-    """A table's entries as options: true is a flag, a list is many words. Raises BadInput."""
-    known = parser._option_string_actions if parser is not None else {}
+def option_words(table: Mapping[str, Any], file: str) -> list[str]:
+    """A table's entries as words of a command: true is a flag, a list is many words. Raises BadInput."""
     words: list[str] = []
     for name, value in table.items():
-        option = f"--{name.replace('_', '-')}"
-        action = known.get(option)
-        if parser is not None and action is None:
-            raise BadInput(file, name, "no such option", hint=did_you_mean(option, known))
-        values = [str(v) for v in value] if isinstance(value, list) else [str(value)]
         if isinstance(value, dict):
             raise BadInput(file, name, "expected a value, not a table")
+        values = [str(v) for v in value] if isinstance(value, list) else [str(value)]
         if isinstance(value, bool):
-            words += [option] if value else []
-        elif isinstance(action, argparse._AppendAction):
-            words += [word for v in values for word in (option, v)]
+            words += [flag(name)] if value else []
         else:
-            words += [option, *values]
+            words += [flag(name), *values]
     return words

@@ -5,16 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import (
-    VIEW,
-    Verb,
-    add_models,
-    counted,
-    echo,
-    echo_json,
-    size_of,
-    warn,
-)
+from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
+from pbrs_farm.commands.options import add_options
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import HomeForm, form_names, form_of
 
@@ -23,6 +15,8 @@ SPLIT = "by home: train/val/test (default 80/10/10); without it all views are on
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
+    from pbrs_farm.run.request import ModelsOption
+
     text = "finished views in the form another tool reads; or the homes, for simulators"
     p = verb("export", _export, text)
     add = p.add_argument
@@ -55,7 +49,7 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("classes", _classes, "how often each class is seen, and by which rule")
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
-    add_models(p)
+    add_options(p, ModelsOption)
     p.add_argument("--json", action="store_true", help="as JSON")
 
     p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")

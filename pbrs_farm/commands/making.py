@@ -14,22 +14,14 @@ from typing import TYPE_CHECKING, Any
 from pbrs_farm.commands.arguments import (
     HOME,
     Verb,
-    add_cameras,
-    add_dress,
-    add_light,
-    add_models,
-    add_output,
-    add_recipe,
-    at_least,
     counted,
     dress_seeds,
     echo,
     home_arguments,
-    options,
     recipe_of,
-    views_wanted,
     warn,
 )
+from pbrs_farm.commands.options import add_options, group_of, request_from
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.recipe import recipe_from_json
@@ -45,13 +37,14 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add demo, run, objects and step."""
+    from pbrs_farm.run.request import CameraOptions, ModelsOption, ObjectsRequest, RunRequest
+
     p = verb("demo", _demo, "render an example home and lay out a sheet: out/demo/sheet.png")
     text = "example home, `builtin`, or a file (default Studio)"
     p.add_argument("--home", default="Studio", help=text)
     p.add_argument("--out", default="out/demo", help="output folder")
     p.add_argument("--bare", action="store_true", help="the home as it was drawn, not dressed")
-    add_dress(p)
-    _add_run(p, "preview")
+    add_options(p, RunRequest, recipe="preview")
     # A stranger's first command ends in seconds.
     p.set_defaults(views=6)
     p.epilog = "six views unless --views asks for others"
@@ -63,12 +56,11 @@ def add_verbs(verb: Verb) -> None:
     text = "file with a SUNCG house id a line (HOME is the root)"
     add("--houses", metavar="LIST", help=text)
     add("--out", help="output folder or store URL (default: out/ and the first home's name)")
-    add_cameras(p)
-    add_models(p)
+    add_options(p, CameraOptions)
+    add_options(p, ModelsOption)
     text = "your own: JSON list, or room_camera.txt"
-    options(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
-    add_dress(p)
-    _add_run(p)
+    group_of(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
+    add_options(p, RunRequest)
     p.usage = "%(prog)s HOME [HOME ...] [options]"
     p.epilog = (
         "example: pbrs-farm run Studio --dress 1 --recipe preview --views 4 --layers albedo depth_z"
@@ -84,7 +76,7 @@ def add_verbs(verb: Verb) -> None:
     text = "models picked at random (default 3500)"
     add("--count", type=int, default=3500, metavar="N", help=text)
     add("--out", required=True, help="output folder or store URL")
-    _add_run(p)
+    add_options(p, ObjectsRequest)
 
     p = verb("step", _step, "one step in this process: reproduces a failure")
     add = p.add_argument
@@ -95,28 +87,7 @@ def add_verbs(verb: Verb) -> None:
     text = "optional layers that the step truth writes"
     add("--layers", nargs="+", default=[], metavar="LAYER", help=text)
     add("--dress", type=int, default=0, metavar="SEED", help="of a dressed variant")
-    add_models(p)
-
-
-def _add_run(p: argparse.ArgumentParser, recipe: str = "fast") -> None:
-    """The options of every verb that runs the whole plan."""
-    add_recipe(p, recipe)
-    add_light(p)
-    add_output(p)
-    add = options(p, "the run").add_argument
-    text = "processes (default 1, and a second one for most of all but light; each view uses all cores)"
-    add("--jobs", type=int, default=1, metavar="N", help=text)
-    text = "seconds a step may take (default 3600)"
-    add("--step-timeout", type=float, default=3600.0, metavar="S", help=text)
-    text = "seconds a process may say nothing (default: those of a step)"
-    add("--silence", type=float, default=0.0, metavar="S", help=text)
-    text = "memory a process may hold (default: its share of the machine)"
-    add("--memory", type=float, default=0.0, metavar="MB", help=text)
-    text = "pairs.parquet: what each two views of a room have in common (docs/motion.md)"
-    add("--pairs", action="store_true", help=text)
-    text = "give the output folder this recipe, rendering again what differs"
-    add("--update", action="store_true", help=text)
-    add("--json", action="store_true", help="a JSON line per event")
+    add_options(p, ModelsOption)
 
 
 def _run(args: argparse.Namespace) -> int:
@@ -155,9 +126,6 @@ def _run_homes(
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
 
-    at_least("--jobs", args.jobs, 1)
-    at_least("--silence", args.silence, 0)
-    at_least("--memory", args.memory, 0)
     run = replace(_described(args, homes, sources), refused=refused)
     # Say at once which extra is missing, not once a step.
     need("mitsuba", "drjit", "pyoidn", "moderngl")
@@ -180,11 +148,12 @@ def _run_homes(
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
     """The run that the options describe; BadInput before anything is stored."""
     from pbrs_farm.run.local import Run
-    from pbrs_farm.run.plan import wanted
+    from pbrs_farm.run.request import RunRequest, wanted_of
     from pbrs_farm.settings import settings_from_environment
 
+    request = request_from(args, RunRequest)
     recipe = recipe_of(args)
-    want = wanted(args.modes, args.layers, views_wanted(args), pairs=args.pairs)
+    want = wanted_of(request)
     if want.layers:
         from pbrs_farm.truth.optional_layers import check_lens
 
@@ -199,15 +168,15 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
         store_url=args.out,
         recipe=recipe,
         want=want,
-        n_jobs=args.jobs,
-        update=args.update,
-        step_timeout_s=args.step_timeout,
-        silence_s=args.silence,
-        memory_mb=args.memory,
+        n_jobs=request.jobs,
+        update=request.update,
+        step_timeout_s=request.step_timeout,
+        silence_s=request.silence,
+        memory_mb=request.memory,
         debug=args.debug,
         store=settings_from_environment().store,
         sources=sources,
-        dress_seeds=dress_seeds(getattr(args, "dress", None)),
+        dress_seeds=dress_seeds(request.dress),
     )
 
 

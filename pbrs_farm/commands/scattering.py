@@ -7,16 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import (
-    HOME,
-    Verb,
-    add_recipe,
-    at_least,
-    counted,
-    dress_seeds,
-    echo,
-    recipe_of,
-)
+from pbrs_farm.commands.arguments import HOME, Verb, at_least, counted, dress_seeds, echo, recipe_of
+from pbrs_farm.commands.options import add_options
 from pbrs_farm.core.errors import BadInput
 
 if TYPE_CHECKING:
@@ -26,6 +18,8 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add scatter."""
+    from pbrs_farm.run.request import SeededRecipeOptions
+
     p = verb("scatter", _scatter, "put models of your own into a home and look at them")
     add = p.add_argument
     add("homes", nargs="+", metavar="HOME", help=HOME)
@@ -51,7 +45,7 @@ def add_verbs(verb: Verb) -> None:
     add("--dress", metavar="SEED", help="dress the home first, by this seed")
     add("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help="default mlt_il_ol")
     add("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write too")
-    add_recipe(p, "fast")
+    add_options(p, SeededRecipeOptions)
 
 
 def _scatter(args: argparse.Namespace) -> int:

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import math
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.commands.arguments import (
     Verb,
-    add_dress,
-    add_farm,
-    add_light,
-    add_models,
-    add_output,
-    add_recipe,
-    at_least,
     counted,
     dress_seeds,
     echo,
@@ -27,62 +18,40 @@ from pbrs_farm.commands.arguments import (
     farm_of,
     home_arguments,
     recipe_of,
-    views_wanted,
     warn,
 )
 from pbrs_farm.commands.job_file import job_file, job_like, option_words, submit_arguments
+from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
-from workers.ids import DEFAULT_PRIORITY, LEAST_URGENT, check_job_id
+from workers.ids import check_job_id
 from workers.ledger.task_ledger import WITH_FAILURES
 
 if TYPE_CHECKING:
-    from workers.job import JobSpec
+    from workers.job import JobSpec, SubmitRequest
 
 
 def add_verbs(verb: Verb) -> None:
     """Add submit."""
+    from workers.job import SubmitRequest
+
     p = verb("submit", _submit, "put houses on the farm")
-    add_farm(p)
     p.set_defaults(parser=p)
     text = "files, folders, example homes; or one job.toml that says all (docs/farm.md)"
     p.add_argument("homes", nargs="+", metavar="HOME", help=text)
-    text = "file with a SUNCG house id a line (HOME: root)"
-    p.add_argument("--houses", metavar="LIST", help=text)
-    add_models(p)
-    add_dress(p)
-    add_recipe(p)
-    add_light(p)
-    add_output(p)
-    p.add_argument("--reference", type=Path, help="reference file: select when the job ends")
-    p.add_argument("--gpu", action="store_true", help="light goes to the queue light.gpu")
-    p.add_argument(
-        "--priority", type=int, default=DEFAULT_PRIORITY, choices=range(LEAST_URGENT + 1),
-        help=f"0 goes first, {LEAST_URGENT} last",
-    )  # fmt: skip
-    text = "tasks of it in flight at once, at most (0: as many as there are slots)"
-    p.add_argument("--max-slots", type=int, default=0, metavar="N", help=text)
-    text = "slot-hours after which it pauses itself (0: none)"
-    p.add_argument("--budget", type=float, default=0.0, metavar="HOURS", help=text)
-    text = "begin when this job is done, repeatable"
-    p.add_argument("--after", action="append", default=[], metavar="JOB", help=text)
-    text = "urgent: running tasks of other jobs make room, and keep what they have rendered"
-    p.add_argument("--preempt", action="store_true", help=text)
-    text = "a job.toml as a template: its options, for the homes that are named here"
-    p.add_argument("--like", default="", metavar="FILE", help=text)
-    p.add_argument("--update", action="store_true", help="give the store this recipe")
-    p.add_argument("--dry-run", action="store_true", help="print tasks, hours, storage; do nothing")
-    p.add_argument("--slots", type=int, default=2, help="for --dry-run: tasks at once")
+    add_options(p, SubmitRequest)
 
 
 def _submit(args: argparse.Namespace) -> int:
+    from workers.job import SubmitRequest
+
     described = job_like(args.like, args.homes) if args.like else job_file(args.homes)
     if described is not None:
         return _submit_file(args, described)
-    _submitted(args)
+    _submitted(args, request_from(args, SubmitRequest))
     return 0
 
 
-def _submitted(args: argparse.Namespace) -> str:
+def _submitted(args: argparse.Namespace, request: SubmitRequest) -> str:
     """Put the houses on the farm; the job's id, "" after a dry run."""
     from pbrs_farm.prepare.passes import uses_catalogue
     from workers.client.estimate import estimate
@@ -96,20 +65,20 @@ def _submitted(args: argparse.Namespace) -> str:
         upload_catalogue,
     )
 
-    spec = _spec(args)
+    spec = _spec(request)
     # Read the homes: what each is, and where workers will find it.
-    seeds = dress_seeds(args.dress) or (spec.recipe.dress.seed,)
+    seeds = dress_seeds(request.dress) or (spec.recipe.dress.seed,)
     found = entries_from_arguments(
-        home_arguments(args.homes, args.houses), seeds, models=args.models
+        home_arguments(args.homes, request.houses), seeds, models=request.models
     )
-    reference = placed_reference(args.reference) if args.reference else ("", b"")
+    reference = placed_reference(request.reference) if request.reference else ("", b"")
     spec = spec.model_copy(update={"reference": reference[0]})
     houses, refs = [entry for entry, _ref in found], [ref for _entry, ref in found]
     _warn_of_paths([ref.location for ref in refs if is_left_in_place(ref)])
     # Estimate, and touch neither the store nor Redis.
-    if args.dry_run:
-        plan = estimate(completed(houses, spec)[1], args.slots)
-        if args.json:
+    if request.dry_run:
+        plan = estimate(completed(houses, spec)[1], request.slots)
+        if request.as_json:
             echo_json(plan)
         else:
             echo("\n".join(f"{k:<14}{v}" for k, v in plan.items()))
@@ -131,8 +100,8 @@ def _submitted(args: argparse.Namespace) -> str:
     upload(farm.store, refs)
     if reference[0]:
         farm.store.put_if_absent(*reference)
-    job = farm.submit(houses, spec, update=args.update)
-    if args.json:
+    job = farm.submit(houses, spec, update=request.update)
+    if request.as_json:
         echo_json({"job": job.job_id, "houses": job.n_houses, "was": job.was})
         return job.job_id
     # The same homes and recipe are the same job.
@@ -144,10 +113,12 @@ def _submitted(args: argparse.Namespace) -> str:
 
 def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
     """Submit what a job.toml says; with a table pack, wait for the job's end and pack its views."""
+    from workers.job import SubmitRequest
+
     file = args.like or args.homes[0]
     chosen = submit_arguments(job, args, args.parser, file)
     pack = option_words(job.get("pack", {}), file)
-    name = _submitted(chosen)
+    name = _submitted(chosen, request_from(chosen, SubmitRequest))
     if not pack or not name:
         return 0
     farm = farm_of(chosen)
@@ -169,30 +140,22 @@ def _warn_of_paths(in_place: Sequence[str]) -> None:
         warn(f"{count} not uploaded: {where}; workers must see that path")
 
 
-def _spec(args: argparse.Namespace) -> JobSpec:
+def _spec(request: SubmitRequest) -> JobSpec:
     """What the job is made with, its houses apart; raises BadInput, BadRecipe."""
-    from pbrs_farm.run.plan import wanted
+    from pbrs_farm.run.request import Wanted, wanted_of
     from workers.client.estimate import seconds_per_view
     from workers.client.farm_client import new_spec
+    from workers.job import FarmOptions
     from workers.node.house_runner import batch_stages
 
-    at_least("--slots", args.slots, 1)
-    at_least("--max-slots", args.max_slots, 0)
-    if not 0 <= args.budget < math.inf:
-        raise BadInput("--budget", args.budget, "expected slot-hours, 0 or more")
-    want = wanted(args.modes, args.layers, views_wanted(args))
-    recipe = recipe_of(args)
+    for job in request.after:
+        check_job_id(job)
+    want = wanted_of(request)
+    recipe = recipe_of(request)
     return new_spec(
         recipe,
-        modes=tuple(m.value for m in want.modes),
-        layers=want.layers,
-        n_views=want.n_views,
-        gpu=args.gpu,
-        priority=args.priority,
-        max_slots=args.max_slots,
-        budget_h=args.budget,
-        preempt=args.preempt,
-        after=tuple(check_job_id(job) for job in args.after),
         batch_stages=batch_stages(want),
         seconds_per_view=seconds_per_view(recipe),
+        **{name: getattr(want, name) for name in Wanted.model_fields},
+        **{name: getattr(request, name) for name in FarmOptions.model_fields},
     )

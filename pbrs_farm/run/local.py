@@ -22,11 +22,11 @@ from pbrs_farm.prepare.source import SourceRef, resolve, variants
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.run import plan
 from pbrs_farm.run.output_root import claim_root, finish_root
-from pbrs_farm.run.plan import Wanted
 from pbrs_farm.run.processes.early_start import end_untaken
 from pbrs_farm.run.processes.limits import ProcessLimits, is_room_for_two, memory_share_mb
 from pbrs_farm.run.processes.pool import FINISH, RENDER, Pool
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting
+from pbrs_farm.run.request import Wanted
 from pbrs_farm.store import StoreSettings, store_from_url
 
 # Which task of a local run is done next, by which process, and what follows from how it ended.
@@ -215,7 +215,7 @@ class Schedule:
             self._summary.without_views.append((house, reason))
         # What needs illuminance would fail for the reason that illuminance has told already.
         modes = tuple(m for m in want.modes if not (m.groups and house in self._unlit))
-        steps = plan.view_steps(replace(want, modes=modes))
+        steps = plan.view_steps(want.model_copy(update={"modes": modes}))
         # They go before the next houses.
         waiting = self._waiting[RENDER]
         n_before = len(waiting)

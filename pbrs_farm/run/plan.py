@@ -13,12 +13,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.layers import LAYER, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.prepare import passes
+from pbrs_farm.run.request import Wanted, wanted_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,37 +60,12 @@ PICTURE_GROUPS: Final = tuple(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """What a run was asked to make. Modes may be given by name; BadInput for one that is none."""
-
-    modes: tuple[Mode, ...] = ALL_MODES
-    layers: tuple[str, ...] = ()  # optional layers, by name
-    n_views: int = 0  # per house, 0 = all
-    pairs: bool = False  # what each pair of views of a room has in common, too
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "modes", tuple(map(_mode, self.modes)))
-
-
-def _mode(name: str) -> Mode:
-    """The lighting mode of that name; BadInput for a word that is none."""
-    names = [m.value for m in ALL_MODES]
-    if name not in names:
-        raise BadInput("--modes", name, "no such lighting mode", hint=hint_of_choice(name, names))
-    return Mode(name)
-
-
 def wanted(
     modes: Iterable[str], layers: Iterable[str], n_views: int = 0, *, pairs: bool = False
 ) -> Wanted:
-    """Wanted from words of the command line; raises BadInput for a word that is none of ours."""
-    asked = {_mode(mode) for mode in modes}
-    for layer in layers:
-        if layer not in LAYER:
-            raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, OPTIONAL))
-    chosen = tuple(m for m in ALL_MODES if m in asked) or ALL_MODES
-    return Wanted(chosen, tuple(x for x in OPTIONAL if x in set(layers)), n_views, pairs)
+    """What is made, from words: no modes are all of them. BadInput for a word that is none of ours."""
+    asked = tuple(modes) or ALL_MODES
+    return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=n_views, pairs=pairs))
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:

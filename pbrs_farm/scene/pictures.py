@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Final, overload
+from typing import Any, Final, overload
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
 from pbrs_farm.progress import progress_reporter
-from pbrs_farm.run import plan
 from pbrs_farm.run.local import Run, Summary, run_local
 from pbrs_farm.run.processes.render_task import Event
+from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.sample.stored_cameras import OUTSIDE
 from pbrs_farm.scene.home import Home, recipe_of
 from pbrs_farm.scene.viewpoints import Viewpoint
@@ -114,12 +114,10 @@ def _told(
         report(Event("end", home.id, None, ""))
 
 
-def _wanted(modes: Iterable[str], layers: Iterable[str]) -> plan.Wanted:
-    names = [str(mode) for mode in modes]
-    want = plan.wanted(names, [name for name in layers if name not in _ALWAYS])
+def _wanted(modes: Iterable[str], layers: Iterable[str]) -> Wanted:
     # An empty list asks for labels alone, where the command line takes it for all modes.
-    chosen = tuple(m for m in ALL_MODES if m.value in names)
-    return plan.Wanted(chosen, want.layers)
+    asked = tuple(name for name in layers if name not in _ALWAYS)
+    return wanted_of(Wanted(modes=tuple(modes), layers=asked))
 
 
 def _recipe_of_view(
@@ -159,6 +157,7 @@ def render_homes(
     jobs: int = 1,
     observe: Callable[[Event], None] | None = None,
     progress: bool = False,
+    **options: Any,
 ) -> Views:
     """Every home into one place by this machine's processes: `pbrs-farm run` from Python.
 
@@ -166,6 +165,7 @@ def render_homes(
     again, so that a script that was killed goes on where it was. recipe: for all of them; None: the
     homes' own, which must agree. views: of each home, 0 = all its sampled viewpoints. observe: hears
     each step that ends. progress: show bars on a terminal, lines elsewhere, as `pbrs-farm run` does.
+    options: what else `pbrs-farm run` makes of a house, by its option's name: pairs=True.
 
     Returns the frames of out. A home that cannot be made costs itself alone and is a warning;
     raises BadRecipe where recipes disagree or out holds another, BadInput where nothing was made.
@@ -184,7 +184,7 @@ def render_homes(
             raise BadInput(home.id, "recipe", text)
     run = Run(
         homes=(), store_url=str(out), recipe=made_with[0], sources=[home.source for home in every],
-        want=plan.wanted(modes, layers, views), n_jobs=jobs,
+        want=_wanted_of_words(modes, layers, views, options), n_jobs=jobs,
     )  # fmt: skip
     heard: list[Callable[[Event], None]] = [observe] if observe is not None else []
 
@@ -198,6 +198,15 @@ def render_homes(
         summary = run_local(run, tell)
     _warn_of(summary)
     return open_views(out)
+
+
+def _wanted_of_words(
+    modes: Iterable[str], layers: Iterable[str], views: int, options: Mapping[str, Any]
+) -> Wanted:
+    for name in options.keys() - Wanted.model_fields.keys():
+        raise TypeError(f"render_homes() got an unexpected keyword argument {name!r}")
+    asked = tuple(modes) or ALL_MODES
+    return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=views, **options))
 
 
 def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:

@@ -31,6 +31,7 @@ from pbrs_farm.prepare.passes import FinishedHouse, cache_key, uses_catalogue
 from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
+from pbrs_farm.run.request import Wanted
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.scene.viewpoints import Viewpoint
@@ -78,7 +79,7 @@ class Renderer:
         return self.call(lambda: self._cameras(source, recipe))
 
     def frames(
-        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: plan.Wanted,
+        self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: Wanted,
         observe: Callable[[str], None] = lambda _view: None,
     ) -> Views:  # fmt: skip
         """The viewpoints' frames: the steps of `want` for each, in a store of their own."""
@@ -189,7 +190,7 @@ class Renderer:
 
     def _frames(
         self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint],
-        want: plan.Wanted, observe: Callable[[str], None],
+        want: Wanted, observe: Callable[[str], None],
     ) -> Views:  # fmt: skip
         work = replace(self._with_house(source, recipe), layers=want.layers)
         if recipe.cameras.source == "given":

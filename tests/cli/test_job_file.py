@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import tomllib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from pbrs_farm.commands.job_file import (
-    job_file,
-    job_like,
-    option_words,
-    submit_arguments,
-    submit_words,
-)
+from pbrs_farm.commands.job_file import job_file, job_like, option_words, submit_arguments
+from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
+from workers.job import SubmitRequest
 
 JOB = """
 homes = ["made:1..3", "flat.sh3d"]
@@ -25,7 +24,7 @@ max_slots = 40
 gpu = true
 update = false
 set = ["light.spp=64", "light.denoise=true"]
-modes = ["path", "opengl_dl"]
+modes = ["mlt_ol", "opengl_dl"]
 [select]
 reference = "nyu.npz"
 [pack]
@@ -36,13 +35,13 @@ out = "shards"
 def parser() -> argparse.ArgumentParser:
     p = argparse.ArgumentParser(exit_on_error=False)
     p.add_argument("homes", nargs="+")
-    for name in ("recipe", "views", "max-slots", "reference"):
-        p.add_argument(f"--{name}")
-    p.add_argument("--set", action="append")
-    p.add_argument("--modes", nargs="+")
-    p.add_argument("--gpu", action="store_true")
-    p.add_argument("--update", action="store_true")
+    add_options(p, SubmitRequest)
     return p
+
+
+def arguments(job: Mapping[str, Any], *words: str) -> argparse.Namespace:
+    p = parser()
+    return submit_arguments(job, p.parse_args(["job.toml", *words]), p, "job.toml")
 
 
 def written(folder: Path, text: str) -> str:
@@ -53,17 +52,14 @@ def written(folder: Path, text: str) -> str:
 def test_tables_are_options_and_lists_are_many_words(tmp_path: Path) -> None:
     job = job_file([written(tmp_path, JOB)])
     assert job is not None
-    args = parser().parse_args(submit_words(job, parser(), "job.toml"))
+    args = arguments(job)
     assert args.homes == ["made:1..3", "flat.sh3d"]
-    assert (args.recipe, args.views, args.max_slots, args.reference) == (
-        "fast",
-        "6",
-        "40",
-        "nyu.npz",
-    )
+    request = request_from(args, SubmitRequest)
+    assert (request.recipe, request.n_views, request.max_slots) == ("fast", 6, 40)
+    assert request.reference == Path("nyu.npz")
     assert (args.gpu, args.update) == (True, False)
     assert args.set == ["light.spp=64", "light.denoise=true"]
-    assert args.modes == ["path", "opengl_dl"]
+    assert args.modes == ["mlt_ol", "opengl_dl"]
     assert option_words(job["pack"], "job.toml") == ["--out", "shards"]
 
 
@@ -73,7 +69,7 @@ def test_a_template_s_options_hold_for_the_homes_named_beside_it_but_for_those_g
     job, p = job_like(written(tmp_path, JOB), ["x.sh3d"]), parser()
     given = p.parse_args(["x.sh3d", "--views", "9"])
     args = submit_arguments(job, given, p, "job.toml")
-    assert (args.homes, args.recipe, args.views, args.gpu) == (["x.sh3d"], "fast", "9", True)
+    assert (args.homes, args.recipe, args.views, args.gpu) == (["x.sh3d"], "fast", 9, True)
     assert job_like(written(tmp_path, "[pack]\n"), ["x"]) == {"homes": ["x"], "pack": {}}
     with pytest.raises(BadInput, match="rendr: is no table of a job"):
         job_like(written(tmp_path, "[rendr]\n"), ["x"])
@@ -108,4 +104,32 @@ def test_an_option_there_is_not_is_named(tmp_path: Path) -> None:
     job = job_file([written(tmp_path, 'homes = ["a"]\n[render]\nrecip = "fast"\n')])
     assert job is not None
     with pytest.raises(BadInput, match=r"recip.*recipe"):
-        submit_words(job, parser(), "job.toml")
+        arguments(job)
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("views = 0", "render.toml: views: expected 1 or more"),
+        ('views = "six"', "views: expected a whole number"),
+        ("views = [1, 2]", "views: expected one value, not a list"),
+        ("priority = 10", "priority: 10 is none of them"),
+        ("budget = -1", "budget: expected slot-hours, 0 or more"),
+        ("max_slots = -1", "max_slots: expected 0 or more"),
+        ("gpu = 1", "gpu: expected true or false"),
+        ('groups = "three"', "groups: three is none of them.*two, lamps"),
+        ("views = {of = 3}", "views: expected a value, not a table"),
+    ],
+)
+def test_an_entry_that_does_not_fit_is_named_with_its_file(entry: str, message: str) -> None:
+    job = {"homes": ["a"], "render": tomllib.loads(entry)}
+    p = parser()
+    with pytest.raises(BadInput, match=message):
+        submit_arguments(job, p.parse_args(["x"]), p, "render.toml")
+
+
+def test_libraries_and_pictures_of_one_s_own_are_one_list() -> None:
+    job = {"homes": ["a"], "render": {"catalogue": "a.sh3f", "pictures": ["b", "c"]}}
+    assert arguments(job).catalogue == ["a.sh3f", "b", "c"]
+    words = ["x", "--pictures", "b", "--catalogue", "a.sh3f"]
+    assert parser().parse_args(words).catalogue == ["b", "a.sh3f"]

@@ -8,6 +8,7 @@ from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import differences, recipe_from_name
 from pbrs_farm.run import plan
+from pbrs_farm.run.request import Wanted
 
 
 def digest_of(step: str, **overrides: str) -> str:
@@ -137,8 +138,8 @@ def test_the_first_frames_of_a_sequence_are_made_and_pairs_stay_together() -> No
 
 
 def test_modes_may_be_given_by_name() -> None:
-    want = plan.Wanted(modes=("opengl_il", Mode.MLT_OL))  # type: ignore[arg-type]
+    want = Wanted(modes=("opengl_il", Mode.MLT_OL))  # type: ignore[arg-type]
     assert want.modes == (Mode.OPENGL_IL, Mode.MLT_OL)
     assert plan.view_steps(want) == ("truth", "opengl_il", "light", "develop", "view")
     with pytest.raises(BadInput, match="no such lighting mode"):
-        plan.Wanted(modes=("opengl_li",))  # type: ignore[arg-type]
+        Wanted(modes=("opengl_li",))  # type: ignore[arg-type]

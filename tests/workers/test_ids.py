@@ -17,7 +17,7 @@ from workers.ids import (
     task_from_text,
     tasks_from_group,
 )
-from workers.node.house_runner import steps_of_stage
+from workers.node.house_runner import steps_before_views, steps_of_stage
 
 
 @pytest.mark.parametrize(
@@ -48,6 +48,13 @@ def test_the_last_stage_of_a_batch_writes_the_view() -> None:
     assert steps_of_stage(both, "light")[-1] == "view"
     only_gl = both.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
     assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
+
+
+def test_pairs_that_a_job_asks_for_are_made_with_its_house() -> None:
+    assert steps_before_views(spec(1), "home-1")[:2] == ("house", "cameras")
+    asked = spec(1).model_copy(update={"pairs": True})
+    assert steps_before_views(asked, "home-1")[-1] == "pairs"
+    assert "pairs" not in steps_before_views(asked, "object_chair")
 
 
 def test_keys_of_logs_and_failures_name_their_task_back() -> None:

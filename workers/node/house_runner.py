@@ -27,7 +27,8 @@ from pbrs_farm.run import plan
 from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
-from pbrs_farm.run.plan import Wanted, view_steps, wanted
+from pbrs_farm.run.plan import view_steps
+from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.run.run_task import limit_threads
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
@@ -156,7 +157,6 @@ def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
 # The farm's real runner.
 
 
-_HOUSE_STEPS: Final = ("house", "cameras")  # of the stage geometry
 _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 
 
@@ -218,7 +218,7 @@ class HouseRunner:
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """What the markers' names say of a house: see workers.runner.Survey."""
         # Without its cameras nobody knows the views of the house.
-        if not done.issuperset(_steps_before_views(spec, house)):
+        if not done.issuperset(steps_before_views(spec, house)):
             return Survey()
         batches = self._batches(spec, house)
         units: dict[str, str] = {}
@@ -239,7 +239,7 @@ class HouseRunner:
                 recipe = local_catalogue(self._store, spec.recipe)
                 fetch_catalogue(recipe.dress)
                 here = spec.model_copy(update={"recipe": recipe})
-            for step in _steps_before_views(spec, request.house):
+            for step in steps_before_views(spec, request.house):
                 at = here if step == "house" else spec
                 self._step(store, request, at, on_step, step, source=source)
         return Result(batches=self._batches(spec, request.house))
@@ -336,14 +336,16 @@ class HouseRunner:
 
 
 def want_of(spec: JobSpec) -> Wanted:
-    """Modes, layers and number of views of a job, as the plan takes them."""
-    return wanted(spec.modes, spec.layers, spec.n_views)
+    """What a job asks of each house; BadInput for a layer that this worker has not."""
+    return wanted_of(spec)
 
 
-def _steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
-    """Steps of the stage geometry: with illuminance where it decides which views are made."""
-    is_measured = plan.leaves_out_dark_rooms(spec.recipe, want_of(spec), house)
-    return (*_HOUSE_STEPS, "illuminance") if is_measured else _HOUSE_STEPS
+def steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
+    """Steps of the stage geometry: of the house, but for those that the first batch of light makes."""
+    # Illuminance comes before the views where it decides which of them are made.
+    want = want_of(spec)
+    later = () if plan.leaves_out_dark_rooms(spec.recipe, want, house) else ("illuminance",)
+    return tuple(step for step in plan.house_steps(want, house) if step not in later)
 
 
 def batch_stages(want: Wanted) -> tuple[str, ...]:

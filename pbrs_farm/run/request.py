@@ -1,0 +1,260 @@
+"""What a user asks of `run` and `submit`: one field an option, with type, default, limits and help.
+
+The one place of an option. Both command lines, a job's file, `pf.render_homes` and the farm's JobSpec
+are made from these fields: one that is added to Wanted is an option of both verbs, an entry of job.toml,
+and travels to every worker. commands/options.py makes the command line. No effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, cast
+
+from pydantic import BeforeValidator, Field
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LAYER, OPTIONAL
+from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.recipe import RECIPE_NAMES
+from pbrs_farm.core.record import Record
+from pbrs_farm.core.shown_text import hint_of_choice
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How a field is written as an option: `--name`, a tuple repeated or with many words after it."""
+
+    name: str = ""  # "" = the field's
+    group: str = ""  # title in the help; "" = "options"
+    metavar: str | None = None
+    choices: Sequence[Any] | None = None
+    many_words: bool = False  # of a tuple: --layers a b, else --set a --set b
+    into: str = ""  # the option whose values these join
+    sets: str = ""  # the recipe's field that it is a short form of
+    least: int | None = None  # of a value that is given
+    expected: str = ""  # what a message says that it should be; "" = "{least} or more"
+    hint: str = ""
+
+
+def option(
+    default: Any, text: str, *, ge: float | None = None, le: float | None = None, **shown: Any
+) -> Any:
+    """A field that is an option: its default, its help, limits of any value, and fields of Option.
+
+    In text, {default} stands for the verb's default.
+    """
+    shown_as: dict[str, Any] = {"option": Option(**shown)}
+    return Field(default, ge=ge, le=le, description=text, json_schema_extra=shown_as)
+
+
+def options_of(model: type[Record]) -> dict[str, tuple[str, Option]]:
+    """Option's name as in job files and namespaces -> (field, how it is written), in their order."""
+    found: dict[str, tuple[str, Option]] = {}
+    for field, info in model.model_fields.items():
+        shown: Any = (cast(Any, info.json_schema_extra) or {}).get("option")
+        if shown is not None:
+            found[shown.name or field] = field, shown
+    return found
+
+
+class LibraryOptions(Record):
+    """What to dress with beside the furniture package."""
+
+    catalogue: tuple[str, ...] = option(
+        (), "your own library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB, of"
+        " 3D-FUTURE, hssd-models or objathor; `generated` leaves out the furniture package",
+        group="dressing", metavar="LIBRARY",
+    )  # fmt: skip
+    pictures: tuple[str, ...] = option(
+        (), "your own photographs as pictures on walls, repeatable: a folder of JPEG or PNG",
+        group="dressing", metavar="DIR", into="catalogue",
+    )  # fmt: skip
+
+
+class DressOptions(Record):
+    """By which seeds each home is dressed, and with what."""
+
+    dress: str | None = option(
+        None, "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7",
+        group="dressing", metavar="SEEDS",
+    )  # fmt: skip
+    furnish: Literal["none", "empty"] | None = option(
+        None, "furnish rooms that have nothing in them before the home is dressed (docs/homes.md)",
+        group="dressing", sets="dress.furnish",
+    )  # fmt: skip
+
+
+class RecipeOptions(Record):
+    """The recipe by name, and what overrides its fields."""
+
+    recipe: str = option(
+        "fast", f"{', '.join(RECIPE_NAMES)}, or your own FILE.toml (default {{default}})", group="recipe"
+    )  # fmt: skip
+    set: tuple[str, ...] = option(
+        (), "override a field", group="recipe", metavar="GROUP.FIELD=VALUE"
+    )
+    size: str | None = option(None, "picture size, e.g. 640x480", group="recipe", metavar="WxH")
+    strict: bool = option(False, "recoverable faults of a home are errors", group="recipe")
+
+
+class SeededRecipeOptions(RecipeOptions):
+    """As RecipeOptions, with the recipe's seed."""
+
+    seed: int | None = option(None, "the recipe's seed (default 0)", group="recipe", sets="seed")
+
+
+class LightOptions(Record):
+    """How long light is traced and which groups are stored: short forms of the recipe's fields."""
+
+    noise: str | None = option(
+        None, "end a view's light at this estimated relative error, e.g. 0.05 (light.noise):"
+        " path adds samples, metropolis leaves out mutations",
+        group="light", metavar="E", sets="light.noise",
+    )  # fmt: skip
+    time_budget: str | None = option(
+        None, "seconds of light a view, instead of samples or mutations (light.time_budget_s)",
+        group="light", metavar="S", sets="light.time_budget_s",
+    )  # fmt: skip
+    groups: Literal["two", "lamps"] | None = option(
+        None, "lamps: store the light of each lamp, too, for `relight VIEW --lamp` (light.groups;"
+        " path only; default two: outdoor and indoor)",
+        group="light", sets="light.groups",
+    )  # fmt: skip
+
+
+class CameraOptions(Record):
+    """Where viewpoints come from."""
+
+    cameras: Literal["sampled", "stored", "walk"] | None = option(
+        None, "where viewpoints come from; walk: frames along a person's way (docs/motion.md)",
+        group="viewpoints", sets="cameras.source",
+    )  # fmt: skip
+    trajectory: Path | None = option(
+        None, "your own way: TUM rows t x y z qx qy qz qw (docs/motion.md)",
+        group="viewpoints", metavar="FILE",
+    )  # fmt: skip
+    frames: int | None = option(
+        None, "frames of a walk (default 150)",
+        group="viewpoints", metavar="N", sets="cameras.walk_frames",
+    )  # fmt: skip
+    fps: float | None = option(
+        None, "frames a second of a walk (default 30)",
+        group="viewpoints", metavar="F", sets="cameras.walk_fps",
+    )  # fmt: skip
+    doors: Literal["drawn", "open"] | None = option(
+        None, "open: doors between rooms stand open, where their model has a hinge (read.doors)",
+        group="viewpoints", sets="read.doors",
+    )  # fmt: skip
+    stereo: float | None = option(
+        None, "a second view to the right of each, so many metres off, e.g. 0.065",
+        group="viewpoints", metavar="B", sets="cameras.stereo_m",
+    )  # fmt: skip
+
+
+class ModelsOption(Record):
+    """Where the models lie that a home's file names."""
+
+    models: str = option(
+        "", "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses.md)",
+        metavar="DIR",
+    )  # fmt: skip
+
+
+def _modes(given: object) -> object:
+    """Modes by name or themselves, in the order of ALL_MODES; BadInput for one that is none."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        return given
+    names = [mode.value for mode in ALL_MODES]
+    asked = [str(mode) for mode in given]
+    for name in asked:
+        if name not in names:
+            hint = hint_of_choice(name, names)
+            raise BadInput("--modes", name, "no such lighting mode", hint=hint)
+    return tuple(mode for mode in ALL_MODES if mode.value in asked)
+
+
+class Wanted(Record):
+    """What is made of each house: the options that `run`, `submit` and every worker know alike.
+
+    A field that is added here needs nothing elsewhere but the code that heeds it. Modes may be given
+    by name; no mode at all is labels alone.
+
+        >>> Wanted(modes=("mlt_ol", "opengl_dl")).modes[0].value
+        'opengl_dl'
+    """
+
+    modes: Annotated[tuple[Mode, ...], BeforeValidator(_modes)] = option(
+        ALL_MODES, "opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
+        group="what is made", metavar="MODE", many_words=True,
+    )  # fmt: skip
+    layers: tuple[str, ...] = option(
+        (), "optional layers to write beside those that are there",
+        group="what is made", metavar="LAYER", many_words=True,
+    )  # fmt: skip
+    n_views: int = option(
+        0, "at most N views a house (default: all)", ge=0,
+        name="views", group="what is made", metavar="N", least=1, hint="leave it out for all views",
+    )  # fmt: skip
+    pairs: bool = option(
+        False, "pairs.parquet: what each two views of a room have in common (docs/motion.md)",
+        group="what is made",
+    )  # fmt: skip
+
+
+def wanted_of(request: Wanted) -> Wanted:
+    """What a request, or a job of the farm, asks of each house, its layers in the table's order.
+
+    Raises BadInput for a layer that is not installed here.
+    """
+    want = Wanted(**{name: getattr(request, name) for name in Wanted.model_fields})
+    for layer in want.layers:
+        if layer not in LAYER:
+            raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, OPTIONAL))
+    return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in want.layers)})
+
+
+class ProcessOptions(Record):
+    """How this machine's processes do a run."""
+
+    jobs: int = option(
+        1, "processes (default 1, and a second one for most of all but light; each view uses all cores)",
+        group="the run", metavar="N", least=1,
+    )  # fmt: skip
+    step_timeout: float = option(
+        3600.0, "seconds a step may take (default 3600)", group="the run", metavar="S"
+    )
+    silence: float = option(
+        0.0, "seconds a process may say nothing (default: those of a step)",
+        group="the run", metavar="S", least=0,
+    )  # fmt: skip
+    memory: float = option(
+        0.0, "memory a process may hold (default: its share of the machine)",
+        group="the run", metavar="MB", least=0,
+    )  # fmt: skip
+    update: bool = option(
+        False, "give the output folder this recipe, rendering again what differs", group="the run"
+    )
+    as_json: bool = option(False, "a JSON line per event", name="json", group="the run")
+
+
+class Request(Wanted, LightOptions, SeededRecipeOptions, LibraryOptions, DressOptions):
+    """What `run` and `submit` take alike: dressing, recipe, light, and what is made of each house."""
+
+
+class RunRequest(ProcessOptions, Request):
+    """What `run` and `demo` take beside the homes."""
+
+
+class ObjectsRequest(ProcessOptions, Wanted, LightOptions, SeededRecipeOptions):
+    """What `objects` takes beside the models: nothing of dressing."""
+
+
+SHORT_FORMS: Final = {
+    name: shown.sets
+    for model in (DressOptions, SeededRecipeOptions, LightOptions, CameraOptions)
+    for name, (_field, shown) in options_of(model).items()
+    if shown.sets
+}
+"""Options that are short forms -> the recipe's field."""
