@@ -69,7 +69,7 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
 
 def house_as_a_run_has_it(name: str) -> House:
     """The home as read, without what its recipe removes: nothing makes way for plants."""
-    from pbrs_farm.repair.repair_house import without_persons_and_plants
+    from pbrs_farm.repair.small_repairs import without_persons_and_plants
 
     recipe = recipe_from_name("fast")
     house = read_house(resolve(name), recipe.read)

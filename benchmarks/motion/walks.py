@@ -15,7 +15,7 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.steps import camera_seed
-from pbrs_farm.sample.paper_rules import near_any_triangle
+from pbrs_farm.sample.clearance import near_any_triangle
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 
 N_MADE: Final = int(os.environ.get("MADE", "20"))

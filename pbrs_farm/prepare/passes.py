@@ -177,7 +177,7 @@ def _dress(work: Preparation) -> Preparation:
     the furniture package cannot be had.
     """
     from pbrs_farm.dress.dressing import dressed_house
-    from pbrs_farm.repair.repair_house import with_rooms_closed, without_persons_and_plants
+    from pbrs_farm.repair.small_repairs import with_rooms_closed, without_persons_and_plants
 
     fields = work.recipe.repair
     # Nothing makes way for people and plants that repair will take out; lamps hang from ceilings.

@@ -188,7 +188,7 @@ def camera_file_text(fields: CameraFields) -> str:
         text = read_regular(path, MAX_TEXT_BYTES).decode("utf-8")
         if path.name != "room_camera.txt" or not names.exists():
             return text
-        from pbrs_farm.sample.camera_file import with_names
+        from pbrs_farm.sample.room_camera_file import with_names
 
         return with_names(text, read_regular(names, MAX_TEXT_BYTES).decode("utf-8"), str(names))
     except OSError as error:

@@ -8,110 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.shown_text import shown
-from pbrs_farm.core.svg import Element, element, svg_file, svg_text
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import RoomReport, Verdict
+from pbrs_farm.sample.drawing import Drawing, Mark
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.room_sampler import RoomTrace
-
-# A drawing of polygons, lines, dots and text, as SVG text or as an RGB array.
-
-
-Shape = Literal["polygon", "line", "dot", "text"]
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """One shape of a drawing."""
-
-    shape: Shape
-    points: tuple[tuple[float, float], ...]  # px, x right, y down; one for a dot or text
-    colour: str  # "#rrggbb"
-    size: float = 1.0  # px: line width, dot radius or letter height
-    text: str = ""
-    title: str = ""  # shown by a browser over the shape
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Marks on a white sheet."""
-
-    width: int  # px
-    height: int
-    marks: tuple[Mark, ...]  # later ones on top
-
-    def svg(self) -> str:
-        """The drawing as a whole SVG file."""
-        box = f"0 0 {self.width} {self.height}"
-        root = svg_file(width=self.width, height=self.height, viewBox=box, font_family="sans-serif")
-        element(root, "rect", width="100%", height="100%", fill="#ffffff")
-        for mark in self.marks:
-            _draw(root, mark)
-        return svg_text(root) + "\n"
-
-    def rgb(self) -> NDArray[np.uint8]:
-        """(height, width, 3) uint8 sRGB, drawn at twice the size and halved."""
-        # Paint shapes at twice the size and halve it: edges become smooth.
-        big = Image.new("RGB", (2 * self.width, 2 * self.height), "#ffffff")
-        pen = ImageDraw.Draw(big)
-        for mark in self.marks:
-            if mark.shape != "text":
-                _paint(pen, mark)
-        # Set text at the final size, where letters are sharpest.
-        image = big.resize((self.width, self.height), Image.Resampling.BOX)
-        pen = ImageDraw.Draw(image)
-        for mark in self.marks:
-            if mark.shape == "text":
-                font = ImageFont.load_default(mark.size)
-                pen.text(mark.points[0], mark.text, fill=mark.colour, font=font, anchor="lm")
-        return np.asarray(image, np.uint8)
-
-
-def _draw(root: Element, mark: Mark) -> None:
-    # Points are in pixels of the drawing; the first is where dots and text stand.
-    x, y = (f"{value:.1f}" for value in mark.points[0])
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in mark.points)
-    if mark.shape == "dot":
-        shape = element(root, "circle", cx=x, cy=y, r=f"{mark.size:.1f}", fill=mark.colour)
-    elif mark.shape == "text":
-        where = {"x": x, "y": y, "dominant_baseline": "middle"}
-        size = f"{mark.size:.0f}"
-        shape = element(root, "text", mark.text, **where, font_size=size, fill=mark.colour)
-    elif mark.shape == "polygon":
-        shape = element(root, "polygon", points=points, fill=mark.colour)
-    else:
-        stroke = {"stroke": mark.colour, "stroke_width": f"{mark.size:.1f}"}
-        shape = element(root, "polyline", points=points, fill="none", **stroke)
-    if mark.title:
-        element(shape, "title", mark.title)
-
-
-def _paint(pen: ImageDraw.ImageDraw, mark: Mark) -> None:
-    points = [(2 * x, 2 * y) for x, y in mark.points]
-    if mark.shape == "polygon" and len(points) >= 3:
-        pen.polygon(points, fill=mark.colour)
-    elif mark.shape == "line":
-        pen.line(points, fill=mark.colour, width=max(1, round(2 * mark.size)), joint="curve")
-    elif mark.shape == "dot":
-        (x, y), r = points[0], 2 * mark.size
-        pen.ellipse((x - r, y - r, x + r, y + r), fill=mark.colour)
-
-
-# The floor plan with every candidate, why it was rejected, and the winners.
-
 
 # Colour the dots by verdict.
 COLOURS: Final = {
@@ -126,7 +38,6 @@ COLOURS: Final = {
     Verdict.LOWER_SCORE: "#5aa469",
     Verdict.WINNER: "#0b5fff",
 }
-
 _PX_PER_M, _MAX_PX, _MARGIN = 70.0, 1600.0, 30.0  # scale, largest width of a panel, border
 _MOST_LETTERS: Final = 200  # of a line of text
 _ROW, _LETTERS, _LETTER_WIDTH, _TEXT_PX = 16.0, 12.0, 0.56, 200.0  # px
@@ -147,10 +58,10 @@ def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
 
 def camera_map(house: House, sampling: Sampling) -> Drawing:
     """The map of a house's sampling; x of the world to the right, z down."""
-    marks, left, bottom = _levels(house, sampling.views, sampling.traces)
+    marks, left, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
     # Write the legend and the reasons to the right of the last level.
     notes = _notes(sampling)
-    marks += [_shifted(mark, left) for mark in notes]
+    marks += [_shift_marks(mark, left) for mark in notes]
     height = max(bottom, *(mark.points[0][1] for mark in notes)) + _MARGIN
     letters = max(len(mark.text) for mark in notes)
     width = left + max(_TEXT_PX, _LETTER_WIDTH * _LETTERS * letters) + _MARGIN
@@ -159,11 +70,11 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
 
 def plan_svg(house: House, views: Sequence[View] = ()) -> str:
     """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given."""
-    marks, width, bottom = _levels(house, views, (), is_plan=True)
+    marks, width, bottom = _levels_to_draw(house, views, (), is_plan=True)
     return Drawing(math.ceil(width), math.ceil(bottom + _MARGIN), tuple(marks)).svg()
 
 
-def _levels(
+def _levels_to_draw(
     house: House, views: Sequence[View], traces: Sequence[RoomTrace], *, is_plan: bool = False
 ) -> tuple[list[Mark], float, float]:
     """The levels side by side, each at the scale that fits; where they end on the right and below."""
@@ -177,7 +88,7 @@ def _levels(
         x0, z0, x1, z1 = shapely.total_bounds(shapes)
         scale = min(_PX_PER_M, _MAX_PX / max(x1 - x0, z1 - z0, 1e-6))
         panel = _Panel(left - scale * x0, 2 * _MARGIN - scale * z0, scale)
-        marks.append(_text(left, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
+        marks.append(_text_mark(left, _MARGIN, shown(level.name) or f"Level {level.id}", 14.0))
         marks += _level_marks(house, views, traces, level.id, panel, is_plan)
         left += scale * (x1 - x0) + 2 * _MARGIN
         bottom = max(bottom, 2 * _MARGIN + scale * (z1 - z0))
@@ -209,7 +120,7 @@ def _level_marks(
     for item in items:
         marks += _footprint(item, panel, is_plan)
     if is_plan:
-        marks += [mark for item in items for mark in _lamps(item, panel)]
+        marks += [mark for item in items for mark in _lamp_marks(item, panel)]
     for trace in traces:
         if trace.room_id in rooms:
             for eye, verdict in zip(trace.candidates.eye, trace.verdict, strict=True):
@@ -218,7 +129,7 @@ def _level_marks(
                     point = panel(eye[0], eye[2])
                     marks.append(Mark("dot", (point,), COLOURS[kind], 1.4, title=kind.label))
     marks += [
-        _text(*panel(*_middle(room.polygon)), f"{room.id} {shown(room.name)}", _LETTERS)
+        _text_mark(*panel(*_middle(room.polygon)), f"{room.id} {shown(room.name)}", _LETTERS)
         for room in rooms.values()
         if len(room.polygon)
     ]
@@ -246,7 +157,7 @@ def _walk(frames: list[View], panel: _Panel) -> list[Mark]:
         marks += [Mark("line", line, gaze, 1.5, title=title), Mark("dot", line[:1], gaze, 2.0)]
     for view, place, text in ((frames[0], places[0], "start"), (frames[-1], places[-1], "end")):
         marks.append(Mark("dot", (panel(*place),), colour, 5.0, title=view.id))
-        marks.append(_text(panel(*place)[0] + 8, panel(*place)[1], text, _LETTERS, colour))
+        marks.append(_text_mark(panel(*place)[0] + 8, panel(*place)[1], text, _LETTERS, colour))
     return marks
 
 
@@ -273,7 +184,7 @@ def _footprint(item: Item, panel: _Panel, has_edge: bool) -> list[Mark]:
     return [inside, Mark("line", points, _EDGE)] if has_edge else [inside]
 
 
-def _lamps(item: Item, panel: _Panel) -> list[Mark]:
+def _lamp_marks(item: Item, panel: _Panel) -> list[Mark]:
     """A dot at each light source."""
     marks = []
     for light in item.lights:
@@ -299,7 +210,7 @@ def _winner(view: View, panel: _Panel) -> list[Mark]:
     return [
         Mark("line", (*wedge, wedge[0]), colour, 2.0, title=title),
         Mark("dot", (wedge[0],), colour, 4.0, title=title),
-        _text(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
+        _text_mark(*label, view.id.removeprefix(f"{view.room_id}_"), _LETTERS, colour),
     ]
 
 
@@ -323,7 +234,7 @@ def _notes(sampling: Sampling) -> list[Mark]:
         y = _MARGIN + k * _ROW
         if colour:
             marks.append(Mark("dot", ((6.0, y),), colour, 4.0))
-        marks.append(_text(16.0 if colour else 0.0, y, text, _LETTERS))
+        marks.append(_text_mark(16.0 if colour else 0.0, y, text, _LETTERS))
     return marks
 
 
@@ -343,11 +254,11 @@ def _middle(polygon: F64) -> tuple[float, float]:
     return float(x) - 0.4, float(z)
 
 
-def _text(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
+def _text_mark(x: float, y: float, text: str, size: float = _LETTERS, colour: str = _INK) -> Mark:
     # Ids are strangers' words, too, and a line end stops the drawing.
     return Mark("text", ((x, y),), colour, size, text=shown(text, _MOST_LETTERS))
 
 
-def _shifted(mark: Mark, dx: float) -> Mark:
+def _shift_marks(mark: Mark, dx: float) -> Mark:
     points = tuple((x + dx, y) for x, y in mark.points)
     return Mark(mark.shape, points, mark.colour, mark.size, mark.text, mark.title)

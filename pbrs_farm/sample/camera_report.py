@@ -65,9 +65,6 @@ def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
     return dict(total)
 
 
-# What became of a candidate viewpoint.
-
-
 class Verdict(IntEnum):
     """The first rule that rejected a candidate, in the order the rules are tried, or its success."""
 

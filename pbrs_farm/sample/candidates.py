@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.core.house import Room
 from pbrs_farm.core.recipe import CameraFields
 
 
@@ -102,10 +101,10 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
         z = grid.z_min + (row + u[:, 1]) * fields.cell_m
         height = fields.height_min_m + u[:, 3] * (fields.height_max_m - fields.height_min_m)
         azimuth = (sector + u[:, 2]) * step
-        tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal(u[:, 4], u[:, 5]))
+        tilt = np.deg2rad(fields.tilt_deg + fields.tilt_sd_deg * _normal_numbers(u[:, 4], u[:, 5]))
         # Few focal lengths: pictures of one are traced together.
         zooms.append(1 + fields.hfov_spread * (np.floor(5 * u[:, 6]) - 2) / 2)
-        rolls.append(np.deg2rad(fields.roll_sd_deg * _normal(u[:, 7], u[:, 8])))
+        rolls.append(np.deg2rad(fields.roll_sd_deg * _normal_numbers(u[:, 7], u[:, 8])))
         eyes.append(np.stack([x, grid.base_y + height, z], axis=1))
         # Look along the azimuth, tilted down.
         directions.append(
@@ -140,45 +139,19 @@ def uniforms(key: int, cell: I32, n: int) -> F64:
     # Mix key, column and row into one state, then a number per index.
     state = np.full(len(cell), key % 2**64, np.uint64)
     for part in (cell[:, 0], cell[:, 1]):
-        state = _mixed(state ^ part.astype(np.int64).astype(np.uint64))
-    numbers = [_mixed(state ^ np.uint64(k)) for k in range(n)]
+        state = _splitmix64(state ^ part.astype(np.int64).astype(np.uint64))
+    numbers = [_splitmix64(state ^ np.uint64(k)) for k in range(n)]
     # Keep 53 bits, as many as a float64 holds.
     return np.stack([(x >> np.uint64(11)).astype(np.float64) * 2.0**-53 for x in numbers], axis=1)
 
 
-def _normal(u: F64, v: F64) -> F64:
+def _normal_numbers(u: F64, v: F64) -> F64:
     """Standard normal numbers from two uniform ones (Box and Muller 1958), held to -2..2."""
     return np.asarray(np.clip(np.sqrt(-2 * np.log1p(-u)) * np.cos(2 * np.pi * v), -2.0, 2.0))
 
 
-def _mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _splitmix64(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
     x = x + np.uint64(0x9E3779B97F4A7C15)  # SplitMix64 (Steele et al. 2014)
     x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return x ^ (x >> np.uint64(31))
-
-
-# What a room's candidates of the preset `photo` show and score.
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomCandidates:
-    """A room's candidates with the rule that rejected each, and what the others show.
-
-    verdict: (N,) uint8 of Verdict. score: (N,) float64, -inf where a rule rejected it. nyu13:
-    (N, 14) shares of the picture of each class, framing: (N,) framing_cost of photo_score.py; both
-    0 where it was not looked at.
-    """
-
-    room: Room
-    candidates: Candidates
-    verdict: NDArray[np.uint8]
-    score: F64
-    nyu13: F64
-    framing: F64
-
-    def ranked(self, sector: int) -> NDArray[np.intp]:
-        """Numbers of a sector's candidates that no rule rejected, best first."""
-        mine = (self.candidates.sector == sector) & np.isfinite(self.score)
-        which = np.flatnonzero(mine)
-        return which[np.argsort(-self.score[which], kind="stable")]

@@ -13,12 +13,12 @@ from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
-from pbrs_farm.sample.candidates import RoomCandidates
 from pbrs_farm.sample.eye_probes import ItemCounter
+from pbrs_farm.sample.photo_choice import RoomCandidates
 from pbrs_farm.sample.photo_sampler import PhotoSampler, room_report
 from pbrs_farm.sample.room_sampler import RoomSampler, RoomTrace
 from pbrs_farm.sample.stored_cameras import stored_views
-from pbrs_farm.sample.view_score import DepthOf
+from pbrs_farm.sample.view_overlap import DepthOf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,9 +131,6 @@ def _report(
         rooms=rooms,
         notes=notes,
     )
-
-
-# Stereo pairs: for each view one more, moved to the right along its own x axis.
 
 
 def with_right_views(views: Iterable[View], baseline_m: float) -> tuple[View, ...]:

@@ -5,15 +5,12 @@ No effects.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I64
-from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import House, ItemKind, Room
 from pbrs_farm.core.recipe import CameraFields
 
@@ -93,48 +90,3 @@ def released_score(
     score = np.log(np.where(kept, objects // least, 1)).sum(1)
     n_objects = kept.sum(1)
     return Scored(n_objects, np.where(n_objects >= fields.min_objects, score, 0.0))
-
-
-# How much two views show the same surfaces, by reprojection of one's pixels into the other.
-# No effects. Pictures of 32 x 24 pixels are enough: twins differ by far less than their
-# threshold.
-
-
-DEPTH_SIZE: Final = (32, 24)
-TOLERANCE: Final = 0.05
-"""Two depths of one direction are of one surface when they differ by less than this part."""
-
-DepthOf = Callable[[Sequence[Camera]], F32]
-"""Planar depth at each pixel's centre of cameras of one size: (N, H, W) metres, 0 = nothing."""
-
-
-def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
-    """The part of a's pixels with a surface that b sees too; 0 where a sees nothing.
-
-    depth_a, depth_b: (H, W) planar depth in metres of the cameras' own pictures, 0 = nothing.
-    """
-    # Lift a's pixels to points of the world.
-    origin, directions = a.rays()
-    points = (origin + directions * depth_a[..., None])[depth_a > 0]
-    if not len(points):
-        return 0.0
-
-    # Project them into b, and keep those that lie in its picture.
-    camera = (points - b.eye) @ b.world_from_camera[:3, :3]
-    z = -camera[:, 2]
-    in_front = z > 1e-3
-    camera, z = camera[in_front], z[in_front]
-    i = b.intrinsics
-    column = np.floor(i.cx + i.fx * camera[:, 0] / z).astype(np.int64)
-    row = np.floor(i.cy - i.fy * camera[:, 1] / z).astype(np.int64)
-    inside = (column >= 0) & (column < i.width_px) & (row >= 0) & (row < i.height_px)
-
-    # A point is seen where nothing stands before it.
-    there = depth_b[row[inside], column[inside]]
-    seen = np.abs(there - z[inside]) <= TOLERANCE * z[inside]
-    return float(seen.sum() / len(points))
-
-
-def overlap(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
-    """The larger of both directions' shared parts: 1 = one view shows nothing the other does not."""
-    return max(shared_part(a, depth_a, b, depth_b), shared_part(b, depth_b, a, depth_a))

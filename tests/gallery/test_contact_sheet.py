@@ -244,7 +244,7 @@ def test_a_line_end_in_any_text_of_a_sheet_is_a_space() -> None:
         for text in ("one\ntwo", "one two", "é\r\nb")
     ]
     assert lengths[0] == lengths[1]
-    assert camera_map._text(0, 0, "Level 1\n2").text == "Level 1 2"
+    assert camera_map._text_mark(0, 0, "Level 1\n2").text == "Level 1 2"
 
 
 def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.structure.cut_openings import MOVED_M, with_frames_apart
+from pbrs_farm.repair.structure.frames_apart import MOVED_M, with_frames_apart
 from tests.repair.wall_rooms import WALL, covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)

@@ -26,8 +26,10 @@ from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import is_lived_in
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.lamps.bulbs import icosphere, with_bulbs, with_shades
-from pbrs_farm.repair.lamps.room_lighting import GivenLights, place_of_lamp, with_room_lighting
+from pbrs_farm.repair.lamps.bulbs import icosphere, with_bulbs
+from pbrs_farm.repair.lamps.ceiling_lamp import place_of_lamp
+from pbrs_farm.repair.lamps.lampshades import with_shades
+from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.structure.plan_geometry import polygon_of_room
 from tests.repair.embree import EmbreeOccluder
 

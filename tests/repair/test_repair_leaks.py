@@ -12,8 +12,9 @@ from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
-from pbrs_farm.repair.measure.enclosure import RoomInterior, Space
+from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.leaks import LeakMeter, leaks_of_house
+from pbrs_farm.repair.measure.room_interiors import RoomInterior
 from pbrs_farm.repair.structure import watertight as structure
 from pbrs_farm.repair.structure.prisms import level_plane
 from tests.repair.embree import EmbreeOccluder

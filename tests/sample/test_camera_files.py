@@ -8,8 +8,9 @@ import pytest
 
 from pbrs_farm.core.camera import PAPER_HFOV_RAD
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.sample import camera_file, sample_cameras
+from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
+from pbrs_farm.sample.room_camera_file import cameras_from_text, with_names
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from tests.builders import builtin_home
 from tests.sample.sampled_rooms import QUICK, counter_of
@@ -18,7 +19,7 @@ LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.4338
 
 
 def test_a_published_line_gives_the_published_intrinsics_and_pose() -> None:
-    (line,) = camera_file.cameras_from_text(LINE + "\n\n", "room_camera.txt", 640, 480)
+    (line,) = cameras_from_text(LINE + "\n\n", "room_camera.txt", 640, 480)
     camera = line.camera
     assert camera.intrinsics.fx == pytest.approx(517.97, abs=0.005)
     assert camera.intrinsics.fy == camera.intrinsics.fx
@@ -42,7 +43,7 @@ def test_a_published_line_gives_the_published_intrinsics_and_pose() -> None:
 )
 def test_a_line_that_is_no_camera_is_rejected_with_its_number(line: str, reason: str) -> None:
     with pytest.raises(BadInput, match=reason) as caught:
-        camera_file.cameras_from_text(f"{LINE}\n{line}\n", "room_camera.txt", 640, 480)
+        cameras_from_text(f"{LINE}\n{line}\n", "room_camera.txt", 640, 480)
     assert "room_camera.txt: line 2" in str(caught.value)
 
 
@@ -112,7 +113,7 @@ def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
 
 
 def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:
-    text = camera_file.with_names(f"{LINE}\n\n{LINE}\n", "Room#0_1_2\nRoom#9_9_0\n", "names")
+    text = with_names(f"{LINE}\n\n{LINE}\n", "Room#0_1_2\nRoom#9_9_0\n", "names")
     given = cameras_from_file_text(text, "room_camera.txt", 640, 480)
     assert [room for _, room in given] == ["0_1", "9_9"]
     house = builtin_home()
@@ -123,7 +124,7 @@ def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:
     )
     assert [v.room_id for v in views] == ["0_1", "0_0"]
     with pytest.raises(BadInput, match="1 names for 2 cameras"):
-        camera_file.with_names(f"{LINE}\n{LINE}\n", "Room#0_1_2\n", "names")
+        with_names(f"{LINE}\n{LINE}\n", "Room#0_1_2\n", "names")
 
 
 def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.eye_probes import ItemCounter
-from pbrs_farm.sample.room_sampler import Coarse, FullScores, best_first
+from pbrs_farm.sample.sector_search import Coarse, FullScores, best_first
 from tests.builders import builtin_home
 from tests.sample.sampled_rooms import QUICK, IndependentLook, counter_of, furnished
 

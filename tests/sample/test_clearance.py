@@ -5,7 +5,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.sample.paper_rules import near_any_triangle
+from pbrs_farm.sample.clearance import near_any_triangle
 from tests.raycast.scenes import geometry, soup
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU13_NAMES
-from pbrs_farm.sample.photo_sampler import NYUV2_SHARES, share_distance
+from pbrs_farm.sample.photo_choice import NYUV2_SHARES, share_distance
 
 PHOTOGRAPHS = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU13_NAMES])
 

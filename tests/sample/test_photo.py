@@ -23,7 +23,7 @@ from pbrs_farm.sample.photo_score import (
     photo_score,
     photo_shares,
 )
-from pbrs_farm.sample.view_score import DEPTH_SIZE, overlap, shared_part
+from pbrs_farm.sample.view_overlap import DEPTH_SIZE, overlap, shared_part
 from tests.sample.sampled_rooms import box, furnished, room_house, shell
 
 FIELDS: CameraFields = recipe_from_name("fast").cameras.model_copy(

@@ -11,9 +11,15 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.sample.camera_report import Verdict
-from pbrs_farm.sample.candidates import Candidates, RoomCandidates
-from pbrs_farm.sample.photo_sampler import MOST_WORSE, NYUV2_SHARES, PhotoChoice, share_distance
-from pbrs_farm.sample.view_score import DEPTH_SIZE
+from pbrs_farm.sample.candidates import Candidates
+from pbrs_farm.sample.photo_choice import (
+    MOST_WORSE,
+    NYUV2_SHARES,
+    PhotoChoice,
+    RoomCandidates,
+    share_distance,
+)
+from pbrs_farm.sample.view_overlap import DEPTH_SIZE
 from tests.sample.sampled_rooms import room_house, shell
 
 FIELDS: CameraFields = recipe_from_name("fast").cameras

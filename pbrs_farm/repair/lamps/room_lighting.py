@@ -8,151 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.classes import LAMP
-from pbrs_farm.core.house import (
-    House,
-    Item,
-    ItemKind,
-    LightPart,
-    Material,
-    MaterialKind,
-    Opening,
-    Room,
-    corners_of_surfaces,
-)
-from pbrs_farm.core.lighting import PowerUnit, flux_lm
-from pbrs_farm.core.mesh import distances_to_triangles
-from pbrs_farm.geometry.heights import lowest_above
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import House, Item, LightPart, Material, MaterialKind, Opening, Room
+from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.home.lamps import flux_for_floor
 from pbrs_farm.home.room_use import is_lived_in
-from pbrs_farm.repair.lamps.bulbs import icosphere
+from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, ceiling_lamp, heights_above
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.prisms import polygons_of
-
-# The lamp that repair hangs in a room: where, and what it looks like.
-# `ceiling_lamp` is the one place that says what an added lamp is: a ball of light.
-
-
-ADDED_LAMP = "added"  # tag of every lamp that repair adds
-_BELOW_CEILING_M = 0.2  # centre of the lamp
-_TALL_M = 0.5  # what reaches this near the ceiling takes part of it
-_OWN_WALL_M = 0.2  # a room's own walls may stand so far inside its outline
-_HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
-_RADIUS_M = 0.1
-_POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
-_LEAST_LM, _MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
-_ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
-_GRID_M = 0.25  # of places tried below a sloped ceiling
-
-
-def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0) -> Item:
-    """A ball below the ceiling, in the middle of the largest part of it that is free.
-
-    material: index of its bulb material. tag: why it was added; begins the item's id. flux_lm: its
-    luminous flux, kept within what one lamp gives; 0 = that of a lamp of Sweet Home 3D.
-    """
-    centre = place_of_lamp(house, room)
-    radius = _RADIUS_M
-    near = [i for i in house.items if _within(i, centre, 2 * radius)]
-    # Shrink it until it touches nothing.
-    for item in near:
-        free = distances_to_triangles(centre, corners_of_surfaces(item.surfaces)).min()
-        radius = max(min(radius, 0.9 * float(free)), 0.01)
-    light = LightPart(
-        position=triple(centre),
-        radius_m=radius,
-        power=min(max(flux_lm, _LEAST_LM), _MOST_LM) if flux_lm else _POWER,
-        unit=PowerUnit.LUMEN if flux_lm else PowerUnit.SWEETHOME3D,
-        emitting=(0,),
-        escape=1.0,
-    )
-    return Item(
-        id=f"{tag}_{room.id}",
-        name=f"{tag} ceiling light",
-        kind=ItemKind.LAMP,
-        level_id=room.level_id,
-        surfaces=(icosphere("bulb", centre, radius, material),),
-        nyu40=LAMP,
-        source_class=tag,
-        room_id=room.id,
-        lights=(light,),
-        tags=tuple(dict.fromkeys((tag, ADDED_LAMP))),
-    )
-
-
-def place_of_lamp(house: House, room: Room) -> F64:
-    """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of:
-    no cupboard, and no wall that stands inside the room's outline, as of a bathroom drawn in it.
-
-    Below the ceiling that is really there; where that is too low for a head, below its highest
-    place.
-    """
-    # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
-    area = plan.polygon_of_room(room.polygon)
-    free = plan.without(area, *(f for i in house.items if (f := _tall_footprint(i, room))))
-    free = plan.without(free, *_walls_inside(house, room, area))
-    largest = max(polygons_of(free) or polygons_of(area), key=lambda p: p.area)
-    circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
-    # Measure how high it is there, and look for a higher place if it is low.
-    places = circle[:1]
-    heights = heights_above(house, room, places)
-    if heights[0] < room.floor_y + _HEAD_M + _BELOW_CEILING_M:
-        low, high = np.array(largest.bounds).reshape(2, 2)
-        axes = [np.arange(low[k], high[k], _GRID_M) for k in range(2)]
-        grid = np.stack([g.ravel() for g in np.meshgrid(*axes)], 1)
-        inside = shapely.contains_xy(plan.grown(largest, -_RADIUS_M), grid[:, 0], grid[:, 1])
-        places = np.concatenate([places, grid[inside]])
-        heights = heights_above(house, room, places)
-    best = int(np.argmax(np.minimum(heights, room.ceiling_y)))
-    y = min(float(heights[best]), room.ceiling_y) - _BELOW_CEILING_M
-    return np.array([places[best, 0], y, places[best, 1]])
-
-
-def heights_above(house: House, room: Room, places: F64) -> F64:
-    """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none."""
-    surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
-    triangles = corners_of_surfaces(surfaces)
-    return lowest_above(places, triangles, room.floor_y + _ABOVE_FLOOR_M)
-
-
-def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:
-    """The plan area of a piece that reaches the ceiling's height in the room; None of others."""
-    if item.kind.is_structure or not item.n_faces:
-        return None
-    low, high = item.bounds[:, 1]
-    if high < room.ceiling_y - _TALL_M or low > room.ceiling_y:
-        return None
-    corners = item.oriented_box.corners[:, [0, 2]]
-    return plan.on_grid(shapely.convex_hull(shapely.MultiPoint(corners)))
-
-
-def _walls_inside(house: House, room: Room, area: plan.Shape) -> list[plan.Shape]:
-    """The plan areas of walls as high as the room that stand farther inside it than its own."""
-    inner = plan.grown(area, -_OWN_WALL_M)
-    found = []
-    for item in house.items:
-        if item.kind is not ItemKind.WALL or not item.n_faces or inner.is_empty:
-            continue
-        (x0, low, z0), (x1, high, z1) = item.bounds
-        is_tall = low < room.floor_y + _HEAD_M and high > room.ceiling_y - _TALL_M
-        if is_tall and inner.intersects(shapely.box(x0, z0, x1, z1)):
-            found += [
-                plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in item.surfaces
-            ]
-    return found
-
-
-def _within(item: Item, point: F64, by_m: float) -> bool:
-    low, high = item.bounds
-    return bool(((point > low - by_m) & (point < high + by_m)).all())
-
-
-# What lights each room, and a ceiling light where nothing does or no lamp is.
-
 
 FALLBACK = "fallback"
-_WEAK = 0.25  # share of the flux a room wants, up to which its own lamps are too weak
+_DIM = 0.25  # share of the flux a room wants, up to which its own lamps are too weak
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _HEIGHT_SLACK_M = 0.05  # a lamp or opening may lie so far outside the room's heights
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
@@ -199,7 +64,7 @@ def with_room_lighting(
         tag = ""
         if not lit_by and fallback and room.has_floor and room.has_ceiling and area.area > 0:
             tag = FALLBACK
-        elif in_every_room and own_lm <= _WEAK * wanted_lm and room.has_floor:
+        elif in_every_room and own_lm <= _DIM * wanted_lm and room.has_floor:
             tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
         if tag:
             lit_by.append(tag)

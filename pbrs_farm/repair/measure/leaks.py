@@ -16,13 +16,15 @@ import shapely
 from pbrs_farm.core.arrays import F32, F64, I32
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
 from pbrs_farm.core.mesh import dots, lengths, triangle_corners, unit_normals
-from pbrs_farm.repair.measure.enclosure import RoomInterior, Space
+from pbrs_farm.repair.measure.enclosure import Space
+from pbrs_farm.repair.measure.room_interiors import RoomInterior
 from pbrs_farm.repair.repair_report import Leak, LeakReport, SpaceLeaks
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.plan_geometry import Shape
 from pbrs_farm.repair.structure.prisms import Plane, lifted, polygons_of
 
-# What repair asks of a ray caster; the caster itself comes as an argument. No effects.
+WITHIN_M = 0.005  # how near to an edge rays start
+_MAX_LEAKS = 50  # of a space, kept with their rays
 
 
 class Occluder(Protocol):
@@ -36,13 +38,6 @@ class Occluder(Protocol):
         origins, directions: (N, 3) float32, directions unit.
         """
         ...
-
-
-# The leak meter.
-
-
-WITHIN_M = 0.005  # how near to an edge rays start
-_MAX_LEAKS = 50  # of a space, kept with their rays
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,17 +17,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64, Bools, Points2
 from pbrs_farm.core.classes import CEILING
-from pbrs_farm.core.house import (
-    House,
-    Item,
-    ItemKind,
-    Material,
-    Room,
-    Surface,
-    corners_of_surfaces,
-    part_of,
-)
-from pbrs_farm.core.mesh import unit_normals
+from pbrs_farm.core.house import House, Item, ItemKind, Material, Room, Surface, corners_of_surfaces
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise
 from pbrs_farm.geometry.roofs import level_or_sloped
 from pbrs_farm.home.room_use import is_outdoors
@@ -37,20 +27,20 @@ from pbrs_farm.repair.structure.prisms import polygons_of
 ADDED_CEILING: Final = "added-ceiling"
 """Tag of ceilings that repair adds."""
 
-_TALL_M: Final = 1.8  # a lower wall is a parapet: it bounds no room
+MIN_WALL_HEIGHT_M: Final = 1.8  # a lower wall is a parapet: it bounds no room
 _BESIDE_M: Final = 0.3  # a wall farther from a room's edge is another's
 _WALLED: Final = 0.75  # share of a room's edge at which walls or other rooms stand
 _STEP_M: Final = 0.25  # between places of the edge at which walls are looked for
 _TIE_M: Final = 0.01  # walls are equally near within this
 _FLAT_M: Final = 0.05  # tops that differ by less are one height
 _BEND_M: Final = 0.01  # smaller bends of a sloped ceiling are left out
-_LEAST_M2: Final = 0.05  # a smaller hole is a gap in the drawing
-_STOREY_GAP_M: Final = 0.8  # thickest floor between two storeys
+MIN_HOLE_M2: Final = 0.05  # a smaller hole is a gap in the drawing
+MAX_STOREY_GAP_M: Final = 0.8  # thickest floor between two storeys
 _OVERLAP: Final = 0.1  # share of a room that a floor above must cover to lower its ceiling
 _SLAB_M: Final = 0.12  # below a floor without thickness: its slab, and a little
 _APART_M: Final = 0.005  # below a floor that is a solid
 _MOST_EDGES: Final = 20_000  # of the walls around a room; of more the tallest count
-_DOWN: Final = -0.7  # y of the normal of an underside, at most
+MAX_UNDERSIDE_NORMAL_Y: Final = -0.7  # y of the normal of an underside, at most
 
 
 class _Cover(NamedTuple):
@@ -74,7 +64,9 @@ def with_ceilings(house: House) -> House:
     """
     if all(room.has_ceiling for room in house.rooms):
         return house
-    covers = [_cover(i) for i in house.items if i.kind in (ItemKind.FLOOR, ItemKind.CEILING)]
+    covers = [
+        cover_of_surfaces(i) for i in house.items if i.kind in (ItemKind.FLOOR, ItemKind.CEILING)
+    ]
     made: list[Item] = []
     closed: dict[str, Room] = {}
     # From the top storey down: what is under a ceiling that was just added is not open to the sky.
@@ -90,7 +82,7 @@ def with_ceilings(house: House) -> House:
                 source_class="ceiling", room_id=room.id, tags=(ADDED_CEILING,),
             )
         )  # fmt: skip
-        covers.append(_cover(made[-1]))
+        covers.append(cover_of_surfaces(made[-1]))
     if not made:
         return house
     return replace(
@@ -106,7 +98,7 @@ def rooms_with_added_ceilings(house: House) -> tuple[str, ...]:
     return tuple(i.room_id or "" for i in house.items if ADDED_CEILING in i.tags)
 
 
-def _cover(item: Item) -> _Cover:
+def cover_of_surfaces(item: Item) -> _Cover:
     shapes = [plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in item.surfaces]
     low_y, high_y = item.bounds[:, 1].tolist()  # NaN of an item without vertices
     is_ceiling = item.kind is ItemKind.CEILING
@@ -122,12 +114,12 @@ def _closed(room: Room, house: House, covers: Sequence[_Cover]) -> tuple[Surface
     has_wall = np.isfinite(tops)
     if not has_wall.any() or (has_wall | _beside_rooms(ring, room, house.rooms)).mean() < _WALLED:
         return None
-    is_below = any(r.floor_y > room.floor_y + _TALL_M for r in house.rooms)
+    is_below = any(r.floor_y > room.floor_y + MIN_WALL_HEIGHT_M for r in house.rooms)
     level_y = min(float(np.median(tops[has_wall])), _under_floors(area, room, covers))
     is_level = is_below or float(np.ptp(tops[has_wall])) < _FLAT_M
     bare = plan.opened(_bare(area, room, level_y, house, covers, is_below=is_below), _STEP_M / 2)
     parts, heights = [], []
-    for polygon in polygons_of(bare, min_area_m2=_LEAST_M2):
+    for polygon in polygons_of(bare, min_area_m2=MIN_HOLE_M2):
         rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
         if is_level:
             own = [(counter_clockwise(r), np.full(len(r), level_y)) for r in rings]
@@ -144,7 +136,7 @@ def _closed(room: Room, house: House, covers: Sequence[_Cover]) -> tuple[Surface
 
 def _under_floors(area: plan.Shape, room: Room, covers: Sequence[_Cover]) -> float:
     """y below the floors of the storey above; inf without any."""
-    floors = [c for c in covers if not c.is_ceiling and c.low_y > room.floor_y + _TALL_M]
+    floors = [c for c in covers if not c.is_ceiling and c.low_y > room.floor_y + MIN_WALL_HEIGHT_M]
     near = [c for c in floors if plan.common(area, c.area).area > _OVERLAP * area.area]
     return min((c.under_y for c in near), default=np.inf)
 
@@ -159,16 +151,16 @@ def _bare(
     is_below: bool,
 ) -> plan.Shape:
     """What of a room has no ceiling of its own, nor one that a void leads up to, nor stairs."""
-    above = [c for c in covers if c.low_y > room.floor_y + _TALL_M / 2]
-    own = [c.area for c in above if c.is_ceiling and c.low_y < level_y + _STOREY_GAP_M]
+    above = [c for c in covers if c.low_y > room.floor_y + MIN_WALL_HEIGHT_M / 2]
+    own = [c.area for c in above if c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M]
     floors = plan.union(
-        c.area for c in above if not c.is_ceiling and c.low_y < level_y + _STOREY_GAP_M
+        c.area for c in above if not c.is_ceiling and c.low_y < level_y + MAX_STOREY_GAP_M
     )
     high = plan.union(c.area for c in above if c.is_ceiling)
     stairs = [
         shapely.box(low[0], low[2], high[0], high[2])
         for low, high in (i.bounds for i in house.items if i.kind is ItemKind.STAIRS)
-        if is_below and low[1] < level_y - _TALL_M / 2 and high[1] > level_y - _BESIDE_M
+        if is_below and low[1] < level_y - MIN_WALL_HEIGHT_M / 2 and high[1] > level_y - _BESIDE_M
     ]
     roofs = [_roof(i) for i in house.items if _is_roof(i, room, area)]
     return plan.without(area, *own, plan.without(high, floors), *stairs, *roofs)
@@ -185,14 +177,14 @@ def _is_roof(item: Item, room: Room, area: plan.Shape) -> bool:
 
 
 def _roof(item: Item) -> plan.Shape:
-    return _cover(item).area
+    return cover_of_surfaces(item).area
 
 
 def _beside_rooms(points: F64, room: Room, rooms: Sequence[Room]) -> Bools:
     """Whether points (N, 2) lie beside another room of the same storey."""
     found = np.zeros(len(points), np.bool_)
     for other in rooms:
-        if other is not room and abs(other.floor_y - room.floor_y) < _TALL_M / 2:
+        if other is not room and abs(other.floor_y - room.floor_y) < MIN_WALL_HEIGHT_M / 2:
             near = plan.grown(plan.polygon_of_room(other.polygon), _BESIDE_M)
             found |= shapely.contains_xy(near, points[:, 0], points[:, 1])
     return found
@@ -212,7 +204,7 @@ class _WallTops:
             ends = edges[:, :, [0, 2]]
             # Keep what is near the room and reaches high enough.
             near = (ends.max(1) > low).all(1) & (ends.min(1) < high).all(1)
-            edges = edges[near & (edges[:, :, 1].max(1) > room.floor_y + _TALL_M)]
+            edges = edges[near & (edges[:, :, 1].max(1) > room.floor_y + MIN_WALL_HEIGHT_M)]
             order = np.argsort(-edges[:, :, 1].max(1), kind="stable")[:_MOST_EDGES]
             if len(edges):
                 self._walls.append(edges[order])
@@ -276,60 +268,3 @@ def _bent(ring: Points2, walls: _WallTops, otherwise: float) -> tuple[Points2, F
         bends = shapely.get_coordinates(shapely.simplify(shapely.LineString(line), _BEND_M))
         keep[(start + np.rint(bends[:, 0] / _STEP_M).astype(int)) % len(points)] = True
     return points[keep], tops[keep]
-
-
-# The underside of a floor over a room without a ceiling.
-
-
-UNDERSIDE: Final = "underside"
-"""Tag of such ceilings."""
-
-
-def with_undersides(house: House) -> House:
-    """The house with what looks down of floors over rooms without a ceiling as items of their own.
-
-    What one sees above oneself is ceiling. The new items come last.
-    """
-    below = [(r, plan.polygon_of_room(r.polygon)) for r in house.rooms if not r.has_ceiling]
-    if not below:
-        return house
-    items: list[Item] = []
-    made: list[Item] = []
-    for item in house.items:
-        room = _room_below(item, below) if item.kind is ItemKind.FLOOR and item.n_faces else None
-        own, under = _parted(item) if room is not None else (item.surfaces, ())
-        if room is None or not under or not own:
-            items.append(item)
-            continue
-        items.append(replace(item, surfaces=own))
-        made.append(
-            Item(
-                id=f"{UNDERSIDE}_{item.id}", name=f"Underside of {item.name or item.id}",
-                kind=ItemKind.CEILING, level_id=room.level_id, surfaces=under, nyu40=CEILING,
-                source_class="ceiling", room_id=room.id, tags=(UNDERSIDE,),
-            )
-        )  # fmt: skip
-    return house.with_items([*items, *made])
-
-
-def _room_below(item: Item, below: Sequence[tuple[Room, plan.Shape]]) -> Room | None:
-    """The room without a ceiling that lies most below a floor."""
-    area, low_y = _cover(item)[:2]
-    shared = [
-        plan.common(area, shape).area
-        if room.floor_y + _TALL_M / 2 < low_y < room.ceiling_y + _STOREY_GAP_M
-        else 0.0
-        for room, shape in below
-    ]
-    best = int(np.argmax(shared))
-    return below[best][0] if shared[best] > _LEAST_M2 else None
-
-
-def _parted(item: Item) -> tuple[tuple[Surface, ...], tuple[Surface, ...]]:
-    """The surfaces of a floor without the faces that look down, and those faces."""
-    own, under = [], []
-    for s in item.surfaces:
-        down = unit_normals(corners_of_surfaces([s]))[:, 1] < _DOWN
-        own += [part_of(s, s.faces[~down], s.name)] if not down.all() else []
-        under += [part_of(s, s.faces[down], s.name)] if down.any() else []
-    return tuple(own), tuple(under)

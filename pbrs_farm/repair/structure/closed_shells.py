@@ -22,7 +22,6 @@ from pbrs_farm.core.mesh import (
     unit_normals,
 )
 from pbrs_farm.repair.structure.booleans import (
-    MIN_AREA_M2,
     WELD_M,
     Patch,
     Tag,
@@ -30,8 +29,12 @@ from pbrs_farm.repair.structure.booleans import (
     faces_of_patches,
     solid_from_patches,
 )
+from pbrs_farm.repair.structure.slivers import MIN_AREA_M2
 
-# Surfaces of the house as patches for the boolean work, and back.
+_FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
+_LEAST_FACES = 4  # of a closed solid
+_THICKER_THAN_WALLS_M = 0.4  # what is thinner and looks inward is a wall wound the wrong way
+ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
@@ -68,16 +71,6 @@ def surface_from_patch(patch: Patch) -> Surface | None:
         patch.uvs[used].astype(np.float32),
         normals,
     )
-
-
-# The closed shells a structure item is made of.
-
-
-_FLAT_M = 1e-3  # how far corners may lie off the plane of a planar wall
-_LEAST_FACES = 4  # of a closed solid
-_THICKER_THAN_WALLS_M = 0.4  # what is thinner and looks inward is a wall wound the wrong way
-
-ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was made of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,115 +14,13 @@ import numpy as np
 import shapely
 from manifold3d import Manifold
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, reduced
+from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
-from pbrs_farm.repair.structure.slabs import GAP_M, SAME_HEIGHT_M
+from pbrs_farm.repair.structure.room_volumes import MARGIN_M
+from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
-
-# Room volumes as solids, so that no slab or joint sticks into another room.
-
-
-MARGIN_M = 0.005
-"""Volumes of rooms reach this far into what bounds them."""
-
-_TOUCH_M = 0.002  # solids that overlap less are left uncut
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RoomVolume:
-    """A part of a room's volume: a plan area between two planes."""
-
-    area: shapely.Polygon
-    low: Plane
-    high: Plane
-    items: frozenset[int]  # floors and ceilings that bound it, of any room
-    bounds: F64  # (2, 3) lowest and highest corner
-
-
-def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -> list[RoomVolume]:
-    """The volumes of every room, a part below each plane of its ceiling, a little too large.
-
-    What they cut ends inside walls, floor and ceiling, flush with none of them.
-    """
-    margin = _margin(rooms)
-    spans = _height_spans(surfaces)
-    found = []
-    for room in rooms:
-        area = plan.polygon_of_room(room.polygon)
-        own = frozenset(s.item for s in _bounding(room, surfaces, spans))
-        # Stand a part below each plane of the ceiling, one below the nominal height elsewhere.
-        ceilings = [s for s in surfaces if s.is_ceiling and s.room_id == room.id]
-        floor = level_plane(room.floor_y - margin)
-        parts = [(s.area, s.plane.raised(margin)) for s in ceilings]
-        bare = plan.without(area, *(s.area for s in ceilings))
-        parts.append((bare, level_plane(room.ceiling_y + margin)))
-        for shape, high in parts:
-            wide = plan.grown(shape, margin)
-            found += [_volume(p, floor, high, own) for p in polygons_of(wide, min_area_m2=1e-3)]
-    return found
-
-
-def _height_spans(surfaces: Sequence[PlanarSurface]) -> F64:
-    """(N, 2) lowest and highest y of each surface."""
-    heights = [s.plane.at(shapely.get_coordinates(s.area)) for s in surfaces]
-    return np.array([(y.min(), y.max()) for y in heights]).reshape(-1, 2)
-
-
-def _bounding(room: Room, surfaces: Sequence[PlanarSurface], spans: F64) -> list[PlanarSurface]:
-    # Count what lies at the room's own height: slabs.visible_areas settles it in plan.
-    is_ceiling = np.array([s.is_ceiling for s in surfaces], np.bool_)
-    nominal = np.where(is_ceiling, room.ceiling_y, room.floor_y)[:, None]
-    is_level = np.abs(spans - nominal).max(1, initial=0.0) < SAME_HEIGHT_M
-    return [s for s, level in zip(surfaces, is_level, strict=True) if level or s.room_id == room.id]
-
-
-def _margin(rooms: Sequence[Room]) -> float:
-    # Shrink the margin for thin floors: a roof may lie 1 mm above a ceiling.
-    gaps = [
-        upper.floor_y - lower.ceiling_y
-        for lower in rooms
-        for upper in rooms
-        if upper.floor_y > lower.ceiling_y
-    ]
-    return min([MARGIN_M, *(gap / 3 for gap in gaps)])
-
-
-def _volume(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int]) -> RoomVolume:
-    corners = shapely.get_coordinates(area)
-    x0, z0, x1, z1 = area.bounds
-    box = np.array([[x0, low.at(corners).min(), z0], [x1, high.at(corners).max(), z1]])
-    return RoomVolume(area, low, high, items, box)
-
-
-def without_volumes(
-    solid: Manifold, tag: Tag, item: int | None, volumes: Sequence[RoomVolume], table: TagTable
-) -> Manifold:
-    """solid less the volumes of rooms, save of the room that item (a floor or ceiling) bounds.
-
-    New faces get tag.
-    """
-    cutters = []
-    for volume in _overlapping(bounds(solid), volumes):
-        if item in volume.items:
-            continue
-        # Cut with the volume, its faces tagged as the solid's own.
-        cutters += solid_prisms([volume.area], volume.low, volume.high, (tag,) * 3, table)
-    return reduced(solid, cutters)
-
-
-def _overlapping(box: F64, volumes: Sequence[RoomVolume]) -> list[RoomVolume]:
-    # Compare all bounds at once: a house has hundreds of joints and rooms.
-    boxes = np.array([v.bounds for v in volumes]).reshape(-1, 2, 3)
-    overlap = np.minimum(box[1], boxes[:, 1]) - np.maximum(box[0], boxes[:, 0])
-    return [volumes[k] for k in np.flatnonzero((overlap >= _TOUCH_M).all(1)).tolist()]
-
-
-# Where walls meet walls, floors and ceilings.
-
 
 _RECESS_M = 0.001  # joints stay this far behind the faces of their walls
 _OVERLAP_M = 0.01  # least height of a joint, and how far it reaches into its wall
@@ -245,7 +143,7 @@ def joints_with_surface(
     # Reach from inside the wall to the middle of the slab.
     far = surface.plane.raised(away * depth_m)
     found = []
-    for foot in [*feet, *_between(feet, is_ceiling=surface.is_ceiling)]:
+    for foot in [*feet, *_joint_between(feet, is_ceiling=surface.is_ceiling)]:
         low, high = (foot.start, far) if surface.is_ceiling else (far, foot.start)
         corners = shapely.get_coordinates(foot.area)
         if (high.at(corners) - low.at(corners)).min() < _RECESS_M:
@@ -265,7 +163,7 @@ class _Foot:
     gap_m: float  # largest distance of its end from the floor or ceiling, negative inside that
 
 
-def _between(feet: Sequence[_Foot], *, is_ceiling: bool) -> list[_Foot]:
+def _joint_between(feet: Sequence[_Foot], *, is_ceiling: bool) -> list[_Foot]:
     # Fill the corners of walls that end visibly short: drawn back, their feet are apart.
     found = []
     for a, b in combinations(feet, 2):
@@ -288,83 +186,3 @@ def _is_loose(a: Wall, b: Wall) -> bool:
     thin = [plan.grown(w.footprint, -0.5 * MARGIN_M) for w in (a, b)]
     both = plan.grown(plan.union([a.footprint, b.footprint]), -0.5 * MARGIN_M)
     return not any(all(p.intersects(t) for t in thin) for p in polygons_of(both))
-
-
-# Walls drawn back where they reach into another room, so that each room sees its own.
-# Where every room brings walls of its own (SUNCG), the walls of two neighbours fill one slab and
-# their sides lie in one plane. A wall is cut there by the volume of the other room, but its rim
-# alone: along the wall, wherever some of its thickness is left. What stands in the other room
-# with all its thickness is a partition that one outline was drawn around, and stays.
-
-
-_COINCIDE_M = 0.001  # walls nearer than this to a room lie in one plane with its own
-_LEAST_LEFT_M = 0.01  # thickness that must be left behind a rim
-_LEAST_LEFT_SHARE = 0.25  # of the wall's thickness, where that is less
-_OVERLAP_M2 = 1e-3  # outlines that share less lie side by side
-
-
-def with_own_sides_visible(
-    walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable
-) -> list[Wall]:
-    """The walls with their rims cut by other rooms; solid and footprint are what is left.
-
-    Walls that belong to no room stay as they are.
-    """
-    areas = {r.id: plan.polygon_of_room(r.polygon) for r in rooms}
-    found = []
-    for wall in walls:
-        if wall.room_id is None:
-            found.append(wall)
-            continue
-        footprint, cutters = wall.footprint, []
-        for room in rooms:
-            apart = room.floor_y > wall.high_y or room.ceiling_y < wall.bottom_y
-            if room.id == wall.room_id or apart:
-                continue
-            reach = plan.grown(_volume_in_plan(room.id, wall.room_id, areas), _COINCIDE_M)
-            polygons = polygons_of(_rim(footprint, reach))
-            # Draw the wall back from the whole height of the other room.
-            low, high = level_plane(room.floor_y - GAP_M), level_plane(room.ceiling_y + GAP_M)
-            cutters += solid_prisms(polygons, low, high, (wall.tag("hidden"),) * 3, table)
-            footprint = plan.without(footprint, *polygons)
-        if cutters:
-            wall = replace(wall, solid=reduced(wall.solid, cutters), footprint=footprint)
-        found.append(wall)
-    return found
-
-
-def _volume_in_plan(room_id: str, owner_id: str, areas: dict[str, plan.Shape]) -> plan.Shape:
-    # Give what two outlines share to the smaller room: a bathroom drawn inside a living room.
-    area, own = areas[room_id], areas.get(owner_id)
-    if own is None or own.area >= area.area or plan.common(area, own).area < _OVERLAP_M2:
-        return area
-    return plan.without(area, own)
-
-
-def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
-    """The part of reach that cuts a straight wall where some of its thickness is left."""
-    if footprint.is_empty or not footprint.intersects(reach):
-        return shapely.Polygon()
-    # Lay the wall along x.
-    axes = along_and_across(footprint)
-    left = shapely.transform(plan.without(footprint, reach), lambda p: p @ axes.T)
-    whole = shapely.transform(footprint, lambda p: p @ axes.T)
-    x0, z0, x1, z1 = whole.bounds
-    least_m = min(_LEAST_LEFT_M, _LEAST_LEFT_SHARE * (z1 - z0))
-    # Every slice of a connected rest has thickness: its spans are where the wall goes on.
-    size = x1 - x0 + z1 - z0
-    spans = [
-        shapely.box(p.bounds[0], z0 - size, p.bounds[2], z1 + size)
-        for p in polygons_of(plan.opened(left, least_m))
-    ]
-    goes_on = plan.on_grid(shapely.transform(plan.union(spans), lambda p: p @ axes))
-    return plan.common(reach, goes_on)
-
-
-def along_and_across(footprint: plan.Shape) -> F64:
-    """(2, 2) rows: unit vectors in plan along the longest side of a footprint, and across it."""
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(footprint))
-    sides = np.diff(corners[:3], axis=0)
-    along = sides[int(np.linalg.norm(sides, axis=1).argmax())]
-    along = along / max(float(np.linalg.norm(along)), 1e-12)
-    return np.array([along, [-along[1], along[0]]])

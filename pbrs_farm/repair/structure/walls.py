@@ -24,12 +24,12 @@ from pbrs_farm.repair.structure.prisms import (
     prism,
 )
 
-# Faces that cutting and joining made: texture coordinates in metres in each face's plane.
-
-
 REVEAL = "reveal"
 ADDED_SURFACES = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
 """Names of the surfaces repair adds to structure items."""
+
+BASEBOARD = "baseboard"
+"""Tag of wall items that are baseboards."""
 
 
 def with_metric_uv(patch: Patch) -> Patch:
@@ -56,13 +56,6 @@ def with_metric_uv(patch: Patch) -> Patch:
         uvs=uvs.reshape(-1, 2),
         normals=np.zeros((3 * n, 3)),
     )
-
-
-# Walls as closed solids with their footprint and height.
-
-
-BASEBOARD = "baseboard"
-"""Tag of wall items that are baseboards."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

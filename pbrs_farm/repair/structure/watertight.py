@@ -2,221 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-import shapely
 from manifold3d import Manifold
 
-from pbrs_farm.core.house import House, Item, ItemKind, Opening, Room, Surface
-from pbrs_farm.repair.measure.enclosure import (
-    RoomInterior,
-    Space,
-    bare_area,
-    interiors_of_room,
-    spaces_of_rooms,
-)
-from pbrs_farm.repair.repair_report import LeftAsIs, Removed, SideArea, StructureReport, WallLoss
+from pbrs_farm.core.house import House, Item, Surface
+from pbrs_farm.repair.measure.enclosure import Space, spaces_of_rooms
+from pbrs_farm.repair.measure.room_interiors import RoomInterior, interiors_of_room
+from pbrs_farm.repair.repair_report import LeftAsIs, Removed, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, united
 from pbrs_farm.repair.structure.closed_shells import surface_from_patch
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds
-from pbrs_farm.repair.structure.joints import (
-    RoomVolume,
-    along_and_across,
-    joints_between_walls,
-    joints_with_surface,
-    volumes_of_rooms,
-    with_own_sides_visible,
-    without_volumes,
-)
+from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_surface
+from pbrs_farm.repair.structure.own_sides import with_own_sides_visible
 from pbrs_farm.repair.structure.planar_surfaces import (
     Cover,
     FloorsAndCeilings,
     PlanarSurface,
     floors_and_ceilings_from_house,
 )
-from pbrs_farm.repair.structure.prisms import polygons_of
-from pbrs_farm.repair.structure.slabs import (
-    GAP_M,
-    bridged,
-    footprints_of_surfaces,
-    slab,
-    visible_areas,
-)
+from pbrs_farm.repair.structure.room_volumes import RoomVolume, volumes_of_rooms, without_volumes
+from pbrs_farm.repair.structure.slabs import bridged, footprints_of_surfaces, slab, visible_areas
+from pbrs_farm.repair.structure.stairwells import stairwells_of_house
+from pbrs_farm.repair.structure.wall_loss import lost_walls, side_areas
 from pbrs_farm.repair.structure.walls import Wall, walls_from_house, with_metric_uv
-
-# How much of every wall, floor and ceiling is there before and after repair.
-# A wall is measured from the side, along its thickness, and its openings are cut out of it before
-# it is measured first: what is lost was cut away by repair. Floors and ceilings count from above.
-
-
-MAX_LOST_SHARE = 0.1
-"""A wall that loses more of its side is a fault of the repair."""
-
-_LEAST_M2 = 0.01  # less is lost to rounding
-
-
-def side_areas(
-    house: House,
-    walls: Sequence[Wall],
-    cut: Sequence[Wall],
-    left: Sequence[Manifold],
-    surfaces: Mapping[int, Sequence[Surface]],
-    table: TagTable,
-) -> tuple[SideArea, ...]:
-    """Square metres of every structure item before and after.
-
-    walls: before anything was cut. cut: drawn back from other rooms; left: and their openings cut,
-    in the same order. surfaces: item index -> new surfaces; other items stay as they are.
-    """
-    before, after = [0.0] * len(house.items), [0.0] * len(house.items)
-    for wall, own, rest in zip(walls, cut, left, strict=True):
-        area = _seen_from_the_side(rest, wall.footprint)
-        after[wall.item] += area
-        # Cut the openings out of the wall as it was; where nothing else was cut, that is the rest.
-        if own.solid is not wall.solid:
-            area = _seen_from_the_side(_opened(house.openings, wall, table), wall.footprint)
-        before[wall.item] += area
-    uprights = {w.item for w in walls}
-    rows = []
-    for index, item in enumerate(house.items):
-        if not item.kind.is_structure:
-            continue
-        if index not in uprights:
-            before[index] = _seen_from_above(item.surfaces)
-            after[index] = _seen_from_above(surfaces.get(index, item.surfaces))
-        rows.append(_row(item, before[index], after[index]))
-    return tuple(rows)
-
-
-def lost_walls(areas: Iterable[SideArea]) -> tuple[WallLoss, ...]:
-    """The walls that lost more than MAX_LOST_SHARE of their side."""
-    return tuple(
-        WallLoss(item_id=a.item_id, before_m2=a.before_m2, after_m2=a.after_m2)
-        for a in areas
-        if a.kind == ItemKind.WALL
-        and a.before_m2 - a.after_m2 > max(MAX_LOST_SHARE * a.before_m2, _LEAST_M2)
-    )
-
-
-def _opened(openings: Sequence[Opening], wall: Wall, table: TagTable) -> Manifold:
-    # Where the source has cut the walls already, nothing is cut: their solids have the holes.
-    return cut_openings(openings, [WallPart(wall, wall.solid, is_joint=False)], table)[0][0]
-
-
-def _seen_from_the_side(solid: Manifold, footprint: plan.Shape) -> float:
-    if solid.is_empty() or footprint.is_empty:
-        return 0.0
-    # Turn the wall so that its thickness lies along z, and look along z.
-    along, across = along_and_across(footprint)
-    turned = np.zeros((3, 4))
-    turned[0, [0, 2]], turned[1, 1], turned[2, [0, 2]] = along, 1.0, across
-    return float(solid.transform(turned).project().area())
-
-
-def _seen_from_above(surfaces: Iterable[Surface]) -> float:
-    shapes = [plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in surfaces]
-    return float(shapely.area(plan.union(shapes)))
-
-
-def _row(item: Item, before: float, after: float) -> SideArea:
-    return SideArea(
-        item_id=item.id, kind=str(item.kind), before_m2=round(before, 3), after_m2=round(after, 3)
-    )
-
-
-# Stairwells that no room covers, and the floor or ceiling they lack.
-# People draw rooms around a stairwell. Where stairs stand between rooms and walls without a room
-# of their own, the sky would look in from below the stairs or from above them.
-
-
-_MIN_AREA_M2 = 0.05  # a smaller hole is a gap in the drawing
-_NEIGHBOUR_M = 0.6  # a floor farther away is not carried on
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stairwells:
-    """Stairwells as rooms, and the floors and ceilings that were missing there."""
-
-    wells: tuple[Room, ...]  # ids "well_<level>_<k>"
-    surfaces: tuple[PlanarSurface, ...]
-
-
-def stairwells_of_house(
-    house: House, walls: Sequence[Wall], surfaces: Sequence[PlanarSurface], covers: Sequence[Cover]
-) -> Stairwells:
-    """Every hole among a level's rooms and walls in which stairs stand or arrive.
-
-    Its missing floor or ceiling continues the nearest one of its level. A hole without stairs (a
-    courtyard, a shaft) stays as it is.
-    """
-    wells = [
-        Room(
-            id=f"well_{level_id}_{k}",
-            name="stairwell",
-            level_id=level_id,
-            polygon=shapely.get_coordinates(hole.exterior)[:-1],
-            floor_y=floor_y,
-            ceiling_y=ceiling_y,
-        )
-        for level_id in dict.fromkeys(r.level_id for r in house.rooms)
-        for k, (hole, floor_y, ceiling_y) in enumerate(_holes(house, level_id, walls))
-    ]
-    rooms = (*house.rooms, *wells)
-    added = []
-    for well in wells:
-        for above in (False, True):
-            # Carry on the nearest floor or ceiling where the stairwell has none.
-            bare = bare_area(well, rooms, covers, above=above)
-            if bare.area > _MIN_AREA_M2:
-                added += _continued(bare, well, surfaces, is_ceiling=above)
-    return Stairwells(tuple(wells), tuple(added))
-
-
-def _holes(
-    house: House, level_id: str, walls: Sequence[Wall]
-) -> Iterator[tuple[shapely.Polygon, float, float]]:
-    rooms = [r for r in house.rooms if r.level_id == level_id]
-    floor_y = min(r.floor_y for r in rooms)
-    ceiling_y = max(r.ceiling_y for r in rooms)
-    # Unite rooms and walls that stand at this level.
-    feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
-    areas = [plan.polygon_of_room(r.polygon) for r in rooms]
-    whole = plan.closed(plan.union([*areas, *feet]), 2 * GAP_M)
-    stairs = [
-        # Take the boxes of stairs that stand or arrive here.
-        shapely.box(low[0], low[2], high[0], high[2])
-        for low, high in (i.bounds for i in house.items if i.kind is ItemKind.STAIRS)
-        if low[1] < ceiling_y and high[1] > floor_y - 0.2
-    ]
-    # Keep the holes with stairs in them.
-    for polygon in polygons_of(whole):
-        for ring in polygon.interiors:
-            hole = shapely.Polygon(ring)
-            if hole.area > _MIN_AREA_M2 and any(s.intersects(hole) for s in stairs):
-                yield shapely.orient_polygons(hole), floor_y, ceiling_y
-
-
-def _continued(
-    area: plan.Shape, well: Room, surfaces: Sequence[PlanarSurface], *, is_ceiling: bool
-) -> list[PlanarSurface]:
-    near = [
-        s
-        for s in surfaces
-        if s.is_ceiling == is_ceiling
-        and s.area.distance(area) < _NEIGHBOUR_M
-        and well.floor_y - GAP_M < s.plane.at(shapely.get_coordinates(s.area)).mean()
-        and s.plane.at(shapely.get_coordinates(s.area)).mean() < well.ceiling_y + GAP_M
-    ]
-    if not near:
-        return []
-    nearest = min(near, key=lambda s: s.area.distance(area))
-    return [replace(nearest, area=p) for p in polygons_of(area)]
-
-
-# Walls, floors and ceilings made one solid that light cannot pass, openings cut.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -260,16 +71,16 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     # Cut the openings, unite everything, and take the faces back by item.
     cut_parts, plugs, idle = cut_openings(house.openings, parts, table)
     solids = [*cut_parts, *slabs, *(s for found in horizontal.solid.values() for s in found)]
-    surfaces = _surfaces(united(solids), table) if solids else {}
+    surfaces = _surfaces_by_item(united(solids), table) if solids else {}
     touched = {w.item for w in uprights} | {s.item for s in planar} | set(horizontal.solid)
     areas = side_areas(house, uprights, wholes, cut_parts[: len(wholes)], surfaces, table)
-    report = _counts(walls, planar, set(horizontal.solid)).model_copy(
+    report = _report_of_counts(walls, planar, set(horizontal.solid)).model_copy(
         update={
             "n_joints_closed": n_gaps,
             "n_stairwells_closed": len(found.surfaces),
             "n_openings": len(house.openings),
             "n_openings_cut": len(plugs),
-            "left_as_is": _left(house, {**left, **horizontal.left}, idle),
+            "left_as_is": _left_as_is(house, {**left, **horizontal.left}, idle),
             "areas": areas,
             "walls_lost": lost_walls(areas),
         }
@@ -292,7 +103,7 @@ def _parts_of_joints(
     return [WallPart(w, solid, is_joint=True) for w, solid in kept]
 
 
-def _counts(
+def _report_of_counts(
     walls: Sequence[Wall], planar: Sequence[PlanarSurface], solid: set[int]
 ) -> StructureReport:
     # A wall of several shells counts once.
@@ -309,7 +120,7 @@ def _covers(horizontal: FloorsAndCeilings) -> list[Cover]:
     return [Cover(s.is_ceiling, s.area, s.plane) for s in horizontal.planar] + horizontal.covers
 
 
-def _left(house: House, left: dict[int, str], idle: Sequence[str]) -> tuple[LeftAsIs, ...]:
+def _left_as_is(house: House, left: dict[int, str], idle: Sequence[str]) -> tuple[LeftAsIs, ...]:
     items = [
         LeftAsIs(what=str(house.items[i].kind), id=house.items[i].id, reason=reason)
         for i, reason in sorted(left.items())
@@ -335,7 +146,7 @@ def _slabs(
     return found + bridged(planar, thickness_m, table)
 
 
-def _surfaces(solid: Manifold, table: TagTable) -> dict[int, tuple[Surface, ...]]:
+def _surfaces_by_item(solid: Manifold, table: TagTable) -> dict[int, tuple[Surface, ...]]:
     found: dict[int, list[Surface]] = {}
     for patch in patches_from_solid(solid, table):
         surface = surface_from_patch(with_metric_uv(patch))

@@ -11,8 +11,8 @@ from pbrs_farm.core.recipe import CameraFields, RepairFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
 from pbrs_farm.sample.camera_map import camera_map
+from pbrs_farm.sample.clearance import near_any_triangle
 from pbrs_farm.sample.house_sampler import Sampling
-from pbrs_farm.sample.paper_rules import near_any_triangle
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 from pbrs_farm.sample.walks.walk_space import shut_doors, walk_spaces
 from tests.builders import builtin_home

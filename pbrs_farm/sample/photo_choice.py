@@ -1,0 +1,211 @@
+"""Which candidates of a home become its views: good ones, no near-duplicates, together like photographs; no effects of its own.
+
+The views of a home maximise the sum of their scores, less what their framing costs, less likeness times
+their number times the distance of their mean class shares to those of photographs: first sector
+by sector, the best first, then by exchange. That distance is the L1 distance of the mean NYU13 pixel shares of
+the views to those published of NYUv2's labelled frames (Silberman et al. 2012), unlabelled pixels left out of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.classes import NYU13_NAMES
+from pbrs_farm.core.house import Room
+from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.sample.candidates import Candidates
+from pbrs_farm.sample.view_overlap import DepthOf, overlap
+
+NYUV2_SHARES: Final[Mapping[str, float]] = {
+    "wall": 0.235, "furniture": 0.139, "objects": 0.121, "floor": 0.098, "window": 0.051,
+    "bed": 0.041, "table": 0.035, "chair": 0.033, "sofa": 0.031, "picture": 0.022,
+    "ceiling": 0.013, "books": 0.007,
+}  # fmt: skip
+"""Shares of pixels over NYUv2's 1,449 labelled frames, unlabelled pixels counted."""
+
+_PHOTOGRAPHS: Final[F64] = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU13_NAMES])
+# (14,) the same of the labelled pixels alone.
+_OF_LABELLED: Final[F64] = _PHOTOGRAPHS / _PHOTOGRAPHS.sum()
+MOST_OVERLAP: Final = 0.8
+"""A view that shares more than this with a better one is its twin."""
+
+_TRIES: Final = 12
+"""Candidates of a sector that are asked, best first, before the sector is given up as a twin."""
+
+_ROUNDS: Final = 3
+"""How often every view may be exchanged for another of its sector."""
+
+MOST_WORSE: Final = 0.25
+"""By how much of score less than its sector's best a view may be taken for its likeness."""
+
+_Name = tuple[str, int]
+"""A candidate's room and number."""
+
+
+def share_distance(shares: F64) -> F64:
+    """(...) L1 distance, 0..2, of NYU13 shares (..., 14) to those of NYUv2's frames.
+
+    shares: means or sums over views, any scale; column 0 is left out. What shows nothing that has
+    a class is as far as can be.
+    """
+    labelled = shares[..., 1:]
+    total = labelled.sum(-1, keepdims=True)
+    part = labelled / np.where(total > 0, total, 1.0)
+    return np.where(total[..., 0] > 0, np.abs(part - _OF_LABELLED[1:]).sum(-1), 2.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomCandidates:
+    """A room's candidates with the rule that rejected each, and what the others show.
+
+    verdict: (N,) uint8 of Verdict. score: (N,) float64, -inf where a rule rejected it. nyu13:
+    (N, 14) shares of the picture of each class, framing: (N,) framing_cost of photo_score.py; both
+    0 where it was not looked at.
+    """
+
+    room: Room
+    candidates: Candidates
+    verdict: NDArray[np.uint8]
+    score: F64
+    nyu13: F64
+    framing: F64
+
+    def ranked(self, sector: int) -> NDArray[np.intp]:
+        """Numbers of a sector's candidates that no rule rejected, best first."""
+        mine = (self.candidates.sector == sector) & np.isfinite(self.score)
+        which = np.flatnonzero(mine)
+        return which[np.argsort(-self.score[which], kind="stable")]
+
+
+@dataclass(slots=True, eq=False)
+class _Sector:
+    """A sector that may have views: its candidates, best first, and the numbers of those taken."""
+
+    scored: RoomCandidates  # of its room
+    number: int  # in its room
+    candidates: NDArray[np.intp]
+    taken: list[int] = field(default_factory=list)
+
+
+@dataclass(slots=True, eq=False)
+class PhotoChoice:
+    """The choice among all candidates of one home, made once.
+
+    lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures.
+    """
+
+    fields: CameraFields
+    lens: Intrinsics
+    depth_of: DepthOf
+    _shown: F64 = field(default_factory=lambda: np.zeros(len(NYU13_NAMES)))  # sum over views
+    _taken: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+    _looked_at: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+
+    def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
+        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
+
+        Sectors take turns by their best score, over all rooms, so that of two twins the better
+        one stays.
+        """
+        # Let every sector that has a candidate take its turn, the best first.
+        sectors = [
+            _Sector(scored, number, ranked)
+            for scored in rooms
+            for number in range(self.fields.n_sectors)
+            if len(ranked := scored.ranked(number))
+        ]
+        sectors.sort(key=lambda sector: -sector.scored.score[sector.candidates[0]])
+        # Give each its views, compared with those of all rooms that are taken already.
+        with_view: set[str] = set()
+        for sector in sectors:
+            self._leave_out_weak(sector, is_first=sector.scored.room.id not in with_view)
+            self._fill(sector)
+            if sector.taken:
+                with_view.add(sector.scored.room.id)
+        # Exchange views for others that bring all of them nearer to photographs.
+        for _ in range(_ROUNDS if self.fields.likeness > 0 else 0):
+            if not sum(self._exchange(sector) for sector in sectors):
+                break
+        for sector in sectors:
+            sector.scored.verdict[sector.taken] = Verdict.WINNER
+        return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
+
+    def _leave_out_weak(self, sector: _Sector, *, is_first: bool) -> None:
+        """Close a sector to weak candidates; a room's first view, its best, may be weaker."""
+        f, scored = self.fields, sector.scored
+        weak = scored.score[sector.candidates] < f.min_score
+        if is_first and scored.score[sector.candidates[0]] >= f.min_room_score:
+            weak[0] = False
+        scored.verdict[sector.candidates[weak]] = Verdict.WEAK
+        sector.candidates = sector.candidates[~weak]
+        # Likeness chooses among the better ones.
+        if f.likeness > 0 and len(sector.candidates):
+            score = scored.score[sector.candidates]
+            sector.candidates = sector.candidates[score >= score[0] - MOST_WORSE]
+
+    def _fill(self, sector: _Sector) -> None:
+        """Take a sector's views, the candidate that adds most first, leaving out twins."""
+        left = sector.candidates
+        for _ in range(_TRIES * self.fields.per_sector):
+            if len(sector.taken) == self.fields.per_sector or not len(left):
+                return
+            # Rank again after each: what a view adds depends on those that are taken.
+            at = int(np.argmax(self._gain(sector.scored, left)))
+            number, left = int(left[at]), np.delete(left, at)
+            if self._is_twin(sector.scored, number):
+                sector.scored.verdict[number] = Verdict.TWIN
+            else:
+                self._take(sector, number)
+
+    def _exchange(self, sector: _Sector) -> bool:
+        """Give each view of a sector up for the candidate that then adds most."""
+        before = list(sector.taken)
+        for number in before:
+            self._give_up(sector, number)
+            others = np.setdiff1d(sector.candidates, sector.taken)
+            gain = self._gain(sector.scored, others)
+            # Try the better ones from the best down; itself is no twin of any.
+            order = others[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
+            better = order[: order.index(number)] if number in order else order
+            free = (k for k in better if not self._is_twin(sector.scored, k))
+            self._take(sector, next(free, number))
+        return set(before) != set(sector.taken)
+
+    def _gain(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
+        """(M,) what candidates would add to the views that are taken."""
+        score = scored.score[numbers]
+        if self.fields.likeness == 0:
+            return score
+        distance = share_distance(self._shown + scored.nyu13[numbers])
+        unlike = self.fields.likeness * (len(self._taken) + 1) * distance
+        return np.asarray(score - scored.framing[numbers] - unlike)
+
+    def _take(self, sector: _Sector, number: int) -> None:
+        sector.taken.append(number)
+        self._taken[sector.scored.room.id, number] = self._look(sector.scored, number)
+        self._shown = self._shown + sector.scored.nyu13[number]
+
+    def _give_up(self, sector: _Sector, number: int) -> None:
+        sector.taken.remove(number)
+        del self._taken[sector.scored.room.id, number]
+        self._shown = self._shown - sector.scored.nyu13[number]
+
+    def _is_twin(self, scored: RoomCandidates, number: int) -> bool:
+        camera, depth = self._look(scored, number)
+        return any(overlap(camera, depth, *o) > MOST_OVERLAP for o in self._taken.values())
+
+    def _look(self, scored: RoomCandidates, number: int) -> tuple[Camera, F32]:
+        """A candidate's camera and depth picture; remembered."""
+        name = scored.room.id, number
+        if name not in self._looked_at:
+            camera = scored.candidates.cameras(np.array([number]), self.lens)[0]
+            self._looked_at[name] = camera, self.depth_of([camera])[0]
+        return self._looked_at[name]

@@ -1,0 +1,102 @@
+"""The way of a walk: places in rooms, joined by the shortest ways that keep clear of things; no effects."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.walkable import CELL_M, WALK_M
+from pbrs_farm.sample.walks.walk_space import WalkSpace
+
+_ROOMY_M: Final = 0.7  # a way that keeps so far from everything costs its length alone
+_NARROW_COST: Final = 2.0  # and one as narrow as can be, so many times its length more
+_PLACES_A_ROOM: Final = (1, 2)  # fewest and most places of one visit
+_CHOICES: Final = 3  # places that are drawn for each one; the farthest is taken
+_MOST_LEGS: Final = 400
+_LEAST_ROOM_CELLS: Final = 60  # of a room's part of the region, to be visited
+
+
+class WayGraph:
+    """The cells of a region as a graph of neighbours, whose edges cost more near things."""
+
+    def __init__(self, space: WalkSpace) -> None:
+        self.cells: I64 = np.argwhere(space.region)
+        number = np.full(space.grid.shape, -1, np.int64)
+        number[tuple(self.cells.T)] = np.arange(len(self.cells))
+        near = np.clip((_ROOMY_M - space.clearance) / (_ROOMY_M - WALK_M / 2), 0, 1)
+        cost = 1 + _NARROW_COST * near
+        # Join each cell with four of its neighbours; the graph is undirected.
+        ends: list[I64] = []
+        weights: list[F64] = []
+        for dz, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            other = self.cells + np.array([dz, dx])
+            inside = space.grid.holds(other)
+            a = np.flatnonzero(inside)
+            b = number[tuple(other[inside].T)]
+            a, b = a[b >= 0], b[b >= 0]
+            length = CELL_M * float(np.hypot(dz, dx))
+            mean = (cost[tuple(self.cells[a].T)] + cost[tuple(self.cells[b].T)]) / 2
+            ends.append(np.stack([a, b]))
+            weights.append(length * mean)
+        rows, columns = np.concatenate(ends, axis=1)
+        n = len(self.cells)
+        self._matrix = csr_matrix((np.concatenate(weights), (rows, columns)), shape=(n, n))
+
+    def from_cell(self, start: int) -> tuple[F64, NDArray[np.int32]]:
+        """(n,) cost of the way from a cell to each, and the cell before each on it."""
+        cost, before = dijkstra(
+            self._matrix, directed=False, indices=np.array([start]), return_predecessors=True
+        )
+        return cost[0], before[0]
+
+
+def way_through_rooms(space: WalkSpace, length_m: float, rng: np.random.Generator) -> F64:
+    """(M, 2) plan places about 5 cm apart: a way of at least length_m from room to room.
+
+    Rooms are visited nearest first, each with one or two places, and again when all have been.
+    The way is shorter where the region is a few cells alone.
+    """
+    graph = WayGraph(space)
+    room = space.room[tuple(graph.cells.T)]
+    rooms = [int(k) for k in np.unique(room) if k >= 0 and (room == k).sum() >= _LEAST_ROOM_CELLS]
+    members = {k: np.flatnonzero(room == k) for k in rooms} or {-1: np.arange(len(graph.cells))}
+    # Begin anywhere in the region, in proportion to the floor.
+    all_cells = np.concatenate([members[k] for k in sorted(members)])
+    at = int(rng.choice(all_cells))
+    cells, length, unvisited = [at], 0.0, set(members)
+    here = next((k for k in sorted(members) if at in members[k]), min(members))
+    for _leg in range(_MOST_LEGS):
+        if length >= length_m:
+            break
+        # Stay for some places, then go on to the nearest room that was not visited.
+        for _place in range(int(rng.integers(_PLACES_A_ROOM[0], _PLACES_A_ROOM[1] + 1))):
+            cost, before = graph.from_cell(at)
+            drawn = rng.choice(members[here], min(_CHOICES, len(members[here])), replace=False)
+            goal = int(drawn[cost[drawn].argmax()])
+            leg = _leg_to(goal, before)
+            length += _length(graph.cells[[at, *leg]])
+            cells += leg
+            at = goal
+        unvisited.discard(here)
+        unvisited = unvisited or (set(members) - {here}) or {here}
+        cost, _before = graph.from_cell(at)
+        here = min(sorted(unvisited), key=lambda k: float(cost[members[k]].min()))
+    return space.grid.places(graph.cells[cells])
+
+
+def _leg_to(goal: int, before: NDArray[np.int32]) -> list[int]:
+    """The cells behind the start up to the goal."""
+    leg = []
+    while before[goal] >= 0:
+        leg.append(goal)
+        goal = int(before[goal])
+    return leg[::-1]
+
+
+def _length(cells: I64) -> float:
+    return float(np.linalg.norm(np.diff(cells, axis=0), axis=1).sum()) * CELL_M
