@@ -80,7 +80,7 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 	@$(study-packages)
 	$(BIN)/pytest -n 2 --dist loadfile -m "study and not slow and not gpu"
 
-test-manual: setup ## every how-to page, the docstrings' examples and the pages' Python, run to their end
+test-manual: setup ## what the pages show, by the marks of their blocks: commands, Python, docstrings' examples, run to their end
 	@$(study-packages)
 	$(BIN)/pytest -m slow tests/docs
 

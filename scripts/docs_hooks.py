@@ -1,7 +1,11 @@
-"""Lets pages of the site link to files at the top of the repository (../NOTICE). Effects: MkDocs'."""
+"""Pages of the site that the repository has in another form: its own files (../NOTICE), and notebooks.
+
+Effects: MkDocs'. A notebook is shown as a page with a link to its file; links to NAME.ipynb lead to the page.
+"""
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -24,7 +28,24 @@ def on_files(files: Files, config: Any) -> Files:
     for name in SHOWN:
         text = (ROOT / name).read_text(encoding="utf-8")
         files.append(File.generated(config, f"files/{plain(name)}", content=text))
+    for notebook in sorted((ROOT / "docs/notebooks").glob("*.ipynb")):
+        name = f"notebooks/{notebook.stem}.md"
+        files.append(File.generated(config, name, content=page_of_notebook(notebook)))
     return files
+
+
+def page_of_notebook(notebook: Path) -> str:
+    """The cells of a notebook as Markdown: text as it is, code in fences; below the title where its file is."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    parts = []
+    for cell in cells:
+        text = "".join(cell["source"]).strip()
+        parts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+    title, _, rest = "\n\n".join(parts).partition("\n")
+    file = (
+        f"This page is a notebook without its outputs: [download it]({notebook.name}){{download}}."
+    )
+    return f"{title}\n\n{file}\n{rest}\n"
 
 
 def on_page_markdown(markdown: str, page: Any, **_rest: Any) -> str:
@@ -35,6 +56,7 @@ def on_page_markdown(markdown: str, page: Any, **_rest: Any) -> str:
         name = match[1]
         return f"]({up}files/{plain(name)})" if name in SHOWN else match[0]
 
+    markdown = re.sub(r"(\]\([\w./]*\w+)\.ipynb\)(?!\{)", r"\1.md)", markdown)
     return re.sub(r"\]\((?:\.\./)+([A-Za-z/]+(?:\.md)?)\)", moved, markdown)
 
 

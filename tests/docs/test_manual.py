@@ -7,6 +7,7 @@ import inspect
 import re
 import shlex
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.core.recipe import Recipe, field_paths
 from pbrs_farm.scene.home import Home
 from pbrs_farm.views.views import Frame
+from tests.docs.fenced import PAGES, REPO, Block, blocks_of
 
-REPO = Path(__file__).parents[2]
 HOWTO = sorted(p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index")
 MODULE_OF = {verb: module for module, verbs in MODULES.items() for verb in verbs}
 OF_NAME = {"home": Home, "scene": Home, "lit": Home, "frame": Frame, "left": Frame, "right": Frame}
@@ -32,17 +33,33 @@ def name_of(page: Path) -> str:
 
 def fences(page: Path, language: str) -> list[str]:
     """The fenced blocks of a page in one language."""
-    text = page.read_text(encoding="utf-8")
-    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return [block.text for block in blocks_of(page) if block.language == language]
 
 
 def commands(page: Path) -> Iterator[list[str]]:
     """The words of each pbrs-farm command of a page's sh blocks."""
-    for block in fences(page, "sh"):
-        for line in block.splitlines():
-            program, *words = shlex.split(line, comments=True)
-            if program == "pbrs-farm":
+    for block in blocks_of(page):
+        for line in block.lines if block.language == "sh" else ():
+            program, *words = shlex.split(line)
+            if program in ("pbrs-farm", ".venv/bin/pbrs-farm"):
                 yield words
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_fenced_block_says_how_its_commands_are_run(page: Path) -> None:
+    assert [f"{b.name} {fault}" for b in blocks_of(page) for fault in b.faults()] == []
+
+
+def test_a_block_without_a_mark_or_with_a_wrong_one_is_told() -> None:
+    block = Block(REPO / "README.md", 1, "sh", "pbrs-farm homes  # nine\nls\n", "")
+    assert block.lines == ["pbrs-farm homes", "ls"]
+    assert block.faults() == ["has no mark: see tests/docs/fenced.py"]
+    assert replace(block, language="").faults() != []
+    assert replace(block, mark="often").faults() == ["is marked 'often'"]
+    assert replace(block, mark="run; needs data: nothing").faults() == ["no line has 'nothing'"]
+    marked = replace(block, mark="run; needs browser: homes")
+    assert marked.faults() == []
+    assert [marked.how(line) for line in marked.lines] == ["needs browser", "run"]
 
 
 @pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
@@ -76,8 +93,8 @@ def test_readme_has_at_most_110_lines() -> None:
     assert len((REPO / "README.md").read_text(encoding="utf-8").splitlines()) <= 110
 
 
-@pytest.mark.parametrize("page", HOWTO, ids=name_of)
-def test_every_command_of_a_howto_parses_and_its_recipe_is_one(page: Path) -> None:
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_command_of_a_page_parses_and_its_recipe_is_one(page: Path) -> None:
     for words in commands(page):
         args = build_parser(MODULE_OF[words[0]]).parse_args(words)
         if hasattr(args, "recipe") and words[0] != "train":

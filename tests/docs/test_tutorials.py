@@ -10,15 +10,16 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.cli import MODULES, main
+from tests.docs.fenced import COMMANDS, blocks_of
 
 REPO = Path(__file__).parents[2]
 PAGES = sorted((REPO / "docs").rglob("*.md"))
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
-    """(language, text) of each fenced block of a page."""
-    text = (REPO / "docs" / page).read_text(encoding="utf-8")
-    return re.findall(r"^```(sh|python)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    """(language, text) of each block of commands of a page."""
+    found = blocks_of(REPO / "docs" / page)
+    return [(b.language, b.text) for b in found if b.language in COMMANDS]
 
 
 @pytest.mark.slow

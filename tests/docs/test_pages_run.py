@@ -1,7 +1,8 @@
-"""Every how-to page does what it says: its commands and its Python, run in order on small pictures.
+"""Every page does what it says: its commands and its Python, run in order as their marks say.
 
-What a page shows large is made small: two homes for twenty, a view for four, 64 pixels for 640. What needs a
-farm, a server or a GPU is left to the tests of those (NOT_HERE); everything else runs to its end.
+What a page shows large is made small where its mark says so: two homes for twenty, a view for four, 64 pixels for
+640. What needs a farm, a browser or Docker is left to the tests of those (fenced.NEEDS); everything else runs to its
+end. The pages whose blocks are marked `run` alone are run as they stand by test_tutorials.py.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,17 +24,21 @@ from PIL import Image
 
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.recipe_toml import toml_from_recipe
-from tests.docs.test_manual import HOWTO, REPO, name_of
+from tests.docs.fenced import COMMANDS, PAGES, REPO, Block, blocks_of
+from tests.docs.test_manual import name_of
+from tests.hostile.sound_inputs import archive
 from tests.scene.homes import SMALL
 
 pytestmark = pytest.mark.slow
 
-NOT_HERE = ("coordinator", "worker", "status", "failures", "board")  # and submit without --dry-run
+AS_THEY_STAND = ("researcher", "python")  # test_tutorials.py runs these
+WITH_RECIPE = ("run", "scatter", "dress", "cameras", "repair")
+WITH_HERE = ("run", "small", *(["needs study"] if find_spec("torch") else []))
 SHRUNK = (
-    (r"made:1\.\.(20|1000)\b", "made:1..2"), (r"--dress 1\.\.\d+", "--dress 1..2"), (r"--frames \d+", "--frames 3"),
+    (r"made:1\.\.(20|1000)\b", "made:1..2"), (r"\bmake (1000|20|6)\b", "make 2"), (r"--dress 1\.\.\d+", "--dress 1..2"), (r"--frames \d+", "--frames 3"),
     (r"--views \d+", "--views 1"), (r"--scenes \d+", "--scenes 1"), (r"--count \d+", "--count 2"),
     (r"--size 512x512", "--size 64x64"), (r"--size 1024x512", "--size 128x64"), (r"--size 320x240", "--size 48x36"),
-    (r"--size (1280x720|160x120)", "--size 64x48"), (r"--recipe (preview|fast|paper)", "--recipe small.toml"),
+    (r"--size (1280x720|160x120|640x480|480x360)", "--size 64x48"), (r"--recipe (preview|fast|paper)", "--recipe small.toml"),
 )  # fmt: skip
 SHRUNK_PYTHON = (
     (r'recipe="preview"', 'recipe="small.toml"'), (r"range\(1, 11\)", "range(1, 3)"), (r"views=4", "views=1"),
@@ -40,6 +46,8 @@ SHRUNK_PYTHON = (
     (r"600\.0, 0, 640\], \[0, 600, 360\]", "30.0, 0, 32], [0, 30, 18]"),
 )  # fmt: skip
 NEEDS = {  # what a page takes from a page before it
+    "data": "run Studio --recipe preview --views 2 --out out/studio",
+    "study": "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
     "hugging_face": "run made:1..20 --dress 1 --recipe fast --modes mlt_il_ol --out out/homes",
     "night": "run Studio --recipe preview --views 1 --out out/day",
     "train": "run Studio --recipe preview --modes mlt_il_ol --out out/other",
@@ -47,54 +55,58 @@ NEEDS = {  # what a page takes from a page before it
 }
 
 
-@pytest.mark.parametrize("page", HOWTO, ids=name_of)
-def test_a_howto_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
+def _is_run(block: Block) -> bool:
+    return (
+        any(block.how(line) in WITH_HERE for line in block.lines or [""])
+        and block.language in COMMANDS
+    )
+
+
+RUN = [p for p in PAGES if p.stem not in AS_THEY_STAND and any(_is_run(b) for b in blocks_of(p))]
+
+
+@pytest.mark.parametrize("page", RUN, ids=name_of)
+def test_a_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     _provide(tmp_path, text)
     if page.stem in NEEDS:
-        _command(f"pbrs-farm {NEEDS[page.stem]}", tmp_path)
-    if page.stem == "predict":
+        _command(f"pbrs-farm {NEEDS[page.stem]}", tmp_path, small=True)
+    if page.stem == "predict" and find_spec("torch"):
         train = "pbrs-farm train normals out/homes --out out/runs/normals --set steps=2"
-        _command(train, tmp_path)
-    n_run = 0
-    for language, block in re.findall(r"^```(\w*)\n(.*?)^```", text, re.M | re.S):
-        if language == "python":
-            _python(block, tmp_path)
-            n_run += 1
-            continue
-        for line in block.splitlines() if language in ("", "sh") else ():
-            if _is_run_here(line):
-                _command(line, tmp_path)
-                n_run += 1
-    assert n_run > 0 or page.stem == "cluster"
+        _command(train, tmp_path, small=True)
+    variables: dict[str, str] = {}
+    for block in blocks_of(page):
+        if block.language == "python" and block.how() in WITH_HERE:
+            _python(block.text, tmp_path)
+        for line in block.lines if block.language == "sh" else ():
+            if block.how(line) not in WITH_HERE:
+                continue
+            if given := re.fullmatch(r"(\w+)=(\S+)", line):
+                variables[given[1]] = given[2]
+                continue
+            for name, value in variables.items():
+                line = line.replace(f"${name}", value)
+            _command(line, tmp_path, small=block.how(line) != "run")
 
 
-def _is_run_here(line: str) -> bool:
-    if line.startswith("pip install"):
-        return True
-    if not line.startswith("pbrs-farm "):
-        return False
+def _command(line: str, folder: Path, *, small: bool) -> None:
+    for large, smaller in SHRUNK if small else ():
+        line = re.sub(large, smaller, line)
     words = shlex.split(line, comments=True)
-    if words[1] in NOT_HERE or "--fetch" in words:
-        return False
-    return words[1] != "submit" or "--dry-run" in words
-
-
-def _command(line: str, folder: Path) -> None:
-    for large, small in SHRUNK:
-        line = re.sub(large, small, line)
-    words = shlex.split(line, comments=True)
-    if words[0] == "pip":
+    if words[0] == "eval":
+        words = ["bash", "-ec", line]
+    elif words[0] == "pip":
         words = [sys.executable, "-m", *words, "-q", "--no-deps", "--no-build-isolation"]
         words += ["--no-index", "--target", str(folder / "site")]
     else:
-        if words[1] in ("run", "scatter") and "--recipe" not in words:
+        words[1:] = [_placed(w, folder) for w in words[1:]]
+        if small and words[1] in WITH_RECIPE and "--recipe" not in words:
             words += ["--recipe", "small.toml"]
-        if words[1] == "run" and not {"--views", "--frames"} & {*words}:
+        if small and words[1] == "run" and not {"--views", "--frames", "stored"} & {*words}:
             words += ["--views", "2"]
         if words[1] == "train" and "--set" not in words:
             words += ["--set", "steps=2"]
-        words = [sys.executable, "-m", "pbrs_farm.cli", *(_placed(w, folder) for w in words[1:])]
+        words = [sys.executable, "-m", "pbrs_farm.cli", *words[1:]]
     made = subprocess.run(
         words, cwd=folder, env=_environment(folder), capture_output=True, text=True, timeout=900
     )
@@ -105,7 +117,11 @@ def _command(line: str, folder: Path) -> None:
 
 
 def _placed(word: str, folder: Path) -> str:
-    """houses/HOUSE/views/VIEW of a page, as the first view that lies there."""
+    """What a page's placeholder stands for: HOME and N of the gallery, the first view for HOUSE/views/VIEW."""
+    if word == "HOME":
+        return "Studio"
+    if word == "docs/pictures/gallery/N.json":
+        return str(REPO / "docs/pictures/gallery/04.json")  # of Studio, as the gallery says
     root, found, _ = word.partition("/houses/HOUSE/views/VIEW")
     if not found:
         return word
@@ -131,7 +147,17 @@ def _indented(block: str) -> str:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(folder / "site"), str(REPO)])}
+    """A shell's: this tree's packages, what a page installed, and pbrs-farm as a command."""
+    command = folder / "bin/pbrs-farm"
+    if not command.exists():
+        command.parent.mkdir()
+        command.write_text(f'#!/bin/sh\nexec {sys.executable} -m pbrs_farm.cli "$@"\n')
+        command.chmod(0o755)
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(folder / "site"), str(REPO)]),
+        "PATH": os.pathsep.join([str(command.parent), os.environ["PATH"]]),
+    }
 
 
 def _provide(folder: Path, text: str) -> None:
@@ -148,6 +174,7 @@ def _provide(folder: Path, text: str) -> None:
         for name, size in (("mug", 0.1), ("carton", 0.14)):
             edge = 1000 * size if models == "my_models" and "--unit mm" in text else size
             trimesh.creation.box([edge, edge, 1.2 * edge]).export(folder / models / f"{name}.glb")
+    (folder / "my-home.sh3d").write_bytes(archive())
     camera = {"fx": 60.0, "fy": 60.0, "cx": 32.0, "cy": 24.0, "width": 64, "height": 48}
     (folder / "camera.json").write_text(json.dumps({**camera, "depth_scale": 1.0}))
     pose = np.diag([1.0, -1, -1, 1])

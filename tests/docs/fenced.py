@@ -1,0 +1,113 @@
+"""The fenced blocks of the pages, and the mark above each that says how its commands are run.
+
+A block of commands or of Python has a comment above it, which neither GitHub nor the site shows:
+
+    <!-- commands: run -->                  as it stands
+    <!-- commands: small -->                on small pictures, few homes and few steps
+    <!-- commands: needs docker -->         not by a test; NEEDS says what may be needed
+    <!-- commands: small; needs browser: board -->    but for lines in which the pattern (a regex) is found
+    <!-- commands: excerpt -->              a part of a file or of a session
+
+Other blocks name their language: text, json, toml, csv.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+REPO: Final = Path(__file__).parents[2]
+PAGES: Final = (
+    REPO / "README.md", REPO / "CONTRIBUTING.md", REPO / "ARCHITECTURE.md", *sorted((REPO / "docs").rglob("*.md")),
+    *sorted((REPO / "deploy").rglob("*.md")), *sorted((REPO / "examples").rglob("*.md")),
+)  # fmt: skip
+HOW: Final = ("run", "small", "excerpt")
+NEEDS: Final = {
+    "clone": "changes the clone it stands in, or sets it up; tests/docs/test_makefile.py reads make's targets",
+    "docker": "Docker with Compose; make test-infra",
+    "farm": "a Redis and workers; make test-farm",
+    "cluster": "Kubernetes or Slurm; make test-kube, make test-infra",
+    "browser": "somebody who looks; make test-web",
+    "network": "downloads",
+    "study": "torch: run small where the extra study is installed, as make test-manual does",
+    "data": "files of others that we may not ship",
+    "package": "a package that none of our extras brings",
+    "hours": "hours",
+}
+"""What a command may need that a test of the pages does not have."""
+
+_FENCE: Final = re.compile(r"^( *)```([^\n`]*)\n(.*?)^ *```[ ]*$", re.MULTILINE | re.DOTALL)
+_MARK: Final = re.compile(r"<!-- commands: (.+?) -->\n\s*\Z")
+COMMANDS: Final = ("sh", "python")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A fenced block. mark: of its comment, "" where it has none; line: of its fence in the page."""
+
+    page: Path
+    line: int
+    language: str
+    text: str
+    mark: str
+
+    @property
+    def name(self) -> str:
+        """For people: page and line."""
+        return f"{self.page.relative_to(REPO)}:{self.line}"
+
+    @property
+    def lines(self) -> list[str]:
+        """The commands of a sh block, comments and blank lines apart; a line that goes on is one."""
+        whole = re.sub(r"\\\n\s*", " ", self.text)
+        found = [re.sub(r"(?:^|\s)#.*", "", line).strip() for line in whole.splitlines()]
+        return [line for line in found if line]
+
+    def how(self, line: str = "") -> str:
+        """How a line of the block is run: "run", "small", "excerpt", or "needs WHAT"."""
+        first, *exceptions = self.mark.split("; ")
+        for exception in exceptions:
+            need, _, pattern = exception.partition(": ")
+            if re.search(pattern, line):
+                return need
+        return first
+
+    def faults(self) -> list[str]:
+        """What is wrong with the block's mark."""
+        if self.language not in COMMANDS:
+            return [] if self.language else ["has no language (sh, python, text, json, toml, csv)"]
+        if not self.mark:
+            return ["has no mark: see tests/docs/fenced.py"]
+        first, *exceptions = self.mark.split("; ")
+        found = [] if _is_how(first) else [f"is marked {first!r}"]
+        for exception in exceptions:
+            need, colon, pattern = exception.partition(": ")
+            if not colon or not _is_how(need):
+                found.append(f"is marked {exception!r}")
+            elif not any(re.search(pattern, line) for line in self.lines):
+                found.append(f"no line has {pattern!r}")
+        return found
+
+
+def _is_how(word: str) -> bool:
+    return word in HOW or word in {f"needs {need}" for need in NEEDS}
+
+
+def blocks_of(page: Path) -> list[Block]:
+    """The fenced blocks of a page, in order."""
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for match in _FENCE.finditer(text):
+        mark = _MARK.search(text[: match.start()])
+        indent = len(match[1])
+        body = "".join(line[indent:] or "\n" for line in match[3].splitlines(keepends=True))
+        line = text.count("\n", 0, match.start()) + 1
+        found.append(Block(page, line, match[2].strip(), body, mark[1] if mark else ""))
+    return found
+
+
+def every_block() -> list[Block]:
+    """The blocks of all pages."""
+    return [block for page in PAGES for block in blocks_of(page)]
