@@ -17,6 +17,7 @@ from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.prepare.dress_catalogue import GENERATED, has_furniture
+from pbrs_farm.prepare.passes import uses_catalogue
 from pbrs_farm.prepare.source import SourceRef, home_id, resolve, variants, words_of_homes
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.store.object_store import Store
@@ -83,6 +84,8 @@ def needed_plugins(
     named = [("homes", plugin_homes(ref.location)[0].name) for ref in refs if ref.kind == "plugin"]
     named += [("readers", ref.location.partition(":")[0]) for ref in refs if ref.kind == "reader"]
     named += [("passes", name) for name in recipe.dress.passes.split(":") if name]
+    if any(uses_catalogue(ref, recipe) for ref in refs):
+        named += [("furniture", name) for name in plugins("furniture")]
     named += [("pictures", name) for name in recipe.tone.pictures.split(":") if name]
     named += [("cameras", recipe.cameras.preset)] * (recipe.cameras.preset in plugins("cameras"))
     named += [("layers", name) for name in layers if name in plugins("layers")]

@@ -24,7 +24,7 @@ from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.things import case_goods, hung, radiators
-from pbrs_farm.dress.things.families import FAMILIES
+from pbrs_farm.dress.things.families import families
 from pbrs_farm.dress.things.maker import Family, Thing, described_in
 from pbrs_farm.dress.things.things import THINGS
 
@@ -94,7 +94,7 @@ def _groups_of_generated() -> dict[str, str]:
     found = dict.fromkeys(books, "book")
     found |= dict.fromkeys(("framed_picture", "canvas", "poster"), "picture_frame")
     others = described_in((case_goods, hung, radiators), Thing)
-    every: list[Thing[...] | Family] = [*THINGS.values(), *others.values(), *FAMILIES.values()]
+    every: list[Thing[...] | Family] = [*THINGS.values(), *others.values(), *families().values()]
     for one in every:
         forms = re.findall(r'm\.name = "(\w+)"', inspect.getsource(one.build))
         found |= dict.fromkeys((one.name, one.called, *forms), one.group)

@@ -16,7 +16,9 @@ from typing import Any, Final
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.shown_text import hint_of_choice
 
-GROUPS: Final = ("homes", "readers", "layers", "cameras", "passes", "pictures", "exports")
+GROUPS: Final = (
+    "homes", "readers", "layers", "cameras", "passes", "furniture", "pictures", "exports",
+)  # fmt: skip
 """Of entry points, each `pbrs_farm.<group>`; docs/plugins.md says what each function takes."""
 
 PREFIX: Final = "plugin:"
@@ -86,7 +88,8 @@ def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
 
     The one way in which a plugin becomes part of a digest, so that its next version makes anew what
     it made: of `homes` and `readers` in the source (prepare/source.py), of `passes` in the house
-    (prepare/passes.py), of `cameras`, `layers` and `pictures` in their steps (run/step_cache.py).
+    (prepare/passes.py), of `furniture` in the catalogue (dress/things/families.py), of `cameras`,
+    `layers` and `pictures` in their steps (run/step_cache.py).
     Raises MachineFailed for a name that no installed plugin has.
     """
     return [plugin(group, name).mark for name in names]

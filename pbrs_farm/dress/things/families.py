@@ -1,8 +1,8 @@
-"""The generated catalogue: families of furniture, many variations each; no effects but reading.
+"""The generated catalogue: families of furniture, many variations each.
 
-A variation is known by its family, its number and its taste (`generated#cooker-07-nordic`); its size
-is told without making it, its shape is made when it is used. Variations of a set (a kitchen) that
-have one number share what the set draws.
+A variation is known by its family, its number and its style (`generated#cooker-07-nordic`). Its size
+is drawn at once, its shape when it is used. Variations of a set (a kitchen) that have one number share
+what the set draws. Effects: imports the modules of installed plugins that add furniture.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Final
 
 import numpy as np
@@ -20,8 +21,10 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import LAMP
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.things import (
     bathroom,
@@ -40,9 +43,8 @@ from pbrs_farm.dress.things.maker import Family, described_in
 VERSION: Final = 4
 """Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
+# The order decides which piece a seed draws.
 _MODULES: Final = (kitchen, bathroom, seating, tables, storage, beds, lamps, radiators)
-
-FAMILIES: Final[Mapping[str, Family]] = described_in(_MODULES, Family)
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
@@ -54,13 +56,29 @@ def with_families(catalogue: Catalogue) -> Catalogue:
         catalogue,
         pieces=(*catalogue.pieces, *family_pieces()),
         load=lambda piece: family_shape(piece) if is_of_family(piece) else catalogue.load(piece),
-        digest=keys.digest(catalogue.digest, _digest()),
+        digest=keys.digest(catalogue.digest, families_digest()),
     )
+
+
+@cache
+def families() -> Mapping[str, Family]:
+    """Every family by name, ours first, then those of installed plugins.
+
+    Raises BadInput where two families have one name or a plugin names no module with families,
+    MachineFailed where a plugin's module cannot be imported.
+    """
+    modules = []
+    for plugin in plugins("furniture").values():
+        module = plugin.load()
+        if not isinstance(module, ModuleType) or not described_in((module,), Family):
+            raise BadInput(plugin.mark, plugin.entry.value, "is no module with a family in it")
+        modules.append(module)
+    return described_in((*_MODULES, *modules), Family)
 
 
 def is_of_family(piece: Piece) -> bool:
     """Whether a piece is a variation of a family."""
-    return piece.id in _numbers()
+    return piece.id in family_numbers()
 
 
 @cache
@@ -68,17 +86,17 @@ def family_pieces() -> tuple[Piece, ...]:
     """Every variation, in the order of the files."""
     return tuple(
         _piece(name, number)
-        for name, family in FAMILIES.items()
+        for name, family in families().items()
         for number in range(1, family.variants + 1)
     )
 
 
 @cache
-def _numbers() -> dict[str, tuple[str, int]]:
-    # Of each piece's id: its family, its number.
+def family_numbers() -> dict[str, tuple[str, int]]:
+    """Of each variation's id: its family, its number."""
     rows = (
         (name, number)
-        for name, family in FAMILIES.items()
+        for name, family in families().items()
         for number in range(1, family.variants + 1)
     )
     return {piece.id: row for piece, row in zip(family_pieces(), rows, strict=True)}
@@ -97,8 +115,8 @@ def drawn_size(piece: Piece) -> tuple[float, float, float]:
 
 
 def _drawn(piece: Piece) -> Shape:
-    name, number = _numbers()[piece.id]
-    family = FAMILIES[name]
+    name, number = family_numbers()[piece.id]
+    family = families()[name]
     style, shared = _shared(family, number)
     rng = np.random.default_rng(keys.seed("family", "shape", name, number))
     _, shape = family.make(rng, style, piece.size, *shared)
@@ -114,7 +132,7 @@ def _shared(family: Family, number: int) -> tuple[Style, tuple[Any, ...]]:
 
 
 def _piece(name: str, number: int) -> Piece:
-    family = FAMILIES[name]
+    family = families()[name]
     style, shared = _shared(family, number)
     own = np.random.default_rng(keys.seed("family", "size", name, number))
     taste = style.name.replace(" ", "-")
@@ -167,6 +185,8 @@ def _lit(shape: Shape, piece: Piece) -> Shape:
 
 
 @cache
-def _digest() -> str:
+def families_digest() -> str:
+    """Of everything that families are written with, and of the plugins that add some."""
     texts = [Path(str(module.__file__)).read_bytes() for module in (joints, *_MODULES)]
-    return keys.digest(VERSION, *(hashlib.sha256(text).hexdigest() for text in texts))
+    known = [hashlib.sha256(text).hexdigest() for text in texts]
+    return keys.digest(VERSION, *known, *marks_in_digest("furniture", plugins("furniture")))

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY, Piece, Place
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind, Surface
 from pbrs_farm.core.mesh import closed_edge_share, face_areas, signed_volume, triangle_corners
+from pbrs_farm.core.plugins import plugins
 from pbrs_farm.dress.things import bodies, cloth, outlines
 from pbrs_farm.dress.things.families import (
-    FAMILIES,
     drawn_size,
+    families,
+    families_digest,
+    family_numbers,
     family_pieces,
     family_shape,
     with_families,
 )
 
-_NAMES = sorted(FAMILIES)
+_NAMES = sorted(families())
 _MOST_FACES = 3800
 
 
@@ -70,6 +78,78 @@ def test_a_catalogue_with_families_has_another_digest_and_loads_them() -> None:
     assert catalogue.digest != EMPTY.digest
     piece = catalogue.of("cooker")[0]
     assert catalogue.shape(piece) is not None
+
+
+@pytest.fixture
+def install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[[str, str], None]]:
+    """Installs a package of furniture in one file, its name and text given, and takes it out again."""
+    known = (plugins, families, family_pieces, family_numbers, families_digest)
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def installed(name: str, text: str) -> None:
+        (tmp_path / f"{name}.py").write_text(text)
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[pbrs_farm.furniture]\n{name} = {name}\n")
+        for cached in known:
+            cached.cache_clear()
+
+    yield installed
+    for cached in known:
+        cached.cache_clear()
+
+
+_ONE = """
+from pbrs_farm.core.catalogue import Place
+from pbrs_farm.dress.things.bodies import cylinder
+from pbrs_farm.dress.things.maker import Maker, Size, family
+
+
+@family(group="pedestal", place=Place.FLOOR, variants=3, size=lambda m: (0.3, 0.3, m.uniform(0.8, 1)))
+def {name}(m: Maker, size: Size) -> None:
+    {body}
+"""
+_BODY = "m.add(cylinder(size[0] / 2, 0, size[2], n=32), of=m.china())"
+
+
+@pytest.mark.kinds("thing")
+def test_a_file_is_all_that_a_new_piece_of_furniture_takes(
+    install: Callable[[str, str], None],
+) -> None:
+    before = with_families(EMPTY)
+    assert not before.of("pedestal")
+    install("pedestals", _ONE.format(name="pedestal", body=_BODY))
+    catalogue = with_families(EMPTY)
+    assert catalogue.digest != before.digest
+    assert catalogue.pieces[: len(before.pieces)] == before.pieces, "ours stay as they were"
+    pieces = catalogue.of("pedestal")
+    assert len(pieces) == 3
+    for piece in pieces:
+        assert catalogue.shape(piece) is not None
+        _hold(piece)
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "error"),
+    [("sofa", _BODY, "broken: sofa: is the name of another thing already"),
+     ("nothing", "pass", "broken: nothing: has nothing in it")],
+)  # fmt: skip
+def test_what_is_wrong_with_a_plugins_furniture_is_named(
+    install: Callable[[str, str], None], name: str, body: str, error: str
+) -> None:
+    sys.modules.pop("broken", None)
+    install("broken", _ONE.format(name=name, body=body))
+    with pytest.raises(BadInput, match=error):
+        family_shape(family_pieces()[-1])
+
+
+def test_a_plugin_that_names_no_families_is_refused(install: Callable[[str, str], None]) -> None:
+    install("empty_package", "N = 1")
+    with pytest.raises(BadInput, match=r"empty_package 1\.0: empty_package: is no module with a"):
+        with_families(EMPTY)
 
 
 def test_units_of_a_kitchen_that_have_one_number_have_one_front() -> None:
