@@ -3,6 +3,10 @@
 Shards are written and read so, and the labels of a view are stored so: each row as its difference
 from the row above, which compresses labels best and is undone a row at a time. 16 bits stay 16. Where zlib-ng is
 installed it inflates: the same bytes in a seventh of zlib's time.
+
+Not left to a library, because reading is what training waits for. A 640x480 picture takes, here (with
+zlib-ng), by OpenImageIO and by Pillow: normals 2.8 (0.8), 15 ms, and not at all (Pillow makes 16-bit
+RGB 8 bits); colour 10 (9), 20 and 23 ms.
 """
 
 from __future__ import annotations

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 import mmap
-import zipfile
-import zlib
 from collections import OrderedDict
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
@@ -22,7 +17,8 @@ from pbrs_farm.regular_files import fault_of, open_regular
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.views.dataset_json import DATASET_JSON, WHOLE, Dataset, Shard, dataset_from_json
-from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
+from pbrs_farm.views.shard_parts import arrays_of_part, part_of_array
+from pbrs_farm.views.shard_tar import Buffer, OpenShard
 from pbrs_farm.views.stored_layers import (
     Stored,
     ViewFacts,
@@ -34,187 +30,7 @@ from pbrs_farm.views.stored_layers import (
 from pbrs_farm.views.view_sample import Sample, SampleRequest
 from pbrs_farm.views.views import ViewRef, Views
 
-# Arrays <-> deflated .npz bytes without a clock, as webdataset and numpy read them.
-
-
-_DATE: Final = (1980, 1, 1, 0, 0, 0)  # the first a zip file can hold
-_LEVEL: Final = 6
-
-
-def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """.npz bytes; equal arrays give equal bytes."""
-    whole = io.BytesIO()
-    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
-        for name, array in arrays.items():
-            member = zipfile.ZipInfo(f"{name}.npy", _DATE)
-            member.compress_type = zipfile.ZIP_DEFLATED
-            part = io.BytesIO()
-            np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
-            archive.writestr(member, part.getbuffer())
-    return whole.getvalue()
-
-
-def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
-    """Name -> array; BadInput, naming place, where data is no .npz or is damaged."""
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        AttributeError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ):
-        raise BadInput(place, "", "not an .npz of arrays, or damaged") from None
-
-
-# The parts of a packed view: which file of a shard holds which array, written and read.
-# Arrays of 8 bits are PNGs that zlib and numpy undo, colour a JPEG where it was packed so; arrays
-# of 16 bits are .npz, which no picture decoder can make 8 bits of.
-
-
-# Array -> the part that holds it; colour is <mode>.png or <mode>.jpg.
-_PARTS: Final = {
-    "normal": "normal.npz",
-    "valid": "normal.npz",
-    "depth": "depth.npz",
-    "class40": "class40.png",
-    "instance": "instance.npz",
-    "boundary": "boundary.png",
-}
-
-
-def label_parts(stored: Stored) -> dict[str, bytes]:
-    """Part -> bytes of a view's labels, in a fixed order."""
-    parts: dict[str, bytes] = {}
-    for part in dict.fromkeys(_PARTS.values()):
-        arrays = {n: stored[n] for n, own in _PARTS.items() if own == part and n in stored}
-        if arrays:
-            is_npz = part.endswith(".npz")
-            parts[part] = npz_of_arrays(arrays) if is_npz else png_of_rows(*arrays.values())
-    return parts
-
-
-def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
-    """The part that holds an array of a view that has these parts."""
-    if name != "colour":
-        return _PARTS[name]
-    return f"{mode}.jpg" if f"{mode}.jpg" in parts else f"{mode}.png"
-
-
-def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
-    """The arrays of those names in a part; BadInput, naming place, where it is damaged."""
-    if part.endswith(".npz"):
-        arrays = arrays_of_npz(data, place)
-        for name in names:
-            if name not in arrays:
-                raise BadInput(place, "", f"has no array {name}")
-        return {name: arrays[name] for name in names}
-    array = _jpeg_array(data, place) if part.endswith(".jpg") else array_of_rows(data, place)
-    if array is None:
-        raise BadInput(place, "", "a PNG of another program", hint="`pbrs-farm pack` writes shards")
-    return dict.fromkeys(names, array)
-
-
-def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 of a JPEG, by Pillow: one decoder, the same bits on every machine."""
-    from PIL import Image  # a shard of PNGs is read without it
-
-    try:
-        with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
-            return np.asarray(picture.convert("RGB"))
-    except (OSError, ValueError, SyntaxError):
-        raise BadInput(place, "", "cannot be read as a JPEG: damaged") from None
-
-
-# Tar shards written without a clock and read by offset, with numpy's memory at most.
-# The form is POSIX ustar with plain files only, which webdataset, tar and Python's tarfile read.
-
-
-_BLOCK: Final = 512
-_MAX_NAME: Final = 100  # bytes, of ustar without a prefix
-Buffer = bytes | memoryview
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A file of a tar: where its bytes lie."""
-
-    name: str
-    at: int
-    n_bytes: int
-
-
-def tar_member(name: str, data: bytes) -> bytes:
-    """Header, bytes and padding of one file: mode 644, no owner, time 0."""
-    encoded = name.encode()
-    if len(encoded) > _MAX_NAME:
-        raise BadInput(name, "", f"a name in a shard has at most {_MAX_NAME} bytes")
-    header = bytearray(_BLOCK)
-    header[: len(encoded)] = encoded
-    numbers = (b"0000644\0", b"0000000\0", b"0000000\0", b"%011o\0" % len(data), b"%011o\0" % 0)
-    header[100:148] = b"".join(numbers)
-    header[148:156] = b" " * 8  # the checksum is taken with spaces in its place
-    header[156:157] = b"0"
-    header[257:265] = b"ustar\x0000"
-    header[148:156] = b"%06o\0 " % sum(header)
-    return bytes(header) + data + bytes(-len(data) % _BLOCK)
-
-
-def tar_end() -> bytes:
-    """What ends a tar: two empty blocks."""
-    return bytes(2 * _BLOCK)
-
-
-def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
-    """The files of a tar in its order; BadInput, naming place, where it is damaged or cut short."""
-    at = 0
-    while at + _BLOCK <= len(tar):
-        header = bytes(tar[at : at + _BLOCK])
-        if not any(header):
-            return
-        if header[257:262] != b"ustar" or header[156:157] not in (b"0", b"\0"):
-            raise BadInput(place, f"byte {at}", "not a shard of plain files: damaged")
-        name = header[:_MAX_NAME].rstrip(b"\0").decode("utf-8", "replace")
-        try:
-            n_bytes = int(header[124:136].rstrip(b"\0 "), 8)
-        except ValueError:
-            raise BadInput(place, f"byte {at}", "not a shard: damaged") from None
-        yield Member(name, at + _BLOCK, n_bytes)
-        at += _BLOCK + n_bytes + (-n_bytes % _BLOCK)
-    # Two empty blocks were to come.
-    raise BadInput(place, "", "ends too soon: truncated", hint="copy or pack it again")
-
-
 _N_OPEN: Final = 8  # shards that are kept open
-Parts = dict[str, Member]  # a view's parts by what follows its key
-
-
-class OpenShard:
-    """One tar, mapped or in memory, and where each view's parts lie."""
-
-    def __init__(self, tar: Buffer, place: str) -> None:
-        self._tar = tar
-        self.place = place
-        self.views: list[Parts] = []  # in the tar's order
-        key = None
-        for member in members_of_tar(tar, place):
-            # The parts of a view stand together; its key ends at the first dot.
-            own, _, part = member.name.partition(".")
-            if own != key:
-                self.views.append({})
-                key = own
-            self.views[-1][part] = member
-
-    def bytes_of(self, view: int, part: str) -> bytes:
-        """The bytes of a part of the view at that place; BadInput where it has none."""
-        member = self.views[view].get(part)
-        if member is None:
-            raise BadInput(self.place, f"view {view}", f"has no {part}")
-        return bytes(self._tar[member.at : member.at + member.n_bytes])
 
 
 class ShardSet:

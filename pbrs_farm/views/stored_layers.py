@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
-from pbrs_farm.views.view_sample import Sample, SampleRequest, Size, decoded_normal
+from pbrs_farm.views.normal_axes import decoded_normal
+from pbrs_farm.views.view_sample import Sample, SampleRequest, Size
 
 Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
 

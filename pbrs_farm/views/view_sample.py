@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -10,66 +10,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
-from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
-
-# Normals as stored (16 bits) <-> unit vectors in camera axes by name.
-# Stored normals are round((n + 1) 65535 / 2) in the published axes (docs/formats.md).
-
-
-# Name -> for x, y and z: which published axis it is (0 right, 1 forward, 2 up), and its sign.
-AXES: Final[dict[str, tuple[tuple[int, int], ...]]] = {
-    "opencv": ((0, 1), (2, -1), (1, 1)),  # right, down, forward
-    "opengl": ((0, 1), (2, 1), (1, -1)),  # right, up, backward
-    "published": ((0, 1), (1, 1), (2, 1)),  # right, forward, up
-}
-
-
-def axes_from_published(axes: str) -> NDArray[np.float32]:
-    """(3, 3) matrix: n in the axes of that name = matrix @ n in published axes."""
-    matrix = np.zeros((3, 3), np.float32)
-    for row, (column, sign) in enumerate(AXES[axes]):
-        matrix[row, column] = sign
-    return matrix
-
-
-def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
-    """(3, 3) matrix: n in the axes `to` = matrix @ n in the axes `of`."""
-    return axes_from_published(to) @ axes_from_published(of).T
-
-
-def decoded_normal(
-    stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
-) -> NDArray[np.float32]:
-    """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
-    normal = np.empty(stored.shape, np.float32)
-    # Each published channel becomes an axis, turned round where the sign says.
-    for axis, (channel, sign) in enumerate(AXES[axes]):
-        own = normal[..., axis]
-        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=own)
-        own -= np.float32(sign)
-    if not valid.all():
-        normal[~valid] = 0
-    return normal
-
-
-def encoded_as_stored(
-    normal: NDArray[np.float32], valid: NDArray[np.bool_], axes: str
-) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid."""
-    stored = np.full(normal.shape, 32768, np.uint16)
-    for axis, (channel, sign) in enumerate(AXES[axes]):
-        scaled = (sign * normal[..., axis].astype(np.float64) + 1) * (65535 / 2)
-        stored[..., channel][valid] = np.clip(np.rint(scaled), 0, 65535).astype(np.uint16)[valid]
-    return stored
-
-
-# A view's arrays as they are trained on, and what is asked of a view.
-
+from pbrs_farm.views.normal_axes import AXES
 
 # What can be asked of a view. "normal" brings "valid" along.
 LAYERS: Final = ("colour", "normal", "depth", "class40", "instance", "boundary")
 MODES: Final = tuple(str(mode) for mode in Mode)
-
 Size = tuple[int, int]  # width, height in pixels
 
 
@@ -130,76 +75,3 @@ class SampleRequest:
             raise BadInput("axes", self.axes, "no such axes", hint=f"of {', '.join(AXES)}")
         if self.size is not None and min(self.size) < 1:
             raise BadInput("size", str(self.size), "expected a width and height of 1 or more")
-
-
-# Samples flipped, cropped, resized and in other axes: normals and K follow the picture.
-
-
-def flipped(sample: Sample) -> Sample:
-    """The view in a mirror: left and right change places, normals turn x round, K's cx moves."""
-    width = sample.size[0]
-    arrays: dict[str, Any] = {n: a[:, ::-1] for n, a in sample.arrays().items()}
-    if sample.normal is not None:
-        # In all axes that have a name x points right.
-        arrays["normal"] = arrays["normal"] * np.array([-1, 1, 1], np.float32)
-    k = sample.K.copy()
-    k[0, 2] = width - k[0, 2]
-    return replace(sample, K=k, **_contiguous(arrays))
-
-
-def cropped(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
-    """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput."""
-    full_width, full_height = sample.size
-    fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height
-    if not fits or width < 1 or height < 1:
-        text = f"{width}x{height} at ({left}, {top}) lies not inside {full_width}x{full_height}"
-        raise BadInput("crop", sample.id, text)
-    part = (slice(top, top + height), slice(left, left + width))
-    k = sample.K.copy()
-    k[:2, 2] -= (left, top)
-    return replace(sample, K=k, **_contiguous({n: a[part] for n, a in sample.arrays().items()}))
-
-
-def resized(sample: Sample, width: int, height: int) -> Sample:
-    """The sample on another grid: colour by area, boundaries where any is, all other labels nearest.
-
-    K is scaled, also where the sides' ratio changes.
-    """
-    full_width, full_height = sample.size
-    if (full_width, full_height) == (width, height):
-        return sample
-    arrays: dict[str, Any] = {}
-    for name, array in sample.arrays().items():
-        if name == "colour":
-            arrays[name] = resized_by_area(array, width, height)
-        elif name == "boundary":
-            arrays[name] = resized_any(array, width, height)
-        else:
-            arrays[name] = resized_nearest(array, width, height)
-    return replace(
-        sample, K=k_resized(sample.K, (full_width, full_height), (width, height)), **arrays
-    )
-
-
-def k_resized(
-    k: NDArray[np.float32], of: tuple[int, int], to: tuple[int, int]
-) -> NDArray[np.float32]:
-    """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`."""
-    scale = np.array([to[0] / of[0], to[1] / of[1], 1], np.float64)
-    return np.asarray(k.astype(np.float64) * scale[:, None], np.float32)
-
-
-def with_axes(sample: Sample, axes: str) -> Sample:
-    """The sample with its normals in the axes of that name."""
-    if sample.normal is None or sample.axes == axes:
-        return replace(sample, axes=axes)
-    matrix = axes_from_axes(axes, sample.axes)
-    # The axes change places and signs only: pick them, so that no bit is rounded.
-    columns, signs = np.abs(matrix).argmax(1), matrix.sum(1)
-    normal = sample.normal[..., columns] * signs
-    # Keep a zero a zero without a sign.
-    return replace(sample, axes=axes, normal=np.asarray(normal + np.float32(0), np.float32))
-
-
-def _contiguous(arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
-    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}

@@ -4,17 +4,9 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.views.view_sample import (
-    AXES,
-    Sample,
-    axes_from_axes,
-    cropped,
-    decoded_normal,
-    encoded_as_stored,
-    flipped,
-    resized,
-    with_axes,
-)
+from pbrs_farm.views.normal_axes import AXES, axes_from_axes, decoded_normal, encoded_as_stored
+from pbrs_farm.views.sample_changes import cropped, flipped, resized, with_axes
+from pbrs_farm.views.view_sample import Sample
 
 FROM_CAMERA = np.diag([1.0, 1.0, 1.0])
 

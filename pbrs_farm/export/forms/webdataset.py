@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import tarfile
 from pathlib import Path
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import ViewForm
+from pbrs_farm.views.shard_tar import write_samples
 
 
 def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> int:
@@ -16,27 +15,17 @@ def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> int:
     A sample's key is <house>__<view>; its parts are json (view.json) and every layer that is
     exported, by name: "mlt_il_ol.png", "depth.png". No clock, no owner.
     """
-    n_shards = 0
-    for start in range(0, len(views), choice.views_per_shard):
-        shard = out / f"shard-{n_shards:06d}.tar"
-        with tarfile.open(shard, "w", format=tarfile.USTAR_FORMAT) as tar:
-            for view in views[start : start + choice.views_per_shard]:
-                _add_sample(tar, view)
-        n_shards += 1
-    return n_shards
+    starts = range(0, len(views), choice.views_per_shard)
+    for number, start in enumerate(starts):
+        own = views[start : start + choice.views_per_shard]
+        samples = ((f"{view.house.id}__{view.id}", _parts(view)) for view in own)
+        write_samples(out / f"shard-{number:06d}.tar", samples)
+    return len(starts)
 
 
-def _add_sample(tar: tarfile.TarFile, view: ChosenView) -> None:
-    # A dot would end the key.
-    key = f"{view.house.id}__{view.id}".replace(".", "_")
-    parts = {"json": view.facts_json}
-    for layer in view.layers:
-        parts[f"{layer.name}{Path(layer.file).suffix}"] = view.data(layer.name)
-    for part, data in parts.items():
-        # TarInfo's own defaults: time 0, no owner.
-        member = tarfile.TarInfo(f"{key}.{part}")
-        member.size = len(data)
-        tar.addfile(member, io.BytesIO(data))
+def _parts(view: ChosenView) -> dict[str, bytes]:
+    files = {f"{layer.name}{Path(layer.file).suffix}": layer.name for layer in view.layers}
+    return {"json": view.facts_json} | {part: view.data(name) for part, name in files.items()}
 
 
 FORM = ViewForm(

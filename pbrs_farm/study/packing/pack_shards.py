@@ -5,7 +5,6 @@ Effects: reads an output root, writes a new folder; it appears whole or not at a
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,11 +20,13 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import new_folder
 from pbrs_farm.images import jpeg_from_array
+from pbrs_farm.regular_files import digest_of_regular
 from pbrs_farm.study.packing.data_card import card, croissant_json, described, root_facts
 from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans
 from pbrs_farm.views.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
 from pbrs_farm.views.png_rows import png_of_rows
-from pbrs_farm.views.shard_set import label_parts, tar_end, tar_member
+from pbrs_farm.views.shard_parts import label_parts
+from pbrs_farm.views.shard_tar import write_samples
 from pbrs_farm.views.stored_layers import Stored, ViewFacts, resized_stored
 from pbrs_farm.views.stored_root import StoredRoot
 from pbrs_farm.views.view_sample import Size
@@ -226,19 +227,11 @@ def _write_shards(
 
 
 def _write_shard(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Path) -> Shard:
-    name = f"{plan.split}-{plan.number:06d}.tar"
-    digest, n_bytes = hashlib.sha256(), 0
-    with (out / name).open("wb") as tar:
-        for ref in plan.refs:
-            # A dot would end webdataset's key.
-            key = f"{ref.house}__{ref.view}".replace(".", "_")
-            parts = packed_view(source, ref, packing).items()
-            data = b"".join(tar_member(f"{key}.{part}", content) for part, content in parts)
-            n_bytes += tar.write(data)
-            digest.update(data)
-        n_bytes += tar.write(tar_end())
-        digest.update(tar_end())
-    return Shard(name, plan.split, len(plan.refs), n_bytes, digest.hexdigest())
+    path = out / f"{plan.split}-{plan.number:06d}.tar"
+    samples = ((f"{ref.house}__{ref.view}", packed_view(source, ref, packing)) for ref in plan.refs)
+    write_samples(path, samples)
+    n_bytes = path.stat().st_size
+    return Shard(path.name, plan.split, len(plan.refs), n_bytes, digest_of_regular(path))
 
 
 def _write_parquet_files(

@@ -21,7 +21,7 @@ from pbrs_farm.images import decode_photo
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.views.shard_set import arrays_of_part
+from pbrs_farm.views.shard_parts import arrays_of_part
 from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 from tests.scene.homes import small_home
 from tests.views.small_roots import MODES, arrays_of_view, fill
@@ -256,7 +256,7 @@ import sys
 for name in ("pydantic", "OpenImageIO", "torch", "scipy", "pyarrow", "PIL", "obstore", "mitsuba"):
     sys.modules[name] = None
 import pbrs_farm
-from pbrs_farm.views.shard_set import arrays_of_part
+from pbrs_farm.views.shard_parts import arrays_of_part
 from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 views = pbrs_farm.open({str(tmp_path / "x")!r})
 print(len(views), views[0].sample(SampleRequest(LAYERS)).normal.shape)

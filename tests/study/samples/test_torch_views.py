@@ -13,7 +13,8 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.views.open_views import open_views
-from pbrs_farm.views.view_sample import LAYERS, SampleRequest, flipped
+from pbrs_farm.views.sample_changes import flipped
+from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 from tests.views.small_roots import MODES, fill
 
 pytestmark = pytest.mark.study

@@ -1,0 +1,57 @@
+"""Normals as stored (16 bits) <-> unit vectors in camera axes by name; no effects.
+
+Stored normals are round((n + 1) 65535 / 2) in the published axes (docs/formats.md).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Name -> for x, y and z: which published axis it is (0 right, 1 forward, 2 up), and its sign.
+AXES: Final[dict[str, tuple[tuple[int, int], ...]]] = {
+    "opencv": ((0, 1), (2, -1), (1, 1)),  # right, down, forward
+    "opengl": ((0, 1), (2, 1), (1, -1)),  # right, up, backward
+    "published": ((0, 1), (1, 1), (2, 1)),  # right, forward, up
+}
+
+
+def axes_from_published(axes: str) -> NDArray[np.float32]:
+    """(3, 3) matrix: n in the axes of that name = matrix @ n in published axes."""
+    matrix = np.zeros((3, 3), np.float32)
+    for row, (column, sign) in enumerate(AXES[axes]):
+        matrix[row, column] = sign
+    return matrix
+
+
+def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
+    """(3, 3) matrix: n in the axes `to` = matrix @ n in the axes `of`."""
+    return axes_from_published(to) @ axes_from_published(of).T
+
+
+def decoded_normal(
+    stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
+) -> NDArray[np.float32]:
+    """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
+    normal = np.empty(stored.shape, np.float32)
+    # Each published channel becomes an axis, turned round where the sign says.
+    for axis, (channel, sign) in enumerate(AXES[axes]):
+        own = normal[..., axis]
+        np.multiply(stored[..., channel], np.float32(sign * 2 / 65535), out=own)
+        own -= np.float32(sign)
+    if not valid.all():
+        normal[~valid] = 0
+    return normal
+
+
+def encoded_as_stored(
+    normal: NDArray[np.float32], valid: NDArray[np.bool_], axes: str
+) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid."""
+    stored = np.full(normal.shape, 32768, np.uint16)
+    for axis, (channel, sign) in enumerate(AXES[axes]):
+        scaled = (sign * normal[..., axis].astype(np.float64) + 1) * (65535 / 2)
+        stored[..., channel][valid] = np.clip(np.rint(scaled), 0, 65535).astype(np.uint16)[valid]
+    return stored

@@ -1,0 +1,84 @@
+"""Samples flipped, cropped, resized and in other axes: normals and K follow the picture; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
+from pbrs_farm.views.normal_axes import axes_from_axes
+from pbrs_farm.views.view_sample import Sample
+
+
+def flipped(sample: Sample) -> Sample:
+    """The view in a mirror: left and right change places, normals turn x round, K's cx moves."""
+    width = sample.size[0]
+    arrays: dict[str, Any] = {n: a[:, ::-1] for n, a in sample.arrays().items()}
+    if sample.normal is not None:
+        # In all axes that have a name x points right.
+        arrays["normal"] = arrays["normal"] * np.array([-1, 1, 1], np.float32)
+    k = sample.K.copy()
+    k[0, 2] = width - k[0, 2]
+    return replace(sample, K=k, **_contiguous(arrays))
+
+
+def cropped(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
+    """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput."""
+    full_width, full_height = sample.size
+    fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height
+    if not fits or width < 1 or height < 1:
+        text = f"{width}x{height} at ({left}, {top}) lies not inside {full_width}x{full_height}"
+        raise BadInput("crop", sample.id, text)
+    part = (slice(top, top + height), slice(left, left + width))
+    k = sample.K.copy()
+    k[:2, 2] -= (left, top)
+    return replace(sample, K=k, **_contiguous({n: a[part] for n, a in sample.arrays().items()}))
+
+
+def resized(sample: Sample, width: int, height: int) -> Sample:
+    """The sample on another grid: colour by area, boundaries where any is, all other labels nearest.
+
+    K is scaled, also where the sides' ratio changes.
+    """
+    full_width, full_height = sample.size
+    if (full_width, full_height) == (width, height):
+        return sample
+    arrays: dict[str, Any] = {}
+    for name, array in sample.arrays().items():
+        if name == "colour":
+            arrays[name] = resized_by_area(array, width, height)
+        elif name == "boundary":
+            arrays[name] = resized_any(array, width, height)
+        else:
+            arrays[name] = resized_nearest(array, width, height)
+    return replace(
+        sample, K=k_resized(sample.K, (full_width, full_height), (width, height)), **arrays
+    )
+
+
+def k_resized(
+    k: NDArray[np.float32], of: tuple[int, int], to: tuple[int, int]
+) -> NDArray[np.float32]:
+    """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`."""
+    scale = np.array([to[0] / of[0], to[1] / of[1], 1], np.float64)
+    return np.asarray(k.astype(np.float64) * scale[:, None], np.float32)
+
+
+def with_axes(sample: Sample, axes: str) -> Sample:
+    """The sample with its normals in the axes of that name."""
+    if sample.normal is None or sample.axes == axes:
+        return replace(sample, axes=axes)
+    matrix = axes_from_axes(axes, sample.axes)
+    # The axes change places and signs only: pick them, so that no bit is rounded.
+    columns, signs = np.abs(matrix).argmax(1), matrix.sum(1)
+    normal = sample.normal[..., columns] * signs
+    # Keep a zero a zero without a sign.
+    return replace(sample, axes=axes, normal=np.asarray(normal + np.float32(0), np.float32))
+
+
+def _contiguous(arrays: dict[str, NDArray[Any]]) -> dict[str, Any]:
+    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}

@@ -1,0 +1,106 @@
+"""Which file of a shard holds which array of a view, written and read; no effects.
+
+Arrays of 8 bits are PNGs that zlib and numpy undo, colour a JPEG where it was packed so; arrays of
+16 bits are .npz without a clock, which no picture decoder can make 8 bits of.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
+from pbrs_farm.views.stored_layers import Stored
+
+_DATE: Final = (1980, 1, 1, 0, 0, 0)  # the first a zip file can hold
+_LEVEL: Final = 6
+
+# Array -> the part that holds it; colour is <mode>.png or <mode>.jpg.
+_PARTS: Final = {
+    "normal": "normal.npz",
+    "valid": "normal.npz",
+    "depth": "depth.npz",
+    "class40": "class40.png",
+    "instance": "instance.npz",
+    "boundary": "boundary.png",
+}
+
+
+def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """.npz bytes; equal arrays give equal bytes."""
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+        for name, array in arrays.items():
+            member = zipfile.ZipInfo(f"{name}.npy", _DATE)
+            member.compress_type = zipfile.ZIP_DEFLATED
+            part = io.BytesIO()
+            np.lib.format.write_array(part, np.ascontiguousarray(array), allow_pickle=False)
+            archive.writestr(member, part.getbuffer())
+    return whole.getvalue()
+
+
+def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
+    """Name -> array; BadInput, naming place, where data is no .npz or is damaged."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        EOFError,
+        AttributeError,
+        zipfile.BadZipFile,
+        zlib.error,
+    ):
+        raise BadInput(place, "", "not an .npz of arrays, or damaged") from None
+
+
+def label_parts(stored: Stored) -> dict[str, bytes]:
+    """Part -> bytes of a view's labels, in a fixed order."""
+    parts: dict[str, bytes] = {}
+    for part in dict.fromkeys(_PARTS.values()):
+        arrays = {n: stored[n] for n, own in _PARTS.items() if own == part and n in stored}
+        if arrays:
+            is_npz = part.endswith(".npz")
+            parts[part] = npz_of_arrays(arrays) if is_npz else png_of_rows(*arrays.values())
+    return parts
+
+
+def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
+    """The part that holds an array of a view that has these parts."""
+    if name != "colour":
+        return _PARTS[name]
+    return f"{mode}.jpg" if f"{mode}.jpg" in parts else f"{mode}.png"
+
+
+def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
+    """The arrays of those names in a part; BadInput, naming place, where it is damaged."""
+    if part.endswith(".npz"):
+        arrays = arrays_of_npz(data, place)
+        for name in names:
+            if name not in arrays:
+                raise BadInput(place, "", f"has no array {name}")
+        return {name: arrays[name] for name in names}
+    array = _jpeg_array(data, place) if part.endswith(".jpg") else array_of_rows(data, place)
+    if array is None:
+        raise BadInput(place, "", "a PNG of another program", hint="`pbrs-farm pack` writes shards")
+    return dict.fromkeys(names, array)
+
+
+def _jpeg_array(data: bytes, place: str) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 of a JPEG, by Pillow: one decoder, the same bits on every machine."""
+    from PIL import Image  # a shard of PNGs is read without it
+
+    try:
+        with Image.open(io.BytesIO(data), formats=["JPEG"]) as picture:
+            return np.asarray(picture.convert("RGB"))
+    except (OSError, ValueError, SyntaxError):
+        raise BadInput(place, "", "cannot be read as a JPEG: damaged") from None
