@@ -158,7 +158,8 @@ def _folder(path: Path) -> None:
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:
     """The homes that the options name; raises BadInput as a word of `run` would."""
     from pbrs_farm.core.made_home import made_homes
-    from pbrs_farm.generate.programme import Wishes, programme_from_json
+    from pbrs_farm.generate.programme import Wishes
+    from pbrs_farm.generate.programme_file import programme_from_json
 
     if args.apartment:
         raise BadInput("--apartment", args.apartment, "needs --plan FILE.csv")

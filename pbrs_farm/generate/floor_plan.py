@@ -1,6 +1,6 @@
-"""The nouns of a floor plan: rooms, walls, openings; frozen values in metres, no effects.
+"""The nouns of a floor plan and of what stands in it: rooms, walls, openings, pieces, storeys; no effects.
 
-Coordinates are (x, z) as in a house: x to the right, z downwards on the page, as Sweet Home 3D
+Frozen values in metres. Coordinates are (x, z) as in a house: x to the right, z downwards on the page, as Sweet Home 3D
 draws its plans.
 """
 
@@ -172,9 +172,6 @@ def _edges(polygon: tuple[Point, ...]) -> Iterator[tuple[Point, Point]]:
     return zip(polygon, (*polygon[1:], polygon[0]), strict=True)
 
 
-# The nouns of a furnished plan: a piece that stands in a room, a storey with its pieces.
-
-
 @dataclass(frozen=True, slots=True)
 class PlacedPiece:
     """A piece where it stands; metres in the plan's (x, z)."""
@@ -214,3 +211,9 @@ class Storey:
 
     plan: Plan
     pieces: tuple[PlacedPiece, ...]
+
+
+def ground(piece: PlacedPiece) -> Rect:
+    """The rectangle around a piece's corners."""
+    xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
+    return min(xs), min(zs), max(xs), max(zs)

@@ -2,6 +2,20 @@
 
 The program writes the same names and units: centimetres, angles in radians, x to the right and y
 downwards on the plan (https://www.sweethome3d.com, SweetHome3D.dtd of version 7.0).
+
+    NAME.sh3d                       a ZIP; equal arguments give equal bytes
+    ├── Home.xml                    <home version wallHeight camera>
+    │     <property name value/>        author, licence, whose models it holds
+    │     <environment/>                colours of ground, sky and light
+    │     <observerCamera/> <camera/>   where the program looks from
+    │     <level id elevation height/>  only in a home of two storeys
+    │     <doorOrWindow model/>         each opening, with what it cuts of its wall
+    │     <pieceOfFurniture model/>     stairs, then furniture; a lamp is a <light> with <lightSource>s
+    │     <wall xStart yStart .../>     paints left and right
+    │     <room floorColor ...>         <texture> of its floor, a <point> a corner
+    ├── icon.png                    of every piece
+    ├── 0/model.obj, 0/model.mtl    each model once, with its pictures
+    └── t<digest>.jpg               pictures of floors
 """
 
 from __future__ import annotations
@@ -35,7 +49,23 @@ from pbrs_farm.generate.plan_families import FLAT, PlanFamily, plan_families
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
 
-# The paints of a made home.
+AUTHOR: Final = "pbrs_farm"
+VERSION: Final = "7000"
+_ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
+_EYE_M: Final = 1.6
+_FIELD_OF_VIEW_RAD: Final = 1.1
+_LAMP_POWER: Final = 0.5
+_DOOR_NAMES: Final = {
+    OpeningKind.DOOR: "Door", OpeningKind.ENTRANCE: "Front door",
+    OpeningKind.PASSAGE: "Door frame",
+    OpeningKind.WINDOW: "Window", OpeningKind.FRENCH_WINDOW: "French window",
+}  # fmt: skip
+_FLOOR_GROUPS: Final = {
+    RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
+}  # fmt: skip
+_DRY_FLOOR: Final = "dry"
+_OPEN_WELLS: Final = {"level-0": "ceiling", "level-1": "floor"}
+_LEVEL_NAMES: Final = ("Ground floor", "Upper floor")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,28 +87,6 @@ def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
     red, green, blue = (int(wood[k : k + 2], 16) / 255 for k in (0, 2, 4))
     design = drawn_design(rng, (red, green, blue), family.leaves, family.sashes)
     return Paints(tuple(chosen), "EEF1F1", family.floor, "C9C6BF", family.ceiling, design)
-
-
-# A furnished plan as a Sweet Home 3D file.
-
-
-AUTHOR: Final = "pbrs_farm"
-VERSION: Final = "7000"
-_ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
-_EYE_M: Final = 1.6
-_FIELD_OF_VIEW_RAD: Final = 1.1
-_LAMP_POWER: Final = 0.5
-_DOOR_NAMES: Final = {
-    OpeningKind.DOOR: "Door", OpeningKind.ENTRANCE: "Front door",
-    OpeningKind.PASSAGE: "Door frame",
-    OpeningKind.WINDOW: "Window", OpeningKind.FRENCH_WINDOW: "French window",
-}  # fmt: skip
-_FLOOR_GROUPS: Final = {
-    RoomType.KITCHEN: "tiles", RoomType.BATHROOM: "tiles", RoomType.WC: "tiles",
-}  # fmt: skip
-_DRY_FLOOR: Final = "dry"
-_OPEN_WELLS: Final = {"level-0": "ceiling", "level-1": "floor"}
-_LEVEL_NAMES: Final = ("Ground floor", "Upper floor")
 
 
 def home_file(

@@ -14,7 +14,7 @@ from shapely.ops import unary_union
 
 from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, Rect, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.slicing import STEP_M
+from pbrs_farm.generate.slicing_goals import STEP_M
 
 OUTSIDE: Final = -1
 OUTER_M, WET_M, INNER_M, PARAPET_M = 0.26, 0.16, 0.075, 0.10  # thickness, as people draw them

@@ -23,7 +23,8 @@ from pbrs_farm.core.plugins import plugin, plugins
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.installation import install_command, is_installed
 from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import fault_of, open_regular
 
 PLAN: Final = "plan"

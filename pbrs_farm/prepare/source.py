@@ -29,7 +29,8 @@ from pbrs_farm.prepare.formats import (
     summary,
 )
 from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import fault_of, real_path, text_given
 
 if TYPE_CHECKING:

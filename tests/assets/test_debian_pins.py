@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.assets import debian, furniture_package, homes_package, skies
-from pbrs_farm.assets.debian import PINS, Pin, download_pinned, fetched_deb, version_of
+from pbrs_farm.assets.debian import fetched_deb, version_of
+from pbrs_farm.assets.pinned_packages import PINS, Pin, download_pinned
 from pbrs_farm.core.errors import MachineFailed
 
 DATA = b"a Debian package" * 1000
@@ -44,7 +45,7 @@ def mirror(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, bytes]]:
     thread.start()
     monkeypatch.setenv("PBRS_DEBIAN_MIRROR", f"http://127.0.0.1:{server.server_port}/debian/")
     monkeypatch.setenv("PATH", "")
-    monkeypatch.setitem(debian.PINS, PIN.package, PIN)
+    monkeypatch.setitem(PINS, PIN.package, PIN)
     yield files
     server.shutdown()
     thread.join()

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.drawn_home import drawn_plan
+from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, RoomType
 from pbrs_farm.generate.programme import Wishes
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.layout import cut_guests, daylight_m, hosts_of
+from pbrs_farm.generate.guest_rooms import cut_guests, daylight_m, hosts_of
 from pbrs_farm.generate.programme import Programme, RoomWish
-from pbrs_farm.generate.slicing import STEP_M, Brief, IntRect, shared_length
+from pbrs_farm.generate.slicing_goals import STEP_M, Brief, IntRect, shared_length
 
 ALL_LIT = (True, True, True, True)
 # A living room on the left, a bedroom at the top right, the hall below it.

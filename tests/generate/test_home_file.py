@@ -23,7 +23,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.generate.drawn_home import drawn_plan
+from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.geometry.solids import box

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.made_home import PLANS
-from pbrs_farm.generate.drawn_home import drawn_plan
+from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.layout import _easier
 from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Programme, RoomWish, Wishes
-from pbrs_farm.generate.slicing import Brief, IntRect, Rules, SliceLeaf
+from pbrs_farm.generate.slicing_goals import Brief, IntRect, Rules, SliceLeaf
 
 
 def test_every_family_that_a_word_may_name_is_drawn_by_one_seed_in_twenty_or_more() -> None:

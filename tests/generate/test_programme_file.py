@@ -11,9 +11,9 @@ import pytest
 from shapely.geometry import Polygon
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.drawn_home import drawn_plan
+from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.programme import programme_from_json
+from pbrs_farm.generate.programme_file import programme_from_json
 
 FLAT = [{"type": "bedroom", "name": "Ada"}, {"type": "living", "area": 24}, "kitchen", "bathroom"]
 

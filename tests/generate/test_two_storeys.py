@@ -17,12 +17,12 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.generate.drawn_home import drawn_storeys
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, RoomType, Storey
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.openings import plan_faults
 from pbrs_farm.generate.programme import Wishes
 from pbrs_farm.generate.staircase import SLAB_M, Stair, n_risers, staircase
+from pbrs_farm.generate.two_storeys import drawn_storeys
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair

@@ -15,7 +15,8 @@ from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, object_source, resolve
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done

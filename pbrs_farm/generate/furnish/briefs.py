@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -13,7 +13,7 @@ from pydantic import Field, field_validator
 
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.generate.floor_plan import Plan, RoomType
-from pbrs_farm.generate.furnish import rooms
+from pbrs_farm.generate.furnish import bathrooms, bedrooms, living_rooms, small_rooms
 from pbrs_farm.generate.furnish.kitchen import kitchen_places, units_of
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import Places, fixed_places
@@ -38,6 +38,15 @@ _Fact = Literal["", "studio", "closed", "laundry"]
 _Measure = Literal["bounds", "area", "row", "seats"]
 
 
+# What briefs.toml may name: every public function of the modules of templates.
+_TEMPLATES_BY_NAME: Final[dict[str, Callable[..., tuple[Template, ...]]]] = {
+    name: function
+    for module in (bathrooms, bedrooms, living_rooms, small_rooms)
+    for name, function in vars(module).items()
+    if getattr(function, "__module__", "") == module.__name__ and not name.startswith("_")
+}
+
+
 class _ForSome(Record):
     above_m2: float = -inf
     up_to_m2: float = inf
@@ -52,8 +61,8 @@ class _Templates(_ForSome):
     @field_validator("make")
     @classmethod
     def _is_made_here(cls, make: str) -> str:
-        if make.startswith("_") or not callable(getattr(rooms, make, None)):
-            raise ValueError(f"rooms.py makes no {make!r}")
+        if make not in _TEMPLATES_BY_NAME:
+            raise ValueError(f"no module of templates makes {make!r}")
         return make
 
 
@@ -149,7 +158,7 @@ def _templates(
     for one in some:
         if _is_for(one, space):
             given = {k: measures[v] if isinstance(v, str) else v for k, v in one.given.items()}
-            made = getattr(rooms, one.make)(shelf, **given)[: one.first]
+            made = _TEMPLATES_BY_NAME[one.make](shelf, **given)[: one.first]
             found += [replace(t, rank=t.rank - one.lower) if one.lower else t for t in made]
     return tuple(found)
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Rect, RoomType
-from pbrs_farm.generate.furnish.room_space import FurnishSpace, WalkMap, room_space
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, room_space
+from pbrs_farm.generate.furnish.walk_bitmap import WalkMap
 
 _SEATS: Final = ("sofa", "corner_sofa", "armchair", "chair")
 MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {

@@ -13,7 +13,7 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.generate.furnish.template import PieceSlot
+from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Template
 
 STYLES: Final = {
     "mixed": "",
@@ -40,6 +40,7 @@ _UNFIT: Final = frozenset(
     ]
 )
 """Pieces that templates cannot use, each looked at."""
+MAX_CHOICES = 6  # of a kind, the preferred ones: each is tried at every place
 
 
 def style_of(name: str, rng: np.random.Generator) -> str:
@@ -126,3 +127,19 @@ def backed(
     """A piece with its back at the wall."""
     depth = (size or piece.size)[1]
     return slot(piece, u, gap + depth / 2, elevation=elevation, size=size)
+
+
+def single(
+    piece: Piece, *, before: float = 0.6, corner: float = 0.3, rank: float = 0.0,
+    daylight: float = 0.0, size: tuple[float, float, float] | None = None, gap: float = 0.02,
+    elevation: float = 0.0, beside: float = 0.0,
+) -> Template:  # fmt: skip
+    """One piece with its back at a wall and `before` metres free in front."""
+    w, d, _ = size or piece.size
+    half, front = w / 2 + beside, d + gap
+    clear = ((-half, gap if beside else front, half, front + before),) if before else ()
+    reach = ((-w / 2, front + 0.05, w / 2, front + max(before, 0.6)),) if before >= 0.4 else ()
+    return Template(
+        piece.group, (backed(piece, gap=gap, elevation=elevation, size=size),), clear, reach,
+        rank=rank, liking=Liking(corner=corner, daylight=daylight),
+    )  # fmt: skip

@@ -34,7 +34,7 @@ from pbrs_farm.generate.made import turned_by, upright_angle
 from pbrs_farm.generate.plans.plan_format import Part, PlanFormat
 from pbrs_farm.generate.plans.plan_value import plan_of_value
 from pbrs_farm.generate.plans.told_plan import MAX_THINGS, Thing, ToldPlan
-from pbrs_farm.generate.programme import json_from_file
+from pbrs_farm.generate.programme_file import json_from_file
 
 
 @dataclass(frozen=True, slots=True)

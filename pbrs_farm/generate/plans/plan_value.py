@@ -135,9 +135,6 @@ def _wall(path: Path, number: int, row: object) -> PlanWall:
     return PlanWall(given.start, given.end, given.thickness, height=given.height)
 
 
-# Rooms: outlines that walls can stand on.
-
-
 def _check_unit(path: Path, rooms: list[_RoomFields]) -> None:
     """Raise BadInput for rooms whose size tells that they are not drawn in metres."""
     points = np.array([p for room in rooms for p in room.polygon])
@@ -218,9 +215,6 @@ def _apart(drawn: list[DrawnRoom], left_out: LeftOut) -> list[DrawnRoom]:
         kept[k] = room
         taken = unary_union([taken, room.shape])
     return [kept[k] for k in sorted(kept)]
-
-
-# Openings find their wall.
 
 
 @dataclass

@@ -21,7 +21,7 @@ from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 from pbrs_farm.generate.plans.usual_sizes import usual_size
-from pbrs_farm.generate.programme import json_from_file
+from pbrs_farm.generate.programme_file import json_from_file
 
 ASSETS: Final = "asset-database.json"
 _MOST: Final = 5_000

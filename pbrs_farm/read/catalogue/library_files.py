@@ -14,73 +14,11 @@ from typing import Final
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
-from pbrs_farm.read.common.source_files import ZipResources
+from pbrs_farm.read.catalogue.property_files import numbered_entries, numbers, parse_properties
+from pbrs_farm.read.common.resources import ZipResources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
-from pbrs_farm.read.sweethome3d.home_file.parse_home import FULL_CUT_OUT
+from pbrs_farm.read.sweethome3d.home_file.parse_furniture import FULL_CUT_OUT
 from pbrs_farm.regular_files import digest_of_regular, fault_of
-
-# Java property files: the catalogues of Sweet Home 3D's libraries.
-
-
-_ESCAPE: Final = re.compile(r"\\(u[0-9a-fA-F]{4}|.)", re.DOTALL)
-_LETTERS: Final = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
-_ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
-
-
-def parse_properties(data: bytes) -> dict[str, str]:
-    """Key -> value, later lines first; what is no entry is passed over.
-
-    Text is UTF-8 where it decodes, else Latin-1; a line that ends in a backslash goes on.
-    """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    found = {}
-    whole = ""
-    for raw in text.splitlines():
-        line = raw.lstrip()
-        if not whole and (not line or line[0] in "#!"):
-            continue
-        # Join continued lines: an odd number of backslashes ends them.
-        n_slashes = len(line) - len(line.rstrip("\\"))
-        whole += line[:-1] if n_slashes % 2 else line
-        if n_slashes % 2:
-            continue
-        match = _ENTRY.fullmatch(whole)
-        whole = ""
-        if match is not None:
-            found[_plain(match[1])] = _plain(match[2]).strip()
-    return found
-
-
-def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
-    """The entries `key#1`, `key#2`, ... of a catalogue, in order of their numbers."""
-    rows: dict[int, dict[str, str]] = {}
-    for key, value in properties.items():
-        name, mark, number = key.partition("#")
-        if mark and number.isascii() and number.isdigit() and len(number) < 7:
-            rows.setdefault(int(number), {})[name] = value
-    return [rows[k] for k in sorted(rows)]
-
-
-def numbers(text: str) -> list[float]:
-    """The numbers of a value, parted by blanks; ValueError where a word is none."""
-    return [float(word) for word in text.split()]
-
-
-def _plain(text: str) -> str:
-    def letter(match: re.Match[str]) -> str:
-        code = match[1]
-        if len(code) == 5:
-            return chr(int(code[1:], 16))
-        return _LETTERS.get(code, code)
-
-    return _ESCAPE.sub(letter, text)
-
-
-# Furniture libraries on disk.
-
 
 FURNITURE: Final = "PluginFurnitureCatalog.properties"
 JAR_FURNITURE: Final = "com/eteks/sweethome3d/io/DefaultFurnitureCatalog.properties"

@@ -85,9 +85,6 @@ def model_folder(
     return digest, tuple(_piece(path, one, notes) for one in pieces)
 
 
-# What a folder holds: every model measured, given a group, or refused with a reason.
-
-
 def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
     table = model_table(path, notes)
     found = []
@@ -231,9 +228,6 @@ def _bounds_of_glb(path: Path) -> Any:
     return np.array([np.min(corners, 0), np.max(corners, 0)]) if is_whole else None
 
 
-# The index of a folder, kept.
-
-
 def _key(path: Path, files: dict[str, Path]) -> str:
     """Of the folder's name and its files' names, sizes and times: what is cheap to ask of thousands."""
     digest = hashlib.sha256(f"{INDEX_VERSION} {path.name}\n".encode())
@@ -269,9 +263,6 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
         return str(row["digest"]), pieces, tuple(Note(*said) for said in row["notes"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
-
-
-# Pieces and their shapes.
 
 
 def _piece(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:

@@ -103,9 +103,6 @@ def _names_files(file: Path) -> bool:
         return False
 
 
-# A table of the user's own.
-
-
 def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     text = read_regular(path / name, MAX_TEXT_BYTES).decode("utf-8-sig")
     rows = list(csv.DictReader(text.splitlines()))
@@ -160,9 +157,6 @@ def _quarters(text: str) -> int:
         raise ValueError(f"front {text!r} is no axis: +z, -z, +x or -x")
     x, _y, z = numbers
     return (_AXES["+z" if z > 0 else "-z"]) if abs(z) >= abs(x) else _AXES["+x" if x > 0 else "-x"]
-
-
-# Tables of data sets.
 
 
 def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:

@@ -22,9 +22,10 @@ from pbrs_farm.read.catalogue.library_files import (
     LibraryNotes,
     furniture_library,
 )
-from pbrs_farm.read.catalogue.library_shapes import ShapeStore, library_shape
+from pbrs_farm.read.catalogue.library_shapes import library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, PieceVerdict, group_rule, verdicts
+from pbrs_farm.read.catalogue.shape_store import ShapeStore
 from pbrs_farm.read.catalogue.surface_pictures import (
     JAR_TEXTURES,
     TEXTURES,

@@ -28,13 +28,13 @@ from pbrs_farm.read.catalogue.library_files import (
     LibraryNotes,
     OpenedLibrary,
     licence_of,
-    numbered_entries,
     opened_library,
 )
 from pbrs_farm.read.catalogue.library_shapes import small_texture
+from pbrs_farm.read.catalogue.property_files import numbered_entries
 from pbrs_farm.read.common.furniture_classes import plain
 from pbrs_farm.read.common.material_library import texture_from_bytes
-from pbrs_farm.read.common.source_files import Resources
+from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.regular_files import read_regular
 
 TEXTURES: Final = "PluginTexturesCatalog.properties"
@@ -59,6 +59,11 @@ _GROUPS: Final = (
 )
 """What a picture shows, by whole words of its name and category; the first that fits."""
 _PLACES: Final = ("floor", "wall", "sky")  # categories that say nothing of what it is
+MOST_PICTURES: Final = 200  # of one folder; the rest, by name, is left out
+_SUFFIXES: Final = (".jpg", ".jpeg", ".png")
+_PHOTOGRAPH_EDGE_PX: Final = 800
+_MAX_BYTES: Final = 64 * 2**20
+_WIDTH_M: Final = 0.6  # of a print; walls scale it
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,16 +175,6 @@ def _seen() -> dict[str, list[_Seen]]:
         row = _Seen(r["image"], r["group"], r["turned"] == "1", size)
         found.setdefault(r["library"], []).append(row)
     return found
-
-
-# A folder of the user's own photographs -> pictures for the walls. Effects: reads the folder.
-
-
-MOST_PICTURES: Final = 200  # of one folder; the rest, by name, is left out
-_SUFFIXES: Final = (".jpg", ".jpeg", ".png")
-_PHOTOGRAPH_EDGE_PX: Final = 800
-_MAX_BYTES: Final = 64 * 2**20
-_WIDTH_M: Final = 0.6  # of a print; walls scale it
 
 
 def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture, ...]]:

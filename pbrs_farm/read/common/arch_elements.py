@@ -27,7 +27,8 @@ from pbrs_farm.read.common.json_values import (
 )
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.placed_mesh import placed
-from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.mesh.obj import Mesh
 
 # Thickness where an element tells none.
 WALL_DEPTH_M: Final = 0.10

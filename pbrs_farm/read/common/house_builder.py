@@ -15,7 +15,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.joinery import Hole, joinery_of, opening_of
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_floors import check_rooms
+from pbrs_farm.read.common.room_limits import check_rooms
 from pbrs_farm.read.common.rooms import level_of, levels_of, room_at
 
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import RootFolder, read_mtl
-from pbrs_farm.read.mesh.obj import Mesh, ObjMaterial, parse_obj
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import read_mtl
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 
 _BYTES_PER_TRIANGLE = 150
 

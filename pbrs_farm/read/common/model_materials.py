@@ -13,8 +13,8 @@ from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.read.common.json_values import Override
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import RootFolder
-from pbrs_farm.read.mesh.obj import ObjMaterial
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial
 
 MAX_TEXTURE_BYTES: Final = 64_000_000
 GREY: Final = (0.8, 0.8, 0.8)

@@ -20,12 +20,20 @@ from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces, part_of
 from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
 
-# A mesh of several planar walls -> an item per plane, so that repair can thicken each.
-
-
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
 _WELD_M: Final = 1e-4  # corners this near are one
+_LEAST_HEIGHT_M: Final = 1.8  # of a room
+_LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
+_LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
+_LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright
+# Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
+_THICKER_THAN_WALLS_M: Final = 0.3
+_THICKER_THAN_BLOCKS_M: Final = 0.5
+_LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
+
+# NYU40 class of each kind.
+CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}
 
 
 def planar_parts(item: Item) -> tuple[Item, ...]:
@@ -73,22 +81,6 @@ def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
     # Number planes by first appearance, so that ids are stable.
     order = np.argsort(np.argsort(first))
     return np.asarray(order[plane.reshape(-1)], np.int64)
-
-
-# A mesh that shows a room from inside -> its walls, floors and ceilings as items.
-
-
-_LEAST_HEIGHT_M: Final = 1.8  # of a room
-_LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
-_LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
-_LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright
-# Twice the volume over the area is the thickness of a plate: a wall has less, a room more.
-_THICKER_THAN_WALLS_M: Final = 0.3
-_THICKER_THAN_BLOCKS_M: Final = 0.5
-_LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
-
-# NYU40 class of each kind.
-CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}
 
 
 def room_parts(item: Item, others: F64) -> tuple[Item, ...]:

@@ -20,14 +20,13 @@ from pbrs_farm.core.checked_json import Finite, checked, exactly, json_from_byte
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
 from pbrs_farm.read.common.room_floors import (
-    MAX_ROOMS,
     ceiling_height,
-    check_number,
     coverage,
     floor_height,
     floor_polygons,
     polygon_of,
 )
+from pbrs_farm.read.common.room_limits import MAX_ROOMS, check_number
 
 MIN_ROOM_M2: Final = 1.0  # smaller pieces of floor are gaps under doors and walls
 MIN_ROOM_WIDTH_M: Final = 0.5

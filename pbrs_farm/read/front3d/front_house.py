@@ -39,8 +39,10 @@ from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.model_materials import MAX_TEXTURE_BYTES, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_floors import check_number, check_unit, floor_height, floor_polygon
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.room_floors import floor_height, floor_polygon
+from pbrs_farm.read.common.room_limits import check_number, check_unit
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
 from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, told_holes
 from pbrs_farm.read.front3d.front_pieces import (

@@ -25,7 +25,7 @@ from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedMo
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
-from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.front3d.front_file import FrontLight, FrontPiece
 from pbrs_farm.read.front3d.front_openings import is_opening

@@ -28,7 +28,8 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.document import (
     files_of_gltf,
     gltf_document,

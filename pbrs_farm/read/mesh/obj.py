@@ -6,87 +6,16 @@ usemtl, mtllib and line continuations; everything else (l, p, free-form surfaces
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.resources import files
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I32, I64, Bools
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.mesh import face_areas, numbered_points, unit_normals
+from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.core.shown_text import shown
+from pbrs_farm.read.mesh.shading_normals import crease_normals
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
-
-# Shading normals with a crease angle.
-
-
-def crease_normals(points: F64, faces: I64, crease_rad: float) -> tuple[F64, I64]:
-    """Unit normals (N, 3) and, for each face corner (F, 3), which of them it has.
-
-    Two faces share a normal at a vertex if they meet in an edge there whose faces turn by less
-    than crease_rad (or through a chain of such edges around the vertex). Faces are weighted by
-    their angle at the vertex. Vertices at equal positions count as one.
-    """
-    unit = unit_normals(points[faces])
-    if crease_rad <= 0:
-        return unit, np.repeat(np.arange(len(faces)), 3).reshape(-1, 3)
-    n_normals, label = _normal_of_corner(points, faces, unit, np.cos(crease_rad))
-    # Sum the faces' normals at each corner by their angle there, then make them unit vectors.
-    angles = _corner_angles(points, faces)
-    normals = np.zeros((n_normals, 3))
-    for k in range(3):
-        normals[:, k] = np.bincount(label, (unit[:, k : k + 1] * angles).ravel(), n_normals)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(length > 0, length, 1)
-    return normals, label.reshape(-1, 3).astype(np.int64)
-
-
-def _normal_of_corner(points: F64, faces: I64, unit: F64, min_cos: float) -> tuple[int, I32]:
-    # How many normals there are, and which each of the 3 F corners has.
-    _, welded = numbered_points(points[faces.ravel()])
-    first, second = _smooth_links(welded.reshape(-1, 3), unit, min_cos)
-    # Corners that smooth edges join, directly or through others, share one normal.
-    shape = (faces.size, faces.size)
-    links = coo_array((np.ones(len(first), np.int8), (first, second)), shape=shape)
-    n_normals, label = connected_components(links, directed=False)
-    return n_normals, label
-
-
-def _corner_angles(points: F64, faces: I64) -> F64:
-    # (F, 3) radians.
-    corners = points[faces]
-    forward = np.roll(corners, -1, axis=1) - corners
-    backward = np.roll(corners, 1, axis=1) - corners
-    # The arctangent keeps its precision for very sharp and very blunt corners.
-    cross = np.linalg.norm(np.cross(forward, backward), axis=-1)
-    return np.asarray(np.arctan2(cross, (forward * backward).sum(-1)))
-
-
-def _smooth_links(welded: I64, unit: F64, min_cos: float) -> tuple[I64, I64]:
-    # Pairs of corner numbers (3 face + k) at the ends of edges that two faces share smoothly.
-    corner = np.arange(welded.size).reshape(-1, 3)
-    start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
-    # Turn every edge from its lower vertex to its higher one: both faces then name it alike.
-    a, b = welded.ravel(), np.roll(welded, -1, axis=1).ravel()
-    low, high = np.where(a > b, end, start), np.where(a > b, start, end)
-    key = np.minimum(a, b) * (int(welded.max(initial=0)) + 1) + np.maximum(a, b)
-    # Sort the edges, so that those of one pair of vertices are neighbours.
-    order = np.argsort(key, kind="stable")
-    same = key[order[:-1]] == key[order[1:]]
-    one, other = order[:-1][same], order[1:][same]
-    # Keep the pairs whose faces turn by less than the crease; edge k is of face k // 3.
-    is_smooth = (unit[one // 3] * unit[other // 3]).sum(1) >= min_cos
-    one, other = one[is_smooth], other[is_smooth]
-    return np.concatenate([low[one], high[one]]), np.concatenate([low[other], high[other]])
-
-
-# Wavefront OBJ geometry -> triangle meshes per (group, material), fast, in numpy.
-
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
 _MANY_FACES = 50_000  # of a part, above which repeated faces are looked for
@@ -356,118 +285,3 @@ def _unique_rows(rows: I64) -> tuple[I64, I64]:
     code = (rows[:, 0] * spans[1] + rows[:, 1]) * spans[2] + rows[:, 2]
     _, first, inverse = np.unique(code, return_index=True, return_inverse=True)
     return rows[first], inverse.reshape(-1)
-
-
-# Wavefront MTL -> materials by name; and the table of built-in names. Reads that table only.
-
-
-Rgb = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class ObjMaterial:
-    """A material of an MTL."""
-
-    name: str
-    kd: Rgb = (0.8, 0.8, 0.8)  # diffuse, sRGB-encoded
-    ks: Rgb = (0.0, 0.0, 0.0)  # specular, sRGB-encoded
-    ns: float = 0.0  # Phong exponent
-    d: float = 1.0  # opacity
-    map_kd: str = ""  # picture as written, "" = none
-    map_d: str = ""  # picture as written, "" = none
-
-
-def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
-    """The materials in the order of the file; lines that cannot be read are passed over."""
-    materials: list[ObjMaterial] = []
-    fields: dict[str, object] | None = None
-    for raw in data.decode("utf-8", "replace").splitlines():
-        words = raw.split()
-        if not words:
-            continue
-        key = words[0].lower()
-        if key == "newmtl":
-            _append_material(fields, materials)
-            fields = {"name": raw.split(None, 1)[1].strip() if len(words) > 1 else ""}
-        elif fields is not None:
-            _read_line(key, words[1:], raw, fields)
-    _append_material(fields, materials)
-    return tuple(materials)
-
-
-def _append_material(fields: dict[str, object] | None, materials: list[ObjMaterial]) -> None:
-    if fields is not None:
-        materials.append(ObjMaterial(**fields))  # type: ignore[arg-type]
-
-
-def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) -> None:
-    if key in ("kd", "ks"):
-        rgb = [_number(w) for w in words[:3]]
-        # One number means a grey.
-        if len(rgb) == 1:
-            rgb *= 3
-        if len(rgb) == 3 and all(v is not None for v in rgb):
-            fields[key] = _rgb([v or 0.0 for v in rgb])
-    elif key in ("ns", "d", "tr"):
-        # Take the last word: "d -halo 0.5" has an option before it.
-        value = _number(words[-1]) if words else None
-        if value is not None:
-            if key == "ns":
-                fields["ns"] = max(0.0, value)
-            else:
-                d = value if key == "d" else 1.0 - value
-                # The first of d and Tr counts; Tr is one less opacity.
-                fields.setdefault("d", float(np.clip(d, 0, 1)))
-    elif key in ("map_kd", "map_d") and words:
-        fields[key] = _picture_name(words, raw)
-
-
-def _number(word: str) -> float | None:
-    try:
-        value = float(word)
-    except ValueError:
-        return None
-    return value if np.isfinite(value) else None
-
-
-# Options of a map_ line and how many values follow each (OBJ specification, appendix B1).
-_OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1,
-            "-blendv": 1, "-texres": 1, "-imfchan": 1, "-cc": 1, "-boost": 1}  # fmt: skip
-
-
-def _picture_name(words: list[str], raw: str) -> str:
-    # Pass over options and their numbers: what is left is the name, blanks included.
-    at = 0
-    while at < len(words) and words[at].lower() in _OPTIONS:
-        most = _OPTIONS[words[at].lower()]
-        at += 1
-        n = 0
-        while n < most and at < len(words) and (most == 1 or _number(words[at]) is not None):
-            at, n = at + 1, n + 1
-    if at == 0:
-        return raw.split(None, 1)[1].strip()
-    return " ".join(words[at:])
-
-
-@cache
-def builtin_materials() -> dict[str, ObjMaterial]:
-    """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL."""
-    text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
-    table = {}
-    for name, m in json.loads(text).items():
-        # Names that begin so are remarks about the table.
-        if name.startswith("_"):
-            continue
-        table[name] = ObjMaterial(
-            name,
-            _rgb(m.get("Kd", (0.8, 0.8, 0.8))),
-            _rgb(m.get("Ks", (0.0, 0.0, 0.0))),
-            float(m.get("Ns", 0.0)),
-            float(m.get("d", 1.0)),
-        )
-    return table
-
-
-def _rgb(values: Sequence[float]) -> Rgb:
-    r, g, b = (min(max(float(v), 0.0), 1.0) for v in values)
-    return r, g, b

@@ -25,7 +25,8 @@ from pbrs_farm.read.common.model_cache import ModelCache
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping

@@ -25,7 +25,7 @@ from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affin
 from pbrs_farm.read.common.material_library import LoadedTexture
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.suncg.arch_json import MAX_ELEMENTS
 
 MAX_OBJECTS: Final = 20_000

@@ -26,7 +26,7 @@ from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
-from pbrs_farm.read.common.source_files import RootFolder
+from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials

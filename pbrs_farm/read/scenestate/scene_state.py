@@ -33,15 +33,11 @@ from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.joinery import Hole, merged
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import LEAST_HOLE_M
-from pbrs_farm.read.common.room_floors import (
-    ceiling_height,
-    check_number,
-    check_unit,
-    floor_height,
-    floor_polygon,
-)
+from pbrs_farm.read.common.room_floors import ceiling_height, floor_height, floor_polygon
+from pbrs_farm.read.common.room_limits import check_number, check_unit
 from pbrs_farm.read.common.rooms import room_at
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,

@@ -20,18 +20,13 @@ from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedMo
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
-from pbrs_farm.read.common.source_files import RootFolder
-from pbrs_farm.read.mesh.obj import ObjMaterial
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.suncg.arch_json import arch_items
 from pbrs_farm.read.suncg.house_json import Node
+from pbrs_farm.read.suncg.lamp_lights import placed_light, separate_bulbs, with_emitting_bulbs
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
-from pbrs_farm.read.suncg.models import (
-    as_mirror,
-    mirror_slot,
-    placed_light,
-    separate_bulbs,
-    with_emitting_bulbs,
-)
+from pbrs_farm.read.suncg.mirror_glass import as_mirror, mirror_slot
 
 _T = TypeVar("_T")
 

@@ -25,12 +25,13 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
-    check_rooms,
     enclosed_polygon,
     floor_height,
     floor_polygon,
 )
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.room_limits import check_rooms
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.suncg.arch_json import arch_from_json, arch_openings
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import (
@@ -49,10 +50,11 @@ from pbrs_farm.read.suncg.node_items import (
     room_items,
 )
 
-# Which files below a SUNCG root a house is made of. Effect: reads its JSON and MTL files.
-
-
 MAX_HOUSE_BYTES: Final = 64_000_000
+_HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")
+_ROOM_ID: Final = re.compile(r"\d{1,6}_\d{1,6}")
+_STOREY_M: Final = 2.7
+_FLOOR_SLAB_M: Final = 0.05
 
 
 def arch_file(house_id: str) -> str:
@@ -100,15 +102,6 @@ def _named(document: Any) -> Iterator[tuple[str, str]]:
                 name = value.get(key)
                 if isinstance(name, str) and NAME.fullmatch(name):
                     yield key, name
-
-
-# A SUNCG house (v1, or v2 by its arch.json) -> House.
-
-
-_HOUSE_ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_\-]{0,63}")
-_ROOM_ID: Final = re.compile(r"\d{1,6}_\d{1,6}")
-_STOREY_M: Final = 2.7
-_FLOOR_SLAB_M: Final = 0.05
 
 
 def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:

@@ -19,9 +19,11 @@ from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Sou
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_floors import HINT, check_outlines
-from pbrs_farm.read.common.source_files import Resources
+from pbrs_farm.read.common.resources import Resources
+from pbrs_farm.read.common.room_limits import HINT, check_outlines
+from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
+from pbrs_farm.read.sweethome3d.home_file.container import open_container
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,
     HomeRoom,
@@ -30,25 +32,33 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     PlanLevel,
     PlanPiece,
     level_of,
-    open_container,
 )
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import (
-    CeilingHeights,
     ReadRoom,
     plane_items,
     read_rooms,
     room_nouns,
     rooms_between_walls,
-    staircase_cuts,
 )
 from pbrs_farm.read.sweethome3d.open_doors import StandingPiece, opened_doors
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
 from pbrs_farm.read.sweethome3d.piece_models import PieceModels
-from pbrs_farm.read.sweethome3d.wall_solids import Outline, outlines_of, wall_items
+from pbrs_farm.read.sweethome3d.staircases import staircase_cuts
+from pbrs_farm.read.sweethome3d.wall_outlines import Outline, outlines_of
+from pbrs_farm.read.sweethome3d.wall_solids import wall_items
 
-# Stored viewpoints -> cameras in the world.
+MAX_WALLS: Final = 3_000
+MAX_PIECES: Final = 10_000
+MAX_CROSSINGS: Final = 500
+"""Pairs of walls of a level whose centre lines cross; a home has a dozen."""
+
+_Drawn = TypeVar("_Drawn", HomeRoom, HomeWall, PlanPiece)
+_NO_ROOMS = "no walls enclose any; draw rooms (Plan > Create rooms) and save the home again"
+_HIDDEN_ROOMS = "every room is on a level saved as hidden: --set read.hidden_levels=true"
+SAME_LEVEL_M = 0.1  # levels no farther apart in height are versions of one
+ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
 
 def stored_cameras(plan: HomePlan) -> tuple[StoredCamera, ...]:
@@ -61,19 +71,6 @@ def stored_cameras(plan: HomePlan) -> tuple[StoredCamera, ...]:
         towards = np.array([-math.sin(c.yaw) * level, -down, math.cos(c.yaw) * level])
         cameras.append(StoredCamera(c.name, np.array([x, z, y]), towards, c.hfov))
     return tuple(cameras)
-
-
-# What a plan may hold, so that its repair ends within seconds.
-# A home has some dozen rooms and walls; what is far beyond it, or drawn over itself a hundred
-# times, is refused by a line before any of it is built.
-
-
-MAX_WALLS: Final = 3_000
-MAX_PIECES: Final = 10_000
-MAX_CROSSINGS: Final = 500
-"""Pairs of walls of a level whose centre lines cross; a home has a dozen."""
-
-_Drawn = TypeVar("_Drawn", HomeRoom, HomeWall, PlanPiece)
 
 
 def check_plan_bounds(plan: HomePlan, file: str) -> None:
@@ -115,15 +112,6 @@ def _crossings(walls: Sequence[HomeWall]) -> int:
     lines = [shapely.LineString([w.start, w.end]) for w in walls]
     pairs = shapely.STRtree(lines).query(lines, predicate="crosses")
     return int((pairs[0] < pairs[1]).sum())
-
-
-# A Sweet Home 3D home -> House.
-
-
-_NO_ROOMS = "no walls enclose any; draw rooms (Plan > Create rooms) and save the home again"
-_HIDDEN_ROOMS = "every room is on a level saved as hidden: --set read.hidden_levels=true"
-SAME_LEVEL_M = 0.1  # levels no farther apart in height are versions of one
-ETEKS_ATTRIBUTION = "home and models: E. and V. Puybaret / eTeks, CC-BY 3.0, modified"
 
 
 def read_home(

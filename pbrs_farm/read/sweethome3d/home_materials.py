@@ -7,7 +7,7 @@ import posixpath
 from pbrs_farm.core.house import Material
 from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import Resources
+from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint
 
 SHININESS_SCALE = 128.0  # Phong exponent of the program's shininess 1

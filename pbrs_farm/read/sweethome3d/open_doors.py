@@ -22,13 +22,8 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.piece_items import piece_item
-from pbrs_farm.read.sweethome3d.piece_models import (
-    HINGE,
-    PieceModels,
-    Transformations,
-    joint_of,
-    piece_material,
-)
+from pbrs_farm.read.sweethome3d.piece_materials import piece_material
+from pbrs_farm.read.sweethome3d.piece_models import HINGE, PieceModels, Transformations, joint_of
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model
 
 ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest that nothing stands in the way of

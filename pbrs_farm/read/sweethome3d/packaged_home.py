@@ -1,4 +1,4 @@
-"""Homes and the Debian package of example homes, whose models they may name.
+"""Homes that name models of the program: those come from the Debian package of example homes.
 
 Effects: reads the file, and the cached package; an example home is fetched through apt.
 """
@@ -14,7 +14,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.sweethome3d.home import read_home
-from pbrs_farm.read.sweethome3d.home_file.home_xml import needs_program
+from pbrs_farm.read.sweethome3d.home_file.container import needs_program
 from pbrs_farm.regular_files import read_given
 
 

@@ -18,7 +18,8 @@ from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
-from pbrs_farm.read.sweethome3d.piece_models import PANE, PieceModel, PieceModels, piece_material
+from pbrs_farm.read.sweethome3d.piece_materials import piece_material
+from pbrs_farm.read.sweethome3d.piece_models import PANE, PieceModel, PieceModels
 from pbrs_farm.read.sweethome3d.placement import (
     PieceFrame,
     frame_of,

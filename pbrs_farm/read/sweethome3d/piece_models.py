@@ -10,29 +10,22 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.read.common.material_library import PANE_OPACITY, LoadedTexture
-from pbrs_farm.read.mesh.obj import (
-    Mesh,
-    ObjMaterial,
-    ObjModel,
-    builtin_materials,
-    parse_mtl,
-    parse_obj,
-)
-from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, PlanPicture, PlanPiece
-from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMaterials
-
-# Doors, drawers and panes of a model, moved as the home keeps them.
-# A transformation names a hinge or rail ("sweethome3d_hinge_1"); it moves every group that says
-# it hangs on it ("sweethome3d_opening_on_hinge_1", "sweethome3d_window_pane_on_hinge_1_left").
-
+from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
+from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
+from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
 
 HINGE = "sweethome3d_hinge_"
 _FIXED = (HINGE, "sweethome3d_rail_", "sweethome3d_unique")
 Transformations = tuple[tuple[str, tuple[float, ...]], ...]  # (name, 12 numbers)
+PANE, MIRROR, LIGHT = "pane", "mirror", "light"
+# Beginning of a group's name -> what the program makes of it.
+_ROLES = (
+    ("sweethome3d_window_pane", PANE),
+    ("sweethome3d_window_mirror", MIRROR),
+    ("sweethome3d_light", LIGHT),
+)
 
 
 def joint_of(name: str) -> str:
@@ -78,18 +71,6 @@ def _transformed(mesh: Mesh, matrix: F64) -> Mesh:
     faces = mesh.faces if np.linalg.det(linear) > 0 else mesh.faces[:, [0, 2, 1]]
     positions = mesh.positions @ linear.T + matrix[:, 3]
     return replace(mesh, positions=positions, normals=normals, faces=faces)
-
-
-# Models named by a home -> meshes per material with a role.
-
-
-PANE, MIRROR, LIGHT = "pane", "mirror", "light"
-# Beginning of a group's name -> what the program makes of it.
-_ROLES = (
-    ("sweethome3d_window_pane", PANE),
-    ("sweethome3d_window_mirror", MIRROR),
-    ("sweethome3d_light", LIGHT),
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,98 +232,3 @@ def _merged(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
             normals=np.concatenate([p.normals for p in parts]),
         ))  # fmt: skip
     return tuple(merged)
-
-
-# The material of a piece's mesh: its model's, under the home's overrides.
-
-
-CLEAR = 0.95  # Opacity below which a material counts as glass
-
-
-@dataclass(frozen=True, slots=True)
-class PieceMaterial:
-    """The material of one mesh of a piece."""
-
-    name: str  # the surface's: role and material
-    material: int  # index in the library
-    picture: PlanPicture | None  # how the home lays a texture of its own; None: by the model's uv
-    emits: bool
-
-
-def piece_material(
-    piece: PlanPiece, mesh: Mesh, model: PieceModel, materials: HomeMaterials
-) -> PieceMaterial | None:
-    """The material of one mesh, or None if the home makes it invisible."""
-    base = model.materials.get(mesh.material) or ObjMaterial(mesh.material or "default")
-    role = mesh.group
-    paint = dict(piece.materials).get(mesh.material, Paint())
-    if paint.is_hidden:
-        return None
-    # The whole piece's paint covers what no paint of its own has; panes and mirrors stay.
-    if paint.is_empty and role not in (PANE, MIRROR):
-        paint = Paint(
-            piece.paint.colour,
-            piece.paint.picture,
-            piece.paint.shininess if paint.shininess is None else paint.shininess,
-        )
-    emits = role == LIGHT or mesh.material in piece.light_materials
-    loaded, picture = _texture(piece, paint, base, mesh, model, materials)
-    diffuse = (1.0, 1.0, 1.0) if loaded else paint.colour or base.kd
-    # The home's shininess replaces the model's highlights.
-    specular, shininess = base.ks, base.ns
-    if paint.shininess is not None:
-        shine = min(max(paint.shininess, 0.0), 1.0)
-        specular, shininess = (shine, shine, shine), shine * SHININESS_SCALE
-    kind = _material_kind(piece, role, base, emits=emits, is_textured=loaded is not None)
-    # Glass whose model says opaque lets light pass all the same.
-    opacity = base.d
-    if kind in (MaterialKind.PANE, MaterialKind.GLASS) and opacity > CLEAR:
-        opacity = PANE_OPACITY
-    material = Material(
-        name=mesh.material or "default",
-        kind=kind,
-        diffuse=diffuse,
-        specular=specular,
-        shininess=shininess,
-        opacity=1.0 if kind in (MaterialKind.OPAQUE, MaterialKind.BULB) else opacity,
-        texture_id=loaded.texture.id if loaded else None,
-        alpha_cutout=bool(loaded and loaded.has_holes),
-    )
-    name = f"{role}:{material.name}" if role else material.name
-    return PieceMaterial(name, materials.library.index(material), picture, emits)
-
-
-def _material_kind(
-    piece: PlanPiece, role: str, base: ObjMaterial, *, emits: bool, is_textured: bool
-) -> MaterialKind:
-    is_clear = base.d < CLEAR and not is_textured
-    if emits:
-        return MaterialKind.BULB
-    if role == MIRROR:
-        return MaterialKind.MIRROR
-    if role == PANE or is_clear:
-        return MaterialKind.PANE if piece.frame is not None else MaterialKind.GLASS
-    return MaterialKind.OPAQUE
-
-
-def _texture(
-    piece: PlanPiece,
-    paint: Paint,
-    base: ObjMaterial,
-    mesh: Mesh,
-    model: PieceModel,
-    materials: HomeMaterials,
-) -> tuple[LoadedTexture | None, PlanPicture | None]:
-    """The mesh's texture, and how the home lays it (None: by the model's uv)."""
-    if paint.picture is not None:
-        loaded = materials.texture(paint.picture.image, piece.place)
-        return loaded, paint.picture if loaded else None
-    if paint.colour is not None or not base.map_kd or mesh.uvs is None:
-        return None, None
-    place = f"material {base.name}"
-    loaded = materials.texture(content_name(model.folder, base.map_kd), place)
-    # Opacity is read from the colour map's alpha alone.
-    if base.map_d and base.map_d != base.map_kd:
-        text = f"{base.map_d[:80]!r} is not the colour map's alpha"
-        materials.notes.add("unused-opacity-map", place, text)
-    return loaded, None

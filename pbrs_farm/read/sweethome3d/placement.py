@@ -13,7 +13,8 @@ from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import cross_products
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPicture, PlanPiece
-from pbrs_farm.read.sweethome3d.piece_models import PieceMaterial, PieceModel
+from pbrs_farm.read.sweethome3d.piece_materials import PieceMaterial
+from pbrs_farm.read.sweethome3d.piece_models import PieceModel
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 _FLAT = 1e-9  # an extent below it has no scale
@@ -133,9 +134,6 @@ def _rotation_x(angle: float) -> F64:
 def _rotation_z(angle: float) -> F64:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0], [0, 0, 1]])
-
-
-# Light sources of lamps -> LightPart in the world.
 
 
 def light_parts(

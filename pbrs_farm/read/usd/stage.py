@@ -117,9 +117,6 @@ def _mapping(folder: StageFolder, path: Path) -> Mapping:
     return Mapping() if data is None else mapping_from_json(data, name)
 
 
-# Rooms
-
-
 def _told_rooms(
     stage: Any, folder: StageFolder, path: Path, scale: float, *, is_z_up: bool
 ) -> list[dict[str, Any]]:

@@ -13,7 +13,8 @@ from pbrs_farm.generate.floor_plan import (
     Rect,
     RoomType,
 )
-from pbrs_farm.generate.furnish.room_space import FurnishSpace, WalkMap, room_space
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, room_space
+from pbrs_farm.generate.furnish.walk_bitmap import WalkMap
 
 W, D = 5.0, 3.0
 

@@ -9,7 +9,8 @@ import pytest
 import trimesh
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.mesh.obj import Mesh, builtin_materials, parse_mtl, parse_obj
+from pbrs_farm.read.mesh.mtl import builtin_materials, parse_mtl
+from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

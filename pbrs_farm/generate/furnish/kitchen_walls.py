@@ -1,0 +1,115 @@
+"""Where a kitchen run can stand: along one wall, or along two that meet in a corner. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from pbrs_farm.generate.floor_plan import Rect
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, RoomWall
+
+DEPTH_M: Final = 0.62
+MODULE_M: Final = 0.60
+_LONGEST_ARM_M: Final = 3.9
+_LEAST_M: Final = 1.75  # fridge, sink and cooker
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """A stretch of a wall that units stand along, from `low` to `high`."""
+
+    wall: RoomWall
+    low: float
+    high: float
+    turns: int  # of its pieces against those of the main arm
+    corner: float  # u of the main arm's corner that it starts from
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return self.high - self.low
+
+
+def run_shapes(space: FurnishSpace) -> Iterator[tuple[Arm, ...]]:
+    """One arm, two that meet in a corner, or three; the first is the main one."""
+    free = [_free(space, wall) for wall in space.walls]
+    for k, wall in enumerate(space.walls):
+        for low, high in free[k]:
+            for a, b in _cuts(low, high, wall):
+                yield (Arm(wall, a, b, 0, 0.0),)
+        right = _next(space, k)
+        if right is None:
+            continue
+        for low, high in free[k]:
+            if high < wall.length - 0.01 or high - low < 1.2:
+                continue
+            for s_low, s_high in free[right]:
+                if s_low > 0.01 or s_high < DEPTH_M + 0.9:
+                    continue
+                for a in _starts(low, high):
+                    for b in _starts(-s_high, -(DEPTH_M + 0.02)):
+                        main = Arm(wall, a, wall.length, 0, 0.0)
+                        side = Arm(space.walls[right], DEPTH_M + 0.02, -b, 1, wall.length)
+                        yield main, side
+
+
+def _next(space: FurnishSpace, k: int) -> int | None:
+    """The wall that meets wall k at its right end."""
+    wall = space.walls[k]
+    if not wall.is_right_corner:
+        return None
+    end = wall.frame.point(wall.length, 0.0)
+    for n, other in enumerate(space.walls):
+        if abs(other.frame.x - end[0]) + abs(other.frame.z - end[1]) < 0.02:
+            return n
+    return None
+
+
+def _starts(low: float, high: float) -> list[float]:
+    # Whole stretches first, then shorter ones that keep their far end in the corner.
+    cuts = [low] if high - low <= _LONGEST_ARM_M else []
+    cuts += [high - n * MODULE_M for n in (2, 3, 4, 5, 6) if low < high - n * MODULE_M - 0.01]
+    return cuts
+
+
+def _cuts(low: float, high: float, wall: RoomWall) -> list[tuple[float, float]]:
+    if high - low < _LEAST_M:
+        return []
+    found = [(low, high)] if high - low <= _LONGEST_ARM_M + 0.5 else []
+    for n in (4, 5, 6, 7):
+        length = n * MODULE_M
+        if length < high - low - 0.01:
+            found += [(low, low + length), (high - length, high)]
+    return found
+
+
+def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
+    """Stretches of a wall before which a unit can stand."""
+    # What doors' swings and low windows take of the strip that units stand on.
+    taken = []
+    strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
+    low_windows = [w.zone for w in space.windows if w.sill < 0.8]
+    for rect in [*(tuple(r) for r in space.doors.tolist()), *low_windows]:
+        along = _along(rect, strip, wall)
+        if along is not None:
+            taken.append(along)
+    # Sweep along the wall; a unit needs 0.6 m.
+    found, start = [], 0.0
+    for low, high in sorted(taken):
+        if low - start > 0.6:
+            found.append((start, low))
+        start = max(start, high)
+    if wall.length - start > 0.6:
+        found.append((start, wall.length))
+    return found
+
+
+def _along(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
+    if min(rect[2], strip[2]) - max(rect[0], strip[0]) < 0.01:
+        return None
+    if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:
+        return None
+    f = wall.frame
+    at = [(x - f.x) * f.dx + (z - f.z) * f.dz for x, z in (rect[:2], rect[2:])]
+    return max(min(at), 0.0), min(max(at), wall.length)

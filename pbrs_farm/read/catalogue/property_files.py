@@ -1,0 +1,62 @@
+"""Java property files: the catalogues of Sweet Home 3D's libraries. No effects."""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+_ESCAPE: Final = re.compile(r"\\(u[0-9a-fA-F]{4}|.)", re.DOTALL)
+_LETTERS: Final = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
+_ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
+
+
+def parse_properties(data: bytes) -> dict[str, str]:
+    """Key -> value, later lines first; what is no entry is passed over.
+
+    Text is UTF-8 where it decodes, else Latin-1; a line that ends in a backslash goes on.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    found = {}
+    whole = ""
+    for raw in text.splitlines():
+        line = raw.lstrip()
+        if not whole and (not line or line[0] in "#!"):
+            continue
+        # Join continued lines: an odd number of backslashes ends them.
+        n_slashes = len(line) - len(line.rstrip("\\"))
+        whole += line[:-1] if n_slashes % 2 else line
+        if n_slashes % 2:
+            continue
+        match = _ENTRY.fullmatch(whole)
+        whole = ""
+        if match is not None:
+            found[_plain(match[1])] = _plain(match[2]).strip()
+    return found
+
+
+def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
+    """The entries `key#1`, `key#2`, ... of a catalogue, in order of their numbers."""
+    rows: dict[int, dict[str, str]] = {}
+    for key, value in properties.items():
+        name, mark, number = key.partition("#")
+        if mark and number.isascii() and number.isdigit() and len(number) < 7:
+            rows.setdefault(int(number), {})[name] = value
+    return [rows[k] for k in sorted(rows)]
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a value, parted by blanks; ValueError where a word is none."""
+    return [float(word) for word in text.split()]
+
+
+def _plain(text: str) -> str:
+    def letter(match: re.Match[str]) -> str:
+        code = match[1]
+        if len(code) == 5:
+            return chr(int(code[1:], 16))
+        return _LETTERS.get(code, code)
+
+    return _ESCAPE.sub(letter, text)

@@ -1,0 +1,71 @@
+"""How many rooms a house may have and how often they may overlap. No effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import Room
+
+MAX_ROOMS: Final = 500
+MAX_OVERLAPS: Final = 500
+"""Pairs of rooms of a level that share some floor; a home has a few."""
+
+HINT: Final = "remove what is drawn over itself, hide levels, or split the home into several"
+_MIN_SHARED_M2: Final = 0.05
+
+
+def check_rooms(rooms: Sequence[Room], file: str) -> None:
+    """Raise BadHouse, naming the file, for too many rooms, or rooms drawn over each other."""
+    by_level: dict[str, list[Points2]] = {}
+    for room in rooms:
+        by_level.setdefault(room.level_id, []).append(room.polygon)
+    check_outlines(by_level, file)
+
+
+def check_outlines(by_level: Mapping[str, Sequence[Points2]], file: str) -> None:
+    """The same for outlines (N, 2) in plan, a list for each level."""
+    check_number(sum(map(len, by_level.values())), file)
+    n_overlaps = sum(map(_overlaps, by_level.values()))
+    if n_overlaps > MAX_OVERLAPS:
+        text = f"{n_overlaps} pairs of rooms overlap, at most {MAX_OVERLAPS} are taken apart"
+        raise BadHouse(file, "rooms", text, hint=HINT)
+
+
+_SMALL_M, _LARGE_M = 0.6, 500.0  # the rooms of a home together are wider, and less wide
+_LOW_M, _HIGH_M = 1.0, 40.0  # a room's height
+
+
+def check_unit(rooms: Sequence[Room], file: str, place: str, hint: str) -> None:
+    """Raise BadHouse for rooms of no size that a home has: their lengths are in another unit."""
+    plan = np.concatenate([room.polygon for room in rooms])
+    wide = float(np.ptp(plan, axis=0).max())
+    high = float(np.median([room.ceiling_y - room.floor_y for room in rooms]))
+    looks = ""
+    if wide > _LARGE_M or high > _HIGH_M:
+        looks = "millimetres" if max(wide / 8_000, high / 1_000) > 1 else "centimetres"
+    elif wide < _SMALL_M or high < _LOW_M:
+        looks = "another unit than metres"
+    if looks:
+        text = f"the rooms are {wide:.3g} m wide and {high:.3g} m high: looks like {looks}"
+        raise BadHouse(file, place, text, hint=hint)
+
+
+def check_number(n_rooms: int, file: str) -> None:
+    """Raise BadHouse for more than MAX_ROOMS."""
+    if n_rooms > MAX_ROOMS:
+        raise BadHouse(file, "", f"{n_rooms} rooms, at most {MAX_ROOMS} are read", hint=HINT)
+
+
+def _overlaps(outlines: Sequence[Points2]) -> int:
+    found = [shapely.make_valid(shapely.Polygon(p)) for p in outlines if len(p) > 2]
+    areas = np.array(found, object)
+    first, second = shapely.STRtree(found).query(areas, predicate="intersects")
+    is_pair = first < second
+    shared = shapely.area(shapely.intersection(areas[first[is_pair]], areas[second[is_pair]]))
+    return int((shared > _MIN_SHARED_M2).sum())

@@ -1,0 +1,122 @@
+"""Wavefront MTL -> materials by name; and Java 3D's built-in names. Effect: reads the table of those."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjMaterial:
+    """A material of an MTL."""
+
+    name: str
+    kd: Rgb = (0.8, 0.8, 0.8)  # diffuse, sRGB-encoded
+    ks: Rgb = (0.0, 0.0, 0.0)  # specular, sRGB-encoded
+    ns: float = 0.0  # Phong exponent
+    d: float = 1.0  # opacity
+    map_kd: str = ""  # picture as written, "" = none
+    map_d: str = ""  # picture as written, "" = none
+
+
+def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
+    """The materials in the order of the file; lines that cannot be read are passed over."""
+    materials: list[ObjMaterial] = []
+    fields: dict[str, object] | None = None
+    for raw in data.decode("utf-8", "replace").splitlines():
+        words = raw.split()
+        if not words:
+            continue
+        key = words[0].lower()
+        if key == "newmtl":
+            _append_material(fields, materials)
+            fields = {"name": raw.split(None, 1)[1].strip() if len(words) > 1 else ""}
+        elif fields is not None:
+            _read_line(key, words[1:], raw, fields)
+    _append_material(fields, materials)
+    return tuple(materials)
+
+
+def _append_material(fields: dict[str, object] | None, materials: list[ObjMaterial]) -> None:
+    if fields is not None:
+        materials.append(ObjMaterial(**fields))  # type: ignore[arg-type]
+
+
+def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) -> None:
+    if key in ("kd", "ks"):
+        rgb = [_number(w) for w in words[:3]]
+        # One number means a grey.
+        if len(rgb) == 1:
+            rgb *= 3
+        if len(rgb) == 3 and all(v is not None for v in rgb):
+            fields[key] = _rgb([v or 0.0 for v in rgb])
+    elif key in ("ns", "d", "tr"):
+        # Take the last word: "d -halo 0.5" has an option before it.
+        value = _number(words[-1]) if words else None
+        if value is not None:
+            if key == "ns":
+                fields["ns"] = max(0.0, value)
+            else:
+                d = value if key == "d" else 1.0 - value
+                # The first of d and Tr counts; Tr is one less opacity.
+                fields.setdefault("d", float(np.clip(d, 0, 1)))
+    elif key in ("map_kd", "map_d") and words:
+        fields[key] = _picture_name(words, raw)
+
+
+def _number(word: str) -> float | None:
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if np.isfinite(value) else None
+
+
+# Options of a map_ line and how many values follow each (OBJ specification, appendix B1).
+_OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu": 1,
+            "-blendv": 1, "-texres": 1, "-imfchan": 1, "-cc": 1, "-boost": 1}  # fmt: skip
+
+
+def _picture_name(words: list[str], raw: str) -> str:
+    # Pass over options and their numbers: what is left is the name, blanks included.
+    at = 0
+    while at < len(words) and words[at].lower() in _OPTIONS:
+        most = _OPTIONS[words[at].lower()]
+        at += 1
+        n = 0
+        while n < most and at < len(words) and (most == 1 or _number(words[at]) is not None):
+            at, n = at + 1, n + 1
+    if at == 0:
+        return raw.split(None, 1)[1].strip()
+    return " ".join(words[at:])
+
+
+@cache
+def builtin_materials() -> dict[str, ObjMaterial]:
+    """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL."""
+    text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
+    table = {}
+    for name, m in json.loads(text).items():
+        # Names that begin so are remarks about the table.
+        if name.startswith("_"):
+            continue
+        table[name] = ObjMaterial(
+            name,
+            _rgb(m.get("Kd", (0.8, 0.8, 0.8))),
+            _rgb(m.get("Ks", (0.0, 0.0, 0.0))),
+            float(m.get("Ns", 0.0)),
+            float(m.get("d", 1.0)),
+        )
+    return table
+
+
+def _rgb(values: Sequence[float]) -> Rgb:
+    r, g, b = (min(max(float(v), 0.0), 1.0) for v in values)
+    return r, g, b

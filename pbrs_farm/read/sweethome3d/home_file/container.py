@@ -1,0 +1,86 @@
+"""A home file's bytes -> its XML tree and the contents it names. No effects."""
+
+from __future__ import annotations
+
+import posixpath
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, ParseError
+
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.common.resources import Resources, ZipResources
+from pbrs_farm.read.common.source_files import Layered
+from pbrs_farm.read.sweethome3d.home_file.java_home import RESAVE, root_from_java
+
+MAX_XML_BYTES = 16 * 2**20
+MAX_DEPTH = 200  # nested elements
+
+
+@dataclass(frozen=True, slots=True)
+class Container:
+    """The root element <home> and whatever holds models and textures."""
+
+    root: Element
+    contents: Resources
+
+
+def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
+    """Take a home file apart; resources: the program's own models, for files that refer to them.
+
+    Raises BadHouse for what is neither a zip nor XML, has no Home.xml, or is unsafe.
+    """
+    if data.startswith(b"PK"):
+        archive = ZipResources(data, file)
+        xml = archive.read("Home.xml")
+        if xml is None:
+            # Old versions, and homes saved without XML, hold the program's serialised objects alone.
+            java = archive.read("Home")
+            if java is None:
+                raise BadHouse(file, "", "holds no Home.xml and no Home", hint=RESAVE)
+            return Container(root_from_java(java, file), Layered(archive, resources))
+        return Container(_parsed(xml, file, "Home.xml"), Layered(archive, resources))
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return Container(_parsed(data, file, ""), Layered(resources))
+    raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=RESAVE)
+
+
+def needs_program(data: bytes, file: str) -> bool:
+    """Whether a home names models or pictures that its file does not hold: the program's own."""
+    try:
+        root = open_container(data, file, None).root
+        held = ZipResources(data, file).names() if data.startswith(b"PK") else ()
+        # Models and pictures are all that a home names.
+        named = {e.get(key) for e in root.iter() for key in ("model", "image")}
+        return not {posixpath.normpath(name) for name in named if name} <= set(held)
+    except BadHouse:
+        return False  # the reader will say what is wrong with it
+
+
+def _parsed(xml: bytes, file: str, entry: str) -> Element:
+    if len(xml) > MAX_XML_BYTES:
+        raise BadHouse(file, entry, f"{len(xml)} bytes of XML, at most {MAX_XML_BYTES} are read")
+    try:
+        root: Element = fromstring(xml, forbid_dtd=False, forbid_entities=True)
+    except DefusedXmlException as error:
+        what = type(error).__name__
+        raise BadHouse(file, entry, f"XML with entity definitions is refused ({what})") from None
+    except ParseError as error:
+        raise BadHouse(file, entry, f"XML is not well-formed: {error}", hint=RESAVE) from None
+    except (ValueError, LookupError, RecursionError):
+        text = "XML cannot be read: unknown encoding, or nested too deeply"
+        raise BadHouse(file, entry, text, hint=RESAVE) from None
+    if root.tag != "home":
+        raise BadHouse(file, entry, f"the root element is <{root.tag[:40]}>, not <home>")
+    if _depth(root) > MAX_DEPTH:
+        raise BadHouse(file, entry, f"elements nested deeper than {MAX_DEPTH}")
+    return root
+
+
+def _depth(root: Element) -> int:
+    # Go down level by level: no recursion that a deep file could exhaust.
+    depth, level = 0, [root]
+    while level and depth <= MAX_DEPTH:
+        depth, level = depth + 1, [child for element in level for child in element]
+    return depth
