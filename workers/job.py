@@ -31,9 +31,6 @@ def work_version() -> str:
     return keys.digest(steps, versions_of_passes(), laid_out.FORMAT)[:12]
 
 
-# What a job is and where its own objects are stored.
-
-
 class HouseEntry(Record):
     """A house of a job."""
 

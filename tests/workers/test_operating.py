@@ -23,7 +23,7 @@ from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import Fault
 from workers.ledger.worker_registry import Registry
 from workers.node import supervisor
-from workers.node.renderer import without_numbers
+from workers.node.faults import without_numbers
 from workers.store_identity import known_store_id, store_id
 
 HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]

@@ -11,7 +11,6 @@ the recipe's models: `status` is asked often, of machines that are busy.
 from __future__ import annotations
 
 import copy
-import json
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
@@ -26,20 +25,16 @@ from workers.client.rights import Rights
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.ids import (
-    LIGHT,
-    LIGHT_GPU,
-    WHOLE,
     TaskId,
     attempts_from_log_keys,
     check_job_id,
     failed_key,
     job_key,
     log_key,
-    queue_of,
     task_from_text,
 )
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, User, hold_from_text
+from workers.ledger.task_ledger import ALIVE_S, JobView, User
 from workers.ledger.user_table import UserTable
 from workers.ledger.worker_registry import Registry
 from workers.store_identity import known_store_id, store_id
@@ -47,128 +42,15 @@ from workers.store_identity import known_store_id, store_id
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
     from workers.job import HouseEntry, JobSpec
+from workers.client.task_rows import explain_tasks, rerun_command
 
-# The command that does a task of a farm once more, for messages; pure.
-
-
-def rerun_command(job: str, task: str) -> str:
-    """`pbrs-farm rerun ...` of the task, as a shell takes it: neither id holds a special character."""
-    return f"pbrs-farm rerun {task} --job {job}"
-
-
-# What is known of a task, and what keeps it from running. Effects: reads the ledger.
-
-
-_TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
-    STATES["LOADED"]: "loaded, its house not admitted yet",
-    STATES["FAILED"]: "failed for good",
-}
-# What may have an obstacle.
-_WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
-
-
-def explain(
-    ledger: RedisLedger, registry: Registry, view: JobView, text: str
-) -> list[dict[str, Any]]:
-    """A row per task that text names: a task, a house, or a view (HOUSE/VIEW).
-
-    Empty when the house is not in the ledger yet. Raises BadInput for a task or view there is not.
-    """
-    house, _, rest = text.partition("/")
-    states = ledger.unit_states(view.job_id, house)
-    batches = ledger.batches(view.job_id, house)
-    # The house's hash holds other fields beside its units.
-    units = {u: at for u, at in states.items() if u == WHOLE or u.isdigit() or u[:1] == "s"}
-    units = {u: at for u, at in units.items() if ":" in at}
-    wanted = rest.partition("/")[0]
-    # A view names the batch that holds it.
-    if states and wanted and wanted not in units:
-        holding = [str(k) for k, views in enumerate(batches) if wanted in views]
-        if not holding:
-            raise BadInput(text, "", "the job has no such task or view")
-        units = {holding[0]: units[holding[0]]}
-    elif wanted:
-        units = {u: at for u, at in units.items() if u == wanted}
-    rows = [_row(ledger, view.job_id, house, u, at, batches) for u, at in sorted(units.items())]
-    for row in rows:
-        if "worker" in row:
-            row |= _holder(ledger, registry, view, row)
-        if row["state"] in _WAITING and (obstacle := _obstacle(registry, view, row["task"])):
-            row["because"] = obstacle
-    return rows
-
-
-def _row(
-    ledger: RedisLedger,
-    job: str,
-    house: str,
-    unit: str,
-    at: str,
-    batches: tuple[tuple[str, ...], ...],
-) -> dict[str, Any]:
-    # Say the state, then what the ledger knows of the attempt.
-    stage, _, letter = at.partition(":")
-    task = str(TaskId(house, unit, stage))
-    facts = ledger.task_facts(job, task)
-    row: dict[str, Any] = {"task": task, "state": _TEXTS.get(letter, letter)}
-    if unit.isdigit():
-        row["views"] = list(batches[int(unit)])
-    # Ready, but only after a delay.
-    if letter == STATES["READY"] and "not_before" in facts:
-        row["state"] = "waits before it is tried again"
-    if "claim" in facts:
-        hold = hold_from_text(job, task, facts["claim"])
-        row["worker"], row["for_s"] = hold.worker, round(ledger.now() - hold.since, 1)
-        if hold.is_preempted:
-            row["state"] += ", makes room for an urgent job"
-    row |= {name: facts[name] for name in ("attempts", "tried") if name in facts}
-    if "fault" in facts:
-        row["fault"] = json.loads(facts["fault"])
-    return row
-
-
-def _holder(
-    ledger: RedisLedger, registry: Registry, view: JobView, row: dict[str, Any]
-) -> dict[str, Any]:
-    """How long the lease of a running task lasts, and how long its holder has been silent."""
-    stage = task_from_text(row["task"]).stage
-    # Light on a GPU has a lease of its own length.
-    gpu = stage == LIGHT and view.uses_gpu
-    left_s = ledger.lease_left_s(view.job_id, row["task"], LIGHT_GPU if gpu else stage)
-    seen = {w.name: w.age_s for w in registry.workers()}
-    found: dict[str, Any] = {} if left_s is None else {"lease_s": round(max(0.0, left_s), 1)}
-    age_s = seen.get(row["worker"])
-    if age_s is None or age_s > ALIVE_S:
-        found["silent_s"] = None if age_s is None else round(age_s, 1)
-    return found
-
-
-def _obstacle(registry: Registry, view: JobView, task: str) -> str:
-    """Why a task that could run does not: the job, storage or the workers; "" for its turn."""
-    if view.state == "running" and view.blocked_queues:
-        return f"others go first: {view.blocked_why}"
-    if view.state != "running":
-        return f"the job is {view.state}: {view.fields.get('reason', '')}".rstrip(": ")
-    if reason := registry.breaker():
-        return f"storage is unhealthy: {reason}"
-    # Then the workers: none takes its queue, or all are leaving.
-    queue = queue_of(task_from_text(task).stage, gpu=view.uses_gpu)
-    takers = [
-        w
-        for w in registry.workers()
-        if w.age_s <= ALIVE_S and queue in w.fields.get("queues", "").split(",")
-    ]
-    if not takers:
-        return f"no worker takes {queue}"
-    store = view.fields.get("store_id", "")
-    if store and all(w.fields.get("store_id", store) not in (store, "") for w in takers):
-        return f"every worker that takes {queue} has another store than the job"
-    if all(w.fields.get("drain") == "1" for w in takers):
-        return f"every worker that takes {queue} is leaving"
-    return ""
-
-
-# The farm from outside.
+# A submission that takes longer has died; the next one starts afresh.
+_LOADING_S = 900.0
+# A small job is cut finer, so that its last batch does not leave the other slots idle.
+_BATCHES_PER_SLOT = 4
+_SLOTS_UNKNOWN = 2
+_WAIT = "wait for it; after 15 minutes it counts as dead"
+_HOUSE_STATES = ("open", "done", "quarantined")
 
 
 @dataclass(frozen=True, slots=True)
@@ -380,7 +262,7 @@ class Farm:
 
         Says what each waits for. Raises BadInput when the job has no such house.
         """
-        rows = explain(self.ledger, self.registry, self.view(job), text)
+        rows = explain_tasks(self.ledger, self.registry, self.view(job), text)
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
     def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
@@ -543,15 +425,6 @@ class Farm:
         if house not in known:
             raise BadInput(house, "", "the job has no such house", hint=did_you_mean(house, known))
         return [{"task": house, "state": "its house is not admitted yet"}]
-
-
-# A submission that takes longer has died; the next one starts afresh.
-_LOADING_S = 900.0
-# A small job is cut finer, so that its last batch does not leave the other slots idle.
-_BATCHES_PER_SLOT = 4
-_SLOTS_UNKNOWN = 2
-_WAIT = "wait for it; after 15 minutes it counts as dead"
-_HOUSE_STATES = ("open", "done", "quarantined")
 
 
 def completed(

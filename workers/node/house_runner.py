@@ -5,26 +5,21 @@ Effects: those of the steps, and a scratch file for a house's source. Markers de
 
 from __future__ import annotations
 
-import heapq
-import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import lru_cache
-from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
-from typing import IO, Any, Final
+from tempfile import TemporaryDirectory
+from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse, MachineFailed, ObjectMissing
-from pbrs_farm.formats.manifest import lines_by_house
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import uses_catalogue
 from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.run import plan
-from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import finish_house
 from pbrs_farm.run.plan import view_steps
@@ -34,128 +29,14 @@ from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.laid_out import LaidOutStore, one_task
-from pbrs_farm.store.object_store import get_or_none
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.house_files import FOLDER, fill_cache, is_left_in_place, local_catalogue
-from workers.ids import (
-    GEOMETRY,
-    GL,
-    JOB,
-    LIGHT,
-    REDUCE,
-    SHARD,
-    job_key,
-    shard_key,
-    task_from_failed_key,
-)
-from workers.job import JobSpec, houses_from_lines
+from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
+from workers.job import JobSpec
+from workers.node.merging import merge_job, merge_shard
 from workers.node.view_batches import batches_from_views
 from workers.runner import OnText, Request, Result, Survey
-
-# House -> shard -> job: manifests merged upward, and what is missing written down.
-# Effects: the store's. Every object here is rebuilt from those below it, so merging twice is
-# once.
-
-
-def house_ids(store: Store, spec: JobSpec) -> list[str]:
-    """The job's houses in its order."""
-    data = store.get(job_key(spec.job_id, "houses.jsonl"))
-    return [house.house_id for house in houses_from_lines(data)]
-
-
-def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
-    """Write the manifests of a shard's houses as one; houses without one are left out."""
-    # Read the shard's slice of the job's order.
-    size = spec.rules.shard_size
-    parts = []
-    for house in house_ids(store, spec)[shard * size : (shard + 1) * size]:
-        on_step(f"merge {house}")
-        parts.append(_manifest(store, house) or b"")
-    store.put(shard_key(spec.job_id, shard), b"".join(parts))
-
-
-def merge_job(store: Store, spec: JobSpec, on_step: OnText) -> None:
-    """Write the root's manifest.jsonl and the job's report.json, which says what is missing.
-
-    Rows of other jobs' houses in the same root are kept. Over a job that still runs, houses that
-    have no manifest yet are missing, and the report says so. What is held is a shard's rows, and the
-    root's former manifest where there is one.
-    """
-    houses = house_ids(store, spec)
-    own = set(houses)
-    missing: list[str] = []
-    dressed: list[dict[str, str]] = []
-    n_objects = 0
-    # Merge two streams that are sorted by house: nothing but a shard's rows is held.
-    with TemporaryFile() as file:
-        for house, part in _merged(store, own, _new_rows(store, spec, houses, on_step)):
-            if part is None:
-                missing.append(house)
-            else:
-                file.write(part)
-                dressed += dressing_rows(part)
-                n_objects += part.count(b"\n") if house in own else 0  # a row an object
-        _put_file(store, keys.MANIFEST, file)
-    write_attribution_of(store, dressed)
-    # Say what is missing and what failed for good.
-    report: dict[str, Any] = {
-        "job": spec.job_id,
-        "houses": len(houses),
-        "houses_missing": missing,
-        "objects": n_objects,
-        "failed": sorted(_failed(store, spec.job_id), key=lambda row: str(row["task"])),
-    }
-    store.put(job_key(spec.job_id, "report.json"), json.dumps(report, indent=1).encode() + b"\n")
-
-
-def _merged(
-    store: Store, own: set[str], new: Iterator[tuple[str, bytes | None]]
-) -> Iterator[tuple[str, bytes | None]]:
-    """The job's rows and those of other houses of the root, by house, one house at a time."""
-    rows = lines_by_house(get_or_none(store, keys.MANIFEST) or b"")
-    old = ((house, part) for house, part in rows if house not in own)
-    return heapq.merge(old, new, key=lambda row: row[0])
-
-
-def _put_file(store: Store, key: str, file: IO[bytes]) -> None:
-    """Put a file's bytes without holding them: pages of the file come and go."""
-    file.flush()
-    if file.tell() == 0:
-        store.put(key, b"")
-        return
-    with mmap(file.fileno(), 0, access=ACCESS_READ) as pages, memoryview(pages) as view:
-        store.put(key, view)
-
-
-def _new_rows(
-    store: Store, spec: JobSpec, houses: list[str], on_step: OnText
-) -> Iterator[tuple[str, bytes | None]]:
-    """House -> its manifest, through its shard's where that is there; None when it has none."""
-    size = spec.rules.shard_size
-    for first in range(0, len(houses), size):
-        on_step(f"merge shard {first // size}")
-        members = houses[first : first + size]
-        # A house that was finished after its shard was merged has its own manifest.
-        merged = get_or_none(store, shard_key(spec.job_id, first // size))
-        found = dict(lines_by_house(merged)) if merged is not None else {}
-        for house in members:
-            yield house, found.get(house) or _manifest(store, house)
-
-
-def _manifest(store: Store, house: str) -> bytes | None:
-    return get_or_none(store, keys.house_key(house, keys.MANIFEST))
-
-
-def _failed(store: Store, job: str) -> Iterator[dict[str, Any]]:
-    for key in store.list(job_key(job, "failed/")):
-        record = json.loads(store.get(key))
-        task = task_from_failed_key(job, key)
-        yield {"task": task, "fault": record["fault"], "message": record["message"]}
-
-
-# The farm's real runner.
-
 
 _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 

@@ -36,7 +36,7 @@ from workers.ledger.task_ledger import (
     WorkerRegistry,
     batches_from_text,
 )
-from workers.node.renderer import without_numbers
+from workers.node.faults import without_numbers
 from workers.runner import Request, Result
 
 T = TypeVar("T")

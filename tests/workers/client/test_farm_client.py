@@ -24,7 +24,7 @@ from workers.coordinator.metrics import serve_metrics
 from workers.ids import job_key
 from workers.job import HouseEntry, JobSpec, lines_from_houses
 from workers.ledger.task_ledger import Fault
-from workers.node.house_runner import merge_job, merge_shard
+from workers.node.merging import merge_job, merge_shard
 
 HOUSES = [HouseEntry(house_id=f"h{k}", source="{}") for k in range(3)]
 

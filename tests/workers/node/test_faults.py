@@ -18,8 +18,8 @@ from pbrs_farm.store import MemoryStore
 from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments, is_left_in_place
 from workers.ids import job_key
+from workers.node.faults import class_of, fingerprint, without_numbers
 from workers.node.house_runner import HouseRunner
-from workers.node.renderer import class_of, fingerprint, without_numbers
 from workers.runner import Request
 
 
