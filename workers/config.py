@@ -25,7 +25,7 @@ from workers.liveness import alive_file
 _PREFIX: Final = "PBRS_FARM_"
 
 
-# A field's least value stands in its metadata: _check raises BadInput below it.
+# A field's least value stands in its metadata: _check_config raises BadInput below it.
 def _above(default: float, limit: float = 0.0) -> Any:
     return field(default=default, metadata={"above": limit})
 
@@ -47,7 +47,7 @@ class Limits:
     tasks_per_renderer: int = _least(2000, 1)
 
     def __post_init__(self) -> None:
-        _check(self, f"{_PREFIX}LIMITS_")
+        _check_config(self, f"{_PREFIX}LIMITS_")
 
     def deadline_s(self, stage: str) -> float:
         """Seconds a task of the stage may take."""
@@ -93,13 +93,15 @@ class FarmConfig:
     window_per_slot: int = _least(4, 1)  # tasks in flight per stage and slot
     window_min: int = _least(128, 1)  # tasks in flight per stage, at least
     resend_s: float = _above(60.0)  # a message unclaimed for so long may be lost
-    webhook: Secret = field(default_factory=lambda: Secret(""))  # told when a job ends or pauses
+    webhook: Secret = field(
+        default_factory=lambda: Secret("")
+    )  # gets a POST when a job ends or pauses
     token: Secret = field(default_factory=Secret)  # says which user gives orders
     metrics_port: int = _least(0, 0)  # of the coordinator's Prometheus endpoint, 0 = off
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        _check(self, _PREFIX)
+        _check_config(self, _PREFIX)
         unknown = sorted(set(self.queues) - set(QUEUES))
         if unknown:
             hint = f"of {', '.join(QUEUES)}"
@@ -133,7 +135,9 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
     limits = f"{_PREFIX}LIMITS_"
     of_limits = {n: text for n, text in env.items() if n.startswith(limits)}
     of_farm = {n: text for n, text in env.items() if n.startswith(_PREFIX) and n not in of_limits}
-    given: dict[str, Any] = {"worker": platform.node()} | _read(FarmConfig, of_farm, _PREFIX)
+    given: dict[str, Any] = {"worker": platform.node()} | _read_setting(
+        FarmConfig, of_farm, _PREFIX
+    )
     # Looking for a temporary folder fails where none can be written, as in a read-only container.
     if "scratch" not in given:
         given["scratch"] = Path(tempfile.gettempdir())
@@ -144,7 +148,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
         store=settings.store,
         webhook=Secret(value_or_file(env, "PBRS_WEBHOOK")),
         token=Secret(value_or_file(env, "PBRS_TOKEN")),
-        limits=Limits(**_read(Limits, of_limits, limits)),
+        limits=Limits(**_read_setting(Limits, of_limits, limits)),
     )
 
 
@@ -177,7 +181,9 @@ _FORMER_NAMES: Final = {"beat_s": "heartbeat_s", "forgive_s": "cooldown_s"}
 _ELSEWHERE: Final = {"redis_url", "store_url", "store", "limits", "webhook", "token"}
 
 
-def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str) -> dict[str, Any]:
+def _read_setting(
+    cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str
+) -> dict[str, Any]:
     """Field -> its value from its variable's text; BadInput for what is none."""
     # Read each variable by the type of its field; an unknown one is an error: no slip passes.
     kinds = {f.name: str(f.type) for f in fields(cls) if f.name not in _ELSEWHERE}
@@ -195,7 +201,7 @@ def _read(cls: type[FarmConfig | Limits], given: Mapping[str, str], prefix: str)
     return values
 
 
-def _check(config: FarmConfig | Limits, prefix: str) -> None:
+def _check_config(config: FarmConfig | Limits, prefix: str) -> None:
     # NaN fails the comparison too.
     for f in fields(config):
         value, above = getattr(config, f.name), f.metadata.get("above")

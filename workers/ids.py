@@ -107,7 +107,7 @@ def job_key(job: str, file: str = "job.json") -> str:
 
 def log_key(job: str, task: str, attempt: int) -> str:
     """Key of a task's log: of a failed attempt, and of a long one while it runs."""
-    return job_key(job, f"logs/{_flat(task)}.{attempt}.txt")
+    return job_key(job, f"logs/{_flat_name(task)}.{attempt}.txt")
 
 
 def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int, str]:
@@ -118,7 +118,7 @@ def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int
 
 def failed_key(job: str, task: str) -> str:
     """Key of the record of a task that failed for good; survives the loss of Redis."""
-    return job_key(job, f"failed/{_flat(task)}.json")
+    return job_key(job, f"failed/{_flat_name(task)}.json")
 
 
 def task_from_failed_key(job: str, key: str) -> str:
@@ -132,7 +132,7 @@ def shard_key(job: str, shard: int) -> str:
     return job_key(job, f"shards/{shard}.jsonl")
 
 
-def _flat(task: str) -> str:
+def _flat_name(task: str) -> str:
     return task.replace("-/", "whole/", 1) if task.startswith("-/") else task
 
 

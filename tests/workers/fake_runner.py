@@ -150,15 +150,15 @@ class FakeRunner:
             time.sleep(float(slow.read_text() or 0))
 
     def _misbehave(self, request: Request) -> None:
-        def told(what: str) -> bool:
+        def is_asked(what: str) -> bool:
             return (self._control / f"{what}.{request.house}").exists() and request.stage == "gl"
 
-        if told("crash"):
+        if is_asked("crash"):
             print("about to crash", flush=True)  # noqa: T201
             os.abort()
-        if told("hang"):
+        if is_asked("hang"):
             time.sleep(3600)
-        if told("bug"):
+        if is_asked("bug"):
             raise ValueError(f"something odd with {request.house}")
-        if told("data"):
+        if is_asked("data"):
             raise BadHouse(request.house, "wall w3", "two walls in one place")

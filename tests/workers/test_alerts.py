@@ -90,14 +90,14 @@ def test_alerts_fire_in_a_prometheus_that_reads_a_farm_in_trouble(
     tasks = d.dispatch()
     port = free_port()
     server, thread = serve_metrics(replace(ledger.config, metrics_port=port), ledger)
-    told: set[str] = set()
+    found: set[str] = set()
     began, troubled_at = time.monotonic(), 0.0
     try:
         with prometheus(tmp_path, port) as firing:
-            while time.monotonic() - began < 90 and len(told) < 5:
-                told |= firing()
+            while time.monotonic() - began < 90 and len(found) < 5:
+                found |= firing()
                 if not troubled_at and time.monotonic() - began > 8:
-                    assert told <= {"PbrsStuck"}
+                    assert found <= {"PbrsStuck"}
                     troubled_at = time.monotonic()
                     client.zadd(f"{g}workers", {"w2": ledger.now() - 600})
                     client.lpush(f"{g}light.gpu", "message")
@@ -117,4 +117,4 @@ def test_alerts_fire_in_a_prometheus_that_reads_a_farm_in_trouble(
         "PbrsStuck",
         "PbrsStoreUnhealthy",
     }
-    assert expected <= told
+    assert expected <= found

@@ -4,7 +4,7 @@ Effects: Redis and the store. To look at a job it imports neither numpy nor cele
 the recipe's models: `status` is asked often, of machines that are busy.
 
     farm = Farm(config_from_environment())
-    job = farm.submit(houses, recipe).job_id
+    job = farm.submit(houses, new_spec(recipe)).job_id
     farm.status(job)
 """
 
@@ -63,7 +63,16 @@ class Submitted:
 
 
 class Farm:
-    """One farm: a Redis and a store. Raises PbrsError with one clear line."""
+    """One farm: a Redis and a store; submit jobs, watch and steer them.
+
+    Looking needs Redis alone and no rights; what changes something needs the store and, on a farm with users,
+    a token (`config.token`). Every method raises PbrsError with one clear line: LedgerUnavailable without
+    Redis, MachineFailed without a store, BadInput for a job, house or worker that there is not.
+
+        farm = Farm(config_from_environment())
+        submitted = farm.submit(houses, new_spec(recipe_from_name("fast")))
+        farm.status(submitted.job_id)["views_done"]
+    """
 
     def __init__(self, config: FarmConfig) -> None:
         self.config = config
@@ -369,7 +378,7 @@ class Farm:
         if not self.registry.drain(worker, undo=undo):
             offer = did_you_mean(worker, [w.name for w in self.registry.workers()])
             raise BadInput(worker, "", "no such worker", hint=offer or "`workers` lists them")
-        self.rights.note("drain", worker, "undone" if undo else "told")
+        self.rights.note("drain", worker, "undone" if undo else "asked")
 
     def workers(self) -> list[dict[str, Any]]:
         """Workers seen in the last hour, each with its state: alive, draining, drained, dead.

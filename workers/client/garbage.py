@@ -1,4 +1,4 @@
-"""What a farm's store holds and nobody needs: found first, told, and removed only then.
+"""What a farm's store holds and nobody needs: found first, listed, and removed only then.
 
 Effects: lists the store, reads manifests and the ledger; `remove` deletes objects. Nothing of a job
 that is loading, running or paused is touched, nor anything younger than the time that is kept.
@@ -48,11 +48,13 @@ def keep_from_text(text: str) -> float:
 def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
     """What may go, by kind. now_s: seconds since 1970, by the clock of the store's objects."""
     store = farm.store
-    states = {job: _state(farm, job) for job in _jobs(store)}
+    states = {job: _state_of_job(farm, job) for job in _jobs(store)}
     is_old = _older_than(store, now_s - keep_s)
     logs = _logs(store, [job for job, state in states.items() if state not in _LIVE])
     cancelled = _files_of(store, [job for job, state in states.items() if state == "cancelled"])
-    working = {house for job, s in states.items() if s in _LIVE for house in _houses(store, job)}
+    working = {
+        house for job, s in states.items() if s in _LIVE for house in _houses_of_job(store, job)
+    }
     found: list[tuple[Kind, Iterable[str]]] = [
         ("cancelled jobs", cancelled),
         ("logs", logs),
@@ -88,7 +90,7 @@ def _jobs(store: Store) -> list[str]:
     return sorted({parts[1] for parts in ends if len(parts) == 3 and parts[2] == "job.json"})
 
 
-def _state(farm: Farm, job: str) -> str:
+def _state_of_job(farm: Farm, job: str) -> str:
     """The job's state in the ledger; "lost" where the ledger does not know it."""
     view = farm.ledger.view(job)
     return "lost" if view is None else view.state
@@ -114,7 +116,7 @@ def _files_of(store: Store, jobs: Iterable[str]) -> Iterator[str]:
         yield from store.list(f"jobs/{job}/")
 
 
-def _houses(store: Store, job: str) -> list[str]:
+def _houses_of_job(store: Store, job: str) -> list[str]:
     data = get_or_none(store, job_key(job, "houses.jsonl")) or b""
     return [entry.house_id for entry in houses_from_lines(data)]
 
@@ -127,7 +129,7 @@ def _unnamed(store: Store, working: set[str]) -> Iterator[str]:
             if house in working:
                 continue
             manifest = get_or_none(store, keys.house_key(house, keys.MANIFEST))
-            named = _named(manifest) if manifest is not None else set()
+            named = _keys_in_manifest(manifest) if manifest is not None else set()
             named.add(keys.house_key(house, keys.MANIFEST))
             done = keys.house_key(house, "done/")
             for key in group:
@@ -136,5 +138,5 @@ def _unnamed(store: Store, working: set[str]) -> Iterator[str]:
                     yield key
 
 
-def _named(manifest: bytes) -> set[str]:
+def _keys_in_manifest(manifest: bytes) -> set[str]:
     return {str(json.loads(line)["key"]) for line in manifest.splitlines()}

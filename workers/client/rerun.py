@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def rerun(farm: Farm, job: str, text: str, on_step: Callable[[str], None]) -> Result:
     """Run the task that text names; raises what its steps raise, BadInput where there is none.
 
-    on_step: told each step as it begins, and when storage is waited for.
+    on_step: called with each step as it begins, and when storage is waited for.
     """
     task = task_from_text(text)
     farm.check_task(job, task)
@@ -31,7 +31,7 @@ def rerun(farm: Farm, job: str, text: str, on_step: Callable[[str], None]) -> Re
         unit=task.unit,
         stage=task.stage,
         views=_views(farm, job, task),
-        source=_source(farm, job, task.house) if task.stage == GEOMETRY else "",
+        source=_source_of_house(farm, job, task.house) if task.stage == GEOMETRY else "",
     )
     return runner_maker(farm.config.runner)(farm.config, on_step).run(request, on_step)
 
@@ -41,7 +41,7 @@ def _views(farm: Farm, job: str, task: TaskId) -> tuple[str, ...]:
     return farm.ledger.batches(job, task.house)[int(task.unit)] if task.unit.isdigit() else ()
 
 
-def _source(farm: Farm, job: str, house: str) -> str:
+def _source_of_house(farm: Farm, job: str, house: str) -> str:
     """What the house was submitted as, from the store."""
     for entry in houses_from_lines(farm.store.get(job_key(job, "houses.jsonl"))):
         if entry.house_id == house:

@@ -1,7 +1,7 @@
 """Who gives an order to the farm, whether he may, and the line that says he did. Effects: Redis.
 
 A farm without users asks nobody. On one that has some, each order names its user by a token. The
-commands and the board keep these rules: they part accounts, and whoever holds Redis' own password is
+commands and the board keep these rules: they separate accounts, and whoever has Redis' own password is
 outside of them.
 """
 

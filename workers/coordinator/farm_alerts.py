@@ -1,7 +1,7 @@
-"""What a person on call wants to be told of a farm while its jobs run: found by looking again and again.
+"""Alerts for a person on call: what goes wrong on a farm while its jobs run, found by regular looks.
 
 Effect: the clock's. Failure rates, workers that died, queues that do not move, a store in trouble. The
-leader looks; a new one begins afresh, so what goes on may be told once more.
+leader looks; a new leader starts without memory, so it may post what goes on once more.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _WINDOW_S: Final = 600.0  # over which failures are counted
 _MOST_FAILED: Final = 0.2  # of the attempts that ended in it
 _LEAST_ATTEMPTS: Final = 10  # that ended in it: fewer say nothing
 _STUCK_S: Final = 1800.0  # tasks wait and none ends
-_STORE_S: Final = 60.0  # that the store is in trouble before it is told
+_STORE_S: Final = 60.0  # that the store is in trouble before an alert
 _LOST_S: Final = 3600.0  # a worker that died longer ago is history
 
 
@@ -31,7 +31,11 @@ class _Seen:
 
 
 class FarmAlerts:
-    """Tells what begins to be wrong, once each, and when it is over. post: may raise OSError."""
+    """Posts each alert once when it begins and once when it is over.
+
+    Call `look` regularly; what fails to be posted is posted after a later look. post: takes one JSON
+    object, with alert, state ("begins" or "over"), reason and text; may raise OSError. clock: monotonic, s.
+    """
 
     def __init__(
         self, post: Callable[[dict[str, Any]], None], clock: Callable[[], float] = time.monotonic
@@ -39,7 +43,7 @@ class FarmAlerts:
         self._post, self._clock = post, clock
         self._jobs: dict[str, _Seen] = {}
         self._trouble_at: float | None = None  # since when the store is in trouble
-        self._told: dict[str, str] = {}  # alert -> what was said of it
+        self._posted: dict[str, str] = {}  # alert that goes on -> its reason
 
     def look(self, views: Sequence[JobView], workers: Iterable[WorkerView], breaker: str) -> None:
         """Compare with what was seen before. breaker: why claims are stopped, or ""."""
@@ -56,10 +60,10 @@ class FarmAlerts:
             found["store"] = breaker
         # A job that is gone ends its alerts, too.
         self._jobs = {v.job_id: self._jobs[v.job_id] for v in views}
-        for name in found.keys() - self._told.keys():
-            self._tell(name, "begins", found[name])
-        for name in self._told.keys() - found.keys():
-            self._tell(name, "over", self._told[name])
+        for name in found.keys() - self._posted.keys():
+            self._post_alert(name, "begins", found[name])
+        for name in self._posted.keys() - found.keys():
+            self._post_alert(name, "over", self._posted[name])
 
     def _of_job(self, view: JobView, now: float) -> dict[str, str]:
         done = sum(n for name, n in view.counts.items() if name.startswith("done:"))
@@ -84,13 +88,13 @@ class FarmAlerts:
         seen.ended.append((now, failed, done))
         return found
 
-    def _tell(self, name: str, state: str, said: str) -> None:
+    def _post_alert(self, name: str, state: str, said: str) -> None:
         text = f"pbrs_farm: {name} {'is over' if state == 'over' else f'- {said}'}"
         try:
             self._post({"alert": name, "state": state, "reason": said, "text": text})
         except (OSError, ValueError):
             return  # tried again at the next look
         if state == "over":
-            del self._told[name]
+            del self._posted[name]
         else:
-            self._told[name] = said
+            self._posted[name] = said

@@ -76,7 +76,13 @@ class FarmCollector:
 
     def _jobs(self) -> Iterator[Metric]:
         views = [v for j in self._ledger.active_jobs() if (v := self._ledger.view(j)) is not None]
-        yield from (_tasks(views), _done(views), _faults(views), _houses(views), _seconds(views))
+        yield from (
+            _tasks(views),
+            _done(views),
+            _faults(views),
+            _houses_metric(views),
+            _seconds(views),
+        )
         yield from self._progress(views)
         yield from self._users(views)
         expired = CounterMetricFamily("pbrs_leases_expired", "leases that ran out", labels=["job"])
@@ -85,7 +91,7 @@ class FarmCollector:
         yield expired
 
     def _progress(self, views: list[JobView]) -> Iterator[Metric]:
-        """Views an hour and time left, as `status` tells them."""
+        """Views an hour and time left, as `status` shows them."""
         slots = self._registry.slots()
         held = GaugeMetricFamily(
             "pbrs_job_held_back", "1 while its user's slot-hours are spent", labels=["job"]
@@ -171,7 +177,7 @@ def _faults(views: list[JobView]) -> Metric:
     return metric
 
 
-def _houses(views: list[JobView]) -> Metric:
+def _houses_metric(views: list[JobView]) -> Metric:
     metric = GaugeMetricFamily("pbrs_houses", "houses in a state", labels=["job", "state"])
     for view in views:
         metric.add_metric([view.job_id, "waiting"], view.n_waiting_houses)

@@ -15,8 +15,8 @@ def choose_victims(
 ) -> list[Hold]:
     """The holds to end: of the least urgent job first, and of it what began last.
 
-    As many slots are freed as queued tasks of urgent jobs need, less those that are free already or were
-    told to end before. Only slots of workers that take the urgent tasks' queue count. Never chosen: other
+    As many slots are freed as queued tasks of urgent jobs need, less those that are free already or
+    end already. Only slots of workers that take the urgent tasks' queue count. Never chosen: other
     urgent jobs' tasks, and merges. holds_of: the holds of a job. [] while no urgent task waits.
     """
     wanted = {

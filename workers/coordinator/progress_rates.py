@@ -11,7 +11,7 @@ from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, STAGES
 from workers.ledger.task_ledger import JobView
 
 _TAU_S: Final = 120.0  # of the exponential average
-_LEAST_RATE: Final = 1e-6  # tasks per second below which there is no time left to tell
+_LEAST_RATE: Final = 1e-6  # tasks per second below which no time left is given
 
 
 @dataclass(slots=True)
@@ -69,11 +69,11 @@ def views_per_hour(view: JobView) -> float:
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
     """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50."""
     return [
-        _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _known(view, stage)
+        _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _has_stage(view, stage)
     ]
 
 
-def _known(view: JobView, stage: str) -> bool:
+def _has_stage(view: JobView, stage: str) -> bool:
     return stage not in (GL, LIGHT) or stage in view.fields.get("stages", "").split(",")
 
 

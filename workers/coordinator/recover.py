@@ -41,13 +41,13 @@ def rebuild(
     each marker, and what holds is not made again.
     """
     # The markers' names of all houses, then a look at each that has begun.
-    tells = bool(houses) and names_tell(store, spec)
-    done = done_steps(store, [house.house_id for house in houses]) if tells else {}
+    are_current = bool(houses) and are_markers_current(store, spec)
+    done = done_steps(store, [house.house_id for house in houses]) if are_current else {}
     progress(f"{sum(map(len, done.values()))} markers of {len(done)} houses")
     numbered = iter(enumerate(houses))
     with ThreadPoolExecutor(_THREADS) as pool:
         while chunk := list(islice(numbered, _CHUNK)):
-            look = partial(_state, runner, spec, done)
+            look = partial(_house_state, runner, spec, done)
             _enter(ledger, spec.job_id, chunk, list(pool.map(look, chunk)))
 
 
@@ -59,7 +59,7 @@ def lost_jobs(ledger: RedisLedger, store: Store) -> list[str]:
     return sorted(parts[1] for parts in ends if len(parts) == 3)
 
 
-def names_tell(store: Store, spec: JobSpec) -> bool:
+def are_markers_current(store: Store, spec: JobSpec) -> bool:
     """Whether a marker's name says that its step is done: one recipe, one version in this root."""
     if store.head(keys.RECIPE_REPLACED) is not None:
         return False
@@ -100,7 +100,7 @@ def _names_of_markers(found: Iterable[str]) -> dict[str, frozenset[str]]:
     return {house: frozenset(steps) for house, steps in names.items()}
 
 
-def _state(
+def _house_state(
     runner: StepRunner,
     spec: JobSpec,
     done: dict[str, frozenset[str]],
@@ -134,6 +134,6 @@ def _enter(
     for is_fresh, run in groupby(rows, key=lambda row: row[2] is None):
         items = list(run)
         if is_fresh:
-            ledger.add_houses(job, items[0][0], [house for _index, house, _state in items])
+            ledger.add_houses(job, items[0][0], [house for _index, house, _house_state in items])
         else:
             ledger.load_houses(job, [state for _i, _h, state in items if state is not None])

@@ -28,7 +28,11 @@ Post = Callable[[dict[str, Any]], None]
 
 
 class Webhook:
-    """Looks at jobs as the leader sees them and posts each new end or pause. post: may raise OSError."""
+    """Posts each new end or pause of a job once, whoever leads.
+
+    ledger: remembers what was posted. post: takes one JSON object; may raise OSError, and is tried five
+    times for one event.
+    """
 
     def __init__(self, ledger: Ledger, post: Post) -> None:
         self._ledger = ledger
@@ -36,7 +40,7 @@ class Webhook:
         self._tries: Counter[tuple[str, str]] = Counter()
 
     def look(self, views: list[JobView]) -> None:
-        """Tell what is new of these jobs."""
+        """Post what is new of these jobs."""
         for view in views:
             notified = view.fields.get("notified", "")
             if view.outcome not in _POSTED_STATES:
@@ -44,9 +48,9 @@ class Webhook:
                 if notified:
                     self._ledger.set_notified(view.job_id, "")
             elif view.outcome != notified:
-                self._tell(view)
+                self._post_outcome(view)
 
-    def _tell(self, view: JobView) -> None:
+    def _post_outcome(self, view: JobView) -> None:
         try:
             self._post(notice(view))
         except (OSError, ValueError) as error:

@@ -109,7 +109,10 @@ def script_text(name: str) -> str:
 
 
 class RedisLedger:
-    """Implements workers.ledger.task_ledger.Ledger; one per process, safe after a fork.
+    """Implements workers.ledger.task_ledger.Ledger in one Redis; one per process, safe after a fork.
+
+    All methods raise LedgerUnavailable where Redis is away, refuses the password or is out of memory. Each
+    change is one Lua script (ledger/lua), whole or not at all; `common.lua` lists the keys. Times are Redis'.
 
     client: a redis-py client that decodes its answers; made from the configuration by default.
     """
@@ -176,7 +179,7 @@ class RedisLedger:
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
         with self.errors():
-            for chunk in _chunks(houses):
+            for chunk in _in_chunks(houses):
                 pipe = self.client.pipeline(transaction=False)
                 for house in chunk:
                     units = [x for u, at in house.units.items() for x in (u, *at)]
@@ -208,7 +211,7 @@ class RedisLedger:
                 members = self.client.zscan_iter(key, match=f"{job}|*")
                 for member, _score in members:
                     self.client.zrem(key, member)
-            for own_keys in _chunks(self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK)):
+            for own_keys in _in_chunks(self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK)):
                 self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
@@ -227,9 +230,12 @@ class RedisLedger:
     def claim_many(
         self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
     ) -> list[Claim]:
-        """May this worker run the tasks? The attempts are counted before the answers.
+        """May this worker run the tasks? An answer each; the attempts are counted before the answers.
 
-        A task that failed before is claimed alone: it may take others with it.
+        tasks: of one job, "<house>/<unit>/<stage>". token: of this claim; what was claimed by it is kept and
+        ended by it. recipe: digest that this worker renders by. direct: tasks without a message, too. A verdict
+        other than "run" changes nothing, but that a task may be sent again later; docs/farm.md has a
+        table of verdicts. A task that failed before is claimed alone: it may take others with it.
         """
         from workers.job import work_version
 
@@ -376,7 +382,7 @@ class RedisLedger:
     def finished(self, job: str, houses: Iterable[str]) -> list[str]:
         """Those of the houses that are done."""
         done: list[str] = []
-        for chunk in _chunks(houses):
+        for chunk in _in_chunks(houses):
             with self.errors():
                 pipe = self.client.pipeline(transaction=False)
                 for house in chunk:
@@ -486,7 +492,7 @@ def _tasks(answer: object) -> list[str] | None:
     return [str(task) for task in answer] if isinstance(answer, list) else None
 
 
-def _chunks(items: Iterable[T]) -> Iterator[list[T]]:
+def _in_chunks(items: Iterable[T]) -> Iterator[list[T]]:
     rest = iter(items)
     while chunk := list(islice(rest, _CHUNK)):
         yield chunk

@@ -30,7 +30,7 @@ TOGETHER_S: Final = 30.0  # of work that a slot claims at once: long beside a cl
 MOST_TOGETHER: Final = MOST_IN_GROUP  # tasks of one house that a slot claims at once
 EVERYWHERE: Final = "*"  # stands for every queue where a job is blocked
 ALIVE_S: Final = 45.0  # a worker whose last heartbeat is no older than this is there
-# Classes of fault that are nobody's: the attempt is given back.
+# Classes of fault that do not count against the task: the attempt is given back.
 UNCOUNTED: Final = ("preempted", "storage", "version", "drained")
 # Classes of fault that speak against the worker: three in a row and it cools down.
 SUSPECT: Final = ("crash", "resource", "machine", "timeout", "silent")
@@ -61,7 +61,7 @@ class Claim:
     verdict: ClaimAnswer
     detail: str = ""  # the attempt's number for "run", otherwise the reason
     inputs: str = ""  # the house's source for geometry, its batches of views for what follows
-    token: str = ""  # fences off whoever lost the lease
+    token: str = ""  # of the claim; without it nobody ends the task or keeps its lease
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +258,15 @@ class WorkerView:
 
 
 class Ledger(Protocol):
-    """Every method is atomic and may be called again after a lost answer."""
+    """Which task may run, who runs it, how often it was tried, what follows it.
+
+    Every method is atomic, may be called again after a lost answer, and raises LedgerUnavailable. It holds no
+    results: these are in the store, from which `recover` rebuilds a lost ledger.
+
+    A task's life: `dispatch` takes it from the outbox and its message is sent; a slot asks for it by
+    `claim_many`, keeps its lease by `heartbeat`, and ends it by `finish_many` or `fail`. Leases that are not
+    kept end by `reap`, and the task is tried elsewhere. `RedisLedger` says what each method takes and returns.
+    """
 
     # The job: submit and recover
     def create(self, spec: JobSpec, store_id: str = "") -> str: ...
@@ -302,7 +310,11 @@ class Ledger(Protocol):
 
 
 class WorkerRegistry(Protocol):
-    """Who works on the farm, as slots and the coordinator see it."""
+    """Who works on the farm, and whether storage is healthy, as slots and the coordinator see it.
+
+    slots: stage -> tasks that living workers can run at once. The breaker is open while storage is unhealthy:
+    then nothing is claimed or sent; it closes by itself.
+    """
 
     def slots(self) -> dict[str, int]: ...
     def workers(self) -> list[WorkerView]: ...

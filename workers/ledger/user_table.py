@@ -28,7 +28,10 @@ _MOST_CHANGES: Final = 1000  # lines of the audit that are kept
 
 
 class UserTable:
-    """Implements workers.ledger.task_ledger.Users on the ledger's Redis."""
+    """Implements workers.ledger.task_ledger.Users on the ledger's Redis.
+
+    A farm whose table is empty asks nobody who he is. Every method raises LedgerUnavailable.
+    """
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger
@@ -129,5 +132,5 @@ def known_user(users: Mapping[str, User], name: str) -> User:
 
 
 def token_digest(token: str) -> str:
-    """What is kept of a token: it is random, so its plain digest tells nobody what it was."""
+    """What is kept of a token: it is random, so its plain digest does not reveal it."""
     return hashlib.sha256(token.encode("utf-8", "replace")).hexdigest()

@@ -21,7 +21,12 @@ _DRAINED_S = 30 * 86400  # a drained worker that comes back within so long stays
 
 
 class Registry:
-    """Implements workers.ledger.task_ledger.WorkerRegistry on the ledger's Redis."""
+    """Implements workers.ledger.task_ledger.WorkerRegistry on the ledger's Redis.
+
+    A worker calls `heartbeat` every ten seconds and `leave` when it ends; whoever was not seen for ALIVE_S counts
+    as dead, and for an hour is forgotten. `drain` outlasts a restart under the same name. Every
+    method raises LedgerUnavailable.
+    """
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger

@@ -17,7 +17,7 @@ from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
 
 _log = logging.getLogger("pbrs.worker")
-_EVERY_S: Final = 10.0  # well below ALIVE_S, so that one lost heartbeat hurts nobody
+_EVERY_S: Final = 10.0  # well below ALIVE_S, so that one lost heartbeat does no harm
 
 
 class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]

@@ -57,7 +57,12 @@ def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
 
 
 class HouseRunner:
-    """Implements workers.runner.StepRunner; keeps the house it worked on last loaded."""
+    """Implements workers.runner.StepRunner: the steps of run/steps.py over the farm's store.
+
+    It keeps the house it worked on last loaded, so tasks of one house should come one after another. What the
+    markers say is done is not done again; a run that was killed goes on where it was. store: waits while
+    storage does not answer (`runner` wraps it so). n_threads: cores for one task.
+    """
 
     def __init__(self, store: Store, *, n_threads: int) -> None:
         self._store = store

@@ -1,7 +1,7 @@
 """One slot of a worker: claims a task, has it run by its render process, and reports to the ledger.
 
 Effects: Redis, a render process, log objects in storage. The attempt was counted by the claim,
-before any work; the lease is kept by heartbeats; the token fences off whoever lost it.
+before any work; the lease is kept by heartbeats; the token keeps a slot that lost its lease from ending the task.
 """
 
 from __future__ import annotations
@@ -89,8 +89,16 @@ def make_slot(config: FarmConfig) -> Slot:
 
 
 class Slot:
-    """What one pool process of a worker holds: ledger, render process and, for logs, the store.
+    """One pool process of a worker: claims the tasks of a message, has them rendered, reports them.
 
+    A slot runs one task at a time, in a render process of its own, which it kills where a deadline, a lost lease or
+    a preemption asks for it. While a task runs, heartbeats keep its lease and those of the tasks that were
+    claimed with it. After the last task of a message it may go on with others of the same house.
+
+    Not for tests of rendering: run `HouseRunner` for these. `make_slot` makes the slot of a farm; tests give a
+    ledger and a registry in memory, and a clock of their own.
+
+    ledger: may be away for up to ten minutes (_RETRY_S), then LedgerUnavailable is raised. process: started.
     clock: seconds that only grow. sleep: waits for so many seconds.
     """
 
@@ -114,12 +122,16 @@ class Slot:
         self._numbers = itertools.count()
         self._heartbeat_at = 0.0  # next heartbeat of the leases
         self._ended: dict[str, Finished] = {}  # done, and the ledger does not know yet
-        self._report_at = 0.0  # when the ledger is told at the latest
+        self._report_at = 0.0  # when done tasks are reported at the latest
         self._upload_at = 0.0  # next upload of the running task's log
 
     def run_tasks(self, job: str, tasks: Sequence[TaskId], recipe: str) -> None:
-        """Run the tasks that the ledger allows, then others of their house while that pays."""
-        # A token names this hold alone: the ledger tells it from a former holder.
+        """Run the tasks of one message that the ledger allows, then others of their house while that pays.
+
+        tasks: of one house and stage. recipe: digest of the job's recipe, as the message has it. Returns when
+        all have ended; a task that fails is reported, not raised. Raises LedgerUnavailable.
+        """
+        # A token is of this claim alone: the ledger can distinguish it from an earlier holder's.
         number, random_part = next(self._numbers), secrets.token_hex(4)
         token = f"{self._config.worker}:{os.getpid()}:{number}:{random_part}"
         names = [str(task) for task in tasks]
@@ -169,11 +181,11 @@ class Slot:
         return {}
 
     def _report(self, held: _Claimed, go_on: GoOn | None) -> dict[str, Claim]:
-        """Tell the ledger what is done; tasks that were claimed with it."""
+        """Report what is done to the ledger; the tasks that it grants in return."""
         ends, self._report_at = self._ended, self._clock() + _REPORT_EVERY_S
         self._ended = {}
-        tell = partial(self._ledger.finish_many, held.job, ends, held.claim.token, go_on)
-        return self._retry(tell)
+        report = partial(self._ledger.finish_many, held.job, ends, held.claim.token, go_on)
+        return self._retry(report)
 
     def _hand_back(self, held: Sequence[_Claimed]) -> None:
         """Give back what was claimed and not begun; nothing is counted."""
@@ -215,7 +227,7 @@ class Slot:
         try:
             answer = self._ledger.heartbeat(held.job, tasks, held.claim.token)
         except LedgerUnavailable as error:
-            # Go on: the token fences us off if the lease has run out meanwhile.
+            # Go on: if the lease has run out meanwhile, the token is refused later.
             _log.warning("no heartbeat: %s", error)
             return None
         why: dict[str, FaultClass | None] = {"ok": None, "lost": "lost", "preempted": "preempted"}

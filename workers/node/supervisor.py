@@ -107,7 +107,7 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
     registry = Registry(RedisLedger(config))
     if not _wait_while_drained(config, orders):
         return 0
-    # Celery's parent process never touches storage: tell it which one this is.
+    # Celery's parent process never touches storage: name the store in its environment.
     celery = subprocess.Popen(
         command(config),
         env={**os.environ, "PBRS_FARM_STORE_ID": config.store_id},
@@ -142,7 +142,7 @@ def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
     A container that ends is started again by Compose or Kubernetes under the same name: it stays,
     seen as drained, until `drain --undo`.
     """
-    registry, due, told = Registry(RedisLedger(config)), 0.0, False
+    registry, due, is_logged = Registry(RedisLedger(config)), 0.0, False
     while orders.leave_at is None:
         if time.monotonic() >= due:
             due = time.monotonic() + _DRAINED_POLL_S
@@ -154,8 +154,8 @@ def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
                 registry.heartbeat(takes_work=False, memory_mb=tree_mb(os.getpid()))
             except LedgerUnavailable as error:
                 _log.warning("%s", error)
-            if not told:
-                told = True
+            if not is_logged:
+                is_logged = True
                 _log.info(
                     "drained: taking no work until `pbrs-farm drain --undo %s`", config.worker
                 )

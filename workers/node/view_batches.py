@@ -26,8 +26,8 @@ def batches_from_views(
         most = min(most, per_batch)
     # Fill batches room by room: a small room joins the one before it while there is room.
     batches: list[list[str]] = []
-    for room_views in _rooms(views):
-        for part in _parts(room_views, most, per_batch):
+    for room_views in _views_by_room(views):
+        for part in _split_into_batches(room_views, most, per_batch):
             if batches and len(batches[-1]) + len(part) <= per_batch:
                 batches[-1] += part
             else:
@@ -35,14 +35,14 @@ def batches_from_views(
     return tuple(tuple(batch) for batch in batches)
 
 
-def _rooms(views: Sequence[tuple[str, str]]) -> list[list[str]]:
+def _views_by_room(views: Sequence[tuple[str, str]]) -> list[list[str]]:
     rooms: dict[str, list[str]] = {}
     for view, room in views:
         rooms.setdefault(room, []).append(view)
     return list(rooms.values())
 
 
-def _parts(views: list[str], most: int, per_batch: int) -> list[list[str]]:
+def _split_into_batches(views: list[str], most: int, per_batch: int) -> list[list[str]]:
     if len(views) <= most:
         return [views]
     return [views[k : k + per_batch] for k in range(0, len(views), per_batch)]

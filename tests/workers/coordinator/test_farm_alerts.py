@@ -1,4 +1,4 @@
-"""A farm in trouble is told once when it begins and once when it is over."""
+"""Trouble of a farm is posted once when it begins and once when it is over."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ class Watch:
         return self.posted[before:]
 
 
-def test_a_share_of_failed_attempts_is_told_and_its_end() -> None:
+def test_a_share_of_failed_attempts_is_posted_and_its_end() -> None:
     watch = Watch()
     assert watch.look(done_gl=100, failures_bug=50) == []  # of former times
     assert watch.look(done_gl=108, failures_bug=52) == []
     assert watch.look(done_gl=108, failures_bug=60) == [(f"failures of job {JOB}", "begins")]
     assert watch.look(done_gl=109, failures_bug=60) == []
     for _ in range(12):
-        told = watch.look(done_gl=300, failures_bug=60)
+        found = watch.look(done_gl=300, failures_bug=60)
     assert watch.posted[-1] == (f"failures of job {JOB}", "over")
-    assert told == []
+    assert found == []
 
 
 def test_few_failures_say_nothing() -> None:
@@ -61,7 +61,7 @@ def test_few_failures_say_nothing() -> None:
     assert watch.look(failures_crash=9) == []
 
 
-def test_a_worker_that_died_is_told() -> None:
+def test_a_worker_that_died_is_posted() -> None:
     watch = Watch()
     assert watch.look(silent_s=20.0) == []
     assert watch.look(silent_s=80.0) == [("lost worker w1", "begins")]
@@ -70,7 +70,7 @@ def test_a_worker_that_died_is_told() -> None:
     assert watch.look(silent_s=80.0) == [("lost worker w1", "begins")]
 
 
-def test_tasks_that_wait_while_none_ends_are_told() -> None:
+def test_tasks_that_wait_while_none_ends_are_posted() -> None:
     watch = Watch()
     watch.look(gl_q=5, done_gl=3)
     assert watch.look(1700, gl_q=5, done_gl=3) == []
@@ -81,14 +81,14 @@ def test_tasks_that_wait_while_none_ends_are_told() -> None:
     assert watch.look(4000, done_gl=4, gl_r=1) == []
 
 
-def test_a_store_in_trouble_is_told_after_a_minute() -> None:
+def test_a_store_in_trouble_is_posted_after_a_minute() -> None:
     watch = Watch()
     assert watch.look(breaker="the store is full") == []
     assert watch.look(breaker="the store is full") == [("store", "begins")]
     assert watch.look() == [("store", "over")]
 
 
-def test_what_nobody_heard_is_told_again() -> None:
+def test_an_alert_that_could_not_be_posted_is_posted_later() -> None:
     watch = Watch()
     watch.is_deaf = True
     watch.look(silent_s=80.0)

@@ -1,4 +1,4 @@
-"""A webhook is told once of each end and each pause, whoever leads."""
+"""A webhook gets one post for each end and each pause, whoever leads."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Listener:
         self.rows.append(row)
 
 
-def test_an_end_is_told_once_whoever_leads() -> None:
+def test_an_end_is_posted_once_whoever_leads() -> None:
     ledger, heard = MemoryLedger(), Listener()
     for _leader in range(2):
         webhook = Webhook(ledger, heard)
@@ -49,7 +49,7 @@ def test_an_end_is_told_once_whoever_leads() -> None:
     assert [row["state"] for row in heard.rows] == ["done"]
 
 
-def test_a_job_that_runs_again_is_told_again() -> None:
+def test_a_job_that_runs_again_is_posted_again() -> None:
     ledger, heard = MemoryLedger(), Listener()
     webhook = Webhook(ledger, heard)
     for state in ("paused", "running", "paused", "running", "done"):

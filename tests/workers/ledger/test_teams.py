@@ -21,7 +21,7 @@ def of_user(ledger: RedisLedger, user: str) -> Drive:
     return Drive(ledger, job)
 
 
-def test_a_worker_leaves_a_job_to_lie_where_it_could_do_what_others_wait_for(
+def test_a_worker_may_not_claim_of_a_job_that_is_blocked_on_one_of_its_queues(
     ledger: RedisLedger,
 ) -> None:
     d = drive(ledger, 1)
@@ -42,7 +42,7 @@ def test_a_worker_leaves_a_job_to_lie_where_it_could_do_what_others_wait_for(
     assert view.blocked_queues == ()
 
 
-def test_a_job_that_stands_still_everywhere_goes_on_with_no_batch_of_its_house(
+def test_a_job_that_is_blocked_everywhere_goes_on_with_no_batch_of_its_house(
     ledger: RedisLedger,
 ) -> None:
     d = drive(ledger, 1)

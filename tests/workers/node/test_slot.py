@@ -214,20 +214,20 @@ def of_one_house(bench: Bench, *seconds: float) -> None:
     bench.next.at(0, "ready")
 
 
-def test_short_tasks_are_claimed_and_told_together(bench: Bench) -> None:
+def test_short_tasks_are_claimed_and_reported_together(bench: Bench) -> None:
     of_one_house(bench, 0.5, 0.5, 0.5)
     bench.run(TASK, SECOND, THIRD)
     assert bench.ledger.reports == [[TASK, SECOND, THIRD]]
     assert len(bench.started) == 1
 
 
-def test_what_is_done_is_told_every_five_seconds(bench: Bench) -> None:
+def test_what_is_done_is_reported_every_five_seconds(bench: Bench) -> None:
     of_one_house(bench, 4.0, 4.0, 4.0)
     bench.run(TASK, SECOND, THIRD)
     assert bench.ledger.reports == [[TASK, SECOND], [THIRD]]
 
 
-def test_a_heartbeat_keeps_what_runs_what_waits_and_what_is_not_told_yet(bench: Bench) -> None:
+def test_a_heartbeat_keeps_what_runs_what_waits_and_what_is_not_reported_yet(bench: Bench) -> None:
     of_one_house(bench, 2.0, 40.0, 1.0)
     bench.run(TASK, SECOND, THIRD)
     assert bench.ledger.beaten[0] == [SECOND, THIRD, TASK]

@@ -1,4 +1,4 @@
--- One house as storage tells it. ARGV: index, house, what, batches, then unit, stage, letter each
+-- Enter one house as it is in storage. ARGV: index, house, what, batches, then unit, stage, letter each
 -- what: "done" or "loaded"; letters: l (to be run), d (done)
 local i, house, what, batches = ARGV[1], ARGV[2], ARGV[3], ARGV[4]
 local key = house_key(house)
