@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pbrs_farm.core.house import Texture, geometry_from_house
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 
 def test_a_house_and_its_parts_say_in_a_line_what_they_are() -> None:

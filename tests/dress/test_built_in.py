@@ -15,7 +15,7 @@ from pbrs_farm.dress.dressing import dress
 from pbrs_farm.dress.finish_scheme import joinery_scheme
 from pbrs_farm.dress.gates.bodies import bodies_of, has_same_mesh
 from pbrs_farm.dress.style import style_for
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import boards, house, solid
 
 FRAME = [

@@ -21,7 +21,7 @@ from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.things.case_goods import CASE_GOODS, Boards, desk_chair
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import solid
 
 STYLE = style_for(np.random.default_rng(1))

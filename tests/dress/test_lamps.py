@@ -16,7 +16,7 @@ from pbrs_farm.dress.lamps import lamps
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.geometry.solids import box
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 STYLE = style_for(np.random.default_rng(1))
 

@@ -6,7 +6,7 @@ import pytest
 
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.home.room_use import RoomKind, is_lived_in, room_kind
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Box, House, Item, LightPart, corners_of_surfaces
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.recipe import ReadFields, RepairFields
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair
-from tests.builders import builtin_home
 from tests.example_homes import example_homes
 from tests.repair.embree import EmbreeOccluder
 

@@ -11,9 +11,9 @@ import trimesh
 from pbrs_farm.core.classes import MIRROR
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.repair.mirrors import with_mirrors
-from tests.builders import builtin_home
 
 
 def board(name: str, size: tuple[float, float, float], at: tuple[float, float, float]) -> Surface:

@@ -8,11 +8,11 @@ import pytest
 
 from pbrs_farm.core.camera import PAPER_HFOV_RAD
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.room_camera_file import cameras_from_text, with_names
 from pbrs_farm.sample.stored_cameras import views_from_cameras
-from tests.builders import builtin_home
 from tests.sample.sampled_rooms import QUICK, counter_of
 
 LINE = "1.5 1.55 2  0.6929 -0.19612 0.6929  0.1386 0.98058 0.1386  0.5534 0.433896  540"

@@ -7,8 +7,8 @@ from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample import sample_cameras
-from tests.builders import builtin_home
 
 gl_items = pytest.importorskip("benchmarks.views.gl_items")
 

@@ -10,9 +10,9 @@ import pytest
 
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky
-from tests.builders import builtin_home
 from tests.transport import hard_rooms
 from tests.transport.recorded_blocks import FIELDS, N_RUNS, RECIPE, ROOMS, largest_z, measured
 

@@ -13,7 +13,7 @@ from pbrs_farm.dress.clutter import clutter
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import DEPTH, WIDTH, house, solid
 
 

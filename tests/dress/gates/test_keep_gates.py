@@ -13,7 +13,7 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.report import Gate
 from pbrs_farm.geometry.solids import box
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import house, solid
 
 TABLE = solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8])

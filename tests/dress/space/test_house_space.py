@@ -20,7 +20,7 @@ from pbrs_farm.dress.space import (
     item_footprint,
 )
 from pbrs_farm.geometry.solids import box
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 
 @pytest.fixture(scope="module")

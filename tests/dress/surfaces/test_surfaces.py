@@ -17,8 +17,8 @@ from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
 from pbrs_farm.dress.surfaces.dress_surfaces import room_frame
 from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, sided_wall
 from pbrs_farm.geometry.solids import wall_prism
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
-from tests.builders import builtin_home
 
 
 def dressed(seed: int, house: House | None = None, share: float = 1.0) -> House:

@@ -22,7 +22,7 @@ from pbrs_farm.dress.textiles.large_textiles import towel_rail
 from pbrs_farm.dress.textiles.rug_patterns import PATTERNS, inks_of, rug_pixels
 from pbrs_farm.dress.textiles.rugs import rug
 from pbrs_farm.geometry.solids import box
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 STYLE = style_for(np.random.default_rng(1))
 CURTAIN, BLINDS, RUG = 16, 13, 20

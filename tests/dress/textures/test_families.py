@@ -12,7 +12,7 @@ from pbrs_farm.dress.textures.families import FAMILIES, Pattern, pattern_materia
 from pbrs_farm.dress.textures.maps import normals_from_height
 from pbrs_farm.dress.textures.noise import blurred, noise
 from pbrs_farm.dress.textures.wallpaper import PATTERNS
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 maps_of = cache(families.maps_of)  # each is painted once for the tests of this module
 

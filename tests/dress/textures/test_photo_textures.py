@@ -10,7 +10,7 @@ from pbrs_farm.core.house import Texture
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 from pbrs_farm.images import jpeg_from_array
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 
 def _picture(name: str, group: str, size_m: float = 1.0, data: bytes | None = None) -> Picture:

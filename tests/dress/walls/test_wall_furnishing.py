@@ -23,7 +23,7 @@ from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.home.room_use import RoomKind
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import solid
 from tests.repair import wall_rooms
 from tests.repair.wall_rooms import covers, walls_around

@@ -25,7 +25,7 @@ from pbrs_farm.dress.walls import hung_things, walls
 from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
 from pbrs_farm.images import decode_photo, jpeg_from_array
-from tests.builders import builtin_home
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 _HUNG = (PICTURE, MIRROR, SHELVES, CLOTHES, WHITEBOARD, OTHERFURNITURE, OTHERPROP)
 
