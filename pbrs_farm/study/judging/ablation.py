@@ -12,16 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.judging.evaluation import (
-    JudgedViews,
-    evaluate,
-    is_underfit,
-    markdown,
-    open_run,
-    paper_row,
-    spread_text,
-    title_of,
-)
+from pbrs_farm.study.judging.evaluation import JudgedViews, evaluate, open_run
+from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text, title_of
+from pbrs_farm.study.judging.paper_figures import paper_row
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import TrainingViews, ViewArrays

@@ -19,17 +19,14 @@ from pbrs_farm.study.judging.evaluation import (
     notes,
     predictions_of,
     report,
-    shown_figure,
     table,
-    title_of,
 )
-from pbrs_farm.study.metrics.angular import angles_deg
+from pbrs_farm.study.judging.figure_text import shown_figure, title_of
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.run_folder import made_folder
 from pbrs_farm.views.png_rows import png_of_rows
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
-_WORST_DEG: Final = 60.0  # what an error picture shows as white
 
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
@@ -97,14 +94,8 @@ def _card(
     }
     height, width = views.colour[k].shape[:2]
     urls = {name: _url(_fitted(name, picture, width, height)) for name, picture in pictures.items()}
-    said = (
-        f"{error:.1f} degrees" if task.name == "normals" else f"{100 * error:.0f} % {_wrong(task)}"
-    )
-    return {"id": shown(views.ids[k], MAX_PLACE), "error": said, "pictures": urls}
-
-
-def _wrong(task: StudyTask) -> str:
-    return "spread of depth" if task.name == "depth" else "wrong"
+    place = shown(views.ids[k], MAX_PLACE)
+    return {"id": place, "error": task.error_text(error), "pictures": urls}
 
 
 def _fitted(name: str, picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
@@ -116,19 +107,7 @@ def _fitted(name: str, picture: NDArray[np.uint8], width: int, height: int) -> N
 
 def _error_picture(task: StudyTask, prediction: NDArray[Any], truth: Arrays) -> NDArray[np.uint8]:
     """Black is right, white is wrong; blue has no truth."""
-    if task.name == "normals":
-        errors = angles_deg(prediction, truth["normal"]) / _WORST_DEG
-        known = truth["valid"]
-    elif task.name == "segmentation":
-        errors, known = (prediction != truth["labels"]).astype(np.float64), truth["labels"] > 0
-    elif task.name == "depth":
-        known = truth["depth"] > 0
-        ratio = np.log(np.maximum(prediction, 1e-6) / np.where(known, truth["depth"], 1))
-        errors = np.abs(ratio) / np.log(2)  # twice or half as far is white
-    else:
-        # Missed edges and invented ones alike.
-        errors = np.abs(prediction - truth["edges"])
-        known = np.ones(truth["edges"].shape, bool)
+    errors, known = task.error_map(prediction, truth)
     grey = np.rint(255 * np.clip(errors, 0, 1))
     picture = np.repeat(grey[..., None], 3, axis=-1).astype(np.uint8)
     picture[~known] = (24, 34, 72)

@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,14 @@ from torch import nn
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
+from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, title_of
+from pbrs_farm.study.judging.paper_figures import PaperRow, paper_row, tuned_row
 from pbrs_farm.study.metrics.edge_scores import EXACT_THRESHOLDS
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
+from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
-from pbrs_farm.study.tasks.tasks import N_THRESHOLDS, EdgesTask, task_of
+from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
 from pbrs_farm.study.training.prediction import Judged, placed, predicted, scored
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
@@ -29,135 +32,8 @@ from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
-# Figures as Markdown tables: what was judged on what, beside baseline and paper; pure.
-
-
-UNDERFIT: Final = 0.8  # training error above this share of the baseline's: nothing may be ranked
-
-_UNITS: Final = ("_deg", "_m")  # that names of figures end with; others are shares
-_TITLES: Final = {
-    "mean_deg": "mean, degrees", "median_deg": "median, degrees",
-    "rms_deg": "RMS, degrees", "below_5": "< 5", "below_7_5": "< 7.5",
-    "below_11_25": "< 11.25", "below_22_5": "< 22.5", "below_30": "< 30",
-    "mean_iou": "mean IoU", "pixel_accuracy": "pixel accuracy",
-    "mean_accuracy": "mean accuracy", "weighted_iou": "f.w. IoU",
-    "scale_invariant": "scale-invariant", "abs_rel": "absolute relative",
-    "below_1_25": "ratio < 1.25", "rms_m": "RMS, metres",
-    "ods": "ODS", "ois": "OIS", "ap": "AP", "r50": "R50",
-}  # fmt: skip
-
-
-def title_of(figure: str) -> str:
-    """A figure's name as tables have it."""
-    return _TITLES[figure]
-
-
-def shown_figure(figure: str, value: float) -> str:
-    """Degrees and metres with two places, shares as per cent with one; "-" for none."""
-    if not math.isfinite(value):
-        return "-"
-    return f"{value:.2f}" if figure.endswith(_UNITS) else f"{100 * value:.1f} %"
-
-
-def spread_text(figure: str, values: Sequence[float]) -> str:
-    """Mean and, of several seeds, the standard deviation of a sample."""
-    mean = shown_figure(figure, statistics.fmean(values))
-    if len(values) < 2:
-        return mean
-    scale = 1 if figure.endswith(_UNITS) else 100
-    return f"{mean} ± {scale * statistics.stdev(values):.2f}"
-
-
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table whose columns are as wide as their widest cell."""
-    cells = [list(head), *(list(row) for row in rows)]
-    widths = [max(len(row[k]) for row in cells) for k in range(len(head))]
-    lines = [
-        "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |"
-        for row in cells
-    ]
-    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
-    return "\n".join([lines[0], rule, *lines[1:]])
-
-
-def is_underfit(train_error: float, baseline_error: float) -> bool:
-    """The network hardly knows its own training views: no conclusion may be drawn from it."""
-    return train_error > UNDERFIT * baseline_error
-
-
-# The numbers of the paper's tables, by task and figure.
-# Zhang et al. 2017, tables 1 to 3, NYUv2's test split. They stand beside ours and are never mixed
-# with them: other pictures, other truth, 568,793 views and days of a GPU.
-
-
-@dataclass(frozen=True, slots=True)
-class PaperRow:
-    """A row of the paper: what it was trained on, and its figures in the order of Task.figures."""
-
-    pretrained: str
-    tuned: str
-    figures: tuple[float, ...]
-
-
-PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
-    # Mean, median, and shares below 11.25, 22.5, 30 degrees.
-    "normals": (
-        PaperRow("NYUv2 only", "", (27.30, 21.12, 0.2721, 0.5261, 0.6472)),
-        PaperRow("MLT object", "", (48.78, 47.49, 0.0356, 0.1279, 0.2135)),
-        PaperRow("MLT-OL", "", (49.33, 42.30, 0.0747, 0.2324, 0.3409)),
-        PaperRow("MLT-IL/OL", "", (27.90, 21.29, 0.2676, 0.5221, 0.6375)),
-        PaperRow("OpenGL-DL", "", (34.02, 28.00, 0.1856, 0.4114, 0.5290)),
-        PaperRow("OpenGL-IL", "", (33.06, 26.68, 0.2089, 0.4346, 0.5466)),
-        PaperRow("OpenGL-IL", "NYUv2", (23.38, 16.12, 0.3598, 0.6293, 0.7317)),
-        PaperRow("MLT-IL/OL", "NYUv2", (21.74, 14.75, 0.3937, 0.6625, 0.7606)),
-    ),
-    # Mean IoU alone is reported.
-    "segmentation": (
-        PaperRow("ImageNet (Yu et al.)", "NYUv2", (0.317,)),
-        PaperRow("ImageNet + OpenGL", "NYUv2", (0.328,)),
-        PaperRow("ImageNet + MLT", "NYUv2", (0.332,)),
-    ),
-    # ODS, OIS, AP, R50; the R50 of the first row cannot go with its ODS and AP.
-    "boundaries": (
-        PaperRow("NYUv2 only", "", (0.713, 0.725, 0.711, 0.267)),
-        PaperRow("OpenGL-IL", "", (0.523, 0.555, 0.511, 0.504)),
-        PaperRow("MLT-IL/OL", "", (0.604, 0.621, 0.587, 0.749)),
-        PaperRow("OpenGL-IL", "NYUv2", (0.716, 0.729, 0.715, 0.893)),
-        PaperRow("MLT-IL/OL", "NYUv2", (0.725, 0.736, 0.720, 0.887)),
-    ),
-}
-
-_PAPER_CLASSES: Final = 40  # of segmentation
-# Lighting mode -> its name in the paper.
-_NAMES: Final = {"mlt_il_ol": "MLT-IL/OL", "mlt_ol": "MLT-OL", "opengl_il": "OpenGL-IL",
-                 "opengl_dl": "OpenGL-DL"}  # fmt: skip
-
-
-def paper_row(task: str, mode: str, n_classes: int = _PAPER_CLASSES) -> PaperRow | None:
-    """The paper's row for a lighting mode without fine-tuning; where it has none, MLT's best.
-
-    None where the paper says nothing: of depth, and of other classes than NYU40.
-    """
-    if task not in PAPER or n_classes != _PAPER_CLASSES:
-        return None
-    name = _NAMES.get(mode, "MLT-IL/OL")
-    rows = PAPER[task]
-    same = [row for row in rows if row.pretrained == name and not row.tuned]
-    return same[0] if same else rows[-1]
-
-
-def tuned_row(task: str, pretrained: str) -> PaperRow:
-    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone."""
-    name = _NAMES.get(pretrained)
-    rows = PAPER[task]
-    tuned = [row for row in rows if row.tuned and name is not None]
-    # Segmentation tells MLT from OpenGL, the other tasks their lights too.
-    same = [row for row in tuned if row.pretrained == name]
-    kind = "MLT" if name and name.startswith("MLT") else "OpenGL"
-    return next(iter(same or [row for row in tuned if kind in row.pretrained]), rows[0])
-
-
-# Views to judge on whose truth has a size of its own, as of photographs.
+_HED_ROW = "HED untouched"
+_LEAST_GROUPS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,13 +60,6 @@ def judged_of_arrays(
     """Rendered views, whose truth has the network's size."""
     truths = tuple(views.target(k) for k in range(len(views)))
     return JudgedViews(name, truth, views.ids, views.colour, truths, credits)
-
-
-# A finished run judged on views.
-
-
-_HED_ROW = "HED untouched"
-_LEAST_GROUPS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,7 +260,7 @@ def _said_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
     groups = list(evaluation.groups.values())
     if len(groups) < _LEAST_GROUPS:
         return []
-    scale, unit = (1, " degrees") if task.name == "normals" else (100, " %")
+    scale, unit = task.error_scale, task.error_unit
     mean, low, high = (scale * x for x in (statistics.fmean(groups), *mean_interval(groups)))
     what = f"{evaluation.views.name}, over its {len(groups)} homes or folders"
     return [

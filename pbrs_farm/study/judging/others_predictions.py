@@ -24,7 +24,7 @@ from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
-from pbrs_farm.study.tasks.tasks import class_names
+from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _KINDS: Final = {

@@ -16,7 +16,8 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.judging.evaluation import Trained, markdown, open_run, shown_figure, title_of
+from pbrs_farm.study.judging.evaluation import Trained, open_run
+from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
 from pbrs_farm.study.training.run_folder import RunFolder, made_folder
 from pbrs_farm.study.training.view_sources import NYU_LIGHT

@@ -28,7 +28,7 @@ from pbrs_farm.images import decode_photo, jpeg_from_array, png_from_array
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import Trained
 from pbrs_farm.study.judging.others_predictions import file_kind
-from pbrs_farm.study.tasks.tasks import class_names
+from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training.prediction import predicted
 from pbrs_farm.study.training.run_folder import made_folder
 

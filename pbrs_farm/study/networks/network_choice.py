@@ -9,8 +9,11 @@ import torch
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.networks.unets import ResidualUnet, SmallUnet
-from pbrs_farm.study.networks.vgg import DilatedVgg, EdgeHed, NormalsFcn
+from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
+from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.normals_fcn import NormalsFcn
+from pbrs_farm.study.networks.residual_unet import ResidualUnet
+from pbrs_farm.study.networks.small_unet import SmallUnet
 
 # Name -> the network with so many channels out; HED's are always its sides.
 _NETWORKS: Final[dict[str, Callable[[int], nn.Module]]] = {

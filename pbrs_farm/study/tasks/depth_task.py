@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, F64, Mask
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.metrics.depth_errors import DepthErrors
 from pbrs_farm.study.tasks.study_task import Arrays, Batch
@@ -42,6 +42,8 @@ class DepthTask:
     layers: tuple[str, ...] = ("colour", "depth")
     figures: tuple[str, ...] = ("scale_invariant", "abs_rel", "below_1_25", "rms_m")
     error_name: str = "spread of ln depth, scale-invariant"
+    error_scale: float = 100
+    error_unit: str = " %"
     truth: str = "rendered: depth along the axis, where a pixel sees a surface"
 
     def n_out(self, plan: TrainingPlan) -> int:
@@ -90,6 +92,16 @@ class DepthTask:
     def error(self, figures: dict[str, float]) -> float:
         """The scale-invariant one."""
         return figures["scale_invariant"]
+
+    def error_text(self, error: float) -> str:
+        """The spread of ln depth."""
+        return f"{100 * error:.0f} % spread of depth"
+
+    def error_map(self, prediction: NDArray[Any], truth: Arrays) -> tuple[F64, Mask]:
+        """The logarithm's error: twice or half as far is 1."""
+        known = truth["depth"] > 0
+        ratio = np.log(np.maximum(prediction, 1e-6) / np.where(known, truth["depth"], 1))
+        return np.abs(ratio) / np.log(2), known
 
     def picture(self, prediction: NDArray[Any]) -> NDArray[np.uint8]:
         """Near is light, from eight metres on black; unknown is dark blue."""

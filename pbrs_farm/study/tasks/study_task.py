@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, F64, Mask
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.views.view_sample import Sample
 
@@ -35,6 +35,8 @@ class StudyTask(Protocol):
     layers: tuple[str, ...]  # of a Request
     figures: tuple[str, ...]  # what a table shows, the first is what runs are told apart by
     error_name: str  # what `error` is, with its unit
+    error_scale: float  # of an error as it is written: 1, or 100 for shares
+    error_unit: str  # written behind it: " degrees", " %"
     truth: str  # which truth and which mask, in words
 
     def n_out(self, plan: TrainingPlan) -> int:
@@ -71,6 +73,14 @@ class StudyTask(Protocol):
 
     def error(self, figures: dict[str, float]) -> float:
         """One number, 0 for perfect, that "underfit" is decided by."""
+        ...
+
+    def error_text(self, error: float) -> str:
+        """A view's own error in words, as "12.3 degrees" or "8 % wrong"."""
+        ...
+
+    def error_map(self, prediction: NDArray[Any], truth: Arrays) -> tuple[F64, Mask]:
+        """(H, W) how wrong each pixel is, 0 = right, 1 or more = as wrong as is shown; (H, W) has a truth."""
         ...
 
     def picture(self, prediction: NDArray[Any]) -> NDArray[np.uint8]:

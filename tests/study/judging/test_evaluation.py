@@ -13,19 +13,12 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
-from pbrs_farm.study.judging.evaluation import (
-    PAPER,
-    evaluate,
-    is_underfit,
-    markdown,
-    mean_interval,
-    notes,
-    open_run,
-    paper_row,
-    spread_text,
-)
-from pbrs_farm.study.judging.judged_places import camera_of, judged_place
+from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
+from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text
+from pbrs_farm.study.judging.judged_photographs import camera_of
+from pbrs_farm.study.judging.judged_places import judged_place
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
+from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import framed

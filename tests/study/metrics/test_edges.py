@@ -7,14 +7,8 @@ import pytest
 from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
-from pbrs_farm.study.metrics.edge_scores import (
-    EdgeCounts,
-    EdgeScores,
-    edge_counts,
-    n_matched,
-    non_maxima_suppressed,
-    thinned,
-)
+from pbrs_farm.study.metrics.edge_scores import EdgeCounts, EdgeScores, edge_counts, n_matched
+from pbrs_farm.study.metrics.edge_thinning import non_maxima_suppressed, thinned
 
 
 def _assigned(predicted: np.ndarray, truth: np.ndarray, reach_px: float) -> int:

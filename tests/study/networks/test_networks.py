@@ -6,9 +6,11 @@ import pytest
 import torch
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
+from pbrs_farm.study.networks.edge_hed import EdgeHed, edges_of_sides
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import encoded, n_weights, network_of
-from pbrs_farm.study.networks.vgg import STAGES, DilatedVgg, EdgeHed, edges_of_sides, vgg_stages
+from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
 
 pytestmark = pytest.mark.study
 

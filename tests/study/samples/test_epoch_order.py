@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.study.samples.view_loader import shard_order, view_order, whole_order
+from pbrs_farm.study.samples.view_order import shard_order, view_order, whole_order
 
 pytestmark = pytest.mark.study
 

@@ -37,7 +37,7 @@ def ids_of(loader) -> list[list[str]]:
 def test_tensors_have_the_types_that_training_wants(places):
     import torch
 
-    from pbrs_farm.study.samples.view_loader import StoredViews
+    from pbrs_farm.study.samples.stored_views import StoredViews
 
     views = StoredViews(places[0], SampleRequest(LAYERS))
     tensors = views[3]
@@ -55,7 +55,8 @@ def test_tensors_have_the_types_that_training_wants(places):
 def test_shards_and_folder_give_equal_tensors(places):
     import torch
 
-    from pbrs_farm.study.samples.view_loader import ShardedViews, StoredViews
+    from pbrs_farm.study.samples.sharded_views import ShardedViews
+    from pbrs_farm.study.samples.stored_views import StoredViews
 
     request = SampleRequest(LAYERS, "opengl_dl", axes="published")
     stored = {t["id"]: t for t in StoredViews(places[0], request)}
@@ -71,7 +72,9 @@ def test_shards_and_folder_give_equal_tensors(places):
 
 
 def loader_of(place: Path, workers: int, seed: int = 5, rank: int = 0, world: int = 1):
-    from pbrs_farm.study.samples.view_loader import ShardedViews, StoredViews, ViewLoader
+    from pbrs_farm.study.samples.sharded_views import ShardedViews
+    from pbrs_farm.study.samples.stored_views import StoredViews
+    from pbrs_farm.study.samples.view_loader import ViewLoader
 
     is_packed = (place / "dataset.json").exists()
     views = ShardedViews(place) if is_packed else StoredViews(place)
@@ -141,7 +144,7 @@ def test_fewer_views_than_a_batch_are_told(places):
 
 
 def test_transforms_follow_from_seed_epoch_and_view(places):
-    from pbrs_farm.study.samples.view_loader import ShardedViews
+    from pbrs_farm.study.samples.sharded_views import ShardedViews
 
     def by_chance(sample, rng):
         return flipped(sample) if rng.random() < 0.5 else replace(sample)
@@ -161,7 +164,7 @@ def test_transforms_follow_from_seed_epoch_and_view(places):
 
 def test_a_split_is_that_of_the_houses(places, tmp_path):
     from pbrs_farm.core.house_split import shares_from_text, split_of_house
-    from pbrs_farm.study.samples.view_loader import StoredViews
+    from pbrs_farm.study.samples.stored_views import StoredViews
 
     shares = shares_from_text("50/25/25")
     views = StoredViews(places[0], split="train", shares=shares)
@@ -174,7 +177,7 @@ def test_shards_need_torch_and_numpy_alone(places):
 import sys
 for name in ("pydantic", "OpenImageIO", "scipy", "pyarrow", "PIL", "obstore", "mitsuba", "rich", "shapely"):
     sys.modules[name] = None
-from pbrs_farm.study.samples.view_loader import ShardedViews
+from pbrs_farm.study.samples.sharded_views import ShardedViews
 from pbrs_farm.study.samples.view_loader import ViewLoader
 loader = ViewLoader(ShardedViews({str(places[1])!r}), 4)
 print(sum(len(batch["id"]) for batch in loader))
@@ -186,7 +189,7 @@ print(sum(len(batch["id"]) for batch in loader))
 def test_evaluation_reads_every_view_once_whatever_the_workers(places):
     from torch.utils.data import DataLoader
 
-    from pbrs_farm.study.samples.view_loader import ShardedViews
+    from pbrs_farm.study.samples.sharded_views import ShardedViews
 
     views = ShardedViews(places[1], shuffle=False)
     read = [at for batch in DataLoader(views, batch_size=4, num_workers=2) for at in batch["id"]]

@@ -7,7 +7,7 @@ import math
 import pytest
 import torch
 
-from pbrs_farm.study.tasks.tasks import class_loss, edge_loss, normal_loss
+from pbrs_farm.study.tasks.losses import class_loss, edge_loss, normal_loss
 
 pytestmark = pytest.mark.study
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.training_loop import augmented, turned, turned_hue
+from pbrs_farm.study.training.augmentation import augmented, turned, turned_hue
 from tests.study.training.made_views import small_plan
 
 pytestmark = pytest.mark.study

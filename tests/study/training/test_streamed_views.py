@@ -12,14 +12,10 @@ from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.training.checkpoint import read_tensors
 from pbrs_farm.study.training.run_folder import RunFolder
+from pbrs_farm.study.training.streamed_views import StreamedViews
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_views import ViewArrays
-from pbrs_farm.study.training.view_sources import (
-    StreamedViews,
-    TrainingSource,
-    held_out_views,
-    training_views,
-)
+from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
 from tests.study.training.made_views import small_plan
 from tests.views.small_roots import MODES, fill

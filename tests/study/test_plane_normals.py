@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.study.metrics.angular import angles_deg
-from pbrs_farm.study.photographs import normals_of_depth
+from pbrs_farm.study.plane_normals import normals_of_depth
 
 pytestmark = pytest.mark.study
 

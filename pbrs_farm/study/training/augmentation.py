@@ -1,0 +1,135 @@
+"""Random changes to a batch that leave its labels true: mirror, enlarge, turn, hue, light; no effects."""
+
+from __future__ import annotations
+
+from math import pi, sqrt, tan
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from pbrs_farm.study.tasks.study_task import Batch, StudyTask
+from pbrs_farm.study.training_plan import TrainingPlan
+
+
+def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
+    """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw."""
+    n, device = len(batch["colour"]), batch["colour"].device
+
+    def drawn(*shape: int) -> Tensor:
+        return torch.rand((n, *shape), generator=dice).to(device)
+
+    if plan.flip:
+        flips = drawn() < 0.5
+        batch = task.mirrored(batch, flips)
+        colour = batch["colour"]
+        batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
+    if plan.turn_deg > 0:
+        angles = torch.randn((n, 2), generator=dice).to(device).clamp(-2, 2)
+        batch = turned(batch, task, angles * (plan.turn_deg * pi / 180), plan.hfov_deg)
+    if plan.zoom > 1:
+        batch = _enlarged(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
+    if plan.hue > 0:
+        batch["colour"] = turned_hue(batch["colour"], plan.hue * pi * (2 * drawn() - 1))
+    batch["colour"] = _relit(batch["colour"], plan, drawn)
+    if plan.noise > 0:
+        noise = torch.randn(batch["colour"].shape, generator=dice).to(device)
+        batch["colour"] = batch["colour"] + plan.noise * noise
+    return batch
+
+
+def turned_hue(colour: Tensor, angles: Tensor) -> Tensor:
+    """Colours (B, 3, H, W) turned about the grey axis by angles (B,), radians: other paint, same light."""
+    cos, sin = torch.cos(angles), torch.sin(angles)
+    # Rodrigues' formula about (1, 1, 1) / sqrt(3): three numbers that go round.
+    same = cos + (1 - cos) / 3
+    next_, last = (1 - cos) / 3 - sin / sqrt(3), (1 - cos) / 3 + sin / sqrt(3)
+    rows = torch.stack([same, next_, last], 1)
+    turn = torch.stack([rows, rows.roll(1, 1), rows.roll(2, 1)], 1)
+    return torch.einsum("bij,bjhw->bihw", turn, colour).clamp(0, 1)
+
+
+def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
+    """Another exposure, tone and white balance."""
+    assert callable(drawn)
+    if plan.gain == plan.gamma == plan.tint == 0:
+        return colour
+    gain = 1 + plan.gain * (2 * drawn(1, 1, 1) - 1)
+    tint = 1 + plan.tint * (2 * drawn(3, 1, 1) - 1)
+    gamma = 1 + plan.gamma * (2 * drawn(1, 1, 1) - 1)
+    return (colour.clamp(min=1e-4) ** gamma * gain * tint).clamp(0, 1)
+
+
+def _enlarged(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
+    """A part of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
+
+    Directions stay, as if seen by a longer lens.
+    """
+    n, _, height, width = batch["colour"].shape
+    theta = torch.zeros((n, 2, 3), device=shares.device)
+    theta[:, 0, 0] = theta[:, 1, 1] = shares
+    theta[:, :, 2] = shifts * (1 - shares)[:, None]
+    return _sampled(
+        batch, functional.affine_grid(theta, [n, 1, height, width], align_corners=False)
+    )
+
+
+def turned(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
+    """The views as cameras would see them that are pitched up and rolled clockwise by angles (B, 2).
+
+    A turned camera's picture is a homography of the old one, whatever the depth; normals turn with
+    the camera. angles: radians. hfov_deg: of the views. What the old picture does not show has the
+    border's colour and no label.
+    """
+    height, width = batch["colour"].shape[2:]
+    rotation = _rotations(angles)
+    # Rays through the new pixels, in units of the old picture's half width.
+    half = tan(hfov_deg * pi / 360)
+    x = ((torch.arange(width, device=angles.device) + 0.5) * 2 / width - 1) * half
+    y = (
+        ((torch.arange(height, device=angles.device) + 0.5) * 2 / height - 1)
+        * half
+        * height
+        / width
+    )
+    rays = torch.stack(
+        [x.expand(height, -1), y[:, None].expand(-1, width), x.new_ones(height, width)], -1
+    )
+    old = torch.einsum("bji,hwj->bhwi", rotation, rays)  # by the inverse of what turns directions
+    plane = old[..., :2] / old[..., 2:].clamp(min=1e-3) / half
+    grid = plane * plane.new_tensor([1.0, width / height])
+    return task.turned(_sampled(batch, grid), rotation)
+
+
+def _rotations(angles: Tensor) -> Tensor:
+    """(B, 3, 3) that take directions of the old camera's axes (x right, y down) to the turned one's."""
+    cos, sin = torch.cos(angles), torch.sin(angles)
+    one, zero = torch.ones_like(cos[:, 0]), torch.zeros_like(cos[:, 0])
+    # A camera that looks up sees what was ahead lower: z goes to y.
+    pitch = [one, zero, zero, zero, cos[:, 0], sin[:, 0], zero, -sin[:, 0], cos[:, 0]]
+    # One that rolls clockwise sees the world turn the other way.
+    roll = [cos[:, 1], sin[:, 1], zero, -sin[:, 1], cos[:, 1], zero, zero, zero, one]
+    pitched, rolled = (torch.stack(rows, 1).view(-1, 3, 3) for rows in (pitch, roll))
+    return rolled @ pitched
+
+
+def _sampled(batch: Batch, grid: Tensor) -> Batch:
+    """The batch at places of its pictures: grid (B, H, W, 2), -1..1 from edge to edge.
+
+    Colour is interpolated, labels are the nearest pixel's, 0 outside.
+    """
+    n, _, height, width = batch["colour"].shape
+    colour = functional.grid_sample(
+        batch["colour"], grid, mode="bilinear", padding_mode="border", align_corners=False
+    )
+    # Turn the grid into rows and columns of labels.
+    columns = ((grid[..., 0] + 1) * width / 2 - 0.5).round().long().clamp(0, width - 1)
+    rows = ((grid[..., 1] + 1) * height / 2 - 0.5).round().long().clamp(0, height - 1)
+    views = torch.arange(n, device=grid.device).view(-1, 1, 1)
+    labels = {name: x[views, rows, columns] for name, x in batch.items() if name != "colour"}
+    # Beyond the picture nothing is known.
+    outside = (grid.abs() > 1).any(-1)
+    if outside.any():
+        for label in labels.values():
+            label[outside] = 0
+    return labels | {"colour": colour}
