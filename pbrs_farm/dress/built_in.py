@@ -18,15 +18,15 @@ from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import connected_parts
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finish_scheme import JoineryScheme, joinery_scheme
+from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import (
-    Coat,
-    coated,
-    coated_item,
+    Finish,
     has_plain,
     is_plain,
+    item_with_finish,
     part_of_surface,
+    with_finish,
 )
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
@@ -41,12 +41,12 @@ _APPLIANCES: Final = frozenset(
 _TO_STREET: Final = ("front", "garage", "entrance")
 
 
-def joinery(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Give what carpenters and fitters bring the coats of the home's one scheme.
+def finish_built_in_parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Give doors, windows, stairs, railings and fitted appliances the finishes of the home's scheme.
 
     share: of the kinds of things (all doors, all windows, ...) that are changed.
     """
-    scheme = joinery_scheme(draft, style)
+    scheme = finish_scheme(draft, style)
     kinds = {
         kind: float(draft.rng(PART, kind).random()) < share
         for kind in (
@@ -63,16 +63,16 @@ def joinery(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> N
     for index, item in enumerate(draft.items):
         if item.kind.is_structure or not item.n_faces:
             continue
-        kind = _kind(item)
+        kind = _kind_in_scheme(item)
         if not kinds.get(kind, False):
             continue
-        made = _in_scheme(draft, item, kind, scheme)
+        made = _finish_by_scheme(draft, item, kind, scheme)
         if made is not item:
             draft.change(index, made, PART)
             draft.done[f"{PART}: {kind}"] += 1
 
 
-def _kind(item: Item) -> str:
+def _kind_in_scheme(item: Item) -> str:
     """Which of the scheme's kinds of things it is, "" for none."""
     words = words_of_item(item)
     if item.kind is ItemKind.WINDOW:
@@ -93,35 +93,39 @@ def _kind(item: Item) -> str:
     return "appliance" if is_appliance and words & _APPLIANCES else ""
 
 
-def _in_scheme(draft: Draft, item: Item, kind: str, scheme: JoineryScheme) -> Item:
+def _finish_by_scheme(draft: Draft, item: Item, kind: str, scheme: FinishScheme) -> Item:
     if kind == "door":
         said = f"{item.name} {item.source_class}".casefold()
         is_front = any(word in said for word in _TO_STREET)
-        return _fitted(draft, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim)
+        return _finish_opening(
+            draft, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim
+        )
     if kind == "window":
-        return _fitted(draft, item, scheme, scheme.window, scheme.window)
+        return _finish_opening(draft, item, scheme, scheme.window, scheme.window)
     if kind == "stairs":
-        coat = scheme.stone if item.room_id is None and len(item.surfaces) > 1 else scheme.stair
-        return coated_item(draft, item, coat)
+        finish = scheme.stone if item.room_id is None and len(item.surfaces) > 1 else scheme.stair
+        return item_with_finish(draft, item, finish)
     if kind == "railing":
-        return coated_item(draft, item, _coat_of_structure(item, scheme))
+        return item_with_finish(draft, item, _finish_of_railing(item, scheme))
     if kind == "radiator":
-        return coated_item(draft, item, scheme.radiator)
+        return item_with_finish(draft, item, scheme.radiator)
     if kind == "mirror":
-        return _framed_mirror(draft, item, scheme)
+        return _finish_mirror_frame(draft, item, scheme)
     if kind == "spotlight":
-        return _spotlight(draft, item, scheme)
-    return _appliance(draft, item, scheme)
+        return _finish_spotlight(draft, item, scheme)
+    return _finish_appliance(draft, item, scheme)
 
 
-def _coat_of_structure(item: Item, scheme: JoineryScheme) -> Coat:
+def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
     # Rails and balusters are thin two ways; what is not is built of stone.
     if float(np.sort(item.oriented_box.half * 2)[1]) > _SLENDER_M:
         return scheme.stone
     return scheme.pipe if "pipe" in item.name.casefold() else scheme.railing
 
 
-def _fitted(draft: Draft, item: Item, scheme: JoineryScheme, leaf: Coat, frame: Coat) -> Item:
+def _finish_opening(
+    draft: Draft, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
+) -> Item:
     """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
     # What lights is named by the number of its surface, which parting would change.
     if any(light.emitting for light in item.lights) or not has_plain(draft, item):
@@ -133,14 +137,14 @@ def _fitted(draft: Draft, item: Item, scheme: JoineryScheme, leaf: Coat, frame: 
         if not is_plain(draft.materials[surface.material]):
             found.append(surface)
             continue
-        for part, size in _parts(surface, box.axes):
+        for part, size in _connected_surfaces(surface, box.axes):
             is_frame = size[0] > _FRAME * wide and frame != leaf
-            coat = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
-            found.append(coated(draft, part, coat, box.axes))
-    return replace(item, surfaces=tuple(_merged(found)))
+            finish = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
+            found.append(with_finish(draft, part, finish, box.axes))
+    return replace(item, surfaces=tuple(_merge_surfaces(found)))
 
 
-def _parts(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:
+def _connected_surfaces(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:
     """Each connected part of a surface, and its size along the axes (3,)."""
     part = connected_parts(surface, axes)[surface.faces[:, 0]]
     for k in range(int(part.max(initial=-1)) + 1):
@@ -149,15 +153,15 @@ def _parts(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:
             yield mine, np.ptp(mine.positions.astype(np.float64) @ axes, axis=0)
 
 
-def _merged(surfaces: list[Surface]) -> list[Surface]:
+def _merge_surfaces(surfaces: list[Surface]) -> list[Surface]:
     """Surfaces of one name and material as one, in the order they are first met."""
     groups: dict[tuple[str, int], list[Surface]] = {}
     for surface in surfaces:
         groups.setdefault((surface.name, surface.material), []).append(surface)
-    return [_joined(some) for some in groups.values()]
+    return [_join_surfaces(some) for some in groups.values()]
 
 
-def _joined(some: list[Surface]) -> Surface:
+def _join_surfaces(some: list[Surface]) -> Surface:
     if len(some) == 1:
         return some[0]
     starts = np.cumsum([0, *(len(s.positions) for s in some)])
@@ -172,35 +176,37 @@ def _joined(some: list[Surface]) -> Surface:
     )  # fmt: skip
 
 
-def _appliance(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+def _finish_appliance(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
     # The body alone: plates, doors and panels keep their glass and black.
     areas = [float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in item.surfaces]
-    return _with_coat(
+    return _finish_some(
         draft, item, scheme.appliance,
         [a >= _FRONT_SHARE * sum(areas) and _is_bright(draft, s)
          for a, s in zip(areas, item.surfaces, strict=True)],
     )  # fmt: skip
 
 
-def _framed_mirror(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+def _finish_mirror_frame(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
     # Where no surface is known to be glass, all of it may be.
     materials = [draft.materials[s.material] for s in item.surfaces]
     if not any(m.kind is MaterialKind.MIRROR for m in materials):
         return item
-    return coated_item(draft, item, scheme.trim)
+    return item_with_finish(draft, item, scheme.trim)
 
 
-def _spotlight(draft: Draft, item: Item, scheme: JoineryScheme) -> Item:
+def _finish_spotlight(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
     emitting = {k for light in item.lights for k in light.emitting}
-    return _with_coat(
+    return _finish_some(
         draft, item, scheme.spotlight, [k not in emitting for k in range(len(item.surfaces))]
     )
 
 
-def _with_coat(draft: Draft, item: Item, coat: Coat, covers: list[bool]) -> Item:
+def _finish_some(draft: Draft, item: Item, finish: Finish, covers: list[bool]) -> Item:
     axes = item.oriented_box.axes
     surfaces = tuple(
-        coated(draft, s, coat, axes) if is_mine and is_plain(draft.materials[s.material]) else s
+        with_finish(draft, s, finish, axes)
+        if is_mine and is_plain(draft.materials[s.material])
+        else s
         for s, is_mine in zip(item.surfaces, covers, strict=True)
     )
     if all(a is b for a, b in zip(surfaces, item.surfaces, strict=True)):

@@ -36,7 +36,7 @@ def hang_from_ceiling(
     space = house_space(draft)
     room = space.room(room_id)
     choices = _choices(catalogue, style, room, rng)
-    for place, top_y, low_y in _places(draft, space, room):
+    for place, top_y, low_y in _hanging_places(draft, space, room):
         for piece, ready in choices:
             # Load a model when it is its turn: most rooms take the first.
             shape = ready or catalogue.shape(piece)
@@ -44,7 +44,7 @@ def hang_from_ceiling(
             if (
                 shape is None
                 or factor is None
-                or not _is_free(space, room, place, top_y, shape, factor)
+                or not _is_free_below(space, room, place, top_y, shape, factor)
             ):
                 continue
             height = float(shape.bounds[1, 1]) * factor
@@ -106,7 +106,9 @@ def _factor(shape: Shape, height_m: float) -> float | None:
     return factor if factor > 0.6 else None
 
 
-def _places(draft: Draft, space: HouseSpace, room: RoomSpace) -> list[tuple[F64, float, float]]:
+def _hanging_places(
+    draft: Draft, space: HouseSpace, room: RoomSpace
+) -> list[tuple[F64, float, float]]:
     """Plan places, the ceiling's y and the lowest y of a lamp there; best first."""
     floor = room.room.floor_y
     places, lows = [], []
@@ -116,7 +118,7 @@ def _places(draft: Draft, space: HouseSpace, room: RoomSpace) -> list[tuple[F64,
         if item.nyu40 == TABLE and size[1] > 0.6 and min(size[0], size[2]) > 0.7:
             places.append(((low + high) / 2)[[0, 2]])
             lows.append(floor + _TABLE_M)
-    grid = _grid(room)
+    grid = _places_off_walls(room)
     places += list(grid)
     lows += [floor + _HEAD_M] * len(grid)
     if not places:
@@ -127,7 +129,7 @@ def _places(draft: Draft, space: HouseSpace, room: RoomSpace) -> list[tuple[F64,
     return [(points[k], float(tops[k]), lows[k]) for k in np.flatnonzero(ok)]
 
 
-def _grid(room: RoomSpace) -> F64:
+def _places_off_walls(room: RoomSpace) -> F64:
     """(N, 2) places well inside the room, those farthest from its walls first; at most 60."""
     area = shapely.difference(room.area, room.walls)
     shrunk = shapely.buffer(area, -_FROM_WALL_M)
@@ -147,7 +149,7 @@ def _grid(room: RoomSpace) -> F64:
     return np.asarray(grid[order[:60]])
 
 
-def _is_free(
+def _is_free_below(
     space: HouseSpace, room: RoomSpace, place: F64, top_y: float, shape: Shape, factor: float
 ) -> bool:
     """Whether nothing else is where the lamp would hang, and the ceiling is flat over its canopy."""

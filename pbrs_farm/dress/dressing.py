@@ -17,42 +17,42 @@ from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.house import House, Item, Source
 from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields
-from pbrs_farm.dress.built_in import joinery
-from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.built_in import finish_built_in_parts
+from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.draft import CHANGED_TAG, Draft
-from pbrs_farm.dress.finishes import parts
-from pbrs_farm.dress.furniture import furniture
-from pbrs_farm.dress.gates import group_of, keep_gates, kept_as_rendered, part_of, piece_id
-from pbrs_farm.dress.lamps import lamps
-from pbrs_farm.dress.mess import chairs, pictures
+from pbrs_farm.dress.finishes import finish_furniture
+from pbrs_farm.dress.furniture import add_furniture
+from pbrs_farm.dress.gates import group_of, keep_gates, kept_as_rendered, pass_that_added, piece_id
+from pbrs_farm.dress.lamps import add_lamps
+from pbrs_farm.dress.mess import move_chairs, tilt_pictures
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.dress.surfaces import surfaces
-from pbrs_farm.dress.swap import swap
-from pbrs_farm.dress.textiles import textiles_large
-from pbrs_farm.dress.walls import walls
-from pbrs_farm.dress.wear import wear
+from pbrs_farm.dress.surfaces import dress_surfaces
+from pbrs_farm.dress.swap import swap_furniture
+from pbrs_farm.dress.textiles import add_textiles
+from pbrs_farm.dress.walls import furnish_walls
+from pbrs_farm.dress.wear import add_wear
 
 Part = Callable[[Draft, Catalogue, Style, float], None]
 
 
 _FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
-    ("surfaces", surfaces),
-    ("swap", swap),
-    ("furniture", furniture),
-    ("mess", chairs),
+    ("surfaces", dress_surfaces),
+    ("swap", swap_furniture),
+    ("furniture", add_furniture),
+    ("mess", move_chairs),
 )
 """Field of the recipe that holds the part's share, and the part, in the order they are done."""
 
 _THINGS: Final[tuple[tuple[str, Part], ...]] = (
-    ("surfaces", joinery),
-    ("parts", parts),
-    ("parts", wear),
-    ("lamps", lamps),
-    ("textiles", textiles_large),
-    ("walls", walls),
-    ("mess", pictures),
-    ("clutter", clutter),
+    ("surfaces", finish_built_in_parts),
+    ("parts", finish_furniture),
+    ("parts", add_wear),
+    ("lamps", add_lamps),
+    ("textiles", add_textiles),
+    ("walls", furnish_walls),
+    ("mess", tilt_pictures),
+    ("clutter", add_clutter),
 )
 """The same of what is done when it is known which furniture stays."""
 
@@ -98,7 +98,7 @@ def kept_in(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
     if house is dressed.house:
         return dressed
     added = _added(house.items[dressed.n_source :], dressed.pieces)
-    update = {"added": added, "credits": _credits(house, catalogue)}
+    update = {"added": added, "credits": _credits_of_house(house, catalogue)}
     return dressed._replace(house=house, report=report.model_copy(update=update))
 
 
@@ -117,22 +117,22 @@ def _dressed(
                 part(draft, catalogue, style, share)
             n_done += 1
             tell(n_done / len(_FURNITURE + _THINGS))
-        gates = _joined(gates, keep_gates(draft, pieces | draft.used))
+        gates = _merge_gates(gates, keep_gates(draft, pieces | draft.used))
     if fields.passes:
         for name in fields.passes.split(":"):
             plugin("passes", name).load()(draft, catalogue, style, 1.0)
-        gates = _joined(gates, keep_gates(draft, pieces | draft.used))
+        gates = _merge_gates(gates, keep_gates(draft, pieces | draft.used))
     dressed = draft.house()
-    credits = _credits(dressed, catalogue)
+    credits = _credits_of_house(dressed, catalogue)
     dressed = replace(
         dressed,
         id=keys.dressed_id(draft.source.id, draft.seed),
         source=_credited(draft.source.source, credits),
     )
-    return dressed, _report(dressed, draft, style, gates, credits)
+    return dressed, _report_of_dressing(dressed, draft, style, gates, credits)
 
 
-def _joined(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
+def _merge_gates(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
     """The gates as they are now, with what was taken out for them before."""
     taken = {gate.name: gate.n_taken_out for gate in before}
     return tuple(
@@ -141,7 +141,7 @@ def _joined(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ..
     )
 
 
-def _report(
+def _report_of_dressing(
     house: House, draft: Draft, style: Style, gates: tuple[Gate, ...], credits: tuple[Credit, ...]
 ) -> DressReport:
     changed = Counter(
@@ -165,11 +165,11 @@ def _report(
 
 def _added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
     """What was added and stands there now, whatever was tried, by part and group."""
-    found = Counter(f"{part_of(item)}: {group_of(item, pieces)}" for item in items)
+    found = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
     return dict(sorted(found.items()))
 
 
-def _credits(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
+def _credits_of_house(house: House, catalogue: Catalogue) -> tuple[Credit, ...]:
     """The pieces and pictures of libraries that the house shows, by id."""
     pieces: dict[str, Piece] = {p.id: p for p in catalogue.pieces}
     counts = Counter(piece_id(item) for item in house.items)

@@ -53,14 +53,14 @@ _PALE: Final = "birch"
 
 
 @dataclass(frozen=True, slots=True)
-class _Finish:
+class _LaidMaterial:
     # A material, and how its picture is laid; size None: its coordinates stay.
     number: int
     size_m: tuple[float, float] | None = None
     is_grained: bool = False
 
 
-def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def finish_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the furniture's plain parts the look of what they are made of.
 
     Parts of one colour in one room get one look, so that sets stay sets.
@@ -73,9 +73,9 @@ def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
         if item.kind.is_structure or not item.n_faces or is_finished:
             continue
         group = groups.get(item.source_class, "")
-        kinds = _kinds(draft, item, group)
+        kinds = _kinds_of_surfaces(draft, item, group)
         surfaces = tuple(
-            _finished(draft, catalogue, style, share, item, group, surface, kind)
+            _finish_surface(draft, catalogue, style, share, item, group, surface, kind)
             for surface, kind in zip(item.surfaces, kinds, strict=True)
         )
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
@@ -83,7 +83,7 @@ def parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> Non
             draft.done[f"{PART}: {item.kind.value}"] += 1
 
 
-def _kinds(draft: Draft, item: Item, group: str) -> list[PartKind]:
+def _kinds_of_surfaces(draft: Draft, item: Item, group: str) -> list[PartKind]:
     kinds = [kind_of_part(draft.materials[s.material], item, group) for s in item.surfaces]
     materials = [draft.materials[s.material] for s in item.surfaces]
     # One sits or lies on the soft part, whatever it is called.
@@ -124,10 +124,10 @@ def _kinds(draft: Draft, item: Item, group: str) -> list[PartKind]:
 def _may_be_board(surface: Surface, material: Material, item: Item, group: str) -> bool:
     is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
     is_free = is_plain and kind_by_name(material.name) is None and not is_white(material.diffuse)
-    return is_free and is_furniture(item, group) and _area(surface) >= _LEAST_BOARD_M2
+    return is_free and is_furniture(item, group) and _area_of_surface(surface) >= _LEAST_BOARD_M2
 
 
-def _finished(
+def _finish_surface(
     draft: Draft, catalogue: Catalogue, style: Style, share: float, item: Item, group: str,
     surface: Surface, kind: PartKind,
 ) -> Surface:  # fmt: skip
@@ -140,7 +140,11 @@ def _finished(
     )
     if rng.random() >= share:
         return surface
-    make = {PartKind.WOOD: _wood, PartKind.SOFT: _soft, PartKind.METAL: _metal}.get(kind, _lacquer)
+    make = {
+        PartKind.WOOD: _finish_wood,
+        PartKind.SOFT: _finish_soft,
+        PartKind.METAL: _finish_metal,
+    }.get(kind, _finish_lacquer)
     finish = make(draft, catalogue, style, item, material, rng)
     if finish is None:
         return surface
@@ -151,15 +155,15 @@ def _finished(
     return replace(mapped, material=finish.number)
 
 
-def _wood(
+def _finish_wood(
     draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _Finish | None:  # fmt: skip
+) -> _LaidMaterial | None:  # fmt: skip
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
     is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
     if (is_vivid(own) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
-        return _lacquer(draft, catalogue, style, item, material, rng)
+        return _finish_lacquer(draft, catalogue, style, item, material, rng)
     mean = linear_from_srgb(np.array(style.wood.mean))
     mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
     # The stronger a brown, the less of it is of wood.
@@ -181,10 +185,10 @@ def grain_pattern(draft: Draft, wood: Wood) -> Pattern:
     return Pattern("grain", seed, wood=wood)
 
 
-def _soft(
+def _finish_soft(
     draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _Finish | None:  # fmt: skip
+) -> _LaidMaterial | None:  # fmt: skip
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
     wanted = linear_from_srgb(
         np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
@@ -205,10 +209,10 @@ def _soft(
     return _tinted(draft, pattern, wanted, is_grained=False)
 
 
-def _lacquer(
+def _finish_lacquer(
     draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _Finish | None:  # fmt: skip
+) -> _LaidMaterial | None:  # fmt: skip
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
     own = material.diffuse
     # Screen colours are mixed down to those that paint has.
@@ -224,13 +228,13 @@ def _lacquer(
         material, diffuse=(r, g, b), specular=_SHEEN, roughness=roughness,
         shininess=round(2 / roughness**4 - 2, 1),
     )  # fmt: skip
-    return _Finish(draft.material(painted))
+    return _LaidMaterial(draft.material(painted))
 
 
-def _metal(
+def _finish_metal(
     draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _Finish | None:  # fmt: skip
+) -> _LaidMaterial | None:  # fmt: skip
     if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
         return None
     metal = metal_of(material.name.lower(), METALS["chrome"] if has_taps(item) else style.metal)
@@ -240,20 +244,20 @@ def _metal(
         material, diffuse=(r, g, b), specular=metal.colour, roughness=metal.roughness,
         shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
     )  # fmt: skip
-    return _Finish(draft.material(polished))
+    return _LaidMaterial(draft.material(polished))
 
 
-def _tinted(draft: Draft, pattern: Pattern, wanted: F64, *, is_grained: bool) -> _Finish:
+def _tinted(draft: Draft, pattern: Pattern, wanted: F64, *, is_grained: bool) -> _LaidMaterial:
     # The pattern's material in another colour: its picture times a diffuse of at most 1.
     made = pattern_material(draft, pattern)
     ratio = wanted / np.maximum(np.array(made.mean_rgb), 1e-3)
     ratio = ratio / max(1.0, float(ratio.max()))
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
     tinted = replace(draft.materials[made.number], diffuse=(r, g, b))
-    return _Finish(draft.material(tinted), made.size_m, is_grained)
+    return _LaidMaterial(draft.material(tinted), made.size_m, is_grained)
 
 
-def _area(surface: Surface) -> float:
+def _area_of_surface(surface: Surface) -> float:
     return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())
 
 

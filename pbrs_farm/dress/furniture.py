@@ -77,7 +77,7 @@ KINDS: Final[Mapping[str, WantedKind]] = _FILE.kinds
 WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = _FILE.wanted
 
 
-def furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Add furniture to the rooms of the draft. share: 0..1 of what a room would get."""
     space = house_space(draft)
     for room in space.rooms:
@@ -85,17 +85,17 @@ def furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) ->
         if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
             continue
         rng = draft.rng(PART, room.room.id)
-        names = _drawn(draft, room, wanted, rng, share)
+        names = _draw_wanted(draft, room, wanted, rng, share)
         floor = RoomFloor.of(draft, space, room) if names else None
         if floor is None:
             continue
         own = room_style(style, draft.rng("style", room.room.id))
         look = look_of(draft, catalogue, own, draft.rng(PART, "look", int(rng.integers(_LOOKS))))
         for name in names:
-            _stand(draft, catalogue, floor, name, look, rng)
+            _stand_at_wall(draft, catalogue, floor, name, look, rng)
 
 
-def _drawn(
+def _draw_wanted(
     draft: Draft, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
     share: float,
 ) -> list[str]:  # fmt: skip
@@ -111,7 +111,7 @@ def _drawn(
     return found
 
 
-def _stand(
+def _stand_at_wall(
     draft: Draft, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
@@ -127,10 +127,10 @@ def _stand(
             continue
         made = _from_catalogue(catalogue, kind, w, own) if from_catalogue else None
         made = made or _generated(kind, look, (w, height, depth), own)
-        spot = _spot(draft, floor, kind, made, rng)
+        spot = _find_spot(draft, floor, kind, made, rng)
         if spot is None:
             continue
-        _put(draft, floor, made, spot)
+        _put_at_spot(draft, floor, made, spot)
         if name == "desk":
             _chair_before(draft, floor, spot, look, rng)
         return
@@ -162,7 +162,7 @@ def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: i
     return piece, shape
 
 
-def _spot(
+def _find_spot(
     draft: Draft, floor: RoomFloor, kind: WantedKind, made: Made, rng: np.random.Generator
 ) -> FloorSpot | None:
     """A place for the thing, drawn from those that are free; None where there is none."""
@@ -239,14 +239,14 @@ def _is_cooked_at(draft: Draft, floor: RoomFloor, face_number: int, s: float, wi
     return False
 
 
-def _put(draft: Draft, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
+def _put_at_spot(draft: Draft, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
     _piece, shape = made
     low, high = shape.bounds
     # Its back comes to the wall, the middle of its width to the spot.
     y = floor.room.room.floor_y + _LIFT_M - float(low[1])
     at = spot.face.point(spot.s, y, OUT_M - float(low[2]))
     at = at - spot.face.along * float(low[0] + high[0]) / 2
-    _add(draft, floor, made, at, spot.face.turn_rad)
+    _add_to_floor(draft, floor, made, at, spot.face.turn_rad)
     floor.take(spot.body, spot.front)
     floor.wall_m -= float(high[0] - low[0])
 
@@ -269,11 +269,13 @@ def _chair_before(
     )
     floor.fronts.append(own)
     if is_free:
-        _add(draft, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25)))
+        _add_to_floor(
+            draft, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25))
+        )
         floor.take(body, shapely.Polygon())
 
 
-def _add(draft: Draft, floor: RoomFloor, made: Made, at: F64, turn_rad: float) -> None:
+def _add_to_floor(draft: Draft, floor: RoomFloor, made: Made, at: F64, turn_rad: float) -> None:
     room = floor.room.room
     item = draft.placed(
         *made, at, turn_rad, item_id=next_id(draft, PART), room_id=room.id, level_id=room.level_id

@@ -37,19 +37,20 @@ def stand_by_sofas(
     space = house_space(draft)
     room = space.room(room_id)
     has_one = any(
-        draft.items[n].kind is ItemKind.LAMP and _stands(space, room, n) for n in room.items
+        draft.items[n].kind is ItemKind.LAMP and _stands_on_floor(space, room, n)
+        for n in room.items
     )
     sofas = [n for n in room.items if draft.items[n].nyu40 == SOFA]
     if has_one or not sofas or rng.random() >= _BY_SOFA:
         return
-    piece, shape = _drawn(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
+    piece, shape = _draw_lamp(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
     radius = float(np.abs(shape.bounds[:, [0, 2]]).max())
     for number in sofas:
         # Try each end; take the lamp away again where it closes a way.
         for place in _ends(space, room, number, radius):
             if _floor_is_free(space, room, place, radius, float(shape.bounds[1, 1])):
                 at = np.array([place[0], room.room.floor_y, place[1]])
-                _stand(draft, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
+                _stand_lamp(draft, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
                 if _ways_are_open(draft, room_id):
                     return
                 draft.items.pop()
@@ -66,21 +67,21 @@ def stand_by_beds(
     stands = [n for n in room.items if draft.items[n].nyu40 == NIGHT_STAND]
     if not stands or rng.random() >= _BY_BED:
         return
-    piece, shape = _drawn(catalogue, "table_lamp", rng) or table_lamp(rng, style)
+    piece, shape = _draw_lamp(catalogue, "table_lamp", rng) or table_lamp(rng, style)
     for number in stands:
         low, high = space.bounds[number]
         middle = ((low + high) / 2)[[0, 2]]
-        at = _top(draft, space, number, middle, shape)
+        at = _spot_on_top(draft, space, number, middle, shape)
         if at is None:
             draft.refused[f"{PART}: no free nightstand"] += 1
             continue
         turn = draft.items[number].oriented_box.axes[:, 2]
-        _stand(
+        _stand_lamp(
             draft, room, piece, with_flux(shape, _TABLE_LM), at, float(np.arctan2(turn[0], turn[2]))
         )
 
 
-def _drawn(
+def _draw_lamp(
     catalogue: Catalogue, group: str, rng: np.random.Generator
 ) -> tuple[Piece, Shape] | None:
     """A lamp of the catalogue that shines and is not too large to stand; None = make one."""
@@ -92,7 +93,7 @@ def _drawn(
     return (piece, shape) if shape is not None and shape.lights else None
 
 
-def _stand(
+def _stand_lamp(
     draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
 ) -> None:
     item = draft.placed(
@@ -102,7 +103,7 @@ def _stand(
     draft.add(item, PART, piece)
 
 
-def _stands(space: HouseSpace, room: RoomSpace, number: int) -> bool:
+def _stands_on_floor(space: HouseSpace, room: RoomSpace, number: int) -> bool:
     # A lamp that reaches from the floor to a man's chest.
     low, high = space.bounds[number][:, 1] - room.room.floor_y
     return bool(low < 0.1 and high > 1.0)
@@ -151,7 +152,9 @@ def _ways_are_open(draft: Draft, room_id: str) -> bool:
     return not before or doors_are_joined(floor_bitmap(space, room), room)
 
 
-def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape) -> F64 | None:
+def _spot_on_top(
+    draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape
+) -> F64 | None:
     """(3,) where the shape stands on the thing's flat and free top; None where it cannot."""
     low, high = shape.bounds
     radius = float(np.abs([low[[0, 2]], high[[0, 2]]]).max())
@@ -173,7 +176,7 @@ def _top(draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape)
     return np.array([place[0], y, place[1]]) if space.is_free(a, b) else None
 
 
-def lamps(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_lamps(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang a lamp in rooms without one or with too little light; stand some by sofas and beds.
 
     share: of such rooms, 0..1.

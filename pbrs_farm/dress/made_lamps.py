@@ -25,14 +25,16 @@ def ceiling_dome(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     dish = np.stack([r * np.sin(t), 0.085 * (1 - np.cos(t))], -1)
     dish[0, 0] = 0.0
     opal = lathe("opal", np.concatenate([dish, [[0, 0.085]]]), _O, 1, n=40)
-    return _lamp("ceiling_dome", Place.CEILING, (plate, opal), style, emitting=1, at=0.04, radius=r)
+    return _lamp_of(
+        "ceiling_dome", Place.CEILING, (plate, opal), style, emitting=1, at=0.04, radius=r
+    )
 
 
 def globe_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     """An opal ball on a cord."""
     r, height = float(rng.uniform(0.11, 0.17)), 0.5
     ball = sphere("opal", np.array([0, r, 0]), r, 1, n=32)
-    return _lamp("globe_pendant", Place.CEILING, (_cord(2 * r, height), ball), style, emitting=1, at=r, radius=r)  # fmt: skip
+    return _lamp_of("globe_pendant", Place.CEILING, (_cord(2 * r, height), ball), style, emitting=1, at=r, radius=r)  # fmt: skip
 
 
 def shade_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -43,7 +45,7 @@ def shade_pendant(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]
     shell = lathe("shade", np.concatenate([inside, outside, inside[:1]]), _O, 2, n=40)
     bulb = sphere("bulb", np.array([0, 0.3 * tall, 0]), 0.035, 1, n=24)
     parts = (_cord(tall, height), bulb, shell)
-    return _lamp("shade_pendant", Place.CEILING, parts, style, emitting=1, at=0.3 * tall, radius=0.035)  # fmt: skip
+    return _lamp_of("shade_pendant", Place.CEILING, parts, style, emitting=1, at=0.3 * tall, radius=0.035)  # fmt: skip
 
 
 def floor_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -54,7 +56,7 @@ def floor_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     )
     pole = lathe("pole", foot, _O, 0, n=32)
     ball = sphere("opal", np.array([0, height + r - 0.01, 0]), r, 1, n=32)
-    return _lamp("floor_lamp", Place.FLOOR, (pole, ball), style, emitting=1, at=height + r, radius=r)  # fmt: skip
+    return _lamp_of("floor_lamp", Place.FLOOR, (pole, ball), style, emitting=1, at=height + r, radius=r)  # fmt: skip
 
 
 def table_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
@@ -63,7 +65,7 @@ def table_lamp(rng: np.random.Generator, style: Style) -> tuple[Piece, Shape]:
     foot = np.array([[0, 0], [0.07, 0], [0.07, 0.012], [0.02, 0.03], [0.02, 0.16], [0, 0.16]])
     body = lathe("foot", foot, _O, 0, n=32)
     ball = sphere("opal", np.array([0, 0.15 + r, 0]), r, 1, n=32)
-    return _lamp("table_lamp", Place.SURFACE, (body, ball), style, emitting=1, at=0.15 + r, radius=r)  # fmt: skip
+    return _lamp_of("table_lamp", Place.SURFACE, (body, ball), style, emitting=1, at=0.15 + r, radius=r)  # fmt: skip
 
 
 def _cord(low: float, high: float) -> Surface:
@@ -79,7 +81,7 @@ def _cord(low: float, high: float) -> Surface:
     return lathe("cord", np.array(profile, np.float64), _O, 0, n=24)
 
 
-def _lamp(
+def _lamp_of(
     family: str, place: Place, surfaces: tuple[Surface, ...], style: Style, *,
     emitting: int, at: float, radius: float,
 ) -> tuple[Piece, Shape]:  # fmt: skip

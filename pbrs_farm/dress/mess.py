@@ -17,7 +17,7 @@ from pbrs_farm.core.classes import CHAIR, DESK, PICTURE, TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.draft import Draft, moved_item
-from pbrs_farm.dress.neighbours import PieceSurroundings, things_on
+from pbrs_farm.dress.neighbours import Neighbours, things_on
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space, item_footprint
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.swap import FREE_CUBES
@@ -34,13 +34,13 @@ _ASKEW: Final = np.radians(1.6)
 _HUNG_M: Final = 0.2  # a picture that hangs is larger
 
 
-def chairs(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def move_chairs(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Move chairs at tables and desks as people do who get up: most a little, some far.
 
     share: 0..1, of chairs that somebody has just left. No chair goes before a door or into a thing.
     """
     space = house_space(draft)
-    around = PieceSurroundings(draft.items)
+    around = Neighbours(draft.items)
     for room in space.rooms:
         rng = draft.rng(PART, "chairs", room.room.id)
         tables = [k for k in room.items if draft.items[k].nyu40 in (TABLE, DESK)]
@@ -52,7 +52,7 @@ def chairs(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> 
                 _pull_out(draft, space, around, (index, table), (free, zone), rng, share)
 
 
-def pictures(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def tilt_pictures(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Turn pictures that were hung by a degree or so about their middle."""
     for index in range(len(draft.source.items), len(draft.items)):
         item = draft.items[index]
@@ -93,7 +93,7 @@ def _table_of(draft: Draft, space: HouseSpace, index: int, tables: list[int]) ->
 
 
 def _pull_out(
-    draft: Draft, space: HouseSpace, around: PieceSurroundings, pair: tuple[int, int],
+    draft: Draft, space: HouseSpace, around: Neighbours, pair: tuple[int, int],
     areas: tuple[BaseGeometry, BaseGeometry], rng: np.random.Generator, share: float,
 ) -> None:  # fmt: skip
     index, table = pair
@@ -111,7 +111,7 @@ def _pull_out(
         step = out * float(way) * factor
         middle = (space.bounds[index][0] + space.bounds[index][1]) / 2
         moved = moved_item(item, step, rotation_y(float(turn) * factor), middle)
-        if _is_free(around, moved, index, before, areas):
+        if _chair_is_free(around, moved, index, before, areas):
             if index < len(draft.source.items):
                 draft.change(index, moved, PART)
             else:
@@ -136,8 +136,8 @@ def _outwards(space: HouseSpace, index: int, table: int) -> F64:
     return np.asarray(off / np.linalg.norm(off))
 
 
-def _is_free(
-    around: PieceSurroundings, moved: Item, index: int, before: int,
+def _chair_is_free(
+    around: Neighbours, moved: Item, index: int, before: int,
     areas: tuple[BaseGeometry, BaseGeometry],
 ) -> bool:  # fmt: skip
     body = item_footprint(moved)

@@ -26,7 +26,7 @@ _BITS: Final = 21  # of a cube's number along each axis
 Cubes = NDArray[np.int64]
 
 
-class PieceSurroundings:
+class Neighbours:
     """The items of a draft, as they are when they are asked for."""
 
     def __init__(self, items: Sequence[Item]) -> None:
@@ -84,7 +84,7 @@ _LEFT_ALONE: Final = frozenset(
 )  # fmt: skip
 
 
-def things_on(around: PieceSurroundings, index: int) -> tuple[list[int], list[int]]:
+def things_on(around: Neighbours, index: int) -> tuple[list[int], list[int]]:
     """(what stands on an item, what stands in it or under it), by place; index: the item's.
 
     Structure, doors and windows, and what lies flat below it, are neither.
@@ -123,7 +123,7 @@ ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
 """By what holds a thing, the places of the models that may be held so."""
 
 
-def held_by(draft: Draft, around: PieceSurroundings, index: int, group: str) -> Place:
+def held_by(draft: Draft, around: Neighbours, index: int, group: str) -> Place:
     """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling."""
     if HELD.get(group) is HeldBy.TOP:
         return Place.CEILING

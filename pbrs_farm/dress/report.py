@@ -59,7 +59,7 @@ class DressReport(Record):
 def summary_of_dressing(report: DressReport) -> str:
     """What was added to a house, changed in it and refused, a sentence per line."""
     return "\n".join(
-        [f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in _lines(report))]
+        [f"{report.house_id}:", *(f"- {shown(line, MAX_MESSAGE)}" for line in _sentences(report))]
     )
 
 
@@ -73,7 +73,7 @@ _GATE_TEXT = {
 }
 
 
-def _lines(report: DressReport) -> Iterator[str]:
+def _sentences(report: DressReport) -> Iterator[str]:
     style = f", style {report.style}" if report.style else ""
     yield f"dressed by seed {report.seed}{style}."
     # Say what came in, by part, the most frequent first.

@@ -30,18 +30,18 @@ def rgb(code: str) -> Rgb:
     return (r, g, b)
 
 
-def _colour(told: object) -> object:
+def _rgb_if_text(told: object) -> object:
     return rgb(told) if isinstance(told, str) else told
 
 
-def _colours(told: object) -> object:
+def _rgbs_if_text(told: object) -> object:
     return [rgb(code) for code in told.split()] if isinstance(told, str) else told
 
 
 # In tables: a colour, several with spaces between them, and five of those.
-Colour = Annotated[Rgb, BeforeValidator(_colour)]
-Colours = Annotated[tuple[Rgb, ...], BeforeValidator(_colours)]
-Palette = Annotated[tuple[Rgb, Rgb, Rgb, Rgb, Rgb], BeforeValidator(_colours)]
+Colour = Annotated[Rgb, BeforeValidator(_rgb_if_text)]
+Colours = Annotated[tuple[Rgb, ...], BeforeValidator(_rgbs_if_text)]
+Palette = Annotated[tuple[Rgb, Rgb, Rgb, Rgb, Rgb], BeforeValidator(_rgbs_if_text)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,7 +81,7 @@ def supports_of_item(
     """
     item, corners = scene.items[index], scene.of_item(index)
     level = np.abs(unit_normals(corners)[:, 1]) > _LEAST_NORMAL_Y
-    groups = _levels(corners[level], room)
+    groups = _group_levels(corners[level], room)
     if not groups:
         return []
     plan = corners.reshape(-1, 3)[:, [0, 2]]
@@ -144,7 +144,7 @@ def _turn_of_outline(points: F64) -> float:
     return float(np.arctan2(-edge[1], edge[0]))
 
 
-def _levels(faces: F64, room: Room) -> list[F64]:
+def _group_levels(faces: F64, room: Room) -> list[F64]:
     # Groups of flat faces whose heights agree, with enough area together, within reach.
     low, high = triangle_bounds(faces[..., 1])
     top = min(_OUT_OF_REACH_M, room.ceiling_y - room.floor_y - LEAST_FREE_M) + room.floor_y
@@ -234,7 +234,7 @@ def _supports_of_level(
             for s, size in zip(at, parts.shape, strict=True)
         )
         part, air = np.asarray(parts[around_it] == k), clear[around_it]
-        sides = _open_sides(part, air)
+        sides = _find_open_sides(part, air)
         # Leave out the inside of closed bodies: nothing leads there but from above.
         if not any(sides) and np.median(air[part]) < room.ceiling_y - height - 0.01:
             continue
@@ -253,13 +253,13 @@ def _supports_of_level(
     return found
 
 
-def _open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
+def _find_open_sides(part: Bools, clear: F64) -> tuple[bool, bool, bool, bool]:
     """Whether nothing stands beyond the part's right, front, left and back edge."""
     blocked = clear < LEAST_FREE_M
     sides = []
     for axis, step in ((1, 1), (0, 1), (1, -1), (0, -1)):
         # Look at the cells just beyond the outermost ones of each row or column.
-        beyond = [_shifted(blocked, axis, -step * k) for k in (1, 2, 3)]
+        beyond = [_shift_mask(blocked, axis, -step * k) for k in (1, 2, 3)]
         ahead = beyond[0] | beyond[1] | beyond[2]
         order = part if step > 0 else np.flip(part, axis)
         last = order.shape[axis] - 1 - np.argmax(np.flip(order, axis), axis)
@@ -291,7 +291,7 @@ def _is_in_a_bowl(around: FacesAround, part: Bools, height: float) -> bool:
     return True
 
 
-def _shifted(mask: Bools, axis: int, by: int) -> Bools:
+def _shift_mask(mask: Bools, axis: int, by: int) -> Bools:
     moved = np.zeros_like(mask)
     there, here = (slice(by, None), slice(0, -by)) if by > 0 else (slice(0, by), slice(-by, None))
     if axis == 0:
@@ -310,7 +310,7 @@ def turned_to_front(support: Support, room: Room, *, has_front: bool) -> Support
     quarter = _front_quarter(support, room, has_front)
     if quarter == 0:
         return support
-    return _turned(support, quarter)
+    return _turn_axes(support, quarter)
 
 
 def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
@@ -347,7 +347,7 @@ def _way_to_wall(support: Support, quarter: int, area: Polygon) -> float:
     return float(steps[np.argmax(outside)] - half) if outside.any() else 2.0
 
 
-def _turned(support: Support, quarter: int) -> Support:
+def _turn_axes(support: Support, quarter: int) -> Support:
     # Turn the axes by quarters; the cells stay where they are in the world.
     grid, (rows, columns) = support.grid, support.grid.shape
     corner = {1: (0, rows), 2: (columns, rows), 3: (columns, 0)}[quarter]

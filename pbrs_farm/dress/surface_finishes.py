@@ -16,7 +16,7 @@ from pbrs_farm.dress.textures.families import pattern_material
 
 
 @dataclass(frozen=True, slots=True)
-class Coat:
+class Finish:
     """What a part is painted with or made of; the first of wood, metal and paint that is there."""
 
     name: str
@@ -26,42 +26,45 @@ class Coat:
     metal: Metal | None = None
 
 
-COATED = "coated"
+FINISHED = "coated"
 """First word of the names of these materials: the part `parts` leaves them as they are."""
 
 _SHEEN = (0.4, 0.4, 0.4)
 
 
-def coated(draft: Draft, surface: Surface, coat: Coat, axes: F64) -> Surface:
-    """The surface under a coat; axes: (3, 3), columns are the thing's own, along which wood grows."""
-    if coat.wood is None:
-        return replace(surface, material=plain_material(draft, coat))
-    veneer = pattern_material(draft, grain_pattern(draft, coat.wood))
+def with_finish(draft: Draft, surface: Surface, finish: Finish, axes: F64) -> Surface:
+    """The surface with a finish; texture coordinates are made anew for wood.
+
+    axes: (3, 3), columns are the thing's own axes, along which the grain of wood runs.
+    """
+    if finish.wood is None:
+        return replace(surface, material=number_of_finish(draft, finish))
+    veneer = pattern_material(draft, grain_pattern(draft, finish.wood))
     mapped = box_mapped(surface, axes, veneer.size_m)
     return replace(mapped, material=veneer.number)
 
 
-def coated_item(draft: Draft, item: Item, coat: Coat) -> Item:
-    """The item with every plain opaque surface under the coat; itself where it has none."""
+def item_with_finish(draft: Draft, item: Item, finish: Finish) -> Item:
+    """The item with the finish on every plain opaque surface; itself where it has none."""
     if not has_plain(draft, item):
         return item
     axes = np.eye(3) if item.box is None else item.box.axes
     return replace(
         item,
         surfaces=tuple(
-            coated(draft, s, coat, axes) if is_plain(draft.materials[s.material]) else s
+            with_finish(draft, s, finish, axes) if is_plain(draft.materials[s.material]) else s
             for s in item.surfaces
         ),
     )
 
 
 def has_plain(draft: Draft, item: Item) -> bool:
-    """Whether a coat would cover any of its surfaces."""
+    """Whether a finish would cover any of its surfaces."""
     return any(is_plain(draft.materials[s.material]) for s in item.surfaces)
 
 
 def is_plain(material: Material) -> bool:
-    """Whether a coat would cover it: opaque and without a picture."""
+    """Whether a finish would cover it: opaque and without a picture."""
     is_solid = material.kind is MaterialKind.OPAQUE and material.opacity == 1
     return is_solid and material.texture_id is None
 
@@ -79,32 +82,32 @@ def part_of_surface(surface: Surface, faces: Bools) -> Surface:
     )
 
 
-def plain_material(draft: Draft, coat: Coat) -> int:
-    """The number of the material of a coat without a picture; wood counts as its mean colour."""
-    return draft.material(coat_material(coat))
+def number_of_finish(draft: Draft, finish: Finish) -> int:
+    """The number of the material of a finish without a picture; wood counts as its mean colour."""
+    return draft.material(material_of_finish(finish))
 
 
-def coat_material(coat: Coat) -> Material:
-    """The material of a coat without a picture; wood counts as its mean colour."""
-    if coat.metal is not None:
-        return _polished(coat.metal)
-    paint = coat.paint if coat.wood is None else coat.wood.mean
-    return _painted_coat(coat.name, paint, coat.roughness)
+def material_of_finish(finish: Finish) -> Material:
+    """The material of a finish without a picture; wood counts as its mean colour."""
+    if finish.metal is not None:
+        return _metal_material(finish.metal)
+    paint = finish.paint if finish.wood is None else finish.wood.mean
+    return _paint_material(finish.name, paint, finish.roughness)
 
 
-def _painted_coat(name: str, colour: Rgb, roughness: float) -> Material:
+def _paint_material(name: str, colour: Rgb, roughness: float) -> Material:
     r, g, b = (round(c, 4) for c in colour)
     code = "".join(f"{round(255 * c):02x}" for c in (r, g, b))
     return Material(
-        f"{COATED} {name} {code} {roughness:.2f}", diffuse=(r, g, b), specular=_SHEEN,
+        f"{FINISHED} {name} {code} {roughness:.2f}", diffuse=(r, g, b), specular=_SHEEN,
         shininess=round(2.0 / roughness**4 - 2.0, 1), roughness=roughness,
     )  # fmt: skip
 
 
-def _polished(metal: Metal) -> Material:
+def _metal_material(metal: Metal) -> Material:
     # Nearly all light is in the highlight, as the metals of furniture have it.
     r, g, b = (round(0.4 * c, 4) for c in metal.colour)
     return Material(
-        f"{COATED} {metal.name}", diffuse=(r, g, b), specular=metal.colour,
+        f"{FINISHED} {metal.name}", diffuse=(r, g, b), specular=metal.colour,
         roughness=metal.roughness, shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
     )  # fmt: skip

@@ -20,7 +20,7 @@ from pbrs_farm.dress.draft import Draft, moved_item
 from pbrs_farm.dress.fitting_pieces import Scale, common_scale, is_lit_alike
 from pbrs_farm.dress.neighbours import (
     ALIKE_HELD,
-    PieceSurroundings,
+    Neighbours,
     drop_onto,
     height_above_floor,
     held_by,
@@ -62,7 +62,7 @@ class _Member:
     held_by: Place
 
 
-def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def swap_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the source's furniture another model of the catalogue.
 
     Each side of the new one is 75 to 100 % of the old one's, its height within 15 %; its back and
@@ -70,19 +70,19 @@ def swap(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None
     the new one would reach into its neighbours, or where things stand in it, the old one stays.
     What stands on a balcony or a terrace stays, too.
     """
-    around = PieceSurroundings(draft.items)
-    for key, indices in _sets(draft, catalogue).items():
+    around = Neighbours(draft.items)
+    for key, indices in _sets_of_models(draft, catalogue).items():
         group = key[0]
         rng = draft.rng(PART, *key)
         if rng.random() >= share:
             continue
-        members = _members(draft, indices, group, around)
+        members = _members_of_set(draft, indices, group, around)
         if members is None:
             continue
         _swap_set(draft, catalogue, group, members, around, rng)
 
 
-def _sets(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
+def _sets_of_models(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
     # Items of one model in one room, by group, room, level and model.
     by_id = pieces_by_plain_id(catalogue)
     # Catalogues furnish rooms: an upholstered armchair would stand in the rain.
@@ -96,8 +96,8 @@ def _sets(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]
     return found
 
 
-def _members(
-    draft: Draft, indices: Sequence[int], group: str, around: PieceSurroundings
+def _members_of_set(
+    draft: Draft, indices: Sequence[int], group: str, around: Neighbours
 ) -> list[_Member] | None:
     found = []
     for index in indices:
@@ -151,7 +151,7 @@ def _walls_near(draft: Draft, item: Item) -> list[F64]:
 
 def _swap_set(
     draft: Draft, catalogue: Catalogue, group: str, members: list[_Member],
-    around: PieceSurroundings, rng: np.random.Generator,
+    around: Neighbours, rng: np.random.Generator,
 ) -> None:  # fmt: skip
     places, items = [m.place for m in members], [m.item for m in members]
     old = plain_id(items[0].source_class)
@@ -178,19 +178,19 @@ def _swap_set(
         shape = catalogue.shape(piece)
         if shape is None or not is_lit_alike(bool(shape.lights), items):
             continue
-        new = [_placed(draft, piece, shape, scale, group, m) for m in members]
+        new = [_item_at_old_place(draft, piece, shape, scale, group, m) for m in members]
         lifts = _lifts(around, members, new)
         if lifts is None:
             why = "a thing on it would find no place"
-        elif not _is_free(around, members, new):
+        elif not _fits_between_neighbours(around, members, new):
             why = "it would reach into its neighbours"
         else:
-            _put(draft, group, piece, members, new, lifts)
+            _put_set(draft, group, piece, members, new, lifts)
             return
     draft.refused[f"{PART}: {why}"] += 1
 
 
-def _placed(
+def _item_at_old_place(
     draft: Draft, piece: Piece, shape: Shape, scale: Scale, group: str, member: _Member
 ) -> Item:
     """The piece as the member's item: same id, room, kind and tags of its source."""
@@ -236,7 +236,7 @@ def _lights_like(old: tuple[LightPart, ...], new: tuple[LightPart, ...]) -> tupl
     )  # fmt: skip
 
 
-def _is_free(around: PieceSurroundings, members: list[_Member], new: list[Item]) -> bool:
+def _fits_between_neighbours(around: Neighbours, members: list[_Member], new: list[Item]) -> bool:
     # The new ones may reach into their neighbours no farther than the old ones did.
     own = {m.index for m in members} | {k for m in members for k in m.on}
     return all(
@@ -245,9 +245,7 @@ def _is_free(around: PieceSurroundings, members: list[_Member], new: list[Item])
     )
 
 
-def _lifts(
-    around: PieceSurroundings, members: list[_Member], new: list[Item]
-) -> dict[int, float] | None:
+def _lifts(around: Neighbours, members: list[_Member], new: list[Item]) -> dict[int, float] | None:
     # How far each thing on the old ones goes up, with what stands on it; None: one finds no place.
     lifts: dict[int, float] = {}
     for member, item in zip(members, new, strict=True):
@@ -261,7 +259,7 @@ def _lifts(
     return lifts
 
 
-def _put(
+def _put_set(
     draft: Draft, group: str, piece: Piece, members: list[_Member], new: list[Item],
     lifts: dict[int, float],
 ) -> None:  # fmt: skip

@@ -32,7 +32,7 @@ _COATED: Final = 0.55  # Ks: more is metal
 _CLEAN: Final = 0.66  # roughness of a smudge map where nobody has touched it
 
 
-def wear(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def add_wear(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Give smooth parts of furniture a roughness map, in share of the homes' pieces."""
     smudges = brushed = None
     for index, item in enumerate(draft.items):
@@ -41,7 +41,7 @@ def wear(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> No
         surfaces = []
         for surface in item.surfaces:
             material = draft.materials[surface.material]
-            if not _is_smooth(material) or _area(surface) < _LEAST_M2:
+            if not _is_smooth(material) or _area_of_surface(surface) < _LEAST_M2:
                 surfaces.append(surface)
                 continue
             axes = np.eye(3) if item.box is None else item.box.axes
@@ -73,17 +73,19 @@ def smudge_map(rng: np.random.Generator) -> F32:
     for _ in range(int(rng.integers(5, 10))):
         y, x = rng.random(2)
         for k in range(int(rng.integers(1, 5))):
-            _stamp(
+            _stamp_oval(
                 touched, y + 0.012 * k * rng.uniform(-0.6, 0.6), x + 0.033 * k, 0.013, 0.009, 0.0
             )
     for _ in range(int(rng.integers(2, 6))):
         y, x = rng.random(2)
         r = float(rng.uniform(0.008, 0.016))
-        _stamp(touched, float(y), float(x), r, r, 0.72)
+        _stamp_oval(touched, float(y), float(x), r, r, 0.72)
     return np.asarray(np.clip(rough + 0.26 * blurred(touched, 0.8), 0.0, 1.0), np.float32)
 
 
-def _stamp(field: F32, y: float, x: float, high_m: float, wide_m: float, hollow: float) -> None:
+def _stamp_oval(
+    field: F32, y: float, x: float, high_m: float, wide_m: float, hollow: float
+) -> None:
     """An oval at (y, x) of the repeat, half axes in metres, hollow up to that share of them."""
     rows, columns = field.shape
     dy = (np.arange(rows) / rows - y + 0.5) % 1.0 - 0.5
@@ -139,5 +141,5 @@ def _is_smooth(material: Material) -> bool:
     )
 
 
-def _area(surface: Surface) -> float:
+def _area_of_surface(surface: Surface) -> float:
     return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())

@@ -85,8 +85,8 @@ class Worktop:
         n = (int(np.ceil(size[2] / cell)) + 1, int(np.ceil(size[0] / cell)) + 1)
         margin, inset = round(margin_m / cell), round(inset_m / cell)
         # The thing must lie on the support, and nothing lower than it stand near.
-        off = _counts(~self.support.mask, n, inset)
-        hit = _counts(self.clear < size[1] + _HEADROOM_M, n, margin)
+        off = _count_in_windows(~self.support.mask, n, inset)
+        hit = _count_in_windows(self.clear < size[1] + _HEADROOM_M, n, margin)
         rows, columns = np.nonzero((off == 0) & (hit == 0))
         return rows.astype(np.int32), columns.astype(np.int32), n
 
@@ -140,7 +140,7 @@ def turned_size(size: F64, turn_rad: float) -> tuple[float, float, float]:
     )  # fmt: skip
 
 
-def _counts(bad: Bools, n: tuple[int, int], grown: int) -> I32:
+def _count_in_windows(bad: Bools, n: tuple[int, int], grown: int) -> I32:
     # How many bad cells are in each window of n cells, grown by so many on each side.
     tall, wide = n[0] + 2 * grown, n[1] + 2 * grown
     total = np.zeros((bad.shape[0] + 2 * grown + 1, bad.shape[1] + 2 * grown + 1), np.int32)

@@ -25,11 +25,11 @@ def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) ->
     """
     limit = np.broadcast_to(np.asarray(limit_y, np.float64), (len(places),))
     found = np.full(len(places), -np.inf)
-    triangles = _near(places, triangles)
+    triangles = _candidates_near(places, triangles)
     step = max(1, _PAIRS // max(1, len(triangles)))
     for k in range(0, len(places) if len(triangles) else 0, step):
         part = slice(k, k + step)
-        y, covers = _heights(places[part, None], triangles)
+        y, covers = _heights_at(places[part, None], triangles)
         found[part] = np.where(covers & (y <= limit[part, None]), y, -np.inf).max(1)
     return found
 
@@ -41,11 +41,11 @@ def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
     """
     least = np.broadcast_to(np.asarray(least_y, np.float64), (len(places),))
     found = np.full(len(places), np.inf)
-    triangles = _near(places, triangles)
+    triangles = _candidates_near(places, triangles)
     triangles = triangles[triangles[:, :, 1].max(1) > least.min(initial=np.inf)]
     step = max(1, _PAIRS // max(1, len(triangles)))
     for k in range(0, len(places) if len(triangles) else 0, step):
-        y, covers = _heights(places[k : k + step, None], triangles)
+        y, covers = _heights_at(places[k : k + step, None], triangles)
         found[k : k + step] = np.where(covers & (y > least[k : k + step, None]), y, np.inf).min(1)
     return found
 
@@ -55,11 +55,11 @@ def heights_in(places: F64, triangles: F64, edge: float = _EDGE) -> F64:
 
     edge: barycentric coordinates by which a place may lie beyond an edge.
     """
-    y, covers = _heights(places, triangles, edge)
+    y, covers = _heights_at(places, triangles, edge)
     return np.where(covers, y, np.nan)
 
 
-def _near(places: F64, triangles: F64) -> F64:
+def _candidates_near(places: F64, triangles: F64) -> F64:
     """The triangles whose plan box meets the places' and that are not upright."""
     if not len(places) or not len(triangles):
         return triangles[:0]
@@ -69,7 +69,7 @@ def _near(places: F64, triangles: F64) -> F64:
     return np.asarray(near[np.abs(e[:, 0] * f[:, 2] - e[:, 2] * f[:, 0]) > _UPRIGHT_M2])
 
 
-def _heights(places: F64, triangles: F64, edge: float = _EDGE) -> tuple[F64, Bools]:
+def _heights_at(places: F64, triangles: F64, edge: float = _EDGE) -> tuple[F64, Bools]:
     """y of triangles (..., 3, 3) at places (..., 2), which broadcast, and whether they cover them."""
     a = triangles[..., 0, :]
     e, f = triangles[..., 1, :] - a, triangles[..., 2, :] - a

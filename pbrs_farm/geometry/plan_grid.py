@@ -78,7 +78,7 @@ def cells_over(grid: PlanGrid, corners: F64, *, touched: bool) -> CellHits:
     triangle, row, column, doubled = _cells_over(grid, local, touched=touched)
     steepest, half = _MAX_SLOPE * grid.cell_m, 0.5 if touched else 0.0
     x, z = (np.asarray(cell + 0.5, np.float64) for cell in (column, row))
-    low, high = _heights(local, doubled, steepest, triangle, x, z, half)
+    low, high = _heights_in_cells(local, doubled, steepest, triangle, x, z, half)
     return CellHits(triangle, row, column, low, high)
 
 
@@ -142,7 +142,7 @@ def top_heights(grid: PlanGrid, corners: F64) -> F64:
     return top
 
 
-def _heights(
+def _heights_in_cells(
     local: F64, doubled: F64, steepest: float,
     triangle: NDArray[np.intp], x: F64, z: F64, half: float,
 ) -> tuple[F64, F64]:  # fmt: skip

@@ -150,8 +150,8 @@ def wall_prism(
     return (
         _side("left", left_low[::-1], left_high[::-1], materials[0]),
         _side("right", right_low, right_high, materials[1]),
-        quads_surface("top", _strip(right_high, left_high), rest if top is None else top),
-        quads_surface("bottom", _strip(left_low, right_low), rest),
+        quads_surface("top", _quads_between(right_high, left_high), rest if top is None else top),
+        quads_surface("bottom", _quads_between(left_low, right_low), rest),
         quads_surface("start", start, rest),
         quads_surface("end", end, rest),
     )
@@ -163,13 +163,13 @@ def _lifted(plan: Points2, y: F64 | float) -> F64:
     return points
 
 
-def _strip(near: F64, far: F64) -> F64:
+def _quads_between(near: F64, far: F64) -> F64:
     # Quads between two polylines; counter-clockwise when far lies to the left of near's direction.
     return np.stack([near[:-1], near[1:], far[1:], far[:-1]], 1)
 
 
 def _side(name: str, low: F64, high: F64, material: int) -> Surface:
-    surface = quads_surface(name, _strip(low, high), material)
+    surface = quads_surface(name, _quads_between(low, high), material)
     # Measure u along the side in plan, v from the wall's bottom.
     steps = np.linalg.norm(np.diff(low[:, [0, 2]], axis=0), axis=1)
     u = np.concatenate([[0.0], np.cumsum(steps)])

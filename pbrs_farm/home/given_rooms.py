@@ -17,14 +17,16 @@ NO_ROOM: Final = "none"
 
 def given_room(source: str, name: str) -> str | None:
     """The type of a source's name, whatever its case and joints; None where the table has none."""
-    return _table().get((source, _key(name)))
+    return _read_given_rooms().get((source, _plain_name(name)))
 
 
-def _key(name: str) -> str:
+def _plain_name(name: str) -> str:
     return "".join(c for c in name.casefold() if c.isalnum())
 
 
 @cache
-def _table() -> dict[tuple[str, str], str]:
+def _read_given_rooms() -> dict[tuple[str, str], str]:
     text = files("pbrs_farm.home").joinpath("given_rooms.csv").read_text("utf-8")
-    return {(r["source"], _key(r["name"])): r["type"] for r in csv.DictReader(text.splitlines())}
+    return {
+        (r["source"], _plain_name(r["name"])): r["type"] for r in csv.DictReader(text.splitlines())
+    }

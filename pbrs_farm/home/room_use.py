@@ -93,7 +93,7 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
 
 def named_kind(name: str) -> RoomKind | None:
     """What a room of that name is for; None where the name does not say."""
-    rule = _rule(name)
+    rule = _rule_for(name)
     return rule.use if rule else None
 
 
@@ -122,7 +122,7 @@ def is_lived_in(room: Room, area_m2: float) -> bool:
 
     Types go before the name; a room of several types is lived in when one of them is.
     """
-    rules = [_rule(text) for text in room.types or (room.name,)]
+    rules = [_rule_for(text) for text in room.types or (room.name,)]
     return area_m2 > MIN_LIVED_IN_M2 and any(rule is None or rule.is_lived_in for rule in rules)
 
 
@@ -154,7 +154,7 @@ def _rules() -> tuple[_Rule, ...]:
 
 
 @lru_cache(1024)
-def _rule(said: str) -> _Rule | None:
+def _rule_for(said: str) -> _Rule | None:
     words, whole = words_of(said), folded(said)
     for rule in _rules():
         if any(w in whole for w in rule.words) if rule.is_part else words & rule.words:

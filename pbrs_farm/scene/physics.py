@@ -262,10 +262,10 @@ def _set_poses(state: Any, things: Sequence[_Body]) -> None:
 def _mjcf(
     things: Sequence[_Body], parts: dict[Model, tuple[F64, ...]], statics: Sequence[F64]
 ) -> str:
-    assets = [_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
+    assets = [_mjcf_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
     names = {model: f"m{j}" for j, model in enumerate(parts)}
     for model, hulls in parts.items():
-        assets += [_mesh(f"{names[model]}_{k}", hull) for k, hull in enumerate(hulls)]
+        assets += [_mjcf_mesh(f"{names[model]}_{k}", hull) for k, hull in enumerate(hulls)]
     bodies = [f'<geom type="mesh" mesh="s{k}"/>' for k in range(len(statics))]
     for thing in things:
         geoms = "".join(
@@ -286,7 +286,7 @@ def _mjcf(
 <worldbody>{"".join(bodies)}</worldbody></mujoco>"""
 
 
-def _mesh(name: str, points: F64) -> str:
+def _mjcf_mesh(name: str, points: F64) -> str:
     text = " ".join(f"{v:.7g}" for v in np.asarray(points).ravel())
     return f'<mesh name="{name}" vertex="{text}"/>'
 

@@ -60,7 +60,7 @@ def free_pose(house: House, model: Model, targets: Sequence[Target], seed: int) 
     rng = np.random.default_rng([seed, 1])
     surfaces = tops_of(house, targets)
     for k in rng.permutation(len(surfaces)):
-        pose = _stand(model, surfaces[int(k)].tops, rng)
+        pose = _stand_on_tops(model, surfaces[int(k)].tops, rng)
         if pose is not None:
             return pose
     text, hint = f"has no free place for {model.id}", "a smaller thing, or another place"
@@ -88,7 +88,7 @@ def scattered_poses(
         which = list(untried)[int(rng.integers(len(untried)))]
         choices = untried[which]
         at = int(rng.choice(choices, p=areas[choices] / areas[choices].sum()))
-        pose = _stand(models[which], surfaces[at].tops, rng)
+        pose = _stand_on_tops(models[which], surfaces[at].tops, rng)
         if pose is not None:
             placed.append((models[which], pose))
             continue
@@ -156,7 +156,7 @@ def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:
     return matrix
 
 
-def _stand(model: Model, tops: Sequence[Worktop], rng: np.random.Generator) -> F64 | None:
+def _stand_on_tops(model: Model, tops: Sequence[Worktop], rng: np.random.Generator) -> F64 | None:
     """Take a free place of some tops for a model; its pose (4, 4), None where it fits on none.
 
     It is turned at random, and along the top's sides where it fits in no other way.

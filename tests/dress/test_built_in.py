@@ -1,4 +1,4 @@
-"""One scheme of joinery a home: doors, windows, stairs and what is fitted have its coats."""
+"""One scheme of finishes a home: doors, windows, stairs and what is fitted have them."""
 
 from dataclasses import replace
 
@@ -9,10 +9,10 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import DressFields
-from pbrs_farm.dress.built_in import joinery
+from pbrs_farm.dress.built_in import finish_built_in_parts
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.dressing import dress
-from pbrs_farm.dress.finish_scheme import joinery_scheme
+from pbrs_farm.dress.finish_scheme import finish_scheme
 from pbrs_farm.dress.gates.bodies import bodies_of, has_same_mesh
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -40,7 +40,7 @@ def door() -> Item:
 
 def joined(source: House, seed: int, share: float = 1.0) -> House:
     draft = Draft(source, seed)
-    joinery(draft, EMPTY, style_for(draft.rng("style")), share)
+    finish_built_in_parts(draft, EMPTY, style_for(draft.rng("style")), share)
     return draft.house()
 
 
@@ -121,9 +121,9 @@ def test_a_share_of_nothing_changes_no_door() -> None:
 def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
     draft = Draft(house(door()), 3)
     style = style_for(draft.rng("style"))
-    first = joinery_scheme(draft, style)
+    first = finish_scheme(draft, style)
     draft.rng("surfaces").random(100)
-    assert joinery_scheme(draft, style) == first
+    assert finish_scheme(draft, style) == first
 
 
 @pytest.mark.slow

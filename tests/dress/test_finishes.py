@@ -11,7 +11,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Item, Material, MaterialKind
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finishes import parts
+from pbrs_farm.dress.finishes import finish_furniture
 from pbrs_farm.dress.part_kinds import is_brown, is_dark, is_white, kind_by_name
 from pbrs_farm.dress.style import Rgb, style_for
 from pbrs_farm.dress.textures.families import PatternMaterial
@@ -30,7 +30,7 @@ def _dressed(
 ) -> Draft:
     whole: House = replace(house(*items), materials=materials)
     draft = Draft(whole, seed)
-    parts(draft, EMPTY, style_for(draft.rng("style"), ""), share)
+    finish_furniture(draft, EMPTY, style_for(draft.rng("style"), ""), share)
     return draft
 
 

@@ -13,7 +13,7 @@ from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.furniture import KINDS, furniture
+from pbrs_farm.dress.furniture import KINDS, add_furniture
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
@@ -31,7 +31,7 @@ BOARDS = Boards(_WOOD, plain("white", (0.9, 0.9, 0.9), 0.4), _WOOD)
 
 def _draft(seed: int, share: float = 1.0) -> Draft:
     draft = Draft(builtin_home(), seed)
-    furniture(draft, EMPTY, STYLE, share)
+    add_furniture(draft, EMPTY, STYLE, share)
     return draft
 
 
@@ -132,7 +132,7 @@ def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:
     n = 0
     for seed in range(3):
         draft = Draft(replace(home, items=(*bare, worktop)), seed)
-        furniture(draft, EMPTY, STYLE, 1.0)
+        add_furniture(draft, EMPTY, STYLE, 1.0)
         for item in _added(draft):
             if item.nyu40 == BOOKSHELF and item.room_id == "0_0":
                 apart = np.maximum(

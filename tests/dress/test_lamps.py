@@ -12,7 +12,7 @@ from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.dress import made_lamps as made
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.lamps import lamps
+from pbrs_farm.dress.lamps import add_lamps
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.geometry.solids import box
@@ -28,7 +28,7 @@ def _dark() -> House:
 
 def _dressed(house: House, seed: int, share: float = 1.0) -> Draft:
     draft = Draft(house, seed)
-    lamps(draft, EMPTY, STYLE, share)
+    add_lamps(draft, EMPTY, STYLE, share)
     return draft
 
 

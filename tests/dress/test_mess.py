@@ -13,14 +13,14 @@ from pbrs_farm.core.classes import BED, CHAIR, PICTURE, TABLE
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import edges_are_paired, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
-from pbrs_farm.dress.clutter.placing import Placing, apart
+from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import Stock
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
-from pbrs_farm.dress.mess import chairs, pictures
+from pbrs_farm.dress.mess import move_chairs, tilt_pictures
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.things.books import book_covers
 from pbrs_farm.geometry.heights import highest_below
@@ -46,7 +46,7 @@ def _dining() -> House:
 
 def _moves(seed: int, share: float) -> list[float]:
     draft = Draft(_dining(), seed, share)
-    chairs(draft, EMPTY, STYLE, share)
+    move_chairs(draft, EMPTY, STYLE, share)
     pairs = zip(draft.items[1:], draft.source.items[1:], strict=True)
     return [float(np.linalg.norm(a.bounds.mean(0) - b.bounds.mean(0))) for a, b in pairs]
 
@@ -63,12 +63,12 @@ def test_a_chair_is_not_pulled_into_what_stands_behind_it_or_through_a_wall() ->
     cupboard = solid("cupboard", [1.0, 0.0, 0.35], [3.0, 1.0, 0.66])
     for seed in range(8):
         draft = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.7), cupboard), seed, 1.0)
-        chairs(draft, EMPTY, STYLE, 1.0)
+        move_chairs(draft, EMPTY, STYLE, 1.0)
         assert draft.items[1].bounds[0, 2] > 0.64
         keep_gates(draft, {})
         assert not draft.refused["swap: stood in another thing"]
         at_wall = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.02)), seed, 1.0)
-        chairs(at_wall, EMPTY, STYLE, 1.0)
+        move_chairs(at_wall, EMPTY, STYLE, 1.0)
         assert at_wall.items[1].bounds[0, 2] > -0.001
 
 
@@ -87,7 +87,7 @@ def test_a_picture_hangs_a_degree_askew_in_its_own_plane() -> None:
             piece, shape, at, 0.0, item_id="dress-walls-0", room_id="0_0", level_id="0"
         )
         draft.add(item, "walls", piece)
-        pictures(draft, EMPTY, STYLE, 0.5)
+        tilt_pictures(draft, EMPTY, STYLE, 0.5)
         moved = draft.items[-1]
         assert moved.bounds[:, 2] == pytest.approx(item.bounds[:, 2], abs=1e-6)
         assert moved.box is not None
@@ -108,7 +108,7 @@ def _bedroom(width: float) -> House:
 def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: float, n: int) -> None:
     for seed in range(3):
         draft = Draft(_bedroom(width), seed, 0.3)
-        clutter(draft, EMPTY, STYLE, 1.0)
+        add_clutter(draft, EMPTY, STYLE, 1.0)
         keep_gates(draft, draft.used)
         added = draft.items[1:]
         pillows = [i for i in added if i.source_class == "generated#pillow"]
@@ -179,14 +179,14 @@ def test_shoes_stand_apart_and_on_their_soles() -> None:
     )  # fmt: skip
     piece = Piece("generated#shoes", "Shoes", "shoes", Place.SURFACE, 40, (0.18, 0.26, 0.08))
     shape = Shape((surface,), (Material("m"),))
-    _piece, moved = apart((piece, shape), np.random.default_rng(3), 1.0)
+    _piece, moved = separate_pair((piece, shape), np.random.default_rng(3), 1.0)
     points = moved.surfaces[0].positions
     assert points[:, 1].min() == pytest.approx(0.0, abs=1e-6)
     halves = [
         shapely.MultiPoint(points[k * 24 : (k + 1) * 24][:, [0, 2]]).convex_hull for k in (0, 1)
     ]
     assert halves[0].intersection(halves[1]).area < 1e-6
-    _same, tidy = apart((piece, shape), np.random.default_rng(3), 0.0)
+    _same, tidy = separate_pair((piece, shape), np.random.default_rng(3), 0.0)
     assert tidy.surfaces[0].positions == pytest.approx(surface.positions, abs=1e-6)
 
 

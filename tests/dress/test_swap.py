@@ -14,7 +14,7 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.draft import ADDED_TAG, Draft
 from pbrs_farm.dress.old_place import OldPlace, before_boards
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.swap import swap
+from pbrs_farm.dress.swap import swap_furniture
 from pbrs_farm.geometry.solids import box
 from tests.dress.furniture import house, solid
 
@@ -69,7 +69,7 @@ def _item(
 
 def _swapped(catalogue: Catalogue, *items: Item, share: float = 1.0, seed: int = 3) -> Draft:
     draft = Draft(house(*items), seed)
-    swap(draft, catalogue, style_for(draft.rng("style"), ""), share)
+    swap_furniture(draft, catalogue, style_for(draft.rng("style"), ""), share)
     return draft
 
 
@@ -161,7 +161,9 @@ def test_a_chair_on_a_balcony_stays_and_one_in_a_room_is_swapped(name: str, is_k
     size = (0.5, 0.5, 0.9)
     home = house(_item("chair", size, [1, 0, 1], 5, is_seat=True), name=name)
     draft = Draft(home, 3)
-    swap(draft, _catalogue(("chair", "new", size)), style_for(draft.rng("style"), ""), 1.0)
+    swap_furniture(
+        draft, _catalogue(("chair", "new", size)), style_for(draft.rng("style"), ""), 1.0
+    )
     assert (draft.items[0] is home.items[0]) == is_kept
 
 

@@ -14,7 +14,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.wear import SIZE_M, wear
+from pbrs_farm.dress.wear import SIZE_M, add_wear
 from tests.dress.furniture import house, solid
 
 FRONT = Material("coated front", specular=(0.4, 0.4, 0.4), roughness=0.3)
@@ -24,7 +24,7 @@ STEEL = Material("brushed steel", specular=(0.78, 0.77, 0.75), roughness=0.38)
 def _worn(material: Material, size: float = 1.0, share: float = 1.0) -> Draft:
     thing = solid("t", [1, 0, 1], [1 + size, size, 1 + size], NYU40_NAMES.index("cabinet"))
     draft = Draft(replace(house(thing), materials=(material,)), 5)
-    wear(draft, EMPTY, style_for(draft.rng("style"), ""), share)
+    add_wear(draft, EMPTY, style_for(draft.rng("style"), ""), share)
     return draft
 
 

@@ -71,7 +71,9 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
             made = _narrowed(made, most / made[0].size[0])
         apart = max(0.46, (made[0].size[0] + 0.02) / bed.width)
         for at in (0.5 - apart / 2, 0.5 + apart / 2) if is_double else (0.5,):
-            n += lay_down(placing, scene, index, made, *_place(bed, at, 0.06, made), bed.level)
+            n += lay_down(
+                placing, scene, index, made, *_place_on_bed(bed, at, 0.06, made), bed.level
+            )
         # Who sleeps there has a duvet, below the pillows.
         first = bed.rows[0] * bed.grid.cell_m + 0.06 + made[0].size[1] + 0.08
         sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
@@ -84,13 +86,15 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         # A cushion leans where the pillows end, not across the bed's middle.
         made = soft.cushion.make(rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
-        n += lay_down(placing, scene, index, made, *_place(bed, at, 0.56, made), bed.level)
+        n += lay_down(placing, scene, index, made, *_place_on_bed(bed, at, 0.56, made), bed.level)
     if rng.random() < 0.65 * placing.share:
         # A folded blanket across the foot.
         made = soft.folded_blanket.make(rng, placing.style)
         at = float(rng.uniform(0.35, 0.65))
         from_head = bed.length - made[0].size[1] - float(rng.uniform(0.08, 0.25))
-        n += lay_down(placing, scene, index, made, *_place(bed, at, from_head, made), bed.level)
+        n += lay_down(
+            placing, scene, index, made, *_place_on_bed(bed, at, from_head, made), bed.level
+        )
     return n
 
 
@@ -174,7 +178,7 @@ def _has_pillows(bed: Lying) -> bool:
     return bool((part > bed.level + 0.03).mean() > 0.15)
 
 
-def _place(bed: Lying, across: float, from_head_m: float, made: Made) -> tuple[F64, float]:
+def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Made) -> tuple[F64, float]:
     # World (x, z) of a thing that lies so far from the head, and its turn.
     depth = made[0].size[1]
     row = bed.rows[0] + (from_head_m + depth / 2) / bed.grid.cell_m

@@ -51,11 +51,11 @@ def lay_duvet(
     grid: the bed's, whose rows run from its head; sides, rows: metres in it. level: the mattress's.
     """
     rng = placing.rng
-    ground, shift = _ground(placing, scene, grid, sides, rows, level, _DUVET_M)
+    ground, shift = _ground_under_cloth(placing, scene, grid, sides, rows, level, _DUVET_M)
     # It hangs over each side as far as nothing stands beside the bed.
     out = float(rng.uniform(0.1, 0.26))
     free = [
-        _is_free(ground, shift, side, rows, sign, placing)
+        _is_free_beside_bed(ground, shift, side, rows, sign, placing)
         for side, sign in zip(sides, (-1, 1), strict=True)
     ]
     low, high = (
@@ -73,7 +73,7 @@ def lay_duvet(
     tint = mix(
         _LINEN, placing.style.textiles[int(rng.integers(4))], float(rng.choice([0.0, 0.25, 0.6]))
     )
-    return _put(placing, "duvet", net, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
+    return _put_cloth(placing, "duvet", net, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
 
 
 def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | None = None) -> None:
@@ -83,14 +83,16 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
     across = float(max(high[0] - low[0], high[2] - low[2]))
     grid, sides, rows = _over(low, high, float(rng.uniform(-np.pi, np.pi)))
     at = low + (high - low) * rng.uniform(0.25, 0.75, 3)
-    ground, _shift = _ground(placing, scene, grid, sides, rows, float(high[1]), 0.008, more)
+    ground, _shift = _ground_under_cloth(
+        placing, scene, grid, sides, rows, float(high[1]), 0.008, more
+    )
     x, z = _local(ground, at)
     size = (min(1.3, 0.8 * across), min(0.9, 0.6 * across))
     net, threads = flat_net(size, _THREADS_M["throw"], (x, float(high[1]) + 0.05, z), 0.0)
     folds = Folds(10, 0.03, 0.03, (0.2, 0.7))
     net = folded(fallen(net, threads, ground, 0.008), ground, 0.008, folds, rng)
     tint = style.textiles[int(rng.integers(len(style.textiles)))]
-    _put(placing, "throw", net, ground, 0.008, plain("throw", tint, 1.0), OTHERPROP)
+    _put_cloth(placing, "throw", net, ground, 0.008, plain("throw", tint, 1.0), OTHERPROP)
 
 
 def drop_clothes(
@@ -100,7 +102,7 @@ def drop_clothes(
     rng, style = placing.rng, placing.style
     near = np.array([[at[0] - 0.3, level, at[1] - 0.3], [at[0] + 0.3, level, at[1] + 0.3]])
     grid, sides, rows = _over(near[0], near[1], float(rng.uniform(-np.pi, np.pi)))
-    ground, _shift = _ground(placing, scene, grid, sides, rows, level, 0.006)
+    ground, _shift = _ground_under_cloth(placing, scene, grid, sides, rows, level, 0.006)
     x, z = _local(ground, np.array([at[0], level, at[1]]))
     size = (float(rng.uniform(0.3, 0.42)), float(rng.uniform(0.24, 0.36)))
     size = (0.14, 0.12) if napkin else size
@@ -128,7 +130,7 @@ def drop_clothes(
     tint = mix((r, g, b), style.textiles[int(rng.integers(4))], 0.5)
     tint = mix(tint, _LINEN, 0.7 if napkin else 0.0)
     name, nyu40 = ("napkin", OTHERPROP) if napkin else ("crumpled_clothes", CLOTHES)
-    _put(placing, name, net, ground, 0.006, plain(name, tint, 0.95), nyu40)
+    _put_cloth(placing, name, net, ground, 0.006, plain(name, tint, 0.95), nyu40)
 
 
 def _over(
@@ -144,7 +146,7 @@ def _local(ground: Ground, at: F64) -> tuple[float, float]:
     return float(column * ground.grid.cell_m), float(row * ground.grid.cell_m)
 
 
-def _ground(
+def _ground_under_cloth(
     placing: Placing, scene: SceneTriangles, grid: PlanGrid, sides: tuple[float, float],
     rows: tuple[float, float], level: float, thick_m: float,
     more: F64 | None = None,
@@ -166,7 +168,7 @@ def _ground(
     return ground, (reach - sides[0], reach - rows[0])
 
 
-def _is_free(
+def _is_free_beside_bed(
     ground: Ground, shift: tuple[float, float], side: float, rows: tuple[float, float], sign: int,
     placing: Placing,
 ) -> bool:  # fmt: skip
@@ -177,14 +179,14 @@ def _is_free(
     return bool((heights < placing.room.floor_y + _BESIDE_M).mean() > 0.95)
 
 
-def _gap(points: F64, ground: Ground) -> float:
+def _gap_under_cloth(points: F64, ground: Ground) -> float:
     """How far cloth (N, 3) hangs over what it fell on, whose edges it was kept off; metres."""
     below = highest_below(points[:, [0, 2]], ground.corners, points[:, 1] + _SUNK_M)
     gap = float((points[:, 1] - np.maximum(below, points[:, 1] - 1.0)).min()) - TOUCH_M
     return min(max(gap, 0.0), _MOST_GAP_M)
 
 
-def _put(
+def _put_cloth(
     placing: Placing, family: str, net: F64, ground: Ground, thick_m: float, material: Material,
     nyu40: int,
 ) -> F64:  # fmt: skip
@@ -192,7 +194,7 @@ def _put(
     thing = made(family, [(surface, material)], group="blanket", nyu40=nyu40)
     points = surface.positions.astype(np.float64)
     if family != "duvet":
-        points[:, 1] -= _gap(points, ground)
+        points[:, 1] -= _gap_under_cloth(points, ground)
         surface = replace(surface, positions=points.astype(np.float32))
     base = (points.min(0) + points.max(0)) / 2
     base[1] = points[:, 1].min()

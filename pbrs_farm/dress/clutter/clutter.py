@@ -42,7 +42,7 @@ _SCREENS = ("laptop", "monitor")
 _SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook", "pc", "imac"})
 
 
-def clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Put small things where they belong, touching what they stand on and nothing else."""
     space = house_space(draft)
     scene = SceneTriangles(draft.items)

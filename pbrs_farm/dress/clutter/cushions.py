@@ -168,7 +168,7 @@ def _lean(
     points = points - [0, thick / 2, 0]
     own = corners[owner == index]
     placed = _settled(points, own, turn, centre, thick)
-    if placed is None or _meets(placed, turn, points, corners, owner, index):
+    if placed is None or _meets_cushion(placed, turn, points, corners, owner, index):
         placing.refuse("a cushion does not fit on the seat")
         return False
     start, surfaces = 0, []
@@ -226,7 +226,9 @@ def _way_to_seat(placed: F64, corners: F64) -> float | None:
     return float(gap.min() - TOUCH_M)
 
 
-def _meets(placed: F64, turn: F64, points: F64, corners: F64, owner: I32, index: int) -> bool:
+def _meets_cushion(
+    placed: F64, turn: F64, points: F64, corners: F64, owner: I32, index: int
+) -> bool:
     """Whether faces reach deeper than a centimetre into the cushion, or others touch it at all."""
     # Spread points over the faces near it and see them in the cushion's frame.
     centre = placed.mean(0)
@@ -234,12 +236,12 @@ def _meets(placed: F64, turn: F64, points: F64, corners: F64, owner: I32, index:
     weights = np.array([[a, b, 8 - a - b] for a in range(9) for b in range(9 - a)]) / 8
     samples = np.einsum("wk,tkd->twd", weights, corners)
     local = (samples - centre) @ turn
-    deep = _inside(local, size - 0.012)
-    near = _inside(local, size + 0.005)
+    deep = _depth_in_cushion(local, size - 0.012)
+    near = _depth_in_cushion(local, size + 0.005)
     return bool(deep.any() or near[owner != index].any())
 
 
-def _inside(local: F64, half: F64) -> F64:
+def _depth_in_cushion(local: F64, half: F64) -> F64:
     # Inside the cushion's lens: thick in its middle, thin at its rim.
     u = np.abs(local[..., 0] / half[0])
     v = np.abs(local[..., 2] / half[2])

@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.classes import CABINET, COUNTER, DRESSER, OTHERFURNITURE, REFRIGERATOR
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.walkable import CELL_M
-from pbrs_farm.dress.clutter.placing import Placing, apart
+from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import CLUTTER
 from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import (
@@ -62,7 +62,7 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
         for kind, chance in CLUTTER.floors.get(room.kind, ())
         if rng.random() < chance * placing.share
     ]
-    floor = _floor(scene, space, room) if wanted else None
+    floor = _floor_of_room(scene, space, room) if wanted else None
     flights = flights_of(placing.draft, room.room, room.area)
     if floor is not None and not flights.before.is_empty:
         plan = floor.grid.centres()
@@ -73,13 +73,13 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     for kind in wanted:
         made = placing.stock.take(rng, kind, placing.style)
         if made is not None and kind == "shoes":
-            made = apart(made, rng, placing.draft.mess)
+            made = separate_pair(made, rng, placing.draft.mess)
         if made is not None:
-            n += _put(placing, floor, made, at_wall=kind in CLUTTER.at_walls)
+            n += _put_on_floor(placing, floor, made, at_wall=kind in CLUTTER.at_walls)
     return n
 
 
-def _floor(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor | None:
+def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) -> _Floor | None:
     if room.area.is_empty or room.room.polygon.shape[0] < 3:
         return None
     y = room.room.floor_y
@@ -122,7 +122,7 @@ def _before_front(item: Item, floor_y: float) -> BaseGeometry:
     return shapely.Polygon([near - across, near + across, far + across, far - across])
 
 
-def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
+def _put_on_floor(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
     low, high = made[1].bounds
     reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     # Its middle keeps from everything by its own radius, but not much more.
@@ -144,7 +144,7 @@ def _put(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
         ):
             continue
         x, z = floor.grid.plan_of(columns[k] + 0.5, rows[k] + 0.5)
-        turn = _facing(to_wall, int(rows[k]), int(columns[k]))
+        turn = _turn_from_wall(to_wall, int(rows[k]), int(columns[k]))
         placing.put(
             made, np.array([x, placing.room.floor_y + LIFT_M, z]),
             turn + float(placing.rng.normal(0, 0.2)),
@@ -175,7 +175,7 @@ def _disc(shape: tuple[int, int], row: int, column: int, radius_m: float) -> Boo
     return np.asarray((i - row) ** 2 + (j - column) ** 2 <= (radius_m / CELL_M) ** 2)
 
 
-def _facing(to_wall: F64, row: int, column: int) -> float:
+def _turn_from_wall(to_wall: F64, row: int, column: int) -> float:
     # Away from what is nearest: up the slope of the distance.
     i, j = slice(max(row - 2, 0), row + 3), slice(max(column - 2, 0), column + 3)
     part = to_wall[i, j]

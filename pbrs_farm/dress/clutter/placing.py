@@ -26,7 +26,7 @@ _NEAR_M = 0.06
 _MOST_IN_ROOM = 4
 
 
-def apart(made: Made, rng: np.random.Generator, mess: float) -> Made:
+def separate_pair(made: Made, rng: np.random.Generator, mess: float) -> Made:
     """A pair of things that stand side by side, each turned and moved by itself."""
     piece, shape = made
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
@@ -35,7 +35,7 @@ def apart(made: Made, rng: np.random.Generator, mess: float) -> Made:
     for surface in shape.surfaces:
         points = surface.positions.astype(np.float64)
         # Each connected part goes with the side that its middle is on.
-        of = _parts(surface)
+        of = _connected_part_of_vertices(surface)
         middle = np.array([points[of == k, 0].mean() for k in range(int(of.max()) + 1)])[of]
         for side, sign in enumerate((-1, 1)):
             own = middle * sign > 0
@@ -49,7 +49,7 @@ def apart(made: Made, rng: np.random.Generator, mess: float) -> Made:
     return replace(piece, size=(width, depth, height)), moved
 
 
-def _parts(surface: Surface) -> NDArray[np.int64]:
+def _connected_part_of_vertices(surface: Surface) -> NDArray[np.int64]:
     """(N,) the number of the connected part of each vertex; vertices of one place are one."""
     _, place = np.unique(np.round(surface.positions, 5), axis=0, return_inverse=True)
     place = place.reshape(-1)

@@ -61,7 +61,7 @@ class Stock:
         if kind == "magazines":
             return magazines(rng, self.covers, int(rng.integers(1, 6)))
         # Draw for all alike, so that what the catalogue holds moves no later draw.
-        found = _kind(kind)
+        found = _thing_kind(kind)
         is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
         designs = [] if found.made and is_made else self._owned(kind)
         # Of one detailed model there are few in a home.
@@ -76,7 +76,7 @@ class Stock:
     def _owned(self, kind: str) -> list[Made]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
         if kind not in self._designs:
-            found = _kind(kind)
+            found = _thing_kind(kind)
             fitting = [
                 p
                 for p in self._catalogue.of(*found.groups)
@@ -106,7 +106,7 @@ def is_known(kind: str) -> bool:
     return kind in (*_KINDS, *THINGS, "book", "magazines")
 
 
-def _kind(name: str) -> ThingKind:
+def _thing_kind(name: str) -> ThingKind:
     return _KINDS.get(name) or ThingKind(kind=name, made=name)
 
 

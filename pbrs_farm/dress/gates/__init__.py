@@ -2,6 +2,6 @@
 
 from pbrs_farm.dress.gates.as_rendered import kept_as_rendered
 from pbrs_farm.dress.gates.bodies import piece_id
-from pbrs_farm.dress.gates.keep_gates import group_of, keep_gates, part_of
+from pbrs_farm.dress.gates.keep_gates import group_of, keep_gates, pass_that_added
 
-__all__ = ["group_of", "keep_gates", "kept_as_rendered", "part_of", "piece_id"]
+__all__ = ["group_of", "keep_gates", "kept_as_rendered", "pass_that_added", "piece_id"]

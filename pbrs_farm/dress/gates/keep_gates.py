@@ -67,7 +67,7 @@ def keep_gates(
     memory.free.clear()
     taken: Counter[str] = Counter()
     for _round in range(_ROUNDS):
-        checked, broken = _measured(draft, pieces, memory, names)
+        checked, broken = _measure_gates(draft, pieces, memory, names)
         out: dict[int, str] = {}
         for name in names:
             for index in broken[name]:
@@ -77,14 +77,14 @@ def keep_gates(
         taken.update(out.values())
         _take_out(draft, out)
     else:
-        checked, broken = _measured(draft, pieces, memory, names)
+        checked, broken = _measure_gates(draft, pieces, memory, names)
     return tuple(
         Gate(name=n, n_checked=checked[n], n_taken_out=taken[n], n_left=len(broken[n]))
         for n in names
     )
 
 
-def _measured(
+def _measure_gates(
     draft: Draft, pieces: Mapping[str, Piece], memory: _Memory, names: Sequence[str]
 ) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Gate -> how much was measured, and gate -> indices of the items that break it."""
@@ -180,13 +180,15 @@ def _take_out(draft: Draft, out: Mapping[int, str]) -> None:
     n_source = len(draft.source.items)
     for index, name in out.items():
         item = draft.items[index]
-        draft.refused[f"{part_of(item) if index >= n_source else 'swap'}: {_REASONS[name]}"] += 1
+        draft.refused[
+            f"{pass_that_added(item) if index >= n_source else 'swap'}: {_REASONS[name]}"
+        ] += 1
         if index < n_source:
             draft.items[index] = draft.source.items[index]
     draft.items = [x for k, x in enumerate(draft.items) if k < n_source or k not in out]
 
 
-def part_of(item: Item) -> str:
+def pass_that_added(item: Item) -> str:
     """The part of the dressing that added an item, of its id `dress-<part>-<n>`."""
     words = item.id.split("-")
     return words[1] if len(words) > 2 and words[0] == "dress" else "dress"

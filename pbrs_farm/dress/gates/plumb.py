@@ -64,7 +64,9 @@ class Plumb:
         # Enter each triangle into cells of a size that suits it.
         left, self._grids = np.arange(len(self._corners)), list[_Grid]()
         for cell_m in _CELLS_M:
-            grid, left = _grid(self._corners, left, cell_m, is_last=cell_m == _CELLS_M[-1])
+            grid, left = _grid_of_triangles(
+                self._corners, left, cell_m, is_last=cell_m == _CELLS_M[-1]
+            )
             self._grids.append(grid)
 
     def hits(self, points: F64, reach_m: float) -> Hits:
@@ -103,7 +105,9 @@ class _Grid:
         return place, self.triangle[np.repeat(low, count) + _counting(count)]
 
 
-def _grid(corners: F64, numbers: Ints, cell_m: float, *, is_last: bool) -> tuple[_Grid, Ints]:
+def _grid_of_triangles(
+    corners: F64, numbers: Ints, cell_m: float, *, is_last: bool
+) -> tuple[_Grid, Ints]:
     """A grid of some of the triangles (F, 3, 3), and the numbers of those too large for it."""
     plan = corners[numbers][:, :, [0, 2]]
     origin = plan.min((0, 1)) if len(plan) else np.zeros(2)

@@ -85,7 +85,7 @@ def depths_inside(points: F64, corners: F64) -> F64:
         left = np.flatnonzero(inside)
         if not len(left):
             break
-        n_ahead, ahead, n_behind, behind = _along(points[left], corners, axis)
+        n_ahead, ahead, n_behind, behind = _crossings_along(points[left], corners, axis)
         odd_ahead, odd_behind = n_ahead % 2 == 1, n_behind % 2 == 1
         inside[left] &= odd_ahead if axis == 1 else odd_ahead & odd_behind
         nearest = np.minimum(ahead, np.where(odd_behind, behind, np.inf))
@@ -93,7 +93,7 @@ def depths_inside(points: F64, corners: F64) -> F64:
     return np.where(inside & np.isfinite(depth), depth, 0.0)
 
 
-def _along(
+def _crossings_along(
     points: F64, corners: F64, axis: int
 ) -> tuple[NDArray[np.int64], F64, NDArray[np.int64], F64]:
     """Faces ahead of and behind each point along an axis: how many, and how far the nearest."""

@@ -46,7 +46,7 @@ class Held:
 def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
     """By what each of some bodies is held. plumb: of all bodies."""
     low, high = boxes_of(bodies)
-    found = _standing(bodies, numbers, plumb)
+    found = _find_what_holds(bodies, numbers, plumb)
     for number in numbers:
         body = bodies[number]
         ways = [found[number]] if _may_stand(body) else []
@@ -66,24 +66,26 @@ def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
     return held([*bodies[:number], former, *bodies[number + 1 :]], [number], plumb)[number]
 
 
-def _place(body: Body) -> Place | None:
+def _place_of_piece(body: Body) -> Place | None:
     return body.piece.place if body.piece is not None else None
 
 
 def _may_stand(body: Body) -> bool:
-    return _place(body) not in (Place.WALL, Place.OPENING)
+    return _place_of_piece(body) not in (Place.WALL, Place.OPENING)
 
 
 def _may_hang(body: Body) -> bool:
     # A piece of the source that was replaced may have stood or hung.
     is_swapped = body.was is not None
-    hangs = _place(body) in (Place.WALL, Place.OPENING, Place.CEILING, None)
+    hangs = _place_of_piece(body) in (Place.WALL, Place.OPENING, Place.CEILING, None)
     return is_swapped or hangs or body.group in _SOFT
 
 
-def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
+def _find_what_holds(
+    bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb
+) -> dict[int, Held]:
     """What each body stands on, or hangs from at its top, where its piece belongs to the ceiling."""
-    places = [_places(bodies[n]) for n in numbers]
+    places = [_places_that_touch(bodies[n]) for n in numbers]
     points = np.concatenate([np.zeros((0, 3)), *places])
     of = np.repeat(np.asarray(numbers, np.int64), [len(p) for p in places])
     hits = plumb.hits(points, _REACH_M)
@@ -106,10 +108,10 @@ def _standing(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> d
     return found
 
 
-def _places(body: Body) -> F64:
+def _places_that_touch(body: Body) -> F64:
     """(P, 3) the lowest points of a body, or the highest of what hangs from a ceiling."""
     points = body.corners.reshape(-1, 3)
-    if _place(body) is Place.CEILING:
+    if _place_of_piece(body) is Place.CEILING:
         ring = points[points[:, 1] > body.high[1] - _RING_M]
     elif body.group in _SOFT:
         ring = points
@@ -147,13 +149,13 @@ def _distance_m(a: Body, b: Body) -> float:
 def _vertices_to_faces(a: Body, b: Body) -> float:
     # Look for what touches; tell a gap by some vertices alone where nothing does.
     for reach, most in ((2 * MOST_M, _ALL), (_REACH_M / 10, 400)):
-        i, j = _near(a, b, reach, most)
+        i, j = _vertices_and_faces_near(a, b, reach, most)
         if len(i):
             return float(distances_to_triangles(i, j).min())
     return _REACH_M
 
 
-def _near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
+def _vertices_and_faces_near(a: Body, b: Body, reach: float, most: int) -> tuple[F64, F64]:
     """Vertices (N, 3) of a and faces (N, 3, 3) of b whose boxes come as near as reach to each other."""
     points = a.corners.reshape(-1, 3)
     inside = np.ones(len(points), np.bool_)

@@ -36,7 +36,7 @@ class Blocked:
     index: int  # of the body's item in the draft
 
 
-def _counts(body: Body) -> bool:
+def _is_in_the_way(body: Body) -> bool:
     return body.is_new and body.item.nyu40 not in _CURTAINS
 
 
@@ -54,7 +54,7 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
                 [door.width / 2 - _BESIDE_M, min(door.top_y, floor_y + _HEAD_M), door.clear_m]
             )
             for k in np.flatnonzero(_may_enter(boxes, door, side, low, high)).tolist():
-                if _counts(bodies[k]) and _enters(bodies[k], door, side, low, high):
+                if _is_in_the_way(bodies[k]) and _enters(bodies[k], door, side, low, high):
                     found.append(Blocked(door.id, bodies[k].index))
     return n, found
 
@@ -115,7 +115,7 @@ def _covers(
     near_it = _may_enter((space.bounds[:, 0], space.bounds[:, 1]), window, side, low, high)
     found = {}
     for number in np.flatnonzero(near_it).tolist():
-        if not _counts(bodies[number]):
+        if not _is_in_the_way(bodies[number]):
             continue
         # Columns of local: along the window, height, and distance into the room, metres.
         local = in_front_of(window, side, space.points[number])

@@ -157,7 +157,7 @@ def _empty_house(draft: Draft) -> _KeptSpaces:
     faces = room_faces(wall_planes(wall_items), house.rooms, areas)
     rooms = []
     for k, room in enumerate(house.rooms):
-        above = _near(overhead, areas[k])
+        above = _triangles_over(overhead, areas[k])
         empty = _EmptyRoom(room, areas[k], (), walls.at(room.floor_y + _CHEST_M), above)
         ceiling_y = _ceiling(above, room)
         cut = [with_structure(face, walls, passages, ceiling_y) for face in faces.get(k, [])]
@@ -180,7 +180,7 @@ def _overhead(items: Sequence[Item]) -> F64:
     return np.asarray(triangles[np.abs(vectors[:, 1]) > 0.02 * np.linalg.norm(vectors, axis=1)])
 
 
-def _near(triangles: F64, area: BaseGeometry) -> F64:
+def _triangles_over(triangles: F64, area: BaseGeometry) -> F64:
     if area.is_empty or not len(triangles):
         return triangles[:0]
     x0, z0, x1, z1 = area.bounds
@@ -204,7 +204,7 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
     for empty in kept.rooms:
         inside = _items_in(items, points, bounds, empty, kept)
         own = [p for p in kept.passages if empty.room.id in p.room_ids]
-        faces = [_filled(face, items, points, bounds, kept) for face in empty.faces]
+        faces = [_face_behind_things(face, items, points, bounds, kept) for face in empty.faces]
         rooms.append(
             RoomSpace(
                 empty.room,
@@ -221,7 +221,7 @@ def _house_space(items: Sequence[Item], kept: _KeptSpaces) -> HouseSpace:
     return HouseSpace(tuple(rooms), kept.passages, points, bounds)
 
 
-def _filled(
+def _face_behind_things(
     face: WallFace, items: Sequence[Item], points: Sequence[F64], bounds: F64, kept: _KeptSpaces
 ) -> WallFace:
     """The empty face with what stands or hangs before it now; rugs do not count."""

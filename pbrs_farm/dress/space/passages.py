@@ -149,7 +149,7 @@ def _depth_of_walls(
     most = float(lengths.max())
     if most < _LEAST_COVERED * (s1 - s0):
         return None
-    runs = _runs(lengths >= _COVERED * most, round(_SAME_WALL_M / _STEP_M))
+    runs = _stretches(lengths >= _COVERED * most, round(_SAME_WALL_M / _STEP_M))
     first, last = max(runs, key=lambda r: float(lengths[r[0] : r[1]].sum()))
     # The wall's faces themselves, not the lines that met it.
     low, high = float(offsets[first]) - _STEP_M, float(offsets[last - 1]) + _STEP_M
@@ -158,7 +158,7 @@ def _depth_of_walls(
     return float(depths.min()), float(depths.max())
 
 
-def _runs(found: Bools, gap: int) -> list[tuple[int, int]]:
+def _stretches(found: Bools, gap: int) -> list[tuple[int, int]]:
     """(first, end) of each stretch of True, those with at most so many False between joined."""
     runs: list[tuple[int, int]] = []
     for k in np.flatnonzero(found).tolist():
@@ -208,7 +208,7 @@ def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
     if s1 - s0 >= _DOORWAY_M[0]:
         span = _depth_of_walls(box, walls, np.array([across[0], 0.0, across[1]]))
         hole = (s0, s1, *span) if span is not None else None
-    hole = hole or _gap((s0, s1), (t0, t1), along, across, walls)
+    hole = hole or _hole_between((s0, s1), (t0, t1), along, across, walls)
     if hole is None:
         return None
     s0, s1, t0, t1 = hole
@@ -218,7 +218,7 @@ def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
     ])[:, [0, 2, 1]]  # fmt: skip
 
 
-def _gap(
+def _hole_between(
     s: tuple[float, float], t: tuple[float, float], along: F64, across: F64, walls: BaseGeometry
 ) -> tuple[float, float, float, float] | None:
     """(s0, s1, t0, t1) of the narrowest gap of a wall at a box s, t along and across it; None = none."""
@@ -229,7 +229,7 @@ def _gap(
     solid = shapely.contains_xy(walls, places[..., 0], places[..., 1])
     gaps: dict[tuple[int, int], list[int]] = {}
     for row in range(len(tt)):
-        for first, end in _runs(~solid[row], 0):
+        for first, end in _stretches(~solid[row], 0):
             # It lies between two jambs, and the box reaches into it.
             is_closed = first > 0 and end < len(ss)
             is_met = ss[first] < s[1] and ss[end - 1] > s[0]

@@ -111,7 +111,7 @@ def with_structure(
     for passage in passages:
         _cut_passage(clear, face, passage)
     # What is over the room hides what is above it.
-    top = np.minimum(*(_top(face, ceiling_y, columns, out_m) for out_m in (0.03, 0.2)))
+    top = np.minimum(*(_ceiling_over(face, ceiling_y, columns, out_m) for out_m in (0.03, 0.2)))
     clear[ys[:, None] > (top - _UNDER_CEILING_M)[None, :]] = 0.0
     return replace(face, clear=clear)
 
@@ -157,7 +157,9 @@ def _cut_passage(clear: F32, face: WallFace, passage: Passage) -> None:
     clear[i0:i1, j0:j1] = 0.0
 
 
-def _top(face: WallFace, ceiling_y: Callable[[F64], F64], columns: F64, out_m: float) -> F64:
+def _ceiling_over(
+    face: WallFace, ceiling_y: Callable[[F64], F64], columns: F64, out_m: float
+) -> F64:
     # The ceiling over every fourth column, carried to its neighbours.
     some = columns[::4]
     places = face.origin + some[:, None] * face.along + out_m * face.normal

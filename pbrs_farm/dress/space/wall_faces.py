@@ -74,7 +74,7 @@ class WallFace:
 
     def recess_m(self, s0: float, s1: float) -> float:
         """How far the wall lies behind the plane between s0 and s1, where it is nearest to it."""
-        columns = _cells(s0, s1)
+        columns = _cells_between(s0, s1)
         part = self.recess[max(columns[0], 0) : max(columns[1], 0)]
         return float(part.min()) if part.size else 0.0
 
@@ -115,11 +115,11 @@ class WallFace:
     def _window(
         self, s0: float, s1: float, y0: float, y1: float
     ) -> tuple[tuple[int, int], tuple[int, int]]:
-        rows = _cells(y0 - self.low_y, y1 - self.low_y)
-        return rows, _cells(s0, s1)
+        rows = _cells_between(y0 - self.low_y, y1 - self.low_y)
+        return rows, _cells_between(s0, s1)
 
 
-def _cells(low_m: float, high_m: float) -> tuple[int, int]:
+def _cells_between(low_m: float, high_m: float) -> tuple[int, int]:
     return int(np.floor(low_m / CELL_M + 1e-6)), int(np.ceil(high_m / CELL_M - 1e-6))
 
 

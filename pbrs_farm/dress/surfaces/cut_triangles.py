@@ -38,7 +38,7 @@ def _cut(triangle: F64, side: NDArray[np.int_], d: F64) -> list[F64]:
     for a, b in ((0, 1), (1, 2), (2, 0)):
         ring.append((triangle[a], int(side[a])))
         if side[a] * side[b] < 0:
-            ring.append((_between(triangle[a], triangle[b], float(d[a]), float(d[b])), 0))
+            ring.append((_cut_point(triangle[a], triangle[b], float(d[a]), float(d[b])), 0))
     pieces = []
     for keep in (1, -1):
         corners = [p for p, s in ring if s in (keep, 0)]
@@ -46,7 +46,7 @@ def _cut(triangle: F64, side: NDArray[np.int_], d: F64) -> list[F64]:
     return pieces
 
 
-def _between(a: F64, b: F64, da: float, db: float) -> F64:
+def _cut_point(a: F64, b: F64, da: float, db: float) -> F64:
     # Begin at the same end whichever triangle asks.
     if tuple(a[:3]) > tuple(b[:3]):
         a, b, da, db = b, a, db, da

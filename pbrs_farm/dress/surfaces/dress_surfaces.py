@@ -17,10 +17,16 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finish_scheme import JoineryScheme, joinery_scheme
+from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
-from pbrs_farm.dress.surface_finishes import Coat, coated, coated_item, is_plain, plain_material
+from pbrs_farm.dress.surface_finishes import (
+    Finish,
+    is_plain,
+    item_with_finish,
+    number_of_finish,
+    with_finish,
+)
 from pbrs_farm.dress.surfaces.home_finish import (
     WOOD_FLOORS,
     Floor,
@@ -87,13 +93,13 @@ class _RoomFinish:
     walls: WallFinish | None
 
 
-def surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def dress_surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the rooms floors, walls and ceilings of the style, and skirting boards."""
     rooms = house_space(draft).rooms
     home = home_finish(draft.rng(PART, "home"), style)
     finishes = [_room_finish(draft, catalogue, style, home, room, share) for room in rooms]
     _lay_floors(draft, home, finishes)
-    scheme = joinery_scheme(draft, style)
+    scheme = finish_scheme(draft, style)
     _paint_walls(draft, scheme, finishes)
     _set_boards(draft, home, scheme, finishes)
 
@@ -153,7 +159,7 @@ def _lay_floors(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> 
         draft.done[f"{PART}: {pattern.family} {item.kind}"] += 1
 
 
-def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish]) -> None:
+def _paint_walls(draft: Draft, scheme: FinishScheme, finishes: list[_RoomFinish]) -> None:
     house = draft.source
     finder = RoomFinder(house.rooms, [f.space.area for f in finishes])
     walls = {
@@ -163,11 +169,11 @@ def _paint_walls(draft: Draft, scheme: JoineryScheme, finishes: list[_RoomFinish
     }
     accents = _accent_runs(walls, finishes)
     rest = RestOfWall(
-        foot=plain_material(draft, replace(scheme.plaster, name=REVEAL)),
-        flat=plain_material(draft, scheme.plaster),
+        foot=number_of_finish(draft, replace(scheme.plaster, name=REVEAL)),
+        flat=number_of_finish(draft, scheme.plaster),
     )
     render = PatternMaterial(
-        plain_material(draft, scheme.render), (1.0, 1.0), lambda: scheme.render.paint
+        number_of_finish(draft, scheme.render), (1.0, 1.0), lambda: scheme.render.paint
     )
     is_painted = any(f.walls is not None for f in finishes)
     for index, wall in walls.items():
@@ -232,7 +238,7 @@ _NO_ACCENT = WallFinish(Pattern("paint", 0))
 
 
 def _set_boards(
-    draft: Draft, home: HomeFinish, scheme: JoineryScheme, finishes: list[_RoomFinish]
+    draft: Draft, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
 ) -> None:
     if has_boards(draft.source):
         _paint_boards(draft, home, scheme, finishes)
@@ -242,20 +248,20 @@ def _set_boards(
         room = finish.space.room
         if finish.walls is None or finish.walls.is_tiled or finish.space.kind is RoomKind.STORE:
             continue
-        coat = _board_coat(draft, home, scheme, finish)
+        board_finish = _board_finish(draft, home, scheme, finish)
         board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, 0)
         if board is not None:
-            # A new board has no look of its own yet: the coat covers all of it.
-            looks = tuple(coated(draft, s, coat, np.eye(3)) for s in board.surfaces)
+            # A new board has no look of its own yet: the finish covers all of it.
+            looks = tuple(with_finish(draft, s, board_finish, np.eye(3)) for s in board.surfaces)
             board = replace(board, surfaces=looks)
             draft.add(replace(board, tags=(*board.tags, f"seed:{draft.seed}")), PART)
             draft.done[f"{PART}: skirting board"] += 1
 
 
 def _paint_boards(
-    draft: Draft, home: HomeFinish, scheme: JoineryScheme, finishes: list[_RoomFinish]
+    draft: Draft, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
 ) -> None:
-    """Give the source's boards the home's coat; before tiles, the tiles'."""
+    """Give the source's boards the home's finish; before tiles, the tiles'."""
     finder = RoomFinder(draft.source.rooms, [f.space.area for f in finishes])
     for index, item in enumerate(draft.items):
         if BASEBOARD not in item.tags or item.kind is not ItemKind.WALL or not item.n_faces:
@@ -264,8 +270,8 @@ def _paint_boards(
         if not rooms or all(finishes[k].walls is None for k in rooms):
             continue
         finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
-        coat = _board_coat(draft, home, scheme, finish)
-        made = coated_item(draft, item, coat)
+        board_finish = _board_finish(draft, home, scheme, finish)
+        made = item_with_finish(draft, item, board_finish)
         if made is not item:
             draft.change(index, made, PART)
 
@@ -281,15 +287,17 @@ def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
     return sorted(lengths, key=lambda k: (-lengths[k], k))
 
 
-def _board_coat(draft: Draft, home: HomeFinish, scheme: JoineryScheme, finish: _RoomFinish) -> Coat:
+def _board_finish(
+    draft: Draft, home: HomeFinish, scheme: FinishScheme, finish: _RoomFinish
+) -> Finish:
     walls, floor = finish.walls, finish.floor
     if walls is not None and walls.is_tiled:
         # Tiled rooms have a skirting of tiles.
-        return Coat("skirting tile", (walls.low or walls.main).tints[0], 0.15)
+        return Finish("skirting tile", (walls.low or walls.main).tints[0], 0.15)
     if not home.has_floor_boards:
         return scheme.trim
     if floor is None or floor.pattern.family not in WOOD_FLOORS:
         return scheme.trim
     made: PatternMaterial = pattern_material(draft, floor.pattern)
     r, g, b = srgb_from_linear(np.array(made.mean_rgb)).tolist()
-    return Coat("skirting wood", (r, g, b))
+    return Finish("skirting wood", (r, g, b))

@@ -59,9 +59,9 @@ class HomeFinish:
 def home_finish(rng: np.random.Generator, style: Style) -> HomeFinish:
     """What the home's builder chose."""
     wood = [f for f in style.floors if f in WOOD_FLOORS] or ["planks"]
-    usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _one(rng, wood))
+    usual = _wood_floor(rng, style, wood[0] if rng.random() < 0.6 else _pick(rng, wood))
     second = _dry_floor(rng, style, RoomKind.OTHER)
-    white = aged(rng, _one(rng, COLOURS["wall_whites"]))
+    white = aged(rng, _pick(rng, COLOURS["wall_whites"]))
     ceiling = Pattern("smooth plaster", _seed(rng), (white,))
     if rng.random() < 0.06 and style.name in ("country", "warm wood", "nordic"):
         ceiling = replace(_wood_floor(rng, style, "planks").pattern, darkness=-0.4)
@@ -83,7 +83,7 @@ def floor_of(
     if kind is RoomKind.OUTDOOR:
         return _outdoor_floor(rng) if rng.random() < 0.8 else None
     if kind is RoomKind.STORE:
-        return Floor(Pattern("concrete", _seed(rng), (_one(rng, COLOURS["concretes"]),)))
+        return Floor(Pattern("concrete", _seed(rng), (_pick(rng, COLOURS["concretes"]),)))
     if kind in _TILED_FLOORS:
         if rng.random() < 0.85:
             return home.wet_floor if rng.random() < 0.4 else _tile_floor(rng, style)
@@ -106,8 +106,8 @@ def walls_of(
     if kind is RoomKind.OUTDOOR:
         return None
     if kind is RoomKind.STORE:
-        return WallFinish(Pattern("plaster", _seed(rng), (_one(rng, COLOURS["wall_whites"]),)))
-    paint = _paint(rng, style, home)
+        return WallFinish(Pattern("plaster", _seed(rng), (_pick(rng, COLOURS["wall_whites"]),)))
+    paint = _paint_pattern(rng, style, home)
     if kind is RoomKind.BATHROOM:
         return _bathroom_walls(rng, style)
     if kind is RoomKind.KITCHEN:
@@ -135,7 +135,7 @@ def walls_of(
     return WallFinish(paint)
 
 
-def _paint(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
+def _paint_pattern(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
     draw = rng.random()
     if draw < 0.38:
         tint = home.wall
@@ -144,7 +144,7 @@ def _paint(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:
     elif draw < 0.85:
         tint = mix(style.palette[2], (0.95, 0.94, 0.92), float(rng.uniform(0.3, 0.65)))
     else:
-        tint = _one(rng, COLOURS["soft_tints"])
+        tint = _pick(rng, COLOURS["soft_tints"])
     return Pattern("paint", _seed(rng, 3), (tint,))
 
 
@@ -157,18 +157,20 @@ def _accent(rng: np.random.Generator, style: Style) -> Pattern:
 def _brick(rng: np.random.Generator, style: Style) -> Pattern:
     if rng.random() < 0.5:
         return Pattern("painted brick", _seed(rng), (mix(style.palette[0], (1, 1, 1), 0.3),))
-    return Pattern("brick", _seed(rng), (_one(rng, COLOURS["bricks"]),))
+    return Pattern("brick", _seed(rng), (_pick(rng, COLOURS["bricks"]),))
 
 
 def _wallpaper(rng: np.random.Generator, style: Style, ground: Rgb) -> Pattern:
     tint, accent = inks(rng, ground, mix(style.palette[2], style.accent, 0.25))
-    return Pattern("wallpaper", _seed(rng), (ground, tint, accent), variant=_one(rng, style.papers))
+    return Pattern(
+        "wallpaper", _seed(rng), (ground, tint, accent), variant=_pick(rng, style.papers)
+    )
 
 
 def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tuple[Pattern, float]:
     """Wall tiles, and the height near height_m that is a whole number of them."""
-    laid, tile_m = _one(rng, (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)))  # fmt: skip
-    tint = _one(rng, COLOURS["wall_tiles"])
+    laid, tile_m = _pick(rng, (("20", 0.2), ("20x40", 0.2), ("30x60", 0.3), ("15", 0.15), ("10", 0.1), ("subway", 0.075)))  # fmt: skip
+    tint = _pick(rng, COLOURS["wall_tiles"])
     if rng.random() < 0.12:
         tint = mix(style.palette[2], (0.95, 0.95, 0.94), 0.3)
     grout = mix(tint, _DIRT, 0.55)
@@ -176,10 +178,10 @@ def _wall_tiles(rng: np.random.Generator, style: Style, height_m: float) -> tupl
 
 
 def _bathroom_walls(rng: np.random.Generator, style: Style) -> WallFinish:
-    above = Pattern("paint", _seed(rng, 3), (_one(rng, COLOURS["wall_whites"]),))
+    above = Pattern("paint", _seed(rng, 3), (_pick(rng, COLOURS["wall_whites"]),))
     draw = rng.random()
     if draw < 0.12:
-        light, vein = _one(rng, _MARBLES[:2])
+        light, vein = _pick(rng, _MARBLES[:2])
         return WallFinish(Pattern("marble", _seed(rng), (light, vein)))
     if draw < 0.45:
         tiles, _height = _wall_tiles(rng, style, 2.5)
@@ -196,37 +198,37 @@ def _dry_floor(rng: np.random.Generator, style: Style, kind: RoomKind) -> Floor:
     if name == "carpet":
         return _carpet(rng, style)
     if name == "terracotta":
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
+        return Floor(Pattern("terracotta", _seed(rng), (_pick(rng, COLOURS["clays"]),)))
     return _tile_floor(rng, style) if name == "tiles" else _wood_floor(rng, style, name)
 
 
 def _wood_floor(rng: np.random.Generator, style: Style, name: str) -> Floor:
     # Floors are seldom of the furniture's own wood.
-    wood = style.wood if rng.random() < 0.45 else WOODS[_one(rng, WOODS_FOR.floors)]
+    wood = style.wood if rng.random() < 0.45 else WOODS[_pick(rng, WOODS_FOR.floors)]
     pattern = Pattern(name, _seed(rng), wood=wood, darkness=round(style.darkness, 3))
     return Floor(pattern, np.pi / 4 if name == "herringbone" else 0.0)
 
 
 def _carpet(rng: np.random.Generator, style: Style) -> Floor:
     tint = mix(style.textiles[int(rng.integers(2))], rgb("a89c8a"), 0.45)
-    return Floor(Pattern(_one(rng, ("carpet", "carpet", "loop carpet")), _seed(rng), (tint,)))
+    return Floor(Pattern(_pick(rng, ("carpet", "carpet", "loop carpet")), _seed(rng), (tint,)))
 
 
 def _tile_floor(rng: np.random.Generator, style: Style) -> Floor:
     draw = rng.random()
     turn = np.pi / 4 if rng.random() < 0.12 else 0.0
     if draw < 0.08:
-        light, vein = _one(rng, _MARBLES)
+        light, vein = _pick(rng, _MARBLES)
         return Floor(Pattern("marble", _seed(rng), (light, vein)), turn)
     if draw < 0.16 or (style.floors[0] == "terracotta" and draw < 0.4):
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)), turn)
+        return Floor(Pattern("terracotta", _seed(rng), (_pick(rng, COLOURS["clays"]),)), turn)
     if draw < 0.25:
-        dark = _one(rng, COLOURS["checkers"])
+        dark = _pick(rng, COLOURS["checkers"])
         tints = (rgb("e6e3db"), dark, mix(dark, _DIRT, 0.5))
-        return Floor(Pattern("tiles", _seed(rng), tints, variant=_one(rng, ("15", "20", "30")) + "-checker"), turn)  # fmt: skip
-    body = _one(rng, COLOURS["floor_tiles"])
+        return Floor(Pattern("tiles", _seed(rng), tints, variant=_pick(rng, ("15", "20", "30")) + "-checker"), turn)  # fmt: skip
+    body = _pick(rng, COLOURS["floor_tiles"])
     stone = "-stone" if rng.random() < 0.55 else ""
-    laid = _one(rng, ("30", "30", "45", "60", "30x60"))
+    laid = _pick(rng, ("30", "30", "45", "60", "30x60"))
     return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant=laid + stone), turn)  # fmt: skip
 
 
@@ -235,12 +237,12 @@ def _outdoor_floor(rng: np.random.Generator) -> Floor:
     if draw < 0.35:
         return Floor(Pattern("planks", _seed(rng), wood=WOODS["teak"], darkness=0.1))
     if draw < 0.6:
-        return Floor(Pattern("terracotta", _seed(rng), (_one(rng, COLOURS["clays"]),)))
-    body = _one(rng, COLOURS["floor_tiles"][2:8])
+        return Floor(Pattern("terracotta", _seed(rng), (_pick(rng, COLOURS["clays"]),)))
+    body = _pick(rng, COLOURS["floor_tiles"][2:8])
     return Floor(Pattern("tiles", _seed(rng), (body, mix(body, _DIRT, 0.6)), variant="45-stone"))
 
 
-def _one(rng: np.random.Generator, choices: Sequence[_T]) -> _T:
+def _pick(rng: np.random.Generator, choices: Sequence[_T]) -> _T:
     return choices[int(rng.integers(len(choices)))]
 
 

@@ -90,7 +90,7 @@ class RoomFinder:
 
 def sided_wall(wall: Item, finder: RoomFinder) -> SidedWall:
     """The wall's triangles with their sides and the rooms that the sides face."""
-    rows, surface = _rows(wall)
+    rows, surface = _rows_of_wall(wall)
     vectors = area_vectors(rows[..., :3])
     areas = np.linalg.norm(vectors, axis=1)
     normals = vectors / np.maximum(areas, 1e-12)[:, None]
@@ -107,13 +107,13 @@ def sided_wall(wall: Item, finder: RoomFinder) -> SidedWall:
         members = (side < 0) & (off < _SAME_PLANE_M) & (normals @ normal > 0.995)
         members[first] = True
         side[members] = len(sides)
-        sides.append(_side(rows[members][..., :3], normal, offset, finder))
+        sides.append(_side_of_plane(rows[members][..., :3], normal, offset, finder))
     _, places = np.unique(rows[..., :3].reshape(-1, 3), axis=0, return_inverse=True)
     is_closed = edges_are_paired(np.ravel(places).reshape(-1, 3)) if len(rows) else False
     return SidedWall(rows, surface, side, tuple(sides), is_closed)
 
 
-def _rows(wall: Item) -> tuple[F64, Ints]:
+def _rows_of_wall(wall: Item) -> tuple[F64, Ints]:
     parts, numbers = [np.zeros((0, 3, 8))], [np.zeros(0, np.int64)]
     for k, s in enumerate(wall.surfaces):
         normals = np.zeros_like(s.positions) if s.normals is None else s.normals
@@ -124,7 +124,7 @@ def _rows(wall: Item) -> tuple[F64, Ints]:
     return np.concatenate(parts), np.concatenate(numbers)
 
 
-def _side(corners: F64, normal: F64, offset: float, finder: RoomFinder) -> Side:
+def _side_of_plane(corners: F64, normal: F64, offset: float, finder: RoomFinder) -> Side:
     along = np.array([normal[2], 0.0, -normal[0]])
     s, y = corners @ along, corners[..., 1]
     low, high = float(s.min()), float(s.max())
@@ -137,10 +137,10 @@ def _side(corners: F64, normal: F64, offset: float, finder: RoomFinder) -> Side:
         points = middles[:, None] * along + (offset + out_m) * normal
         there = finder.at(points[:, [0, 2]], low_y, high_y)
         found = np.where(found < 0, there, found)
-    return Side(along, normal, offset, low_y, high_y, _runs(found, low, high))
+    return Side(along, normal, offset, low_y, high_y, _runs_of_rooms(found, low, high))
 
 
-def _runs(found: Ints, low: float, high: float) -> tuple[SideRun, ...]:
+def _runs_of_rooms(found: Ints, low: float, high: float) -> tuple[SideRun, ...]:
     """Runs of one room; what faces no room, but lies between or beside rooms, is shared out."""
     if (found < 0).all():
         return (SideRun(None, low, high),)

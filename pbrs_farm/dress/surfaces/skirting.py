@@ -63,7 +63,7 @@ def skirting_board(
     strip = strip.intersection(reach).difference(_doors(house, room, height_m))
     surfaces = [
         s
-        for p in _pieces(strip, solid)
+        for p in _pieces_of_strip(strip, solid)
         for s in _prism(p, room.floor_y - _SUNK_M, room.floor_y + height_m, material)
     ]
     if not surfaces:
@@ -89,7 +89,7 @@ def _doors(house: House, room: Room, height_m: float) -> BaseGeometry:
     return shapely.union_all(found)
 
 
-def _pieces(strip: BaseGeometry, solid: BaseGeometry) -> Iterator[shapely.Polygon]:
+def _pieces_of_strip(strip: BaseGeometry, solid: BaseGeometry) -> Iterator[shapely.Polygon]:
     for part in shapely.get_parts(areal(shapely.set_precision(strip, 1e-5))):
         # Leave crumbs out, and what lies in the wall alone.
         if part.geom_type != "Polygon" or part.length / 2 < _LEAST_M:
@@ -109,8 +109,8 @@ def _prism(polygon: shapely.Polygon, low_y: float, high_y: float, material: int)
     turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     down = np.where((turn > 0)[:, None], faces, faces[:, ::-1])[turn != 0]
     surfaces = [
-        _flat("bottom", points, down, low_y, material),
-        _flat("top", points, down[:, ::-1], high_y, material),
+        _level_surface("bottom", points, down, low_y, material),
+        _level_surface("top", points, down[:, ::-1], high_y, material),
     ]
     for ring in rings:
         # Go round with the solid on the right, seen from above with z down: outlines and holes alike.
@@ -118,7 +118,7 @@ def _prism(polygon: shapely.Polygon, low_y: float, high_y: float, material: int)
     return surfaces
 
 
-def _flat(name: str, points: F64, faces: np.ndarray, y: float, material: int) -> Surface:
+def _level_surface(name: str, points: F64, faces: np.ndarray, y: float, material: int) -> Surface:
     positions = np.column_stack([points[:, 0], np.full(len(points), y), points[:, 1]])
     return Surface(
         name, positions.astype(np.float32), np.ascontiguousarray(faces, np.int32), material,

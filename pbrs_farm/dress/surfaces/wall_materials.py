@@ -61,11 +61,11 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
         surface, side = surface[parents], side[parents]
     found: list[Surface] = []
     left = np.ones(len(rows), bool)
-    for part in _parts(rows, side, wall, looks):
+    for part in _parts_by_look(rows, side, wall, looks):
         left &= ~part.members
         for n in np.unique(surface[part.members]).tolist():
             mine = rows[part.members & (surface == n)]
-            found.append(_surface(item.surfaces[n].name, part.material.number, _in_metres(mine, part)))  # fmt: skip
+            found.append(_surface_of_rows(item.surfaces[n].name, part.material.number, _in_metres(mine, part)))  # fmt: skip
     # Level faces are of plaster; what else is left stays as it is.
     height = unit_normals(rows[..., :3])[:, 1]
     for mine, name, material in (
@@ -74,11 +74,11 @@ def painted_wall(item: Item, wall: SidedWall, looks: LooksOf, rest: RestOfWall) 
     ):
         left &= ~mine
         if mine.any():
-            found.append(_surface(name, material, rows[mine]))
+            found.append(_surface_of_rows(name, material, rows[mine]))
     for n, source in enumerate(item.surfaces):
         mine = left & (surface == n)
         if mine.any():
-            found.append(_surface(source.name, source.material, rows[mine]))
+            found.append(_surface_of_rows(source.name, source.material, rows[mine]))
     return replace(item, surfaces=tuple(found))
 
 
@@ -98,7 +98,9 @@ def _cuts(wall: SidedWall, looks: LooksOf) -> Iterator[tuple[F64, float]]:
         yield np.array([0.0, 1.0, 0.0]), y
 
 
-def _parts(rows: F64, side: np.ndarray, wall: SidedWall, looks: LooksOf) -> Iterator[_SidePart]:
+def _parts_by_look(
+    rows: F64, side: np.ndarray, wall: SidedWall, looks: LooksOf
+) -> Iterator[_SidePart]:
     middles = rows[..., :3].mean(1)
     for k, plane in enumerate(wall.sides):
         here = side == k
@@ -126,7 +128,7 @@ def _in_metres(rows: F64, part: _SidePart) -> F64:
     return out
 
 
-def _surface(name: str, material: int, rows: F64) -> Surface:
+def _surface_of_rows(name: str, material: int, rows: F64) -> Surface:
     flat = rows.reshape(-1, 8)
     normals = flat[:, 3:6].astype(np.float32)
     length = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -43,7 +43,7 @@ def facade(rng: np.random.Generator, number: int) -> Facade:
     wide, high = rng.uniform(0.36, 0.52), rng.uniform(0.46, 0.6)
     low = rng.uniform(0.24, 0.3)
     window = (0.5 - wide / 2, low, 0.5 + wide / 2, low + high)
-    picture = _wall(rng, wall, is_brick=k >= _BRICKS)
+    picture = _facade_pixels(rng, wall, is_brick=k >= _BRICKS)
     half = _PX // 2
     surround = rng.random() < 0.5
     for row in range(2):
@@ -54,7 +54,7 @@ def facade(rng: np.random.Generator, number: int) -> Facade:
     return Facade(look, bay_m, window)
 
 
-def _wall(rng: np.random.Generator, rgb: Rgb, *, is_brick: bool) -> F32:
+def _facade_pixels(rng: np.random.Generator, rgb: Rgb, *, is_brick: bool) -> F32:
     tone = 1 + 0.05 * noise(rng, (_PX, _PX), slope=1.6) + 0.03 * noise(rng, (_PX, _PX), slope=0.3)
     if is_brick:
         rows = np.arange(_PX) * 80 // _PX  # 7.5 cm each

@@ -104,7 +104,7 @@ class Scenery:
         for thing in dict.fromkeys((*self._level, *self._quads)):
             surfaces = [replace(s, material=index[name]) for name, s in self._level.get(thing, [])]
             surfaces += [
-                _surface(self._looks[name], rows, index[name])
+                _surface_of_quads(self._looks[name], rows, index[name])
                 for name, rows in self._quads.get(thing, {}).items()
             ]
             items.append(
@@ -116,7 +116,7 @@ class Scenery:
         return items, materials, textures
 
 
-def _surface(look: Look, rows: list[tuple[F64, F64 | None]], material: int) -> Surface:
+def _surface_of_quads(look: Look, rows: list[tuple[F64, F64 | None]], material: int) -> Surface:
     made = quads_surface(look.name, np.concatenate([q for q, _ in rows]), material)
     assert made.uvs is not None
     own = made.uvs.reshape(-1, 4, 2) / np.array(look.size_m, np.float32)

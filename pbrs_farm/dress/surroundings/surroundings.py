@@ -95,7 +95,7 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
         return home
     rng = np.random.default_rng(keys.seed("surroundings", home.id, seed))
     footprint = shapely.union_all([_walled_area(r) for r in rooms])
-    ground_y, n_below = _ground(home, windows, rng)
+    ground_y, n_below = _level_of_ground(home, windows, rng)
     top = max(float(o.quad[:, 1].max()) for o in windows)
     place = _Place(
         scenery=Scenery(), rng=rng, leaves=leaf_looks(rng), trunk=bark(rng),
@@ -126,7 +126,9 @@ def _walled_area(room: Room) -> BaseGeometry:
     return shapely.buffer(shape, _WALL_M, join_style="mitre")
 
 
-def _ground(home: House, windows: list[Opening], rng: np.random.Generator) -> tuple[float, int]:
+def _level_of_ground(
+    home: House, windows: list[Opening], rng: np.random.Generator
+) -> tuple[float, int]:
     """(y of the ground, storeys below the home): a flat lies on any storey of its building.
 
     A home of several storeys, or one with a garden or a garage, stands on the ground.
@@ -169,7 +171,7 @@ def _kinds(rng: np.random.Generator, kind: str, *, is_flat: bool) -> list[str]:
     return [drawn.get(k, str(aside)) for k in range(4)]
 
 
-def _strip(side: _Side, near: float, far: float, wide: float = 0.0) -> BaseGeometry:
+def _strip_of_side(side: _Side, near: float, far: float, wide: float = 0.0) -> BaseGeometry:
     """The plan area between two distances of a side, as long as the surroundings reach."""
     half = wide or side.half + _REACH_M
     corners = [side.at(s, a) for s, a in ((-half, near), (half, near), (half, far), (-half, far))]
@@ -189,16 +191,18 @@ def _lay_ground(
         if kind == "street":
             near, far = _ROAD
             for edge in (near, far):
-                zones.append(("kerb", _strip(side, edge - 0.08, edge + 0.08), 0.03))
-            zones.append(("asphalt", _strip(side, near, far), 0.0))
-            zones.append(("slabs", _strip(side, near - _PAVEMENT_M, far + _PAVEMENT_M + 1.0), 0.0))
+                zones.append(("kerb", _strip_of_side(side, edge - 0.08, edge + 0.08), 0.03))
+            zones.append(("asphalt", _strip_of_side(side, near, far), 0.0))
+            zones.append(
+                ("slabs", _strip_of_side(side, near - _PAVEMENT_M, far + _PAVEMENT_M + 1.0), 0.0)
+            )
             middle = (near + far) / 2
             for s in np.arange(-side.half - 30, side.half + 30, 6.0):
                 dash = [side.at(s + a, middle + b)[[0, 2]] for a, b in ((0, -0.06), (3, -0.06), (3, 0.06), (0, 0.06))]  # fmt: skip
                 place.scenery.lay("ground", place.ground["line"], shapely.Polygon(dash), y + 0.012)
         elif kind == "court":
             name = "slabs" if place.rng.random() < 0.5 else "gravel"
-            zones.append((name, _strip(side, 0.0, 13.0, side.half + 12.0), 0.0))
+            zones.append((name, _strip_of_side(side, 0.0, 13.0, side.half + 12.0), 0.0))
     # What was named first lies on top: each zone takes what is still free.
     for name, area, above in zones:
         own = free.intersection(area)

@@ -122,7 +122,7 @@ def hang_curtains(
     # Both panels end at one height.
     bottom = max(p[2] for p in panels)
     piece, shape, middle = _curtain_set(seen, panels, bottom, rod_y, rod_z, depth, cloth, rng)
-    _add(draft, room, piece, shape, seen, middle, bottom)
+    _add_at_window(draft, room, piece, shape, seen, middle, bottom)
     return True
 
 
@@ -190,7 +190,7 @@ def room_cloth(draft: Draft, style: Style, room: RoomSpace, rng: np.random.Gener
     if rng.random() < 0.45:
         tint = mix(tint, (0.93, 0.91, 0.87), float(rng.uniform(0.5, 0.85)))
     family = "weave" if rng.random() < 0.6 else "twill"
-    pattern = pattern_material(draft, Pattern(family, int(rng.integers(4)), (_rounded(tint),)))
+    pattern = pattern_material(draft, Pattern(family, int(rng.integers(4)), (_round_colour(tint),)))
     return Cloth(
         draft.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
         metal(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
@@ -209,7 +209,7 @@ def _curtain_set(
     for a, b, _low in panels:
         folds = Folds(cloth.fold_m, depth, float(rng.uniform(0, 6)), float(rng.uniform(0.1, 0.6)))
         sheet = panel("curtain", b - a, height, rod_z, folds, cloth.tile_m)
-        parts.append((_moved(sheet, (a - middle, 0.0, 0.0)), cloth.material))
+        parts.append((_shift_surface(sheet, (a - middle, 0.0, 0.0)), cloth.material))
     # The rod passes over the panels and rests on two brackets.
     half, y = (x1 - x0) / 2 + 0.03, height + _ROD_M
     parts.append((bar("rod", -half, half, y, rod_z, _ROD_M), cloth.rod))
@@ -248,7 +248,7 @@ def hang_blind(
         arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
         parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
     piece, shape = hung("blind", "blinds", BLINDS, parts)
-    _add(draft, room, piece, shape, seen, 0.0, top - drop)
+    _add_at_window(draft, room, piece, shape, seen, 0.0, top - drop)
     return True
 
 
@@ -285,7 +285,7 @@ def _slats(
     return parts
 
 
-def _add(
+def _add_at_window(
     draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, seen: WindowSide, x: float, y: float
 ) -> Item:
     at = seen.origin + seen.along * x + seen.inward * GAP_M
@@ -299,10 +299,10 @@ def _add(
     return item
 
 
-def _moved(surface: Surface, offset: tuple[float, float, float]) -> Surface:
+def _shift_surface(surface: Surface, offset: tuple[float, float, float]) -> Surface:
     return replace(surface, positions=(surface.positions + np.array(offset)).astype(np.float32))
 
 
-def _rounded(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+def _round_colour(colour: tuple[float, float, float]) -> tuple[float, float, float]:
     r, g, b = (round(c, 2) for c in colour)
     return (r, g, b)

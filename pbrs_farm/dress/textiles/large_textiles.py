@@ -37,18 +37,18 @@ def hang_towels(
         return
     hanging = Hanging(draft, room, PART)
     for _ in range(int(rng.integers(1, 3))):
-        piece, shape = _drawn(catalogue, rng) or towel_rail(draft, style, rng)
+        piece, shape = _draw_rail(catalogue, rng) or towel_rail(draft, style, rng)
         (x0, _y0, _z0), (x1, y1, z1) = shape.bounds
         width, height, depth = float(x1 - x0), float(y1), float(z1)
         low = room.room.floor_y + _RAIL_M - height
-        spot = _nearest(hanging, space, room, draft, width, (low, low + height), depth)
+        spot = _spot_near_basin(hanging, space, room, draft, width, (low, low + height), depth)
         if spot is None:
             draft.refused[f"{PART}: no free wall for a towel"] += 1
             return
         hanging.hang(piece, shape, spot[0], spot[1] + width / 2, low)
 
 
-def _drawn(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
+def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
     pieces = [p for p in catalogue.of("towel") if p.place is Place.WALL and p.size[0] < 0.7]
     if not pieces or rng.random() < 0.5:
         return None
@@ -75,7 +75,7 @@ def towel_rail(draft: Draft, style: Style, rng: np.random.Generator) -> Made:
     return hung("towel_rail", "towel", TOWEL, parts)
 
 
-def _nearest(
+def _spot_near_basin(
     hanging: Hanging, space: HouseSpace, room: RoomSpace, draft: Draft, width: float,
     heights: tuple[float, float], depth: float,
 ) -> tuple[int, float] | None:  # fmt: skip
@@ -91,7 +91,7 @@ def _nearest(
     return None if best is None else (best[1], best[2])
 
 
-def textiles_large(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_textiles(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang curtains, blinds and towels, lay rugs. share: 0..1 of what rooms would get."""
     cover_drawn_rugs(draft, style, share)
     for room_id in [r.room.id for r in house_space(draft).rooms]:

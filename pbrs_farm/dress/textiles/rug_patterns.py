@@ -54,7 +54,7 @@ def _coordinates(size: Size) -> tuple[F32, F32]:
     return u.astype(np.float32), v.astype(np.float32)
 
 
-def _filled(size: Size, colour: Rgb) -> F32:
+def _one_colour(size: Size, colour: Rgb) -> F32:
     return np.broadcast_to(np.array(colour, np.float32), (size[1], size[0], 3)).copy()
 
 
@@ -67,7 +67,7 @@ def _to_edge(u: F32, v: F32) -> F32:
 def _bordered(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Borders within borders round a field of small figures and a medallion."""
     u, v = _coordinates(size)
-    edge, picture = _to_edge(u, v), _filled(size, inks[1])
+    edge, picture = _to_edge(u, v), _one_colour(size, inks[1])
     step = float(rng.uniform(0.07, 0.1))
     figures = np.sin(2 * np.pi * u / step) * np.sin(2 * np.pi * v / step)
     picture[figures > 0.55] = inks[2]
@@ -101,7 +101,7 @@ def _lattice(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Dark lines crossing as lozenges on a light ground."""
     u, v = _coordinates(size)
     wide, high = float(rng.uniform(0.28, 0.45)), float(rng.uniform(0.28, 0.6))
-    picture = _filled(size, mix(inks[0], (0.86, 0.83, 0.76), 0.6))
+    picture = _one_colour(size, mix(inks[0], (0.86, 0.83, 0.76), 0.6))
     wobble = 0.012 * np.sin(11 * v + 7 * u)
     a, b = (u + wobble) / wide + v / high, (u + wobble) / wide - v / high
     line = np.minimum(np.abs(a - np.round(a)), np.abs(b - np.round(b)))
@@ -119,7 +119,7 @@ def _diamonds(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     column, row = np.round(u / pitch), np.round(v / (1.3 * pitch))
     # The L1 distance to the nearest diamond's middle; bands of it take turns in three colours.
     ring = np.abs(u / pitch - column) + np.abs(v / (1.3 * pitch) - row)
-    picture = _filled(size, inks[0])
+    picture = _one_colour(size, inks[0])
     pick = (column + 2 * row).astype(int) % 3 + 1
     for k, (low, high) in enumerate(((0.0, 0.13), (0.2, 0.34), (0.34, 0.42))):
         band = (ring >= low) & (ring < high)
@@ -135,13 +135,13 @@ def _shag(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     tuft = ndimage.gaussian_filter(rng.standard_normal((size[1], size[0])), 1.2, mode="wrap")
     lie = ndimage.gaussian_filter(rng.standard_normal((size[1], size[0])), 14.0, mode="wrap")
     tone = 0.9 + 0.07 * tuft / tuft.std() + 0.05 * lie / lie.std()
-    return np.asarray(_filled(size, inks[0]) * tone[..., None], np.float32)
+    return np.asarray(_one_colour(size, inks[0]) * tone[..., None], np.float32)
 
 
-def _plain(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
+def _plain_rug(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """One colour with a bound edge, or a wide border."""
     u, v = _coordinates(size)
-    picture, edge = _filled(size, inks[0]), _to_edge(u, v)
+    picture, edge = _one_colour(size, inks[0]), _to_edge(u, v)
     picture[edge < (0.03 if rng.random() < 0.6 else 0.16)] = inks[1]
     return picture
 
@@ -149,7 +149,7 @@ def _plain(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
 def _blocks(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Large areas of colour with round corners: a modern rug."""
     u, v = _coordinates(size)
-    picture = _filled(size, inks[0])
+    picture = _one_colour(size, inks[0])
     for k in range(4):
         x, y = float(rng.uniform(u.min(), u.max())), float(rng.uniform(v.min(), v.max()))
         a, b = float(rng.uniform(0.3, 0.8)), float(rng.uniform(0.25, 0.6))
@@ -163,7 +163,7 @@ def _kilim(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     u, v = _coordinates(size)
     snap = 0.02
     u, v = np.floor(u / snap) * snap, np.floor(v / snap) * snap
-    picture, edge = _filled(size, inks[0]), float(u.min())
+    picture, edge = _one_colour(size, inks[0]), float(u.min())
     colours = np.array(inks, np.float32)
     while edge < u.max():
         wide = float(rng.choice([0.04, 0.06, 0.16, 0.2]))
@@ -183,17 +183,17 @@ def _checks(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Squares of two colours in turn."""
     u, v = _coordinates(size)
     side = float(rng.uniform(0.12, 0.3))
-    picture = _filled(size, mix(inks[0], (0.9, 0.87, 0.8), 0.5))
+    picture = _one_colour(size, mix(inks[0], (0.9, 0.87, 0.8), 0.5))
     picture[(np.floor(u / side) + np.floor(v / side)) % 2 == 0] = inks[1]
     return picture
 
 
-def _grid(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
+def _line_grid_rug(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Thin lines that cross at right angles, drawn by hand, on light wool."""
     u, v = _coordinates(size)
     side, picture = (
         float(rng.uniform(0.22, 0.4)),
-        _filled(size, mix(inks[0], (0.88, 0.85, 0.78), 0.7)),
+        _one_colour(size, mix(inks[0], (0.88, 0.85, 0.78), 0.7)),
     )
     a, b = (u + 0.01 * np.sin(9 * v)) / side, (v + 0.01 * np.sin(8 * u + 1)) / side
     line = np.minimum(np.abs(a - np.round(a)), np.abs(b - np.round(b))) * side
@@ -218,7 +218,7 @@ def _sisal(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     step = 0.016
     over = (np.floor(u / step) + np.floor(v / step)) % 2
     cross = np.where(over == 0, np.sin(np.pi * u / step) ** 2, np.sin(np.pi * v / step) ** 2)
-    picture = _filled(size, straw) * (0.72 + 0.34 * cross)[..., None].astype(np.float32)
+    picture = _one_colour(size, straw) * (0.72 + 0.34 * cross)[..., None].astype(np.float32)
     picture[_to_edge(u, v) < 0.04] = shade(inks[1], 0.7)
     return np.asarray(picture, np.float32)
 
@@ -227,7 +227,7 @@ def _arches(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Rows of arches within arches, as fish scales."""
     u, v = _coordinates(size)
     pitch = float(rng.uniform(0.28, 0.5))
-    picture, colours = _filled(size, inks[0]), np.array(inks, np.float32)
+    picture, colours = _one_colour(size, inks[0]), np.array(inks, np.float32)
     n_rows = int(np.ceil(float(v.max() - v.min()) / (0.5 * pitch))) + 2
     for row in range(n_rows):
         foot = float(v.min()) + row * 0.5 * pitch - pitch * 0.5
@@ -241,7 +241,7 @@ def _arches(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
 def _curves(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Few lines that wander over one ground."""
     u, v = _coordinates(size)
-    picture = _filled(size, mix(inks[0], (0.86, 0.83, 0.77), 0.4))
+    picture = _one_colour(size, mix(inks[0], (0.86, 0.83, 0.77), 0.4))
     for k in range(int(rng.integers(3, 7))):
         a, b, c = rng.uniform(1.5, 4.5), rng.uniform(0.1, 0.35), rng.uniform(0, 6.3)
         turn = rng.uniform(0, np.pi)
@@ -251,7 +251,7 @@ def _curves(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     return picture
 
 
-def _rings(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
+def _ring_rug(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Rings round the middle, braided."""
     u, v = _coordinates(size)
     out = np.maximum(np.hypot(u / u.max(), v / v.max()), 1e-3)
@@ -264,7 +264,7 @@ def _rings(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
 def _stars(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Small stars or dots scattered on a grid: a child's rug."""
     u, v = _coordinates(size)
-    pitch, picture = float(rng.uniform(0.16, 0.28)), _filled(size, mix(inks[1], (1, 1, 1), 0.4))
+    pitch, picture = float(rng.uniform(0.16, 0.28)), _one_colour(size, mix(inks[1], (1, 1, 1), 0.4))
     row = np.round(v / pitch)
     shifted = u + 0.5 * pitch * (row % 2)
     x, y = shifted - np.round(shifted / pitch) * pitch, v - row * pitch
@@ -281,7 +281,7 @@ def _bobbles(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     row = np.floor(v / step)
     x, y = (u / step + 0.5 * (row % 2)) % 1 - 0.5, (v / step) % 1 - 0.5
     tone = 1.05 - 0.9 * np.minimum(x * x + y * y, 0.5)
-    return np.asarray(_filled(size, inks[0]) * tone[..., None], np.float32)
+    return np.asarray(_one_colour(size, inks[0]) * tone[..., None], np.float32)
 
 
 def _waffle(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
@@ -289,7 +289,7 @@ def _waffle(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     u, v = _coordinates(size)
     step = float(rng.uniform(0.012, 0.02))
     rib = np.maximum(np.abs((u / step) % 1 - 0.5), np.abs((v / step) % 1 - 0.5)) * 2
-    picture = _filled(size, inks[0]) * (0.82 + 0.2 * rib)[..., None]
+    picture = _one_colour(size, inks[0]) * (0.82 + 0.2 * rib)[..., None]
     picture[_to_edge(u, v) < 0.035] = inks[0]
     return np.asarray(picture, np.float32)
 
@@ -297,7 +297,7 @@ def _waffle(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
 def _towelling(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """A mat of terry with stripes near its ends."""
     u, _v = _coordinates(size)
-    picture, end = _filled(size, inks[0]), float(u.max()) - np.abs(u)
+    picture, end = _one_colour(size, inks[0]), float(u.max()) - np.abs(u)
     for k in range(int(rng.integers(1, 4))):
         picture[(end > 0.05 + 0.04 * k) & (end < 0.07 + 0.04 * k)] = inks[1]
     return picture
@@ -310,7 +310,7 @@ def _coir(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     """Bristles of coconut with a dark border, stripes or a big figure."""
     u, v = _coordinates(size)
     bristle = rng.standard_normal((size[1], size[0]), np.float32)
-    picture = _filled(size, _COIR) * (1 + 0.12 * bristle)[..., None]
+    picture = _one_colour(size, _COIR) * (1 + 0.12 * bristle)[..., None]
     dark, edge = (0.1, 0.09, 0.08), _to_edge(u, v)
     form = int(rng.integers(3))
     if form == 0:
@@ -328,20 +328,20 @@ def _ribs(rng: np.random.Generator, size: Size, inks: Inks) -> F32:
     u, v = _coordinates(size)
     grey = float(rng.uniform(0.15, 0.4))
     rib = 0.75 + 0.35 * np.sin(2 * np.pi * u / 0.012)
-    picture = _filled(size, (grey, grey, grey * 1.02)) * rib[..., None].astype(np.float32)
+    picture = _one_colour(size, (grey, grey, grey * 1.02)) * rib[..., None].astype(np.float32)
     picture[_to_edge(u, v) < 0.025] = (0.06, 0.06, 0.06)
     return np.asarray(picture, np.float32)
 
 
 RUGS: dict[str, Pattern] = {
     "bordered": _bordered, "striped": _striped, "lattice": _lattice, "diamonds": _diamonds,
-    "shag": _shag, "plain": _plain, "blocks": _blocks, "kilim": _kilim, "checks": _checks,
-    "grid": _grid, "faded": _faded, "sisal": _sisal, "arches": _arches, "curves": _curves,
-    "rings": _rings, "stars": _stars,
+    "shag": _shag, "plain": _plain_rug, "blocks": _blocks, "kilim": _kilim, "checks": _checks,
+    "grid": _line_grid_rug, "faded": _faded, "sisal": _sisal, "arches": _arches, "curves": _curves,
+    "rings": _ring_rug, "stars": _stars,
 }  # fmt: skip
 BATH_MATS: dict[str, Pattern] = {
     "shag": _shag, "bobbles": _bobbles, "waffle": _waffle, "towelling": _towelling, "striped": _striped,
 }  # fmt: skip
-DOOR_MATS: dict[str, Pattern] = {"coir": _coir, "ribs": _ribs, "plain": _plain, "sisal": _sisal}
+DOOR_MATS: dict[str, Pattern] = {"coir": _coir, "ribs": _ribs, "plain": _plain_rug, "sisal": _sisal}
 PATTERNS: dict[str, Pattern] = RUGS | BATH_MATS | DOOR_MATS
 """Every pattern by its name; docs/dress.md shows the rugs."""

@@ -59,7 +59,7 @@ def rug(
     edge = plain("rug edge", (r, g, b), 1.0)
     fringe = 0.05 if form == "fringed" else 0.0
     face, back = _slab(
-        _outline(length - 2 * fringe, width, form), thick, (length - 2 * fringe, width)
+        _rug_outline(length - 2 * fringe, width, form), thick, (length - 2 * fringe, width)
     )
     parts = [(face, shown), (back, edge)]
     if fringe:
@@ -68,7 +68,7 @@ def rug(
     return hung("rug", "rug", FLOOR_MAT, parts, [texture], Place.FLOOR)
 
 
-def _outline(length: float, width: float, form: str) -> list[tuple[float, float]]:
+def _rug_outline(length: float, width: float, form: str) -> list[tuple[float, float]]:
     if form == "oval":
         return oval(length, width, n=40)
     if form == "half":
@@ -120,7 +120,7 @@ def lay_rugs(
 def _by_sofa(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    sofas = _things(draft, room, SOFA)
+    sofas = _furniture_of_class(draft, room, SOFA)
     if not sofas:
         if room.kind is RoomKind.LIVING:
             _by_table(draft, space, room, style, rng)
@@ -131,7 +131,7 @@ def _by_sofa(
     middle = box.centre + front * (float(box.half[2]) + 0.65)
     tables = [
         draft.items[n].oriented_box.centre
-        for n in _things(draft, room, TABLE)
+        for n in _furniture_of_class(draft, room, TABLE)
         if np.linalg.norm((draft.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
     ]
     if tables:
@@ -143,7 +143,7 @@ def _by_sofa(
 def _by_bed(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    beds = _things(draft, room, BED)
+    beds = _furniture_of_class(draft, room, BED)
     if not beds:
         return
     box = max((draft.items[n].oriented_box for n in beds), key=lambda b: float(b.half[0]))
@@ -169,7 +169,7 @@ def _by_bed(
 def _by_table(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    boxes = [draft.items[n].oriented_box for n in _things(draft, room, TABLE)]
+    boxes = [draft.items[n].oriented_box for n in _furniture_of_class(draft, room, TABLE)]
     large = [b for b in boxes if min(b.half[0], b.half[2]) > 0.35]
     if not large:
         return
@@ -189,7 +189,7 @@ def _bath_mat(
     draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
     for wanted in (BATHTUB, SINK):
-        for number in _things(draft, room, wanted):
+        for number in _furniture_of_class(draft, room, wanted):
             box = draft.items[number].oriented_box
             for axis, sign in ((2, 1.0), (0, 1.0), (0, -1.0)):
                 out = box.axes[:, axis] * sign * [1, 0, 1]
@@ -231,7 +231,7 @@ def _doormats(
         )  # fmt: skip
 
 
-def _things(draft: Draft, room: RoomSpace, nyu40: int) -> list[int]:
+def _furniture_of_class(draft: Draft, room: RoomSpace, nyu40: int) -> list[int]:
     # Toys of the class stand on tables; furniture stands on the floor.
     floor = room.room.floor_y
     return [
@@ -273,7 +273,7 @@ def _lay_largest(
             (0.0, -0.15),
         ):
             at = middle + _offset(turn, shift)
-            area = _rectangle(at, turn, width, length)
+            area = _rug_area(at, turn, width, length)
             if not shapely.contains(free, area) or shapely.intersects(taken, area):
                 continue
             if bare and not _is_bare(space, room, area):
@@ -295,7 +295,7 @@ def _offset(turn: float, shift: tuple[float, float]) -> F64:
     return np.array([shift[0] * c + shift[1] * s, 0.0, -shift[0] * s + shift[1] * c])
 
 
-def _rectangle(at: F64, turn: float, width: float, length: float) -> BaseGeometry:
+def _rug_area(at: F64, turn: float, width: float, length: float) -> BaseGeometry:
     corners = [
         (at + _offset(turn, (sx * length / 2, sz * width / 2)))[[0, 2]]
         for sx, sz in ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -123,13 +123,13 @@ def pattern_material(draft: Draft, pattern: Pattern) -> PatternMaterial:
         number, size, mean = photograph_material(draft, pattern.photograph, pattern.family)
         made = PatternMaterial(number, size, lambda: mean)
     else:
-        number, painting = draft.materials.paint(partial(_painted, pattern))
+        number, painting = draft.materials.paint(partial(_paint_pattern, pattern))
         made = PatternMaterial(number, size_of(pattern), lambda: painting.painted().mean_rgb)
     draft.kept[key] = made
     return made
 
 
-def _painted(pattern: Pattern) -> Painted:
+def _paint_pattern(pattern: Pattern) -> Painted:
     maps = maps_of(pattern)
     material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
     return Painted(material, textures, maps.mean_rgb)
@@ -146,11 +146,11 @@ def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Te
     colour, rough, normal = encoded(maps, name)
     # Keep the Phong lobe that matches, for who reads no roughness.
     alpha = max(maps.mean_roughness, 0.1) ** 2
-    coat = maps.gloss
+    gloss = maps.gloss
     material = Material(
         name=name,
-        specular=(coat, coat, coat),
-        shininess=round(2.0 / alpha**2 - 2.0, 1) if coat else 0.0,
+        specular=(gloss, gloss, gloss),
+        shininess=round(2.0 / alpha**2 - 2.0, 1) if gloss else 0.0,
         texture_id=colour.id,
         roughness=1.0 if rough is not None else round(maps.mean_roughness, 4),
         roughness_texture_id=None if rough is None else rough.id,
@@ -159,12 +159,12 @@ def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Te
     return material, tuple(t for t in (colour, rough, normal) if t is not None)
 
 
-def _strip(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+def _strip_parquet(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 28, 4)
     return _planks(rng, p, layout, PlankLook(variation=0.05))
 
 
-def _boards(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+def _board_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     # Long boards: a wide repeat, a joint or two in each row.
     layout = rows_of_planks(
         rng, pixels_of(size_of(p)), size_of(p), int(rng.choice([12, 14, 17])), 1
@@ -209,7 +209,7 @@ _TILES: dict[str, tuple[tuple[float, float], Laying, float]] = {
 }
 
 
-def _tiles(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+def _tile_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
     laid, kind = _laid(p)
     size, laying, bevel = _TILES[laid]
@@ -251,18 +251,18 @@ def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     return wallpaper_maps(rng, _COARSE, p.variant, p.tints[0], p.tints[1], p.tints[2])
 
 
-def _cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
+def _woven_cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
     second = p.tints[1] if len(p.tints) > 1 else None
     return weave_maps(rng, _COARSE, size_of(p), p.tints[0], second=second, twill=twill)
 
 
 FAMILIES: dict[str, _Painter] = {
-    "strip": _strip,
-    "planks": _boards,
+    "strip": _strip_parquet,
+    "planks": _board_floor,
     "laminate": _laminate,
     "herringbone": _herringbone,
     "chevron": _chevron,
-    "tiles": _tiles,
+    "tiles": _tile_floor,
     "marble": _marble,
     "terracotta": _terracotta,
     "brick": lambda r, p: brick_maps(
@@ -285,8 +285,8 @@ FAMILIES: dict[str, _Painter] = {
     ),
     "wallpaper": _wallpaper,
     "grain": lambda r, p: grain_maps(r, p.wood, edge_px=pixels_of(size_of(p))[0]),
-    "weave": lambda r, p: _cloth(r, p, twill=False),
-    "twill": lambda r, p: _cloth(r, p, twill=True),
+    "weave": lambda r, p: _woven_cloth(r, p, twill=False),
+    "twill": lambda r, p: _woven_cloth(r, p, twill=True),
     "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),
 }
 """Painters by family; docs/dress.md shows them all."""

@@ -27,7 +27,7 @@ class SurfaceMaps:
     roughness: Srgb8Image | float  # (h, w) uint8, 255 = 1, or one value 0..1
     normal: Srgb8Image | None  # (h, w, 3) uint8, tangent space as glTF's; None = flat
     size_m: tuple[float, float]  # width and height of one repeat
-    gloss: float = 0.0  # strength of the coat's reflection, 0 matt, 0.5 varnish or glaze
+    gloss: float = 0.0  # specular strength of the surface, 0 matt, 0.5 varnish or glaze
 
     @property
     def mean_rgb(self) -> Rgb:

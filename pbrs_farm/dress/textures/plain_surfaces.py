@@ -109,7 +109,7 @@ def leather_maps(
     rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
 ) -> SurfaceMaps:
     """Leather: pebbles parted by fine creases, worn tones."""
-    cells, second = _cells(rng, shape, int(size_m[0] * size_m[1] / 0.0045**2))
+    cells, second = _distances_to_points(rng, shape, int(size_m[0] * size_m[1] / 0.0045**2))
     crease = smoothstep(0.45, 0.0, second - cells)
     creases = blurred(crease, 0.7)
     clouds = noise(rng, shape, slope=2.6, band=(1.0, 40.0))
@@ -118,7 +118,7 @@ def leather_maps(
     return surface_maps(colour, 0.46 + 0.05 * clouds + 0.2 * creases, height, size_m, 0.4)
 
 
-def _cells(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:
+def _distances_to_points(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:
     # Distance to the nearest and second nearest of about n jittered points, in cell widths.
     side = max(4, round(float(np.sqrt(n))))
     jitter = rng.random((2, side, side)).astype(np.float32)

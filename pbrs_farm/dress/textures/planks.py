@@ -136,8 +136,8 @@ def plank_maps(
     sheet = wood_sheet(rng, wood, (512, shape[1]), pixel_m) if sheet is None else sheet
     n = layout.n_planks
     # Cut each plank from a place of its own, one half of them turned round.
-    rows = _placed(rng, layout.across, layout.plank, n, sheet.shape[0])
-    columns = _placed(rng, layout.along, layout.plank, n, sheet.shape[1])
+    rows = _start_of_planks(rng, layout.across, layout.plank, n, sheet.shape[0])
+    columns = _start_of_planks(rng, layout.along, layout.plank, n, sheet.shape[1])
     tone = sampled(sheet.tone, rows, columns)
     # Give each plank a brightness and a warmth of its own.
     light, dark = _stained(wood, darkness)
@@ -161,7 +161,7 @@ def plank_maps(
     return surface_maps(colour, rough, height, size_m, look.gloss)
 
 
-def _placed(
+def _start_of_planks(
     rng: np.random.Generator, pixels: _INTS, plank: _INTS, n: int, most: int
 ) -> NDArray[np.int32]:
     # Pixels of each plank from a start of its own, forwards or backwards.

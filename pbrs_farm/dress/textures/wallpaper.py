@@ -51,7 +51,7 @@ def _pixels(shape: Shape2) -> tuple[F32, F32]:
     return np.broadcast_to(x[None], shape), np.broadcast_to(y[:, None], shape)
 
 
-def _filled(distance: F32 | F64, shape: Shape2) -> F32:
+def _fill_inside(distance: F32 | F64, shape: Shape2) -> F32:
     # 1 inside (distance < 0), one pixel soft.
     pixel = 1.0 / shape[1]
     return smoothstep(0.8 * pixel, -0.8 * pixel, distance.astype(np.float32))
@@ -61,9 +61,9 @@ def _stripes(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     x, _y = _pixels(shape)
     n = int(rng.choice([3, 4, 5, 8, 11]))
     f = np.abs((x * n) % 1.0 - 0.5)
-    wide = _filled((f - rng.uniform(0.15, 0.27)) / n, shape)
+    wide = _fill_inside((f - rng.uniform(0.15, 0.27)) / n, shape)
     # Add a thin line beside the broad stripe, or in the gap.
-    line = _filled((np.abs(f - rng.choice([0.34, 0.42])) - 0.018) / n, shape)
+    line = _fill_inside((np.abs(f - rng.choice([0.34, 0.42])) - 0.018) / n, shape)
     return [wide, line if rng.random() < 0.6 else np.zeros(shape, np.float32)]
 
 
@@ -77,7 +77,7 @@ def _geometric(rng: np.random.Generator, shape: Shape2) -> list[F32]:
         a, b = (x * n + y * n) % 1.0, (x * n - y * n) % 1.0
         lines = np.minimum(np.minimum(a, 1 - a), np.minimum(b, 1 - b))
         centre = np.maximum(np.abs(a - 0.5), np.abs(b - 0.5))
-        return [_filled((lines - width) / n, shape), _filled((centre - 0.14) / n, shape)]
+        return [_fill_inside((lines - width) / n, shape), _fill_inside((centre - 0.14) / n, shape)]
     if kind == 1:
         # Scales of concentric arcs: rows of circles, each over those above it.
         return _scales(x, y, n, shape)
@@ -85,12 +85,12 @@ def _geometric(rng: np.random.Generator, shape: Shape2) -> list[F32]:
         # Zigzags.
         rise = np.abs((x * 2 * n) % 2.0 - 1.0)
         f = np.abs(((y * 2 * n) - rise) % 1.0 - 0.5)
-        return [_filled((f - 0.21) / (3 * n), shape), np.zeros(shape, np.float32)]
+        return [_fill_inside((f - 0.21) / (3 * n), shape), np.zeros(shape, np.float32)]
     if kind == 3:
         # Dots on a diagonal grid.
         a, b = (x * 2 * n) % 2.0 - 1.0, (y * 2 * n) % 2.0 - 1.0
         d = np.minimum(np.hypot(a, b), np.hypot(1 - np.abs(a), 1 - np.abs(b)))
-        return [_filled((d - rng.uniform(0.18, 0.34)) / (2 * n), shape), np.zeros(shape, np.float32)]  # fmt: skip
+        return [_fill_inside((d - rng.uniform(0.18, 0.34)) / (2 * n), shape), np.zeros(shape, np.float32)]  # fmt: skip
     # Hexagons.
     return [_hexagons(x, y, n, width, shape), np.zeros(shape, np.float32)]
 
@@ -108,7 +108,7 @@ def _scales(x: F32, y: F32, n: int, shape: Shape2) -> list[F32]:
         d = np.hypot(cx, (y - cy) * n)
         inside = (d < 0.5) & ~done & (y <= cy + 0.5 / n)
         rings = np.abs(((d / 0.5) * 3.0) % 1.0 - 0.93)
-        lines = np.where(inside, _filled((rings - 0.13) / (6 * n), shape), lines)
+        lines = np.where(inside, _fill_inside((rings - 0.13) / (6 * n), shape), lines)
         done |= inside
     return [np.asarray(lines, np.float32), np.zeros(shape, np.float32)]
 
@@ -127,10 +127,10 @@ def _hexagons(x: F32, y: F32, n: int, width: float, shape: Shape2) -> F32:
                 d = np.hypot(sx - cx, sy - cy).astype(np.float32)
                 second = np.minimum(second, np.maximum(near, d))
                 near = np.minimum(near, d)
-    return _filled(((second - near) - width) / n, shape)
+    return _fill_inside(((second - near) - width) / n, shape)
 
 
-def _leaf(x: F32, y: F32, length: float, width: float) -> F32:
+def _leaf_distance(x: F32, y: F32, length: float, width: float) -> F32:
     # Distance-like value of a pointed leaf from (0, 0) to (length, 0); < 0 inside.
     t = np.clip(x / length, 0.0, 1.0)
     half = width * np.sin(np.pi * t**0.8) * (1.0 - 0.25 * t)
@@ -138,7 +138,7 @@ def _leaf(x: F32, y: F32, length: float, width: float) -> F32:
     return np.asarray(np.maximum(np.abs(y) - half, outside), np.float32)
 
 
-def _turned(x: F32, y: F32, at: tuple[float, float], angle: float) -> tuple[F32, F32]:
+def _axes_about(x: F32, y: F32, at: tuple[float, float], angle: float) -> tuple[F32, F32]:
     # Coordinates from a point on the torus, along and across a direction.
     dx = (x - np.float32(at[0]) + 0.5) % 1.0 - 0.5
     dy = (y - np.float32(at[1]) + 0.5) % 1.0 - 0.5
@@ -146,7 +146,7 @@ def _turned(x: F32, y: F32, at: tuple[float, float], angle: float) -> tuple[F32,
     return np.asarray(dx * c + dy * s, np.float32), np.asarray(dy * c - dx * s, np.float32)
 
 
-def _stamp(
+def _stamp_motif(
     mask: F32,
     at: tuple[float, float],
     angle: float,
@@ -161,7 +161,7 @@ def _stamp(
     dx = ((columns + 0.5) / edge - at[0]).astype(np.float32)[None]
     dy = (1.0 - (rows + 0.5) / edge - at[1]).astype(np.float32)[:, None]
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
-    ink = _filled(distance(dx * c + dy * s, dy * c - dx * s), (edge, edge))
+    ink = _fill_inside(distance(dx * c + dy * s, dy * c - dx * s), (edge, edge))
     place = np.ix_(rows % edge, columns % edge)
     mask[place] = np.maximum(mask[place], ink)
 
@@ -174,12 +174,12 @@ def _leaves(rng: np.random.Generator, shape: Shape2) -> list[F32]:
         angle = np.pi / 2 + float(rng.uniform(-0.45, 0.45)) + (0.25 if k % 2 else -0.25)
         curve, point = float(rng.uniform(-0.7, 0.7)) / 8, np.array(at)
         for step in range(8):
-            _stamp(veins, (point[0], point[1]), angle, 0.065, _stem(0.062, 0.0022))
+            _stamp_motif(veins, (point[0], point[1]), angle, 0.065, _stem(0.062, 0.0022))
             size = length * (1.0 - 0.09 * step)
             for side in (1, -1) if step < 7 else (0,):
                 turn = angle + side * 0.85
-                _stamp(fills, (point[0], point[1]), turn, size, partial(_leaf, length=size, width=size * 0.17))  # fmt: skip
-                _stamp(veins, (point[0], point[1]), turn, size, _stem(0.8 * size, 0.0013))
+                _stamp_motif(fills, (point[0], point[1]), turn, size, partial(_leaf_distance, length=size, width=size * 0.17))  # fmt: skip
+                _stamp_motif(veins, (point[0], point[1]), turn, size, _stem(0.8 * size, 0.0013))
             point = point + 0.06 * np.array([np.cos(angle), np.sin(angle)])
             angle += curve
     return [fills, veins]
@@ -196,28 +196,30 @@ def _damask(rng: np.random.Generator, shape: Shape2) -> list[F32]:
     lift = float(rng.uniform(0.8, 1.1))
     # Repeat a palmette, mirrored about its axis, at the nodes and centres of the repeat.
     for at in ((0.25, 0.02), (0.75, 0.52)):
-        mx, my = _turned(x, y, at, 0.0)
+        mx, my = _axes_about(x, y, at, 0.0)
         mx = np.abs(mx)
         for k in range(petals):
             angle = np.pi / 2 - k * lift * 1.5 / petals
             c, s = np.cos(angle), np.sin(angle)
             px, py = mx * c + (my - 0.10) * s, (my - 0.10) * c - mx * s
             size = 0.21 - 0.018 * k
-            petal = _leaf(px - 0.03, py, size, 0.026)
-            ink = np.maximum(ink, _filled(petal, shape))
-            second = np.maximum(second, _filled(_leaf(px - 0.05, py, size * 0.7, 0.008), shape))
+            petal = _leaf_distance(px - 0.03, py, size, 0.026)
+            ink = np.maximum(ink, _fill_inside(petal, shape))
+            second = np.maximum(
+                second, _fill_inside(_leaf_distance(px - 0.05, py, size * 0.7, 0.008), shape)
+            )
         # Let a smaller palmette hang below, and close the ogee around both.
         for k in range(4):
             angle = -np.pi / 2 + k * 0.42
             c, s = np.cos(angle), np.sin(angle)
             px, py = mx * c + (my - 0.09) * s, (my - 0.09) * c - mx * s
             size = 0.15 - 0.014 * k
-            ink = np.maximum(ink, _filled(_leaf(px - 0.02, py, size, 0.018), shape))
+            ink = np.maximum(ink, _fill_inside(_leaf_distance(px - 0.02, py, size, 0.018), shape))
         arm = np.abs(np.hypot(mx - 0.115, my - 0.085) - 0.052)
         arm = np.maximum(arm, 0.085 - my - 0.02)
-        ink = np.maximum(ink, _filled(arm - 0.006, shape))
+        ink = np.maximum(ink, _fill_inside(arm - 0.006, shape))
         ogee = np.abs(mx - 0.25 * np.cos(np.pi * np.clip(my, -0.5, 0.5)) ** 2)
-        ink = np.maximum(ink, _filled(ogee - 0.0065, shape))
+        ink = np.maximum(ink, _fill_inside(ogee - 0.0065, shape))
     return [ink, second]
 
 

@@ -139,23 +139,23 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         return
     # All switches of a home are of one make.
     form = int(hanging.draft.rng("switches", "form").integers(SWITCH_FORMS))
-    switch = _fitting(catalogue, "switch", rng) or hung_furniture.wall_switch.make(
+    switch = _draw_fitting(catalogue, "switch", rng) or hung_furniture.wall_switch.make(
         rng, style, 1, colour, form
     )
     lit = 0
     for door in room.doors:
         side = door.side_of(room.room.id)
-        if side is not None and lit < 3 and _beside(hanging, door, side, switch, rng):
+        if side is not None and lit < 3 and _fit_beside_door(hanging, door, side, switch, rng):
             lit += 1
     for _ in range(WANTS[room.kind].sockets):
         n = int(rng.choice([1, 1, 2, 3]))
-        socket = _fitting(catalogue, "socket", rng) or hung_furniture.wall_socket.make(
+        socket = _draw_fitting(catalogue, "socket", rng) or hung_furniture.wall_socket.make(
             rng, style, n, colour
         )
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
-def _fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made | None:
+def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made | None:
     """A socket or switch of the catalogue that is as small as they are; None = make one."""
     fit = [p for p in catalogue.of(group) if max(p.size) < 0.2 and p.size[1] < 0.06]
     if not fit or rng.random() < 0.4:
@@ -165,7 +165,7 @@ def _fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made
     return (piece, shape) if shape is not None else None
 
 
-def _beside(
+def _fit_beside_door(
     hanging: Hanging, door: Passage, side: int, made: Made, rng: np.random.Generator
 ) -> bool:
     """Hang a switch on one side of a door: the handle's side is unknown, so either that is free."""

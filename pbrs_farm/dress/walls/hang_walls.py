@@ -66,7 +66,7 @@ def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) ->
     )
 
 
-def walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def furnish_walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks and sockets in the rooms of the draft.
 
     share: 0..1 of what a room would get.

@@ -31,7 +31,7 @@ def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float
     rng = hanging.draft.rng("kitchen wall", hanging.room.room.id)
     if hanging.room.kind is not RoomKind.KITCHEN or rng.random() >= share:
         return
-    runs = _runs(hanging, space)
+    runs = _walls_over_worktops(hanging, space)
     if not _has_cupboards(hanging, space) and rng.random() < _CHANCE:
         _hang_cupboards(hanging, runs, style, rng)
     if rng.random() < _RAIL:
@@ -46,7 +46,7 @@ def _has_cupboards(hanging: Hanging, space: HouseSpace) -> bool:
     )
 
 
-def _runs(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float, float]]:
+def _walls_over_worktops(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float, float]]:
     """(face, s0, s1) of the wall behind each stretch of worktops that join."""
     pieces: dict[int, list[tuple[float, float]]] = {}
     for number in hanging.room.items:

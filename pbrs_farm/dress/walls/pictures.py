@@ -192,7 +192,7 @@ def _group_for(
     face, floor = hanging.faces[spot.face], hanging.floor_y
     for attempt in range(5):
         width = min(max(spot.width * 0.85**attempt, 0.22), 1.6)
-        group = _drawn(rng, width, left)
+        group = _draw_group(rng, width, left)
         w, h = group.size
         bottom = floor + _EYE_M + float(rng.uniform(-0.08, 0.08)) - h / 2
         if spot.above_y is not None:
@@ -208,7 +208,7 @@ def _group_for(
     return None
 
 
-def _drawn(rng: np.random.Generator, width: float, left: int) -> PictureGroup:
+def _draw_group(rng: np.random.Generator, width: float, left: int) -> PictureGroup:
     """A group about so wide of at most `left` pictures; sides of 20 to 110 cm."""
     gap = float(rng.uniform(0.05, 0.08))
     kind = rng.random()
@@ -242,7 +242,9 @@ def _hang_group(
     for x, y, w, h in pictures.frames:
         shown = gallery.print_for(w / h, hung)
         hung.append(shown.texture.id)
-        piece, shape = _picture(np.random.default_rng(own), kind, (w, h), shown, style, frame)
+        piece, shape = _framed_picture(
+            np.random.default_rng(own), kind, (w, h), shown, style, frame
+        )
         middle = left + x + w / 2
         hanging.hang(piece, shape, spot.face, middle, bottom + y, margin_m=0.0)
     w, h = pictures.size
@@ -252,7 +254,7 @@ def _hang_group(
     )
 
 
-def _picture(
+def _framed_picture(
     rng: np.random.Generator, kind: str, size: tuple[float, float], shown: Print, style: Style,
     frame: Material,
 ) -> Made:  # fmt: skip

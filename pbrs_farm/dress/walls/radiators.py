@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Final
 
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finish_scheme import joinery_scheme
+from pbrs_farm.dress.finish_scheme import finish_scheme
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.surface_finishes import coat_material
+from pbrs_farm.dress.surface_finishes import material_of_finish
 from pbrs_farm.dress.things import radiators
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.walls.hanging import Hanging
@@ -33,7 +33,7 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
     room, rng = hanging.room, hanging.draft.rng("radiators", hanging.room.room.id)
     if room.kind in _UNHEATED or rng.random() >= share:
         return
-    paint = coat_material(joinery_scheme(hanging.draft, style).radiator)
+    paint = material_of_finish(finish_scheme(hanging.draft, style).radiator)
 
     def make(wide: float, high: float) -> Made:
         return radiators.wall_radiator.make(rng, style, wide, high, paint)

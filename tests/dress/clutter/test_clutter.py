@@ -13,7 +13,7 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.dress.clutter import clutter, table_tops
+from pbrs_farm.dress.clutter import add_clutter, table_tops
 from pbrs_farm.dress.clutter.receptacles import Row, receptacle_of, shares
 from pbrs_farm.dress.clutter.stock import Stock, is_known
 from pbrs_farm.dress.draft import Draft
@@ -30,7 +30,7 @@ _BOOKS = 23
 
 def _dressed(home: House, seed: int = 1, share: float = 1.0) -> Draft:
     draft = Draft(home, seed)
-    clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), share)
+    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), share)
     return draft
 
 
@@ -139,7 +139,7 @@ def test_a_room_has_no_more_of_a_kind_than_people_keep(monkeypatch: pytest.Monke
     rows = {"coffee_table": (Row(receptacle="coffee_table", kind="box", share=1.0, source="own"),)}
     monkeypatch.setattr(table_tops, "shares", lambda: rows)
     draft = Draft(house(*tables), 1)
-    clutter(draft, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    add_clutter(draft, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
     on_tables = [i for i in _added(draft) if i.bounds[0, 1] > 0.4]
     assert len(on_tables) == 2
     assert draft.refused["clutter: enough of box in the room"] > 0

@@ -9,7 +9,7 @@ import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
@@ -19,7 +19,7 @@ from tests.dress.furniture import DEPTH, WIDTH, house, solid
 
 def _dressed(seed: int) -> Draft:
     draft = Draft(builtin_home(), seed)
-    clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
     return draft
 
 
@@ -60,7 +60,7 @@ def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() ->
     n = 0
     for seed in range(3):
         draft = Draft(house(table, name="Garage"), seed)
-        clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
         for item in _on_floor(draft):
             (x0, z0), (x1, z1) = item.bounds[:, [0, 2]]
             assert min(x0, z0, WIDTH - x1, DEPTH - z1) < 0.35, item.name
@@ -75,7 +75,7 @@ def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
     before = shapely.box(0.5, 0.6, 3.5, 1.2)
     for seed in range(4):
         draft = Draft(house(wardrobe, low, name="Bedroom"), seed)
-        clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
         for item in _on_floor(draft):
             footprint = shapely.box(*item.bounds[:, [0, 2]].ravel())
             assert before.intersection(footprint).area < 1e-4, item.name
@@ -84,7 +84,7 @@ def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
 def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
     full = solid("Block", [0, 0, 0], [4, 1.0, 3], 39)
     draft = Draft(house(full), 1)
-    clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    add_clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
     assert not _on_floor(draft)
 
 
@@ -92,5 +92,5 @@ def test_a_room_of_two_corners_is_left_alone() -> None:
     home = house()
     flat = replace(home.rooms[0], polygon=np.array([[0.0, 0.0], [1.0, 0.0]]))
     draft = Draft(replace(home, rooms=(flat,)), 1)
-    clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    add_clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
     assert not _on_floor(draft)

@@ -9,7 +9,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.dress.clutter import clutter
+from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.clutter.beds import lying_place
 from pbrs_farm.dress.clutter.cushions import find_seat
 from pbrs_farm.dress.draft import Draft
@@ -38,7 +38,7 @@ def _sofa() -> Item:
 
 def _pillows(home: House, seed: int) -> list[Item]:
     draft = Draft(home, seed)
-    clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
     return [i for i in draft.items[len(home.items) :] if i.nyu40 == _PILLOW]
 
 

@@ -12,7 +12,7 @@ from pbrs_farm.core.mesh import edges_are_paired, face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.surfaces import surfaces
+from pbrs_farm.dress.surfaces import dress_surfaces
 from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
 from pbrs_farm.dress.surfaces.dress_surfaces import room_frame
 from pbrs_farm.dress.surfaces.sided_walls import RoomFinder, sided_wall
@@ -23,7 +23,7 @@ from pbrs_farm.repair import repair
 
 def dressed(seed: int, house: House | None = None, share: float = 1.0) -> House:
     draft = Draft(builtin_home() if house is None else house, seed)
-    surfaces(draft, EMPTY, style_for(draft.rng("style")), share)
+    dress_surfaces(draft, EMPTY, style_for(draft.rng("style")), share)
     return draft.house()
 
 

@@ -15,7 +15,7 @@ from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corner
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
-from pbrs_farm.dress.textiles import textiles_large
+from pbrs_farm.dress.textiles import add_textiles
 from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
 from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel, towel_over_bar
 from pbrs_farm.dress.textiles.large_textiles import towel_rail
@@ -43,7 +43,7 @@ def _empty(*more: Item) -> House:
 
 def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> Draft:
     draft = Draft(house or _bare(), seed)
-    textiles_large(draft, EMPTY, STYLE, share)
+    add_textiles(draft, EMPTY, STYLE, share)
     return draft
 
 

@@ -12,13 +12,13 @@ from pbrs_farm.core.classes import BED
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.finish_scheme import joinery_scheme
+from pbrs_farm.dress.finish_scheme import finish_scheme
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.dress.surface_finishes import coat_material
+from pbrs_farm.dress.surface_finishes import material_of_finish
 from pbrs_farm.dress.things import hung, radiators
 from pbrs_farm.dress.things.maker import Thing
-from pbrs_farm.dress.walls import walls
+from pbrs_farm.dress.walls import furnish_walls
 from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
@@ -36,7 +36,7 @@ def _style() -> Style:
 def _drafts(n: int = 8) -> list[Draft]:
     drafts = [Draft(builtin_home(), seed) for seed in range(1, n)]
     for draft in drafts:
-        walls(draft, EMPTY, _style(), 1.0)
+        furnish_walls(draft, EMPTY, _style(), 1.0)
     return drafts
 
 
@@ -93,7 +93,7 @@ def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
 def test_added_radiators_have_the_coat_of_the_home() -> None:
     coats = set()
     for draft in _bare_drafts(24):
-        coat = coat_material(joinery_scheme(draft, _style()).radiator)
+        coat = material_of_finish(finish_scheme(draft, _style()).radiator)
         for item in _named(draft, "Panel radiator"):
             assert coat in [draft.materials[s.material] for s in item.surfaces]
             coats.add(coat)

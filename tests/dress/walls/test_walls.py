@@ -21,7 +21,7 @@ from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.things.hung import round_mirror
-from pbrs_farm.dress.walls import hung_things, walls
+from pbrs_farm.dress.walls import furnish_walls, hung_things
 from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.dress.walls.prints import FAMILIES, palette_of, print_pixels
 from pbrs_farm.images import decode_photo, jpeg_from_array
@@ -36,7 +36,7 @@ def _style(seed: int = 1) -> Style:
 
 def _dressed(seed: int, share: float = 1.0, catalogue: Catalogue = EMPTY) -> Draft:
     draft = Draft(builtin_home(), seed)
-    walls(draft, catalogue, _style(seed), share)
+    furnish_walls(draft, catalogue, _style(seed), share)
     return draft
 
 
