@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from pbrs_farm.commands.options import add_options, group_of
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.number_ranges import seeds_of
 from pbrs_farm.core.shown_text import escaped, printable, shown
 
 if TYPE_CHECKING:
@@ -57,18 +58,10 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
     """The seeds of --dress, each once; none where it is not given. Raises BadInput."""
     if text is None:
         return ()
-    # A dict keeps the order in which seeds are named; MAX_SEEDS bounds each range.
-    seeds: dict[int, None] = {}
-    for word in text.split(","):
-        first, dots, last = word.partition("..")
-        bounds = [first, last] if dots else [first, first]
-        if not all(b.isascii() and b.isdigit() and len(b) < 10 for b in bounds):
-            raise BadInput("--dress", text, "expected a seed, or seeds", hint="3, 1..20 or 1,4,7")
-        low, high = (int(b) for b in bounds)
-        if not 1 <= low <= high < low + MAX_SEEDS:
-            raise BadInput("--dress", text, f"expected 1 to {MAX_SEEDS} seeds from 1 on, ascending")
-        seeds |= dict.fromkeys(range(low, high + 1))
-    return tuple(seeds)
+    try:
+        return seeds_of(text, least=1, max_seeds=MAX_SEEDS)
+    except ValueError as error:
+        raise BadInput("--dress", text, str(error), hint="3, 1..20 or 1,4,7") from None
 
 
 def at_least(name: str, value: float, least: int) -> None:

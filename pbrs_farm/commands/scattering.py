@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from pbrs_farm.commands.arguments import HOME, Verb, at_least, counted, dress_seeds, echo, recipe_of
 from pbrs_farm.commands.options import add_options
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.number_ranges import ends_of
 
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
@@ -58,8 +59,8 @@ def _scatter(args: argparse.Namespace) -> int:
 
     for name in ("count", "scenes", "views"):
         at_least(f"--{name}", getattr(args, name), 1)
-    low, _, high = args.distance.partition("..")
-    distance = _metres(low), _metres(high or low)
+    nearest, farthest = (_metres(end) for end in ends_of(args.distance))
+    distance = nearest, farthest
     found = [
         model
         for pattern in args.models

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from typing import Final
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.number_ranges import range_of
 from pbrs_farm.core.plugins import is_plugin, plugin_homes
 
 PREFIX: Final = "made:"
@@ -36,7 +36,6 @@ AREA_OF_TWO_STOREYS: Final = {2: (76, 150), 3: (84, 190), 4: (96, 230)}
 """The same of both storeys together."""
 
 _HINT: Final = "made:12, made:1..1000 or made:1..100,rooms=2..4,area=60..90"
-_RANGE: Final = re.compile(r"(\d{1,40})(?:\.\.(\d{1,40}))?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,22 +94,22 @@ def made_homes(word: str) -> list[MadeHome]:
     """The homes of a word, one a seed. Raises BadInput for a word that names none."""
     # made:FIRST..LAST,key=value,...
     seeds, *options = word.removeprefix(PREFIX).split(",")
-    first, last = _range(word, seeds, MAX_SEED)
+    first, last = _checked_range(word, seeds, MAX_SEED)
     if last - first >= MAX_HOMES:
         raise BadInput(word, "", f"names {last - first + 1} homes, at most {MAX_HOMES}")
     home = MadeHome(first)
     for option in options:
         key, _, value = option.partition("=")
         if key == "rooms":
-            home = replace(home, bedrooms=_range(word, value, 4))
+            home = replace(home, bedrooms=_checked_range(word, value, 4))
         elif key == "area":
-            home = replace(home, area=_range(word, value, 1000))
+            home = replace(home, area=_checked_range(word, value, 1000))
         elif key == "style":
             home = replace(home, style=_one_of(STYLES, word, option, "no such style"))
         elif key == "plans":
             home = replace(home, plans=_one_of(PLANS, word, option, "no such family of plans"))
         elif key == "storeys":
-            home = replace(home, storeys=_range(word, value, 99)[1])
+            home = replace(home, storeys=_checked_range(word, value, 99)[1])
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
@@ -165,11 +164,11 @@ def _one_of(names: tuple[str, ...], word: str, option: str, text: str) -> str:
     return value
 
 
-def _range(word: str, text: str, most: int) -> tuple[int, int]:
-    match = _RANGE.fullmatch(text)
-    if match is None:
+def _checked_range(word: str, text: str, most: int) -> tuple[int, int]:
+    ends = range_of(text)
+    if ends is None:
         raise BadInput(word, text[:40], "is no number and no range LOW..HIGH", hint=_HINT)
-    low, high = int(match[1]), int(match[2] or match[1])
+    low, high = ends
     if low > high:
         raise BadInput(word, text, "runs downwards", hint=f"{high}..{low}")
     if high > most:

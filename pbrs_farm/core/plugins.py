@@ -6,7 +6,6 @@ first used. Its package and version are part of the digest of the steps that use
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +13,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.number_ranges import range_of
 from pbrs_farm.core.shown_text import hint_of_choice
 
 GROUPS: Final = (
@@ -25,7 +25,6 @@ PREFIX: Final = "plugin:"
 """Of the words that name homes of a plugin: plugin:kitchen,1..100,option=x."""
 
 MAX_HOMES: Final = 1_000_000  # of one word
-_RANGE: Final = re.compile(r"(\d{1,18})(?:\.\.(\d{1,18}))?")
 _HINT: Final = "plugin:NAME,1..100 or plugin:NAME,7,option=x"
 
 
@@ -143,10 +142,10 @@ def plugin_homes(word: str) -> list[PluginHome]:
     name, *parts = word.removeprefix(PREFIX).split(",")
     numbers = [part for part in parts if "=" not in part]
     options = [part.partition("=") for part in parts if "=" in part]
-    match = _RANGE.fullmatch(numbers[0]) if len(numbers) == 1 else None
-    if not name.isidentifier() or match is None:
+    ends = range_of(numbers[0]) if len(numbers) == 1 else None
+    if not name.isidentifier() or ends is None:
         raise BadInput(word, "", "names no homes of a plugin", hint=_HINT)
-    low, high = int(match[1]), int(match[2] or match[1])
+    low, high = ends
     if not low <= high < low + MAX_HOMES:
         raise BadInput(word, numbers[0], f"is no range of up to {MAX_HOMES:,} homes", hint=_HINT)
     for key, _, _value in options:
