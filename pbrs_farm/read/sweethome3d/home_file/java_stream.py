@@ -1,4 +1,8 @@
-"""A Java serialisation stream -> plain objects, without Java. No effects."""
+"""A Java serialisation stream -> plain objects, without Java. No effects.
+
+Not by javaobj-py3 (0.6.1): it recurses, and ends in RecursionError at a few hundred contents within each
+other, where a home's joined walls, each written within its neighbour, nest by the thousand.
+"""
 
 from __future__ import annotations
 
