@@ -1,6 +1,6 @@
 """What the formats that people have cost to read, and what becomes of them -> out/bench/inputs.json.
 
-`python -m benchmarks inputs`: one realistic house of each format, written here, is read, furnished,
+`python -m benchmarks inputs`: one realistic house of each format, written by tests/inputs, is read, furnished,
 repaired and looked at, each in a process of its own; then hostile ones of the same formats.
 """
 
@@ -29,7 +29,7 @@ UNITS: Final = {
 def main() -> None:
     """Measure every format and write the report."""
     from benchmarks import hostile
-    from benchmarks.inputs.sound_files import sound_files
+    from tests.inputs.sound_files import sound_files
 
     rows = {title: _measured(title) for title in sound_files()}
     good = [row for row in rows.values() if "error" not in row]

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.inputs.sound_files import sound_files
+from tests.inputs.sound_files import sound_files
 
 
 def measure(title: str) -> dict[str, Any]:

@@ -13,7 +13,13 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from benchmarks.inputs.plan_files import (
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
+from pbrs_farm.generate.plans.closed_rings import closed_rings
+from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file, upright
+from pbrs_farm.generate.plans.plan_format import Part, part_of
+from pbrs_farm.generate.plans.told_plan import footprint, footprints
+from tests.inputs.plan_files import (
     HOLES,
     ROOMS,
     THINGS,
@@ -26,12 +32,6 @@ from benchmarks.inputs.plan_files import (
     write_swiss,
     write_zind,
 )
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
-from pbrs_farm.generate.plans.closed_rings import closed_rings
-from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file, upright
-from pbrs_farm.generate.plans.plan_format import Part, part_of
-from pbrs_farm.generate.plans.told_plan import footprint, footprints
 
 formats = pytest.mark.parametrize("name", WRITERS)
 fronts = pytest.mark.parametrize("name", ["spatiallm", "procthor", "roomplan", "react-planner"])

@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from benchmarks.inputs.sound_files import SoundFile, sound_files
 from tests.hostile.case import TINY, Case, Place, Words, run
 from tests.hostile.verdict import FORGED
+from tests.inputs.sound_files import SoundFile, sound_files
 
 _SMALL: Final = 300  # triangles
 _MILLION: Final = 10**6

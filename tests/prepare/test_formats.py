@@ -9,7 +9,6 @@ from typing import Final
 
 import pytest
 
-from benchmarks.inputs.sound_files import sound_files
 from pbrs_farm.commands.arguments import home_arguments
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields, Recipe
@@ -19,6 +18,7 @@ from pbrs_farm.prepare.formats import PLAN, format_of_file, format_of_kind, form
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
 from pbrs_farm.store import MemoryStore
+from tests.inputs.sound_files import sound_files
 from tests.read import textured_sources
 from workers.house_files import entries_from_arguments, is_left_in_place, upload
 

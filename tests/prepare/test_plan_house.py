@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.inputs.plan_files import HOLES, ROOMS, TELLING, WRITERS, write_swiss, write_zind
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields, Recipe
@@ -19,6 +18,7 @@ from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
 from pbrs_farm.store import MemoryStore
+from tests.inputs.plan_files import HOLES, ROOMS, TELLING, WRITERS, write_swiss, write_zind
 from tests.prepare.test_furnish_rooms import boxes
 from workers.house_files import entries_from_arguments, upload
 

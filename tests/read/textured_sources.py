@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from benchmarks.inputs import front3d_files, scenestate_files
-from benchmarks.inputs.usd_files import UsdHome, walls_of
 from pbrs_farm.prepare.source import SourceRef, object_source, resolve
 from pbrs_farm.read.objects.model_folders import find_models
+from tests.inputs import front3d_files, scenestate_files
+from tests.inputs.usd_files import UsdHome, walls_of
 from tests.read.gltf.gltf_scenes import Scene, two_rooms
 from tests.read.habitat.habitat_sets import dataset
 from tests.read.suncg import suncg_root

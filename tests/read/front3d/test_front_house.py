@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import shapely
 
-from benchmarks.inputs import front3d_files as files
 from pbrs_farm.core.classes import LAMP, NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import FRONT_TOLD, TOLD, House, ItemKind, MaterialKind
@@ -20,6 +19,7 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.common.given_classes import given_class
+from tests.inputs import front3d_files as files
 
 
 def read(path: Path, models: str = "") -> House:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.inputs.habitat_files import written
+from tests.inputs.habitat_files import written
 from tests.read.gltf.gltf_scenes import Scene, two_rooms
 
 REGIONS = [

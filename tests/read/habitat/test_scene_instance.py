@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.inputs.habitat_files import written
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
+from tests.inputs.habitat_files import written
 from tests.read.gltf.gltf_scenes import item, two_rooms
 from tests.read.habitat.habitat_sets import dataset
 

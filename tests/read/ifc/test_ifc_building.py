@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import shapely
 
-from benchmarks.inputs.ifc_files import IfcHouse, roof, storey_of_two_rooms
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.repair import repair
+from tests.inputs.ifc_files import IfcHouse, roof, storey_of_two_rooms
 from tests.repair.embree import EmbreeOccluder
 
 

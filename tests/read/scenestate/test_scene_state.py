@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.inputs import scenestate_files as files
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import TOLD, House, ItemKind, MaterialKind
@@ -18,6 +17,7 @@ from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
+from tests.inputs import scenestate_files as files
 
 
 def written(folder: Path, scene: dict[str, Any]) -> Path:

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
-from benchmarks.inputs.usd_files import UsdHome, set_label, walls_of
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.repair import repair
+from tests.inputs.usd_files import UsdHome, set_label, walls_of
 from tests.repair.embree import EmbreeOccluder
 
 

@@ -19,7 +19,9 @@ class SoundFile(NamedTuple):
 
 def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     """Title of a format -> its house; meshes have about as many triangles where the format has any."""
-    from benchmarks.inputs import (
+    from pbrs_farm.export.export_homes import export_house
+    from pbrs_farm.read.builtin.builtin_home import builtin_home
+    from tests.inputs import (
         front3d_files,
         habitat_files,
         ifc_files,
@@ -27,8 +29,6 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         scenestate_files,
         usd_files,
     )
-    from pbrs_farm.export.export_homes import export_house
-    from pbrs_farm.read.builtin.builtin_home import builtin_home
 
     plans = {
         "plan of one's own": plan_files.write_own,

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.inputs.front3d_files import (
+from pbrs_farm.formats.glb import GlbWriter
+from tests.inputs.front3d_files import (
     HEIGHT,
     HOLES,
     OUTER,
@@ -19,8 +20,7 @@ from benchmarks.inputs.front3d_files import (
     room_at,
     wall_face,
 )
-from benchmarks.inputs.scenestate_files import model_glb
-from pbrs_farm.formats.glb import GlbWriter
+from tests.inputs.scenestate_files import model_glb
 
 _SCENE = "102344115"
 N_OPENINGS = sum(kind != "Hole" for kind, *_ in HOLES)  # a gap without a door is not told
