@@ -43,7 +43,9 @@ def entries_from_arguments(
         note_step(word, "read")
         for ref in variants(resolve(word, files, models=models), seeds):
             entry = HouseEntry(
-                house_id=ref.house_id, source=_placed(ref).model_dump_json(), sha256=ref.fingerprint
+                house_id=ref.house_id,
+                source=_source_in_store(ref).model_dump_json(),
+                sha256=ref.fingerprint,
             )
             found.setdefault(ref.house_id, (entry, ref))
     return list(found.values())
@@ -55,7 +57,7 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
     Folders (SUNCG, glTF with side files) are not copied: workers must see them at the same path.
     """
     # A source in one file goes into the store, below its home's id, once for all its variants.
-    for place, path in {_placed(ref).location: ref.location for ref in refs}.items():
+    for place, path in {_source_in_store(ref).location: ref.location for ref in refs}.items():
         if place != path:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
@@ -103,7 +105,7 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
     SUNCG, files with others beside them or with a folder of models, and what plugins read.
     """
-    return ref.format is not None and _placed(ref).location == ref.location
+    return ref.format is not None and _source_in_store(ref).location == ref.location
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
@@ -184,7 +186,7 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
             write_whole(cache_folder() / name, store.get(key))
 
 
-def _placed(ref: SourceRef) -> SourceRef:
+def _source_in_store(ref: SourceRef) -> SourceRef:
     """The source as workers find it: a single file by its key in the store."""
     entry = ref.format
     if entry is None or ref.kind == "reader" or not entry.travels:

@@ -50,7 +50,7 @@ class Deb:
         try:
             for name, content in _ar_members(self.path.read_bytes()):
                 if name.startswith("data.tar"):
-                    return _files(_plain_tar(name, content, self.path), wanted)
+                    return _extract_files(_plain_tar(name, content, self.path), wanted)
         except (tarfile.TarError, lzma.LZMAError, EOFError, OSError, ValueError) as error:
             raise self.damaged(str(error)) from None
         raise self.damaged("holds no files")
@@ -168,7 +168,7 @@ def version_of(deb: Path) -> str:
     return deb.name.split("_")[1].replace("%3a", ":") if deb.name.count("_") >= 2 else ""
 
 
-def _files(tar: bytes, wanted: Callable[[str], bool]) -> dict[str, bytes]:
+def _extract_files(tar: bytes, wanted: Callable[[str], bool]) -> dict[str, bytes]:
     found = {}
     with tarfile.open(fileobj=io.BytesIO(tar)) as archive:
         # Read the wanted files alone; links and folders are passed over.

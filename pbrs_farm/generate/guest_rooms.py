@@ -84,9 +84,11 @@ def cut_guests(
         whole = parts[host][0]
         fitting = (
             (inner, rest)
-            for inner, rest in (*_strips(whole, wish), *_corners(whole, wish))
-            if _fits(inner, wish.type)
-            and any(_fits(r, programme.rooms[host].type) for r in _rectangles(rest, inner))
+            for inner, rest in (*_strips(whole, wish), *_corner_cuts(whole, wish))
+            if _fits_room_type(inner, wish.type)
+            and any(
+                _fits_room_type(r, programme.rooms[host].type) for r in _rectangles(rest, inner)
+            )
             and _keeps_rules((inner, rest), parts, programme, (guest, host), brief, notch)
         )
         found = next(fitting, None)
@@ -117,18 +119,20 @@ def _keeps_rules(
 
     if host.type is RoomType.KITCHEN:
         wide = 2.0 if programme.open_kitchen else DOOR_WALL_M
-        if _shared(rest, (*halls, *living)) < wide:
+        if _shared_length(rest, (*halls, *living)) < wide:
             return False
-    elif _shared(rest, ways_to(host.type)) < door_m(host.type):
+    elif _shared_length(rest, ways_to(host.type)) < door_m(host.type):
         return False
     # What is left of a living room keeps the way to its kitchen.
     if host.type is RoomType.LIVING:
         kitchen = parts[first_of(programme, RoomType.KITCHEN)]
         ways = rest if programme.open_kitchen else (*rest, *halls)
-        if _shared(kitchen, ways) < (2.0 if programme.open_kitchen else DOOR_WALL_M):
+        if _shared_length(kitchen, ways) < (2.0 if programme.open_kitchen else DOOR_WALL_M):
             return False
     # A wardrobe is entered from its bedroom, a store of a kitchen from there.
-    if _opens_to_hall(wish, host) and _shared((inner,), ways_to(wish.type)) < door_m(wish.type):
+    if _opens_to_hall(wish, host) and _shared_length((inner,), ways_to(wish.type)) < door_m(
+        wish.type
+    ):
         return False
     lit = max(daylight_length(r, brief, notch) for r in rest) * STEP_M
     return not host.type.is_habitable or lit >= daylight_m(host.area)
@@ -145,7 +149,7 @@ def hall_wall_m(host: RoomWish, guest: RoomWish | None) -> float:
     return own + door_m(guest.type) if guest and _opens_to_hall(guest, host) else own
 
 
-def _shared(rects: tuple[IntRect, ...], others: tuple[IntRect, ...]) -> float:
+def _shared_length(rects: tuple[IntRect, ...], others: tuple[IntRect, ...]) -> float:
     return max(shared_length(a, b) for a in rects for b in others) * STEP_M
 
 
@@ -171,7 +175,7 @@ def _strips(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
         yield (x0, z1 - along, x1, z1), ((x0, z0, x1, z1 - along),)
 
 
-def _corners(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
+def _corner_cuts(whole: IntRect, wish: RoomWish) -> Iterator[Cut]:
     """A rectangle in each corner of another, of the wished area: what is left has an L's shape."""
     if wish.type not in SMALL:
         return
@@ -207,7 +211,7 @@ def guest_area(guest: RoomWish, host: RoomWish) -> float:
     return max(guest.area, side * side / _STRIP_ASPECT) + WALL_M * side
 
 
-def _fits(rect: IntRect, type_: RoomType) -> bool:
+def _fits_room_type(rect: IntRect, type_: RoomType) -> bool:
     sides = sorted(side * STEP_M - WALL_M for side in (rect[2] - rect[0], rect[3] - rect[1]))
     return sides[0] >= MIN_WIDTH[type_] and sides[1] <= 1.2 * MAX_ASPECT[type_] * sides[0]
 

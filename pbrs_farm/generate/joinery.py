@@ -81,13 +81,13 @@ def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape
     glass = Material("pane", kind=MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2)
     # The frame is 2 cm deeper than the wall, so that it shows on both sides.
     w, h, d = opening.width, opening.height, wall_m + 0.02
-    frame = _frame(w, h, d, has_sill=opening.sill > 0)
+    frame = _frame_boxes(w, h, d, has_sill=opening.sill > 0)
     if opening.kind is OpeningKind.PASSAGE:
         return Shape((boxes_surface("frame", frame, 0),), (paint,))
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
         kind = design.leaf if opening.kind is OpeningKind.DOOR else design.entrance
         frame += _stops(w, h, d, has_threshold=opening.kind is OpeningKind.ENTRANCE)
-        leaf = _leaf(w, h, d, kind)
+        leaf = _door_leaf_boxes(w, h, d, kind)
         handles = _handles(w, d, opening.hinge_at_start, design.handle)
         surfaces = [boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1)]
         return Shape(tuple(surfaces), (paint, metal))
@@ -97,7 +97,7 @@ def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape
     return Shape(tuple(surfaces), (paint, glass, metal))
 
 
-def _frame(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
+def _frame_boxes(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
     # Two posts, the head between them, a sill below a window.
     x, z, t = w / 2, d / 2, _FRAME_M
     boxes: list[_Box] = [
@@ -125,7 +125,7 @@ def _stops(w: float, h: float, d: float, *, has_threshold: bool) -> list[_Box]:
     return boxes
 
 
-def _leaf(w: float, h: float, d: float, kind: str) -> list[_Box]:
+def _door_leaf_boxes(w: float, h: float, d: float, kind: str) -> list[_Box]:
     """A door's leaf, flush with the room it swings into; panels stand out on both sides."""
     x, front = w / 2 - _FRAME_M - _GAP_M, d / 2 - 0.005
     back, top = front - _LEAF_M, h - _FRAME_M - _GAP_M

@@ -125,8 +125,8 @@ def _solved_layout(
             continue
         guests = tuple(programme.rooms[g] for g, host in hosts.items() if host == number)
         for share in _arms(wish, programme):
-            leaf = _leaf(wish, share, guests, programme.family.hall_aspect)
-            leaves.append(_around(core, wish.type, leaf, programme) if core else leaf)
+            leaf = _leaf_of_wish(wish, share, guests, programme.family.hall_aspect)
+            leaves.append(_leaf_around_core(core, wish.type, leaf, programme) if core else leaf)
             owner.append(number)
     if programme.notch:
         is_court = programme.is_court
@@ -165,7 +165,7 @@ def _arms(wish: RoomWish, programme: Programme) -> tuple[float, ...]:
     return (0.68, 0.32) if l_shaped else (1.0,)
 
 
-def _leaf(
+def _leaf_of_wish(
     wish: RoomWish, share: float, guests: tuple[RoomWish, ...], hall_aspect: float
 ) -> SliceLeaf:
     area = wish.area * share + sum(guest_area(g, wish) for g in guests)
@@ -180,7 +180,9 @@ def _leaf(
     return SliceLeaf(gross, narrow, aspect, outer=lit, any_outer=entrance)
 
 
-def _around(core: Core, type_: RoomType, leaf: SliceLeaf, programme: Programme) -> SliceLeaf:
+def _leaf_around_core(
+    core: Core, type_: RoomType, leaf: SliceLeaf, programme: Programme
+) -> SliceLeaf:
     """The leaf of a storey of several: the stairs where they are, the hall before them."""
     if type_ is RoomType.STAIRS:
         x0, z0, x1, z1 = core.stairs

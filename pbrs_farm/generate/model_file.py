@@ -37,7 +37,7 @@ def model_files(shape: Shape) -> dict[str, bytes]:
 def _obj_lines(shape: Shape) -> Iterator[str]:
     n_points = n_uvs = n_normals = 1
     for number, given in enumerate(shape.surfaces):
-        surface = _seen(given)
+        surface = _visible_surface(given)
         kind = shape.materials[surface.material].kind
         yield f"g {_GROUPS.get(kind, 'part')}_{number}"
         yield f"usemtl {material_name(shape, surface.material)}"
@@ -55,7 +55,7 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
         n_normals += 0 if surface.normals is None else len(surface.normals)
 
 
-def _seen(surface: Surface) -> Surface:
+def _visible_surface(surface: Surface) -> Surface:
     """The surface without faces that have no area once written, and without vertices of those alone.
 
     The program, and every reader, fits the box of all vertices to the piece's size.

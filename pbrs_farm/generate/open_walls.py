@@ -113,6 +113,6 @@ class WallDrawing:
         )
 
 
-def numbers(types: list[RoomType], *wanted: RoomType) -> list[int]:
+def rooms_of_types(types: list[RoomType], *wanted: RoomType) -> list[int]:
     """The rooms of the wanted types."""
     return [i for i, t in enumerate(types) if t in wanted]

@@ -18,7 +18,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.open_walls import WallDrawing, numbers
+from pbrs_farm.generate.open_walls import WallDrawing, rooms_of_types
 from pbrs_farm.generate.plan_walls import OUTSIDE, WallRun, open_pairs
 from pbrs_farm.generate.windows import GLASS_SHARE, add_balcony, add_windows, is_lit
 
@@ -133,7 +133,7 @@ def _add_doors(drawing: WallDrawing, room: int) -> None:
 
 def _add_second_door(drawing: WallDrawing, room: int, chance: float) -> None:
     """A door to the living room beside, where none is; chance: how often."""
-    living = numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)
+    living = rooms_of_types(drawing.types, RoomType.LIVING, RoomType.STUDIO)
     between = [r for r in drawing.runs if room in r.rooms and r.rooms & set(living)]
     joined = any({o.room, o.other} == {room, *living} for o in drawing.openings)
     if between and not joined and drawing.rng.random() < chance:
@@ -143,7 +143,7 @@ def _add_second_door(drawing: WallDrawing, room: int, chance: float) -> None:
 
 def _add_passage(drawing: WallDrawing, room: int) -> bool:
     """A wide hole to the hall without a leaf; False where there is no room."""
-    halls = numbers(drawing.types, RoomType.HALL)
+    halls = rooms_of_types(drawing.types, RoomType.HALL)
     return any(
         _add_door(drawing, run, room, OpeningKind.PASSAGE, width)
         for width in _PASSAGES_M
@@ -162,7 +162,7 @@ def _add_doors_of_en_suite(drawing: WallDrawing, room: int, bedrooms: tuple[int,
     """A bathroom's door to its bedroom; the home's only one has another to the hall if it fits."""
     wanted: list[tuple[Iterable[int], bool]] = [(bedrooms, True)]
     if drawing.types.count(RoomType.BATHROOM) == 1:
-        wanted.append((numbers(drawing.types, RoomType.HALL), False))
+        wanted.append((rooms_of_types(drawing.types, RoomType.HALL), False))
     for others, may_meet in wanted:
         for run in _runs_between(drawing, room, others):
             if _add_door(drawing, run, room, OpeningKind.DOOR, _WET_DOOR_M, may_meet=may_meet):
@@ -171,16 +171,16 @@ def _add_doors_of_en_suite(drawing: WallDrawing, room: int, bedrooms: tuple[int,
 
 def _doors_to(drawing: WallDrawing, type_: RoomType) -> Iterable[list[int]]:
     types = drawing.types
-    halls = numbers(types, RoomType.HALL)
+    halls = rooms_of_types(types, RoomType.HALL)
     if type_ is RoomType.KITCHEN:
-        return halls, numbers(types, RoomType.LIVING, RoomType.STUDIO)
+        return halls, rooms_of_types(types, RoomType.LIVING, RoomType.STUDIO)
     if type_ is RoomType.WARDROBE:
-        return numbers(types, RoomType.BEDROOM), halls
+        return rooms_of_types(types, RoomType.BEDROOM), halls
     if type_ is RoomType.STORE:
-        return halls, numbers(types, RoomType.KITCHEN)
+        return halls, rooms_of_types(types, RoomType.KITCHEN)
     if type_ is RoomType.BATHROOM:
-        return halls, numbers(types, RoomType.BEDROOM)
-    return [numbers(types, one) for one in drawing.layout.programme.entered_from(type_)]
+        return halls, rooms_of_types(types, RoomType.BEDROOM)
+    return [rooms_of_types(types, one) for one in drawing.layout.programme.entered_from(type_)]
 
 
 def _add_door(

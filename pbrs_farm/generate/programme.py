@@ -123,7 +123,7 @@ def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> P
     wishes = with_family(wishes or Wishes(), rng)
     # Draw until the area is as wished; then scale the rooms to it.
     for _ in range(64):
-        programme = _drawn(rng, wishes.bedrooms, wishes.plans)
+        programme = _draw_programme(rng, wishes.bedrooms, wishes.plans)
         if wishes.area[0] <= programme.area <= wishes.area[1]:
             return programme
     area = float(np.clip(programme.area, *wishes.area))
@@ -135,7 +135,7 @@ def with_family(wishes: Wishes, rng: np.random.Generator) -> Wishes:
     return replace(wishes, plans=wishes.plans or drawn_family(rng, wishes.bedrooms))
 
 
-def _drawn(rng: np.random.Generator, bedrooms: tuple[int, int], plans: str) -> Programme:
+def _draw_programme(rng: np.random.Generator, bedrooms: tuple[int, int], plans: str) -> Programme:
     family = plan_families()[plans]
     # A number of bedrooms that the family lacks is drawn where nothing else is wished.
     shares = np.array(family.bedroom_shares)[bedrooms[0] : bedrooms[1] + 1] + 1e-9
@@ -200,10 +200,10 @@ def scaled_rooms(wishes: Sequence[RoomWish], area: float) -> list[RoomWish]:
         factor = (area - fixed) / (sum(w.area for w in found) - fixed)
         if abs(factor - 1) < 1e-3:
             break
-        found = [_resized(wish, factor) for wish in found]
+        found = [_resize_wish(wish, factor) for wish in found]
     return found
 
 
-def _resized(wish: RoomWish, factor: float) -> RoomWish:
+def _resize_wish(wish: RoomWish, factor: float) -> RoomWish:
     low, high = AREA_RANGE.get(wish.type, (wish.area, wish.area))
     return replace(wish, area=float(np.clip(wish.area * factor, low, high)))

@@ -52,7 +52,7 @@ def programme_from_json(path: Path) -> Programme:
     most_notch = 0.2 * sum(w.area for w in wishes)
     return Programme(
         tuple(wishes), open_kitchen=given.open_kitchen, n_blind_sides=int(given.n_blind_sides),
-        notch=_within(path, "notch", given.notch, (0, most_notch)), l_shaped=given.l_shaped,
+        notch=_number_within(path, "notch", given.notch, (0, most_notch)), l_shaped=given.l_shaped,
         balcony=given.balcony, adjacent=_adjacent(path, given.adjacent, wishes),
     )  # fmt: skip
 
@@ -68,7 +68,7 @@ def _wish(path: Path, number: int, row: object) -> RoomWish:
     type_ = RoomType(room.type)
     area = MEDIAN_AREA.get(type_, 0.0)
     if "area" in room.model_fields_set:
-        area = _within(path, f"{place} ({room.type})", room.area, AREA_RANGE[type_], " m2")
+        area = _number_within(path, f"{place} ({room.type})", room.area, AREA_RANGE[type_], " m2")
     return RoomWish(type_, area, room.name[:60])
 
 
@@ -100,7 +100,7 @@ def _called(path: Path, place: str, word: str, wishes: list[RoomWish]) -> list[i
     return found
 
 
-def _within(
+def _number_within(
     path: Path, place: str, value: float, bounds: tuple[float, float], unit: str = ""
 ) -> float:
     low, high = bounds

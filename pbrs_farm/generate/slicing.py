@@ -106,15 +106,15 @@ def _annealed(brief: Brief, draw: _Random, n_moves: int) -> tuple[list[IntRect],
     """The best rectangles of one annealing and how many hard rules they break."""
     tree = _spine_tree(brief, draw)
     rules = Rules(brief)
-    rects = _laid_out(tree, brief)
+    rects = _lay_out_tree(tree, brief)
     cost, unmet = rules.judge(rects)
     best, best_score = rects, (unmet, cost)
     cooling = (_T_END / _T_START) ** (1 / n_moves)
     temperature = _T_START
     for _ in range(n_moves):
         temperature *= cooling
-        moved = _moved(tree, draw)
-        new_rects = _laid_out(moved, brief)
+        moved = _neighbour_tree(tree, draw)
+        new_rects = _lay_out_tree(moved, brief)
         new_cost, unmet = rules.judge(new_rects)
         if new_cost <= cost or draw() < math.exp((cost - new_cost) / temperature):
             tree, cost = moved, new_cost
@@ -148,7 +148,7 @@ def _spine_tree(brief: Brief, draw: _Random) -> _Tree:
     return tree
 
 
-def _moved(tree: _Tree, draw: _Random) -> _Tree:
+def _neighbour_tree(tree: _Tree, draw: _Random) -> _Tree:
     """A neighbour: leaves swapped, a cut turned, children swapped, a subtree turned or moved."""
     new = tree.copy()
     n_cuts, kind = len(new.children), draw()
@@ -197,7 +197,7 @@ def _is_below(tree: _Tree, node: int, top: int) -> bool:
     return False
 
 
-def _laid_out(tree: _Tree, brief: Brief) -> list[IntRect]:
+def _lay_out_tree(tree: _Tree, brief: Brief) -> list[IntRect]:
     """The rectangle of each leaf: every cut divides its rectangle by the areas of its children."""
     n_cuts = len(tree.children)
     leaves, leaf_at, children = brief.leaves, tree.leaf_at, tree.children

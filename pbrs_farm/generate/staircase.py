@@ -79,11 +79,11 @@ def staircase(stair: Stair, rise: float, paint: Triple) -> Shape:
     n = n_risers(rise) // 2
     riser, landing = rise / (2 * n), max(w / 2, 0.9)
     going = (d - landing) / (n - 1)
-    steps = [_step((0.0, -d / 2), (w, landing), n * riser)]
+    steps = [_step_boxes((0.0, -d / 2), (w, landing), n * riser)]
     for k in range(1, n):
         up, down = d / 2 - k * going, -d / 2 + landing + (k - 1) * going
-        steps.append(_step((side * w / 4, up), (w / 2, going), k * riser))
-        steps.append(_step((-side * w / 4, down), (w / 2, going), (n + k) * riser))
+        steps.append(_step_boxes((side * w / 4, up), (w / 2, going), k * riser))
+        steps.append(_step_boxes((-side * w / 4, down), (w / 2, going), (n + k) * riser))
     # The edge of the upper floor, and a railing where one would fall down on the first flight.
     boards = [box for box, _ in steps]
     boards.append(((-w / 2, rise - stair.slab_m, d / 2 - 0.02), (w / 2, rise, d / 2)))
@@ -102,7 +102,7 @@ def staircase(stair: Stair, rise: float, paint: Triple) -> Shape:
 _Box = tuple[Triple, Triple]  # low and high corner
 
 
-def _step(at: Point, size: Point, top: float) -> tuple[_Box, _Box]:
+def _step_boxes(at: Point, size: Point, top: float) -> tuple[_Box, _Box]:
     """(the block below, the tread) of a step; at: the middle of its width, its least z."""
     (x, z), (w, d) = at, size
     block = ((x - w / 2, 0.0, z), (x + w / 2, top - _TREAD_M, z + d))

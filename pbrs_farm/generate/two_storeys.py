@@ -90,7 +90,7 @@ def _programmes(rng: np.random.Generator, wishes: Wishes, n: int) -> tuple[Progr
         above.append(RoomType.WARDROBE)
     if n >= 3 and rng.random() < 0.3:
         above.append(RoomType.BATHROOM)
-    storeys = [_rooms(rng, types) for types in (below, above)]
+    storeys = [_draw_room_wishes(rng, types) for types in (below, above)]
     areas = [sum(r.area for r in rooms) for rooms in storeys]
     # Both have the area between, or half of what is wished.
     whole = float(np.clip(sum(areas), *wishes.area))
@@ -111,7 +111,7 @@ def _with_room_for_toilet(wish: RoomWish) -> RoomWish:
     return replace(wish, area=max(wish.area, MEDIAN_AREA[RoomType.WC]))
 
 
-def _rooms(rng: np.random.Generator, types: list[RoomType]) -> list[RoomWish]:
+def _draw_room_wishes(rng: np.random.Generator, types: list[RoomType]) -> list[RoomWish]:
     rooms = [RoomWish(t, drawn_area(rng, t)) for t in types]
     # The landing and a door for each room are on it.
     hall = max(sum(r.area for r in rooms) * float(rng.uniform(0.13, 0.18)), 3.5 + 1.3 * len(rooms))
@@ -138,7 +138,7 @@ def _drawn_core(rng: np.random.Generator, lower: Programme, upper: Programme) ->
         stairs, landing, front = (at, 0, at + w, d), (at, d, at + w, d + _LANDING), (0, 1)
     # Turn the frame onto that side of the outline.
     origin, tip = (_on_side(side, (x, z), across) for x, z in ((0, 0), front))
-    places = [_turned(side, rect, across) for rect in (stairs, landing)]
+    places = [_turn_rect(side, rect, across) for rect in (stairs, landing)]
     turned = tip[0] - origin[0], tip[1] - origin[1]
     return Core(width, depth, places[0], places[1], turned, lit)
 
@@ -157,6 +157,6 @@ def _on_side(side: int, point: tuple[int, int], across: int) -> tuple[int, int]:
     return ((away, along), (along, away), (across - away, along), (along, across - away))[side]
 
 
-def _turned(side: int, rect: IntRect, across: int) -> IntRect:
+def _turn_rect(side: int, rect: IntRect, across: int) -> IntRect:
     a, b = _on_side(side, rect[:2], across), _on_side(side, rect[2:], across)
     return min(a[0], b[0]), min(a[1], b[1]), max(a[0], b[0]), max(a[1], b[1])

@@ -7,7 +7,7 @@ from typing import Final
 
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening, RoomType
 from pbrs_farm.generate.layout import Layout
-from pbrs_farm.generate.open_walls import WallDrawing, numbers
+from pbrs_farm.generate.open_walls import WallDrawing, rooms_of_types
 from pbrs_farm.generate.plan_walls import OUTSIDE, WallRun, balcony
 
 _WIDEST_M: Final = 2.4
@@ -30,7 +30,7 @@ def is_lit(run: WallRun, layout: Layout) -> bool:
 
 def add_balcony(drawing: WallDrawing) -> None:
     """A balcony before the longest wall with daylight of the living room, and the way out."""
-    living = numbers(drawing.types, RoomType.LIVING, RoomType.STUDIO)[0]
+    living = rooms_of_types(drawing.types, RoomType.LIVING, RoomType.STUDIO)[0]
     lit = [r for r in drawing.runs if r.rooms == {living, OUTSIDE} and is_lit(r, drawing.layout)]
     # Walls of a notch have no room before them.
     ends = (0, drawing.layout.width), (0, drawing.layout.depth)

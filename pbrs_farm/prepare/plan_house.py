@@ -39,7 +39,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     notes = Notes(str(path), strict=fields.strict)
     for line in file.left_out:
         notes.add(LEFT_OUT, "", line)
-    house = _house(file, path.stem, fields)
+    house = _walls_of_plan(file, path.stem, fields)
     items = told_items(house, file.storeys)
     n_lost = sum(len(s.things) for s in file.storeys) - len(items)
     if n_lost:
@@ -53,7 +53,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     )  # fmt: skip
 
 
-def _house(file: PlanFile, name: str, fields: ReadFields) -> House:
+def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
     """The walls, floors, doors and windows of the storeys."""
     storeys = [Storey(s.plan, ()) for s in file.storeys]
     rng = np.random.default_rng(keys.seed("plan", repr([s.plan.walls for s in file.storeys])))
@@ -97,7 +97,7 @@ def _told_pieces(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]
     found: list[list[PlacedPiece]] = [[] for _ in file.storeys]
     if not catalogue.pieces or not any(s.things for s in file.storeys):
         return found
-    house = _house(file, "home", ReadFields())
+    house = _walls_of_plan(file, "home", ReadFields())
     items = told_items(house, file.storeys)
     stood = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
     pieces = {f"piece:{p.id}": p for p in catalogue.pieces}

@@ -154,10 +154,10 @@ def words_of_homes(words: Sequence[str]) -> list[str]:
 def _homes_in(folder: Path) -> list[str]:
     if not folder.is_dir() or format_of_file(folder) is not None:
         return []
-    return [str(path) for path in sorted(folder.iterdir()) if _is_home(path)]
+    return [str(path) for path in sorted(folder.iterdir()) if _is_home_file(path)]
 
 
-def _is_home(path: Path) -> bool:
+def _is_home_file(path: Path) -> bool:
     if path.name.startswith(".") or is_beside_homes(path):
         return False
     entry = format_of_file(path, surely=True)

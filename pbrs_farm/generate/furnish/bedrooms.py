@@ -44,7 +44,7 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
     """Beds for one in a corner, or along a wall; some of a child's have two floors."""
     beds = _beds(shelf, (0.7, 1.16))
     if child:
-        liked = [b for b in beds if {"child", "junior", "bunk", "captain"} & _words(b)]
+        liked = [b for b in beds if {"child", "junior", "bunk", "captain"} & _words_of_piece(b)]
         beds = liked + [b for b in beds if b not in liked]
     stands = shelf.of("nightstand", width=(0.3, 0.55))
     found = []
@@ -91,7 +91,7 @@ def _beds(shelf: Shelf, widths: tuple[float, float]) -> list[Piece]:
     return [*beds[:2], *sorted(beds[2:], key=lambda b: b.size[0] * b.size[1])]
 
 
-def _words(piece: Piece) -> set[str]:
+def _words_of_piece(piece: Piece) -> set[str]:
     return set(piece.name.lower().replace("'", " ").split())
 
 
@@ -105,11 +105,11 @@ def wardrobes(shelf: Shelf, wanted: float, *, height: float = 2.4) -> tuple[Temp
             length = n * piece.size[0]
             if length > max(wanted, 1.0) + 0.5:
                 continue
-            found.append(_row(piece, n, -abs(length - wanted) * 0.6, 0.7))
+            found.append(_row_of_wardrobes(piece, n, -abs(length - wanted) * 0.6, 0.7))
     return tuple(found)
 
 
-def _row(piece: Piece, n: int, rank: float, before: float) -> Template:
+def _row_of_wardrobes(piece: Piece, n: int, rank: float, before: float) -> Template:
     w, d, _ = piece.size
     slots = tuple(backed(piece, (k - (n - 1) / 2) * (w + 0.005)) for k in range(n))
     half, front = n * w / 2, d + 0.02

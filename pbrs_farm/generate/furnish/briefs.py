@@ -94,7 +94,7 @@ def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Gener
     name: str = RoomType.LIVING if type_ is RoomType.STUDIO else type_
     if type_ is RoomType.BEDROOM and _is_childs(plan, space, rng):
         name = _CHILDS_ROOM
-    facts, measures = _facts(plan, space, type_), _measures(space, type_, rng)
+    facts, measures = _facts_of_room(plan, space, type_), _measures(space, type_, rng)
 
     def told(groups: Iterable[_PieceGroup]) -> tuple[PieceGroup, ...]:
         # Draw only for what the room is large enough for.
@@ -126,7 +126,7 @@ def _is_childs(plan: Plan, space: FurnishSpace, rng: np.random.Generator) -> boo
     return bool(space.number != largest and rng.random() < 0.65)
 
 
-def _facts(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fact]:
+def _facts_of_room(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fact]:
     facts: set[_Fact] = {""}
     if type_ is RoomType.STUDIO:
         facts.add("studio")

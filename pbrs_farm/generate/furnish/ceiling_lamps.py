@@ -25,7 +25,7 @@ def ceiling_lamps(
     """One lamp in the room's middle, two in large and in long rooms; none where none is to be had."""
     if type_ in (RoomType.BALCONY, RoomType.STAIRS):
         return []
-    piece = _lamp(shelf, type_)
+    piece = _choose_lamp(shelf, type_)
     if piece is None:
         return []
     found = []
@@ -36,7 +36,7 @@ def ceiling_lamps(
     return found
 
 
-def _lamp(shelf: Shelf, type_: RoomType) -> Piece | None:
+def _choose_lamp(shelf: Shelf, type_: RoomType) -> Piece | None:
     lamps = [p for p in shelf.of("ceiling_lamp") if max(p.size[:2]) > 0.15]
     is_plain = not type_.is_habitable or type_ is RoomType.KITCHEN
     # What hangs low or wide belongs into rooms to live in.
@@ -68,7 +68,7 @@ def _hung(
     scale = max(scale, _SHORTEST)
     w, d, h = w * scale, d * scale, h * scale
     low = space.height - h
-    tall = [_ground(p) for p in standing if p.elevation + p.height > low - 0.05]
+    tall = [_ground_polygon(p) for p in standing if p.elevation + p.height > low - 0.05]
     for dx in _STEPS:
         for dz in _STEPS:
             ground = box(x + dx - w / 2, z + dz - d / 2, x + dx + w / 2, z + dz + d / 2)
@@ -81,6 +81,6 @@ def _hung(
     return None
 
 
-def _ground(piece: PlacedPiece) -> Polygon:
+def _ground_polygon(piece: PlacedPiece) -> Polygon:
     xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
     return box(min(xs), min(zs), max(xs), max(zs))

@@ -74,7 +74,7 @@ def arrangement_of(
     # Try the groups in other orders where one that must stand does not.
     if best.missing:
         best = _other_orders(groups, places, walk, best)
-    return _filled(best, brief, space, walk, rng)
+    return _add_fillers(best, brief, space, walk, rng)
 
 
 def _is_kitchen(group: PieceGroup, brief: RoomBrief) -> bool:
@@ -98,7 +98,7 @@ def _other_orders(
     return best
 
 
-def _filled(
+def _add_fillers(
     start: Arrangement,
     brief: RoomBrief,
     space: FurnishSpace,

@@ -49,7 +49,7 @@ def furnish_report(
 ) -> FurnishReport:
     """The gates of a furnished plan. What the catalogue has nothing for is not asked of a room."""
     broken, walked, area = [], 0.0, 0.0
-    grounds = [_ground(p) for p in pieces]
+    grounds = [_ground_rect(p) for p in pieces]
     for number, room in enumerate(plan.rooms):
         here = [p for p in pieces if p.room == number]
         broken += [f"{room.name}: no {what}" for what in missing(room.type, here, catalogue)]
@@ -62,7 +62,7 @@ def furnish_report(
         walked += walk.share(region) * room.area if region is not None else 0.0
         area += room.area
         broken += _blocked(space, here)
-    broken += _overlaps(pieces, grounds)
+    broken += _overlapping_pieces(pieces, grounds)
     n = sum(p.elevation < _ON_FLOOR_M for p in pieces)
     return FurnishReport(tuple(broken), n / area, walked / area)
 
@@ -82,7 +82,7 @@ def _blocked(space: FurnishSpace, here: list[PlacedPiece]) -> list[str]:
     """Furniture before doors, above window sills, or outside the room."""
     found = []
     for piece in here:
-        ground = _ground(piece)
+        ground = _ground_rect(piece)
         if piece.elevation < 1.9 and any(_meet(ground, d) for d in space.doors.tolist()):
             found.append(f"{piece.piece.name} stands before a door")
         if any(_meet(ground, o) for o in space.outside.tolist()):
@@ -96,7 +96,7 @@ def _blocked(space: FurnishSpace, here: list[PlacedPiece]) -> list[str]:
     return found
 
 
-def _overlaps(pieces: tuple[PlacedPiece, ...], grounds: list[Rect]) -> list[str]:
+def _overlapping_pieces(pieces: tuple[PlacedPiece, ...], grounds: list[Rect]) -> list[str]:
     found = []
     for (a, ra), (b, rb) in combinations(zip(pieces, grounds, strict=True), 2):
         if a.room != b.room or not _meet(ra, rb):
@@ -117,6 +117,6 @@ def _meet(a: Rect | list[float], b: Rect | list[float]) -> bool:
     return bool(np.minimum(x, z) > _DEEP_M)
 
 
-def _ground(piece: PlacedPiece) -> Rect:
+def _ground_rect(piece: PlacedPiece) -> Rect:
     xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
     return min(xs), min(zs), max(xs), max(zs)

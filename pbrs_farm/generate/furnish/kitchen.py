@@ -245,8 +245,10 @@ def _template(
             if dishes is not None and abs(i - sink) == 1 and fits:
                 piece, dishes = dishes, None
         depth = DEPTH_M if module.kind != "fridge" else max(piece.size[1], 0.5)
-        slots.append(_placed(PieceSlot(piece, 0, 0, module.width, depth, height), module, arms))
-        slots += [_placed(s, module, arms) for s in _above(module, units, arms, space, n_base + i)]
+        slots.append(_place_unit(PieceSlot(piece, 0, 0, module.width, depth, height), module, arms))
+        slots += [
+            _place_unit(s, module, arms) for s in _above(module, units, arms, space, n_base + i)
+        ]
     clear, fronts = _rects(modules, arms)
     name = f"kitchen of {len(arms)} arms, {len(modules)} modules"
     return Template(name, tuple(slots), clear, fronts)
@@ -273,7 +275,7 @@ def _above(
     return [PieceSlot(upper, 0, 0, module.width, min(d, 0.36), min(h, 0.72), UPPER_M)]
 
 
-def _placed(slot: PieceSlot, module: _Module, arms: tuple[Arm, ...]) -> PieceSlot:
+def _place_unit(slot: PieceSlot, module: _Module, arms: tuple[Arm, ...]) -> PieceSlot:
     """A unit with its back at its arm's wall, in the frame of the main arm's wall."""
     gap = _GAP if slot.elevation < UPPER_M else _HUNG_GAP
     along, across = (module.low + module.high) / 2, gap + slot.depth / 2

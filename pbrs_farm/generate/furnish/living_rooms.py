@@ -16,7 +16,7 @@ _VIEWING_M = (2.0, 2.25, 2.5, 2.8)  # from the screen to the sofa
 
 def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
     """Television and stand at a wall, sofa opposite, table between, up to two armchairs beside."""
-    stands = _stands(shelf)
+    stands = _television_stands(shelf)
     sofas = shelf.of("sofa", width=(1.4, 2.4), depth=(0.6, 1.1))
     if not sofas:
         return ()
@@ -38,7 +38,7 @@ def lounges(shelf: Shelf, bounds: Rect, area: float) -> tuple[Template, ...]:
     return tuple(found)
 
 
-def _stands(shelf: Shelf) -> list[list[PieceSlot]]:
+def _television_stands(shelf: Shelf) -> list[list[PieceSlot]]:
     """A television on what carries it, at the wall."""
     low = shelf.of("tv_stand", height=(0.2, 0.75), depth=(0.3, 0.7))[:MAX_CHOICES]
     low += shelf.of("dresser", height=(0.4, 0.7), depth=(0.3, 0.6))[: MAX_CHOICES - len(low)]
@@ -126,7 +126,7 @@ def _free(table: Piece, chair: Piece, rank: float) -> Template:
         around = (-w / 2 - 0.6, -d / 2 - 0.6, w / 2 + 0.6, d / 2 + 0.6)
         clear = [around]
     else:
-        for u in _along(w, n // 2):
+        for u in _chair_offsets(w, n // 2):
             slots += [slot(chair, u, -d / 2 - out), slot(chair, u, d / 2 + out, turns=2)]
         far = d / 2 + _BEHIND_CHAIR_M
         clear = [(-w / 2 - 0.3, -far, w / 2 + 0.3, far)]
@@ -148,7 +148,7 @@ def _at_wall(table: Piece, chair: Piece, rank: float) -> Template:
         slots += [slot(chair, -w / 2 - out, v, turns=-1), slot(chair, w / 2 + out, v, turns=1)]
         clear: Rect = (-w / 2 - 0.6, 0.0, w / 2 + 0.6, d)
     else:
-        slots += [slot(chair, u, 0.02 + d + out, turns=2) for u in _along(w, n)]
+        slots += [slot(chair, u, 0.02 + d + out, turns=2) for u in _chair_offsets(w, n)]
         clear = (-w / 2, d, w / 2, d + _BEHIND_CHAIR_M)
     front = (-w / 2 - 0.5, 0.3, w / 2 + 0.5, d + 0.9)
     return Template(
@@ -157,7 +157,7 @@ def _at_wall(table: Piece, chair: Piece, rank: float) -> Template:
     )  # fmt: skip
 
 
-def _along(width: float, n: int) -> list[float]:
+def _chair_offsets(width: float, n: int) -> list[float]:
     return [(k - (n - 1) / 2) * width / n for k in range(n)]
 
 

@@ -58,7 +58,7 @@ class Places:
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
         """Which of the places stay possible when something stands."""
-        bodies, clear = _array(standing.bodies), _array(standing.clear)
+        bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
         # Look again only at those that are possible still.
         left = alive.copy()
@@ -109,7 +109,7 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
         frames.append(here[ok])
         scores.append(_scores(template, here[ok], walls[ok], space) + noise[ok])
         template_of.append(np.full(int(ok.sum()), number))
-    return _places(
+    return _sorted_places(
         versions, np.concatenate([np.zeros(0, int), *template_of]),
         np.concatenate([np.zeros((0, 4)), *frames]), np.concatenate([np.zeros(0), *scores]),
     )  # fmt: skip
@@ -119,10 +119,12 @@ def fixed_places(found: Sequence[Standing]) -> Places:
     """Places that were found elsewhere."""
     frames = frames_array([p.frame for p in found])
     scores = np.array([p.score for p in found], np.float64)
-    return _places([p.template for p in found], np.arange(len(found)), frames, scores)
+    return _sorted_places([p.template for p in found], np.arange(len(found)), frames, scores)
 
 
-def _places(templates: list[Template], template_of: Ints, frames: F64, scores: F64) -> Places:
+def _sorted_places(
+    templates: list[Template], template_of: Ints, frames: F64, scores: F64
+) -> Places:
     # Pad with NaN, which no comparison is true for: templates differ in their number of bodies.
     n_bodies = max((len(t.bodies) for t in templates), default=0)
     n_clear = max((len(t.clear) for t in templates), default=0)
@@ -132,9 +134,11 @@ def _places(templates: list[Template], template_of: Ints, frames: F64, scores: F
         rows = np.flatnonzero(template_of == number)
         if len(rows):
             grounds = np.array([s.rect for s in template.bodies])
-            bodies[rows, : len(template.bodies)] = _moved(grounds, frames[rows])
+            bodies[rows, : len(template.bodies)] = _rects_in_frames(grounds, frames[rows])
         if len(rows) and template.clear:
-            clear[rows, : len(template.clear)] = _moved(np.array(template.clear), frames[rows])
+            clear[rows, : len(template.clear)] = _rects_in_frames(
+                np.array(template.clear), frames[rows]
+            )
     return Places(templates, template_of, frames, bodies, clear, scores)
 
 
@@ -146,14 +150,14 @@ def frames_array(frames: Sequence[WallFrame]) -> F64:
 
 def allowed(template: Template, frames: F64, space: FurnishSpace) -> Bools:
     """(N,) which frames keep a template inside the room, off doors and below window sills."""
-    bodies = _moved(np.array([s.rect for s in template.bodies]), frames)
+    bodies = _rects_in_frames(np.array([s.rect for s in template.bodies]), frames)
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
     if template.clear:
-        bad |= overlap(_moved(np.array(template.clear), frames), space.outside).any(1)
+        bad |= overlap(_rects_in_frames(np.array(template.clear), frames), space.outside).any(1)
     for window in space.windows:
         tall = [s.rect for s in template.slots if s.screen_top > window.sill + _ABOVE_SILL_M]
         if tall:
-            bad |= overlap(_moved(np.array(tall), frames), np.array([window.zone])).any(1)
+            bad |= overlap(_rects_in_frames(np.array(tall), frames), np.array([window.zone])).any(1)
     return np.asarray(~bad)
 
 
@@ -175,7 +179,7 @@ def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
     u0, _, u1, _ = template.extent
     found, walls = [np.zeros((0, 4))], [np.zeros(0, int)]
     for number, wall in enumerate(space.walls):
-        at = _along(template, wall, _BESIDE_M - u0, wall.length - u1 - _BESIDE_M)
+        at = _positions_along_wall(template, wall, _BESIDE_M - u0, wall.length - u1 - _BESIDE_M)
         f = wall.frame
         rows = np.empty((len(at), 4))
         rows[:] = f.x, f.z, f.dx, f.dz
@@ -186,7 +190,7 @@ def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
     return np.concatenate(found), np.concatenate(walls)
 
 
-def _along(template: Template, wall: RoomWall, low: float, high: float) -> F64:
+def _positions_along_wall(template: Template, wall: RoomWall, low: float, high: float) -> F64:
     """Where along a wall a template's origin can be, metres."""
     at: list[float] = []
     if high < low - 1e-9:
@@ -215,7 +219,7 @@ def _free_frames(space: FurnishSpace) -> F64:
     return found.reshape(-1, 4)
 
 
-def _moved(rects: F64, frames: F64) -> F64:
+def _rects_in_frames(rects: F64, frames: F64) -> F64:
     """(N, B, 4) rectangles of the template (B, 4) in each frame."""
     x, z, dx, dz = (frames[:, k, None, None] for k in range(4))
     u, v = rects[None, :, 0::2], rects[None, :, 1::2]
@@ -223,7 +227,7 @@ def _moved(rects: F64, frames: F64) -> F64:
     return np.stack([xs.min(2), zs.min(2), xs.max(2), zs.max(2)], -1)
 
 
-def _array(rects: Sequence[Rect]) -> F64:
+def _rect_array(rects: Sequence[Rect]) -> F64:
     return np.array(rects, np.float64).reshape(-1, 4)
 
 
@@ -237,19 +241,19 @@ def _scores(template: Template, frames: F64, walls: Ints, space: FurnishSpace) -
     if template.stand is not Stand.FREE and len(frames):
         scores += _wall_scores(like, (u0, u1), frames, walls, space)
     if like.daylight and space.windows:
-        scores -= like.daylight * _nearest(middles, [w.middle for w in space.windows])
+        scores -= like.daylight * _distances_to_nearest(middles, [w.middle for w in space.windows])
     if like.door and len(space.doors):
         doors = (space.doors[:, :2] + space.doors[:, 2:]) / 2
-        scores += like.door * np.minimum(_nearest(middles, doors.tolist()), 4.0)
+        scores += like.door * np.minimum(_distances_to_nearest(middles, doors.tolist()), 4.0)
     if like.middle:
         x0, z0, x1, z1 = space.bounds
-        scores -= like.middle * _nearest(middles, [((x0 + x1) / 2, (z0 + z1) / 2)])
+        scores -= like.middle * _distances_to_nearest(middles, [((x0 + x1) / 2, (z0 + z1) / 2)])
     if like.back:
         scores += like.back * _back_scores(template, frames, space)
     return scores
 
 
-def _nearest(points: F64, others: Sequence[Point]) -> F64:
+def _distances_to_nearest(points: F64, others: Sequence[Point]) -> F64:
     """(N,) distance of each point to the nearest of others."""
     apart = points[:, None] - np.array(others)[None]
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(1))
@@ -284,6 +288,6 @@ def _back_scores(template: Template, frames: F64, space: FurnishSpace) -> F64:
     scores = np.full(len(frames), 0.6)
     # From far to near: what is met first decides.
     for far, score in ((0.75, -1.0), (0.3, 0.8), (0.06, 1.0)):
-        behind = _moved(np.array([(u0 + 0.3, v1, u1 - 0.3, v1 + far)]), frames)
+        behind = _rects_in_frames(np.array([(u0 + 0.3, v1, u1 - 0.3, v1 + far)]), frames)
         scores[overlap(behind, space.outside).any(1)] = score
     return scores

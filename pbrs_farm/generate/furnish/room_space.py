@@ -81,7 +81,7 @@ def room_space(plan: Plan, number: int) -> FurnishSpace:
     polygon = Polygon(room.polygon)
     neighbours = _open_neighbours(plan, number)
     near = [n for _, n in neighbours]
-    walls = _walls(room.polygon, near)
+    walls = _walls_of_room(room.polygon, near)
     doors, ways, windows = [], [], []
     for opening in plan.openings_of(number):
         frame = _seen_from(plan, opening, polygon)
@@ -89,13 +89,13 @@ def room_space(plan: Plan, number: int) -> FurnishSpace:
             continue
         half = opening.width / 2
         if opening.kind is OpeningKind.WINDOW:
-            windows.append(_window(opening, frame, walls, _BEFORE_WINDOW_M))
+            windows.append(_window_of_opening(opening, frame, walls, _BEFORE_WINDOW_M))
             continue
         is_french = opening.kind is OpeningKind.FRENCH_WINDOW
         # As far as a leaf reaches, also where it swings to the other side.
         depth = max(BEFORE_DOOR_M, opening.width) + _SPARE_M
         if is_french:
-            windows.append(_window(opening, frame, walls, BEFORE_FRENCH_M))
+            windows.append(_window_of_opening(opening, frame, walls, BEFORE_FRENCH_M))
             depth = BEFORE_FRENCH_M
         side = half + _BESIDE_DOOR_M
         doors.append(frame.rect((-side, 0.0, side, depth)))
@@ -154,7 +154,7 @@ def _open_neighbours(plan: Plan, number: int) -> list[tuple[int, Polygon]]:
     return found
 
 
-def _walls(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[RoomWall, ...]:
+def _walls_of_room(corners: tuple[Point, ...], open_to: Iterable[Polygon]) -> tuple[RoomWall, ...]:
     """The sides of a room, cut where it is open."""
     near = unary_union([p.buffer(2 * _EPSILON) for p in open_to])
     n, found = len(corners), []
@@ -200,7 +200,7 @@ def _solid(frame: WallFrame, length: float, near: BaseGeometry) -> list[tuple[fl
     return found
 
 
-def _around(point: Point) -> Rect:
+def _rect_around_point(point: Point) -> Rect:
     return point[0] - 1e-4, point[1] - 1e-4, point[0] + 1e-4, point[1] + 1e-4
 
 
@@ -244,14 +244,14 @@ def _seen_from(plan: Plan, opening: PlanOpening, polygon: Polygon) -> WallFrame 
     is_vertical = abs(wall.end[0] - wall.start[0]) < abs(wall.end[1] - wall.start[1])
     for side in (1.0, -1.0):
         nx, nz = (side, 0.0) if is_vertical else (0.0, side)
-        inner = box(*_around((x + nx * (half + 0.05), z + nz * (half + 0.05))))
+        inner = box(*_rect_around_point((x + nx * (half + 0.05), z + nz * (half + 0.05))))
         if polygon.intersects(inner):
             # v is the normal: u = (nz, -nx).
             return WallFrame(x + nx * half, z + nz * half, nz, -nx)
     return None
 
 
-def _window(
+def _window_of_opening(
     opening: PlanOpening, frame: WallFrame, walls: tuple[RoomWall, ...], depth: float
 ) -> Window:
     half = opening.width / 2

@@ -35,7 +35,7 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     ends = np.array([p for line in kept for p in line], np.float64).reshape(-1, 2)
     if not len(ends) or not np.isfinite(ends).all() or np.abs(ends).max() > 1e9:
         raise BadInput(path, "walls", "has no wall between two places in metres")
-    joined = _joined(ends, join_m).reshape(-1, 2, 2)
+    joined = _join_near_ends(ends, join_m).reshape(-1, 2, 2)
     # Draw each wall out by a little, so that ends that stop short of a wall's middle meet it.
     drawn = [_longer(a, b, join_m) for a, b in joined if np.hypot(*(b - a)) > 1e-6]
     if not drawn:
@@ -49,14 +49,14 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     )
     rooms = [p for p in polygonize(noded) if p.area >= _LEAST_M2]
     if not rooms:
-        gap, at = _gap(ends)
+        gap, at = _widest_gap(ends)
         text = f"walls close no room: the widest gap, {gap:.2f} m, is at ({at[0]:.2f}, {at[1]:.2f})"
         raise BadInput(path, "walls", text, hint=f"ends within {join_m:g} m are joined")
     whole = [Polygon(p.exterior) if not p.interiors else p for p in rooms]
     return sorted((Polygon(p.exterior) for p in whole), key=lambda p: -p.area)
 
 
-def _joined(ends: F64, join_m: float) -> F64:
+def _join_near_ends(ends: F64, join_m: float) -> F64:
     """The ends, each group of those near each other at one place."""
     points = [Point(end) for end in ends]
     first, second = shapely.STRtree(points).query(points, "dwithin", join_m)
@@ -79,7 +79,7 @@ def _longer(a: F64, b: F64, by: float) -> LineString:
     return LineString([a - way, b + way])
 
 
-def _gap(ends: F64) -> tuple[float, F64]:
+def _widest_gap(ends: F64) -> tuple[float, F64]:
     """The widest of the gaps from an end to the nearest end of another wall, and where it is."""
     away = np.full(len(ends), np.inf)
     for k in range(len(ends)):

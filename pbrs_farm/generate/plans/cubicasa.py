@@ -78,7 +78,7 @@ def plan_of_svg(path: Path) -> ToldPlan:
         )
     left_out = LeftOut()
     scale = _scale(floors, left_out)
-    return ToldPlan(tuple(_storey(f, scale, left_out) for f in floors), left_out.lines())
+    return ToldPlan(tuple(_storey_of_drawing(f, scale, left_out) for f in floors), left_out.lines())
 
 
 def _root(path: Path) -> Element:
@@ -179,7 +179,7 @@ def _scale(floors: list[_Floor], left_out: LeftOut) -> float:
     return _UNIT_M * _USUAL_DOOR_M / median
 
 
-def _storey(floor: _Floor, scale: float, left_out: LeftOut) -> ToldStorey:
+def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> ToldStorey:
     drawn = unary_union([s for _, s in floor.of("Space")])
     x0, y0 = drawn.bounds[:2]
 
@@ -192,7 +192,7 @@ def _storey(floor: _Floor, scale: float, left_out: LeftOut) -> ToldStorey:
     for row in openings:
         row["width"] = max(row["width"], 0.3)
     things = [
-        t for words, s in floor.of("FixedFurniture") for t in _things(words, metres(s))
+        t for words, s in floor.of("FixedFurniture") for t in _things_of_shape(words, metres(s))
     ]  # fmt: skip
     areas = []
     for words, s in floor.of("Space"):
@@ -207,7 +207,7 @@ def _storey(floor: _Floor, scale: float, left_out: LeftOut) -> ToldStorey:
     return ToldStorey(value_of(_opened(rooms, left_out), openings, _HEIGHT_M), tuple(things))
 
 
-def _things(words: Sequence[str], shape: Polygon) -> list[Thing]:
+def _things_of_shape(words: Sequence[str], shape: Polygon) -> list[Thing]:
     name = words[0] if words else "Misc"
     _w, height, _d = usual_size(parted(name)) or usual_size(name) or (0.0, 0.85, 0.0)
     low = 1.4 if name.startswith("WallCabinet") else 0.0

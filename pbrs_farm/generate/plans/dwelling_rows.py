@@ -98,7 +98,7 @@ def plan_of_rows(path: Path, apartment: str = "") -> ToldPlan:
     for floor in sorted(rows, key=lambda f: (_elevation(rows[f]), f)):
         areas = [r for r in rows[floor] if r.kind == "area:own"]
         if areas:
-            storeys.append(_storey(path, areas, rows[floor], left_out))
+            storeys.append(_storey_of_rows(path, areas, rows[floor], left_out))
     return ToldPlan(tuple(storeys), left_out.lines())
 
 
@@ -107,7 +107,7 @@ def _elevation(rows: list[_Row]) -> float:
     return statistics.median(known) if known else 0.0
 
 
-def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
+def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """(line, row) of the table, with the columns that are needed."""
     csv.field_size_limit(_LONGEST_FIELD)
     try:
@@ -133,7 +133,7 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
 def _floors(path: Path) -> dict[str, dict[str, str]]:
     """Apartment -> the floors that its areas lie on (and its own id), in the table's order."""
     floors: dict[str, dict[str, str]] = {}
-    for _line, row in _rows(path):
+    for _line, row in _read_rows(path):
         if row["entity_type"] == "area" and row["apartment_id"] not in _NO_ID:
             apartment = row["apartment_id"]
             floors.setdefault(apartment, {})[row["floor_id"]] = apartment
@@ -143,7 +143,7 @@ def _floors(path: Path) -> dict[str, dict[str, str]]:
 def _of_apartment(path: Path, floors: dict[str, str]) -> dict[str, list[_Row]]:
     """By floor, an apartment's areas and whatever else is drawn on that floor."""
     found: dict[str, list[_Row]] = {floor: [] for floor in floors}
-    for line, row in _rows(path):
+    for line, row in _read_rows(path):
         floor, kind = row["floor_id"], row["entity_type"]
         if floor not in floors:
             continue
@@ -153,16 +153,16 @@ def _of_apartment(path: Path, floors: dict[str, str]) -> dict[str, list[_Row]]:
             kind = "area:own"
         elif row["entity_subtype"].upper() not in _DRAWN.get(kind, ()):
             continue
-        found[floor].append(_read(path, line, row, kind))
+        found[floor].append(_parse_row(path, line, row, kind))
         if len(found[floor]) > _MOST_ROWS:
             raise BadInput(path, f"floor {floor}", f"has over {_MOST_ROWS} rows")
     return found
 
 
-def _read(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
+def _parse_row(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
     text, shape = row["geometry"], None
     # Ask for the form first: the parser of WKT follows nesting without an end.
-    if _IS_POLYGON.match(text) and _depth(text) <= _MOST_NESTED:
+    if _IS_POLYGON.match(text) and _bracket_depth(text) <= _MOST_NESTED:
         try:
             # A NaN or a number beyond all floats is refused below, without the library's own words.
             with np.errstate(all="ignore"):
@@ -179,11 +179,11 @@ def _read(path: Path, line: int, row: dict[str, str], kind: str) -> _Row:
     ring = shapely.get_coordinates(shape.exterior) * [1, -1]
     if not all(map(math.isfinite, (*shape.bounds,))) or abs(ring).max() > 1e9:
         raise BadInput(path, f"line {line}", "has a coordinate that is no place in metres")
-    elevation, height = (_number(row.get(key)) for key in ("elevation", "height"))
+    elevation, height = (_parse_number(row.get(key)) for key in ("elevation", "height"))
     return _Row(kind, row["entity_subtype"].upper(), Polygon(ring), elevation, height)
 
 
-def _depth(text: str) -> int:
+def _bracket_depth(text: str) -> int:
     """How deep the brackets of the text's beginning are nested."""
     head = text[:200]
     return len(head) - len(head.replace("(", "")) if ")" not in head else max(
@@ -191,7 +191,7 @@ def _depth(text: str) -> int:
     )  # fmt: skip
 
 
-def _number(text: str | None) -> float | None:
+def _parse_number(text: str | None) -> float | None:
     try:
         value = float(text or "")
     except ValueError:
@@ -199,7 +199,9 @@ def _number(text: str | None) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _storey(path: Path, areas: list[_Row], rows: list[_Row], left_out: LeftOut) -> ToldStorey:
+def _storey_of_rows(
+    path: Path, areas: list[_Row], rows: list[_Row], left_out: LeftOut
+) -> ToldStorey:
     grounds = [shapely.make_valid(a.shape) for a in areas]
     ground = unary_union(grounds)
     near = [
@@ -211,10 +213,10 @@ def _storey(path: Path, areas: list[_Row], rows: list[_Row], left_out: LeftOut) 
         [a.height for a in areas if a.height and 2 <= a.height <= 6] or [2.5]
     )
     floor = min((a.elevation for a in areas if a.elevation is not None), default=None)
-    openings = [_opening(r, height, floor) for r in near if r.kind == "opening"]
+    openings = [_opening_of_row(r, height, floor) for r in near if r.kind == "opening"]
     things = [
         t for r in near if r.kind == "feature"
-        for t in _things(r, height, floor, left_out) if ground.distance(shapely.Point(t.x, t.z)) < _BESIDE_M
+        for t in _things_of_row(r, height, floor, left_out) if ground.distance(shapely.Point(t.x, t.z)) < _BESIDE_M
     ]  # fmt: skip
     drawn = [DrawnArea(a.shape, a.subtype, is_plain=a.subtype == "ROOM") for a in areas]
     windows = [o for o in openings if o["kind"] in ("window", "french_window")]
@@ -223,12 +225,14 @@ def _storey(path: Path, areas: list[_Row], rows: list[_Row], left_out: LeftOut) 
         raise BadInput(path, "", "has an apartment without rooms")
     balconies = unary_union([Polygon(r["polygon"]) for r in rooms if r["type"] == "balcony"])
     walls = [
-        w for r in near if r.kind == "separator" and (w := _wall(r, balconies, height)) is not None
+        w
+        for r in near
+        if r.kind == "separator" and (w := _wall_of_railing(r, balconies, height)) is not None
     ]
     return ToldStorey(value_of(rooms, openings, height, walls), tuple(things))
 
 
-def _wall(row: _Row, balconies: Any, height: float) -> dict[str, Any] | None:
+def _wall_of_railing(row: _Row, balconies: Any, height: float) -> dict[str, Any] | None:
     """A railing that is no balcony's, which has its parapet already, or a column."""
     box = footprint(row.shape)
     is_railing = row.subtype == "RAILING"
@@ -242,7 +246,7 @@ def _wall(row: _Row, balconies: Any, height: float) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def _opening(row: _Row, height: float, floor: float | None) -> dict[str, Any]:
+def _opening_of_row(row: _Row, height: float, floor: float | None) -> dict[str, Any]:
     """Where an opening is and how large: the long side of its polygon, heights where they are told."""
     box = footprint(row.shape)
     kind = _OPENINGS[row.subtype]
@@ -257,7 +261,7 @@ def _opening(row: _Row, height: float, floor: float | None) -> dict[str, Any]:
     return found
 
 
-def _things(row: _Row, height: float, floor: float | None, left_out: LeftOut) -> list[Thing]:
+def _things_of_row(row: _Row, height: float, floor: float | None, left_out: LeftOut) -> list[Thing]:
     if row.subtype == "STAIRS":
         left_out.add("a staircase is not built")
         return []

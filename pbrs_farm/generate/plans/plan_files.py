@@ -88,16 +88,18 @@ def plan_from_file(path: Path, part: Part | str = "") -> PlanFile:
     if isinstance(value, dict) and value.get("type") == "FeatureCollection":
         value = _from_geojson(path, value)
     plan = plan_of_value(path, value)
-    return _chosen(path, (PlanStorey(plan),), (), part)
+    return _choose_storeys(path, (PlanStorey(plan),), (), part)
 
 
-def _rows(value: object) -> list[Any]:
+def _first_rows(value: object) -> list[Any]:
     return value[:1] if isinstance(value, list) else []
 
 
 def _is_own(value: dict[str, Any]) -> bool:
     """Whether the first room is drawn as a plan of one's own draws it."""
-    return any(isinstance(room, dict) and "polygon" in room for room in _rows(value.get("rooms")))
+    return any(
+        isinstance(room, dict) and "polygon" in room for room in _first_rows(value.get("rooms"))
+    )
 
 
 def _of_machine(path: Path, told: ToldPlan, part: Part) -> PlanFile:
@@ -113,7 +115,7 @@ def _of_machine(path: Path, told: ToldPlan, part: Part) -> PlanFile:
         for _ in range(min(n_lost, 1)):
             left_out.add(f"{n_lost} things have no sound box, or are beyond {MAX_THINGS}")
         storeys.append(PlanStorey(plan, tuple(things[:MAX_THINGS]), storey.name))
-    return _chosen(path, tuple(storeys), (*told.left_out, *left_out.lines()), part)
+    return _choose_storeys(path, tuple(storeys), (*told.left_out, *left_out.lines()), part)
 
 
 def _is_sound(thing: Thing) -> bool:
@@ -144,7 +146,7 @@ def _moved_value(value: dict[str, Any], dx: float, dz: float) -> dict[str, Any]:
     return value | moved | {"rooms": rooms, "walls": walls}
 
 
-def _chosen(
+def _choose_storeys(
     path: Path, storeys: tuple[PlanStorey, ...], left_out: tuple[str, ...], part: Part
 ) -> PlanFile:
     if part.floor is not None and part.floor >= len(storeys):

@@ -101,7 +101,9 @@ def plan_of_value(path: Path, value: Any, left_out: LeftOut | None = None) -> Pl
     fields = [checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(given.rooms, 1)]
     _check_unit(path, fields)
     drawn = [
-        room for k, f in enumerate(fields, 1) if (room := _room(path, f"room {k}", f, left_out))
+        room
+        for k, f in enumerate(fields, 1)
+        if (room := _room_of_fields(path, f"room {k}", f, left_out))
     ]
     if left_out is None:
         _check_apart(path, drawn)
@@ -124,11 +126,11 @@ def plan_of_value(path: Path, value: Any, left_out: LeftOut | None = None) -> Pl
             if left_out is None:
                 raise
             left_out.add(f"an opening {error.text}", place)
-    more = [_wall(path, k, row) for k, row in enumerate(given.walls, 1)]
+    more = [_wall_of_row(path, k, row) for k, row in enumerate(given.walls, 1)]
     return Plan(rooms, (*walls, *more), tuple(builder.found), given.height)
 
 
-def _wall(path: Path, number: int, row: object) -> PlanWall:
+def _wall_of_row(path: Path, number: int, row: object) -> PlanWall:
     given = checked(_WallFields, row, path, f"wall {number}")
     if given.start == given.end:
         raise BadInput(path, f"wall {number}", "has no length")
@@ -156,7 +158,9 @@ def _check_unit(path: Path, rooms: list[_RoomFields]) -> None:
         raise BadInput(path, "", text, hint="coordinates in metres, not a hundredth of them")
 
 
-def _room(path: Path, place: str, room: _RoomFields, left_out: LeftOut | None) -> DrawnRoom | None:
+def _room_of_fields(
+    path: Path, place: str, room: _RoomFields, left_out: LeftOut | None
+) -> DrawnRoom | None:
     shape: Polygon | None = Polygon(room.polygon)
     name = str(room.name or room.type.label)[:60]
     if left_out is not None and shape is not None and not shape.is_valid:
@@ -251,14 +255,14 @@ class _Openings:
             text = f"is higher than the room: {self.height - 0.02 - sill:.2f} m works"
             raise BadInput(self.path, place, text)
         at = shapely.Point(given.at)
-        wall = self._wall(place, at, width)
+        wall = self._nearest_wall(place, at, width)
         if self.walls[wall].length < width + 0.04:
             text = f"is wider than its wall of {self.walls[wall].length:.2f} m"
             hint = f"{max(self.walls[wall].length - 0.05, 0.3):.2f} m works"
             raise BadInput(self.path, place, text, hint=hint)
         self._put(place, at, wall, kind, (width, tall, sill))
 
-    def _wall(self, place: str, at: shapely.Point, width: float) -> int:
+    def _nearest_wall(self, place: str, at: shapely.Point, width: float) -> int:
         near = self._near.query(at.buffer(_REACH_M)).tolist()
         far = {k: self._lines[k].distance(at) for k in near or range(len(self.walls))}
         wall = min(far, key=lambda k: (far[k], k))

@@ -81,11 +81,11 @@ def plan_of_procthor(path: Path, value: Any) -> ToldPlan:
     left_out = LeftOut()
     height = max((p.y for w in house.walls for p in w.polygon), default=2.6)
     walls = {w.id: w for w in house.walls}
-    openings = [_opening(o, "window", walls, left_out) for o in house.windows]
-    openings += [_opening(o, "door", walls, left_out) for o in house.doors]
+    openings = [_opening_of_hole(o, "window", walls, left_out) for o in house.windows]
+    openings += [_opening_of_hole(o, "door", walls, left_out) for o in house.doors]
     rows = [o for o in openings if o is not None]
     assets = _assets(path)
-    things = [t for o in _flat(path, house.objects) if (t := _thing(o, assets, left_out))]
+    things = [t for o in _walk_objects(path, house.objects) if (t := _thing(o, assets, left_out))]
     windows = [o for o in rows if o["kind"] == "window"]
     areas = [
         DrawnArea(Polygon([(p.x, -p.z) for p in r.floorPolygon]), str(r.roomType), _name(r))
@@ -101,7 +101,7 @@ def _name(room: _Room) -> str:
     return str(room.roomType) if "|" in text or not text else text
 
 
-def _opening(
+def _opening_of_hole(
     hole: _Opening, kind: str, walls: dict[str, _Wall], left_out: LeftOut
 ) -> dict[str, Any] | None:
     wall = walls.get(hole.wall0)
@@ -134,7 +134,7 @@ def _opening(
     return row
 
 
-def _flat(path: Path, objects: list[_Object]) -> Iterator[_Object]:
+def _walk_objects(path: Path, objects: list[_Object]) -> Iterator[_Object]:
     """Each object, those that stand on others too; children are told by their own places."""
     waiting, n = [(o, 0) for o in reversed(objects)], 0
     while waiting:

@@ -66,7 +66,7 @@ def plan_of_room_plan(path: Path, value: Any) -> ToldPlan:
     stories = sorted({_story(s.story) for s in (*scan.walls, *scan.floors)})
     if not scan.walls:
         raise BadInput(path, "walls", "has no wall")
-    storeys = [_storey(path, _of(scan, story), left_out) for story in stories]
+    storeys = [_storey_of_scan(path, _of(scan, story), left_out) for story in stories]
     return ToldPlan(tuple(storeys), left_out.lines())
 
 
@@ -82,38 +82,38 @@ def _of(scan: _Scan, story: int) -> _Scan:
     return scan.model_copy(update=parts)
 
 
-def _storey(path: Path, scan: _Scan, left_out: LeftOut) -> ToldStorey:
+def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ToldStorey:
     walls, lines = [], []
     for k, surface in enumerate(scan.walls, 1):
-        pose = _pose(path, f"wall {k}", surface)
+        pose = _parse_pose(path, f"wall {k}", surface)
         edges = surface.completedEdges
         if surface.dimensions[0] > _SPURIOUS_M and edges is not None and len(edges) < 2:
             left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is no wall")
             continue
         walls.append((surface, pose))
-        lines.append(_line(surface, pose))
-    floor = _floor(path, scan, walls)
+        lines.append(_line_of_surface(surface, pose))
+    floor = _floor_height(path, scan, walls)
     height = statistics.median([w.dimensions[1] for w, _ in walls] or [2.6])
     outlines = [
         shape for k, f in enumerate(scan.floors, 1)
-        if len(f.polygonCorners) >= 4 and (shape := _outline(path, f"floor {k}", f)).area >= 0.5
+        if len(f.polygonCorners) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
     ]  # fmt: skip
     outlines = outlines or closed_rings(path, lines, _JOIN_M)
     openings = [
-        _opening(s, _pose(path, f"{kind} {k}", s), kind, floor)
+        _opening_of_surface(s, _parse_pose(path, f"{kind} {k}", s), kind, floor)
         for kind, surfaces in (("door", scan.doors), ("window", scan.windows), ("opening", scan.openings))
         for k, s in enumerate(surfaces, 1)
     ]  # fmt: skip
     things = [
-        _thing(s, _pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
+        _thing(s, _parse_pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
     ]
-    areas = [DrawnArea(shape, _label(shape, scan.sections)) for shape in outlines]
+    areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
     windows = [o for o in openings if o["kind"] == "window"]
     rooms = typed_rooms("roomplan", areas, things, windows, left_out)
     return ToldStorey(value_of(rooms, openings, height), tuple(things))
 
 
-def _pose(path: Path, place: str, surface: _Surface) -> F64:
+def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:
     """(4, 4) world from local, of 16 numbers by column or of 4 rows."""
     rows = surface.transform
     flat = rows if len(rows) == 16 else [x for row in rows if isinstance(row, list) for x in row]
@@ -125,20 +125,20 @@ def _pose(path: Path, place: str, surface: _Surface) -> F64:
     return pose if np.allclose(pose[3], [0, 0, 0, 1]) and pose[:3, 3].any() else pose.T
 
 
-def _line(surface: _Surface, pose: F64) -> Line:
+def _line_of_surface(surface: _Surface, pose: F64) -> Line:
     half = surface.dimensions[0] / 2 * pose[:3, 0]
     a, b = pose[:3, 3] - half, pose[:3, 3] + half
     return (float(a[0]), float(a[2])), (float(b[0]), float(b[2]))
 
 
-def _floor(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) -> float:
+def _floor_height(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) -> float:
     lows = [float(pose[1, 3]) - w.dimensions[1] / 2 for w, pose in walls]
-    floors = [float(_pose(path, "floor", f)[1, 3]) for f in scan.floors]
+    floors = [float(_parse_pose(path, "floor", f)[1, 3]) for f in scan.floors]
     return statistics.median(floors or lows or [0.0])
 
 
-def _outline(path: Path, place: str, floor: _Surface) -> Polygon:
-    pose = _pose(path, place, floor)
+def _outline_of_floor(path: Path, place: str, floor: _Surface) -> Polygon:
+    pose = _parse_pose(path, place, floor)
     local = np.array([(*c, 0.0, 0.0, 0.0)[:3] for c in floor.polygonCorners])
     world = local @ pose[:3, :3].T + pose[:3, 3]
     return Polygon(world[:, [0, 2]])
@@ -150,7 +150,7 @@ def _category(surface: _Surface) -> str:
     return str(next(iter(given), "")) if isinstance(given, dict) else str(given or "")
 
 
-def _opening(surface: _Surface, pose: F64, kind: str, floor: float) -> dict[str, Any]:
+def _opening_of_surface(surface: _Surface, pose: F64, kind: str, floor: float) -> dict[str, Any]:
     width, height = surface.dimensions[:2]
     low = float(pose[1, 3]) - height / 2 - floor
     row: dict[str, Any] = {
@@ -172,13 +172,13 @@ def _thing(surface: _Surface, pose: F64, floor: float) -> Thing:
     )  # fmt: skip
 
 
-def _label(shape: Polygon, sections: list[_Section]) -> str:
+def _section_label(shape: Polygon, sections: list[_Section]) -> str:
     inside = (s for s in sections if shape.contains(Point(s.center[0], s.center[2])))
     found = next(inside, None)
     return str(found.label) if found else ""
 
 
-def _fits(value: dict[str, Any]) -> bool:
+def _is_scan(value: dict[str, Any]) -> bool:
     """A scan, or a structure of several scans, which keeps the walls in its rooms alone."""
     rooms = value.get("rooms")
     first = rooms[0] if isinstance(rooms, list) and rooms else None
@@ -189,5 +189,5 @@ def _fits(value: dict[str, Any]) -> bool:
 FORMAT = PlanFormat(
     title="RoomPlan", files="*.json", order=140, brings="walls, doors, windows, boxes as stand-ins",
     where="a phone's own scan", licence="yours", keys=(("walls", "doors", "windows", "objects"),),
-    fits=_fits, read=lambda path, value, _part: plan_of_room_plan(path, value),
+    fits=_is_scan, read=lambda path, value, _part: plan_of_room_plan(path, value),
 )  # fmt: skip

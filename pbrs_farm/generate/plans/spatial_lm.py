@@ -54,7 +54,7 @@ def plan_of_layout(path: Path) -> ToldPlan:
     # Seen from above y runs up the page: the plan's second coordinate is -y.
     outlines: list[Line] = [((w[0], -w[1]), (w[3], -w[4])) for w in walls]
     rooms = closed_rings(path, outlines)
-    openings = [_opening(kind, n, floor) for kind, n in holes]
+    openings = [_opening_of_numbers(kind, n, floor) for kind, n in holes]
     things = [
         Thing("spatiallm", word, x, -y, z - sz / 2 - floor, sx, sy, sz, angle)
         for word, (x, y, z, angle, sx, sy, sz) in boxes
@@ -85,7 +85,7 @@ def _entity(path: Path, number: int, line: str) -> tuple[str, str, list[float]]:
     return kind, word, numbers
 
 
-def _opening(kind: str, numbers: list[float], floor: float) -> dict[str, Any]:
+def _opening_of_numbers(kind: str, numbers: list[float], floor: float) -> dict[str, Any]:
     x, y, z, width, height = numbers
     row: dict[str, Any] = {
         "at": [x, -y], "width": max(width, 0.3), "height": max(height, 0.3), "kind": kind.lower(),

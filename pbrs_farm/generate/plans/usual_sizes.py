@@ -13,7 +13,7 @@ Size = tuple[float, float, float]  # width, height, depth
 
 def usual_size(name: str) -> Size | None:
     """The size of the row of usual_sizes.csv that a name is, else of the last that it has a word of."""
-    table = _table()
+    table = _sizes_by_name()
     key = name.lower().replace("_", "").replace(" ", "")
     if key in table:
         return table[key]
@@ -22,7 +22,7 @@ def usual_size(name: str) -> Size | None:
 
 
 @cache
-def _table() -> dict[str, Size]:
+def _sizes_by_name() -> dict[str, Size]:
     text = files("pbrs_farm.generate.plans").joinpath("usual_sizes.csv").read_text("utf-8")
     return {
         row["name"]: (float(row["width"]), float(row["height"]), float(row["depth"]))

@@ -46,12 +46,12 @@ def walled(drawn: Sequence[DrawnRoom]) -> tuple[tuple[PlanWall, ...], tuple[Plan
         others = [int(k) for k in near.query(room.shape.buffer(_THICKEST_M)) if k != number]
         is_open_air = room.type is RoomType.BALCONY
         walls += _walls_of(number, room.shape, rings, sorted(others), is_open_air=is_open_air)
-    ground = unary_union([_ground(wall) for wall in walls])
+    ground = unary_union([_wall_polygon(wall) for wall in walls])
     rooms = [PlanRoom(r.type, r.name, corners(r.shape.difference(ground))) for r in drawn]
     return tuple(walls), tuple(rooms)
 
 
-def _ground(wall: PlanWall) -> Polygon:
+def _wall_polygon(wall: PlanWall) -> Polygon:
     line = LineString([wall.start, wall.end])
     return line.buffer(wall.thickness / 2, cap_style="flat")
 

@@ -52,13 +52,13 @@ def plan_of_zind(path: Path, value: Any) -> ToldPlan:
         scale = scales.get(name) if isinstance(scales, dict) else None
         if not isinstance(scale, int | float) or not 1e-6 < scale < 1e6:
             raise BadInput(path, f"scale_meters_per_coordinate.{name}", "expected metres a unit")
-        storeys.append(_storey(path, name, floors[name], float(scale), left_out))
+        storeys.append(_storey_of_rooms(path, name, floors[name], float(scale), left_out))
     if not storeys:
         raise BadInput(path, "redraw", "has no floor with a room")
     return ToldPlan(tuple(storeys), left_out.lines())
 
 
-def _storey(
+def _storey_of_rooms(
     path: Path, name: str, rooms: dict[str, _Room], scale: float, left_out: LeftOut
 ) -> ToldStorey:
     areas, openings = [], []
@@ -68,9 +68,9 @@ def _storey(
         label = next((str(pin.label) for pin in room.pins if pin.label), "")
         areas.append(DrawnArea(Polygon(points), "", label))
         for kind, pairs in (("door", room.doors), ("window", room.windows)):
-            for a, b in _pairs(path, f"{place}, {kind}s", pairs):
+            for a, b in _pair_ends(path, f"{place}, {kind}s", pairs):
                 ends = [_point(path, place, p, scale) for p in (a, b)]
-                openings.append(_opening(kind, *ends))
+                openings.append(_opening_between(kind, *ends))
     once: list[dict[str, Any]] = []
     for row in openings:
         if not any(
@@ -83,7 +83,7 @@ def _storey(
     )
 
 
-def _pairs(path: Path, place: str, given: list[Any]) -> list[tuple[_Pair, _Pair]]:
+def _pair_ends(path: Path, place: str, given: list[Any]) -> list[tuple[_Pair, _Pair]]:
     """Ends by pairs: [[a, b], ...], or the ends of all in one row."""
     points = checked(list[list[Any]], given, path, place)
     is_flat = all(len(p) == 2 and not isinstance(p[0], list) for p in points)
@@ -99,7 +99,7 @@ def _point(path: Path, place: str, point: _Pair, scale: float) -> tuple[float, f
     return point[0] * scale, -point[1] * scale
 
 
-def _opening(kind: str, a: tuple[float, float], b: tuple[float, float]) -> dict[str, Any]:
+def _opening_between(kind: str, a: tuple[float, float], b: tuple[float, float]) -> dict[str, Any]:
     middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2]
     row: dict[str, Any] = {"at": middle, "width": max(math.dist(a, b), 0.3), "kind": kind}
     if kind == "door":

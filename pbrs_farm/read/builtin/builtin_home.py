@@ -38,8 +38,8 @@ from pbrs_farm.read.builtin.builtin_pieces import (
     BuiltinPiece,
     Part,
     Triple,
-    _place,
     checks,
+    place_piece,
     planks,
     png_from_srgb8,
     stripes,
@@ -92,14 +92,14 @@ def builtin_home() -> House:
     """The built-in home, unrepaired; the same on every call."""
     library, index = _materials()
     openings, joinery = _openings(index)
-    items = (*_walls(index), *_planes(index), *joinery, *_furniture(index))
+    items = (*_wall_items(index), *_plane_items(index), *joinery, *_furniture_items(index))
     sha = keys.sha256(f"builtin home {VERSION}".encode())
     return House(
         id=keys.house_id("builtin", sha),
         name="Built-in home",
         source=Source("builtin", "builtin", sha, author="pbrs_farm", licence="Apache-2.0"),
         levels=(Level("0", "Ground floor", 0.0, WALL_HEIGHT_M),),
-        rooms=(_room("0_0", "Living room", LIVING, "Living_Room"), _room("0_1", "Bedroom", BEDROOM, "Bedroom")),
+        rooms=(_make_room("0_0", "Living room", LIVING, "Living_Room"), _make_room("0_1", "Bedroom", BEDROOM, "Bedroom")),
         items=items,
         materials=library.materials,
         textures=library.textures,
@@ -119,7 +119,7 @@ def _materials() -> tuple[MaterialLibrary, dict[str, int]]:
         "rug": checks(64, 8, (150, 40, 45), (205, 190, 160)),
         "picture": stripes(64, 6, (30, 90, 150), (230, 190, 60)),
     }
-    textures = {name: _texture(library, name, pixels) for name, pixels in pictures.items()}
+    textures = {name: _add_texture(library, name, pixels) for name, pixels in pictures.items()}
     materials = [
         replace(m, texture_id=textures[m.texture_id]) if m.texture_id else m
         for m in _FILE.materials
@@ -127,22 +127,22 @@ def _materials() -> tuple[MaterialLibrary, dict[str, int]]:
     return library, {m.name: library.index(m) for m in materials}
 
 
-def _texture(library: MaterialLibrary, name: str, rgb_srgb8: NDArray[np.uint8]) -> str | None:
+def _add_texture(library: MaterialLibrary, name: str, rgb_srgb8: NDArray[np.uint8]) -> str | None:
     png = png_from_srgb8(rgb_srgb8)
     loaded = library.texture(name, name=name, place=name, load=lambda: png)
     return loaded and loaded.texture.id
 
 
-def _room(room_id: str, name: str, rect: tuple[float, float, float, float], kind: str) -> Room:
-    return Room(room_id, name, "0", _rectangle(rect), 0.0, WALL_HEIGHT_M, types=(kind,))
+def _make_room(room_id: str, name: str, rect: tuple[float, float, float, float], kind: str) -> Room:
+    return Room(room_id, name, "0", _corners_of_rect(rect), 0.0, WALL_HEIGHT_M, types=(kind,))
 
 
-def _rectangle(rect: tuple[float, float, float, float]) -> Points2:
+def _corners_of_rect(rect: tuple[float, float, float, float]) -> Points2:
     x0, z0, x1, z1 = rect
     return counter_clockwise(np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]], np.float64))
 
 
-def _walls(index: dict[str, int]) -> tuple[Item, ...]:
+def _wall_items(index: dict[str, int]) -> tuple[Item, ...]:
     x0, z0, x1, z1 = LIVING[0], LIVING[1], BEDROOM[2], BEDROOM[3]
     o = OUTER_M
     inner = np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
@@ -173,11 +173,11 @@ def _walls(index: dict[str, int]) -> tuple[Item, ...]:
     )  # fmt: skip
 
 
-def _planes(index: dict[str, int]) -> list[Item]:
+def _plane_items(index: dict[str, int]) -> list[Item]:
     items = []
     for room_id, rect, floor in (("0_0", LIVING, "floor_planks"), ("0_1", BEDROOM, "carpet")):
         # A floor and a ceiling of the room's outline.
-        polygons = [[_rectangle(rect)]]
+        polygons = [[_corners_of_rect(rect)]]
         for kind, nyu40, y, material, up in (
             (ItemKind.FLOOR, FLOOR, 0.0, floor, True),
             (ItemKind.CEILING, CEILING, WALL_HEIGHT_M, "ceiling_default", False),
@@ -207,11 +207,11 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         name, make = ("window", _window_piece) if hole.is_window else ("door", _door_piece)
         turn = 0.0 if hole.along == "x" else 90.0
         piece = make(width, y1 - y0)
-        items.append(_place(name, piece, hole.id, hole.room, (x, y0, z), turn, index))
+        items.append(place_piece(name, piece, hole.id, hole.room, (x, y0, z), turn, index))
     return tuple(openings), items
 
 
-def _frame(w: float, h: float, t: float, d: float) -> Boxes:
+def _window_frame(w: float, h: float, t: float, d: float) -> Boxes:
     return (
         ((-w / 2, 0.0, -d), (-w / 2 + t, h, d)),
         ((w / 2 - t, 0.0, -d), (w / 2, h, d)),
@@ -222,7 +222,7 @@ def _frame(w: float, h: float, t: float, d: float) -> Boxes:
 def _door_piece(w: float, h: float) -> BuiltinPiece:
     leaf = ((-w / 2 + 0.05, 0.0, -0.02), (w / 2 - 0.05, h - 0.05, 0.02))
     knobs = ((w / 2 - 0.16, 0.98, -0.07), (w / 2 - 0.1, 1.02, 0.07))
-    parts = _parts(white=_frame(w, h, 0.05, 0.11), wood=(leaf,), metal=(knobs,))
+    parts = _parts_of_home(white=_window_frame(w, h, 0.05, 0.11), wood=(leaf,), metal=(knobs,))
     return BuiltinPiece(**{"class": "door"}, parts=parts, kind=ItemKind.DOOR)
 
 
@@ -233,16 +233,16 @@ def _window_piece(w: float, h: float) -> BuiltinPiece:
         ((-w / 2 + 0.05, 0.05, -0.002), (-0.025, h - 0.05, 0.002)),
         ((0.025, 0.05, -0.002), (w / 2 - 0.05, h - 0.05, 0.002)),
     )
-    parts = _parts(white=(*_frame(w, h, 0.05, 0.05), sill, mullion), pane=panes)
+    parts = _parts_of_home(white=(*_window_frame(w, h, 0.05, 0.05), sill, mullion), pane=panes)
     return BuiltinPiece(**{"class": "window"}, parts=parts, kind=ItemKind.WINDOW)
 
 
-def _parts(**boxes: Boxes) -> tuple[Part, ...]:
+def _parts_of_home(**boxes: Boxes) -> tuple[Part, ...]:
     return tuple(Part(material=name, boxes=some) for name, some in boxes.items())
 
 
-def _furniture(index: dict[str, int]) -> list[Item]:
+def _furniture_items(index: dict[str, int]) -> list[Item]:
     return [
-        _place(name, _FILE.pieces[name], f"piece_{k}", room_id, at, turn, index)
+        place_piece(name, _FILE.pieces[name], f"piece_{k}", room_id, at, turn, index)
         for k, (name, room_id, at, turn) in enumerate(_FILE.places)
     ]

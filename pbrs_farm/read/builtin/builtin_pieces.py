@@ -116,7 +116,7 @@ def _legs(w: float, d: float, h: float, t: float) -> Boxes:
     return tuple(((x0, 0.0, z0), (x1, h, z1)) for x0, x1 in xs for z0, z1 in zs)
 
 
-def _place(
+def place_piece(
     name: str, piece: BuiltinPiece, item_id: str, room_id: str, at: Triple, turn_deg: float,
     materials: dict[str, int],
 ) -> Item:  # fmt: skip

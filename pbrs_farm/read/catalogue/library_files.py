@@ -148,7 +148,7 @@ def _entry(row: dict[str, str], library: str, notes: LibraryNotes) -> Entry | No
         rotation = numbers(row.get("modelRotation", ""))
         if len(rotation) not in (0, 9):
             raise ValueError(f"modelRotation has {len(rotation)} numbers, not 9")
-        lights = _lights(row, (width, depth, height))
+        lights = _lights_of_row(row, (width, depth, height))
         elevation = float(row.get("elevation") or 0) / 100
     except (KeyError, ValueError) as error:
         notes.add("unreadable-entry", place, f"{error}: left out")
@@ -164,7 +164,7 @@ def _entry(row: dict[str, str], library: str, notes: LibraryNotes) -> Entry | No
     return Entry(place, row.get("category", ""), row.get("creator", ""), piece)
 
 
-def _lights(row: dict[str, str], size: tuple[float, float, float]) -> tuple[PlanLight, ...]:
+def _lights_of_row(row: dict[str, str], size: tuple[float, float, float]) -> tuple[PlanLight, ...]:
     # Each source as fractions of the piece's width, depth and height, its colour, its diameter.
     places = [numbers(row.get(f"lightSource{axis}", "")) for axis in "XYZ"]
     colours = row.get("lightSourceColor", "").split()

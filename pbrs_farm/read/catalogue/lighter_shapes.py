@@ -60,11 +60,11 @@ def _clustered(shape: Shape, cell: float) -> Shape:
         own = cluster[first : first + len(surface.positions)]
         first += len(surface.positions)
         # What is smaller than a cell stays as it is: lights count surfaces by their place.
-        surfaces.append(_surface(surface, own, mean) or surface)
+        surfaces.append(_lighter_surface(surface, own, mean) or surface)
     return replace(shape, surfaces=tuple(surfaces))
 
 
-def _surface(surface: Surface, cluster: I64, mean: F64) -> Surface | None:
+def _lighter_surface(surface: Surface, cluster: I64, mean: F64) -> Surface | None:
     # Drop faces that fell together, and the second of two equal ones.
     corners = cluster[surface.faces]
     is_whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])

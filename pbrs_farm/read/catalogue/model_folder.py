@@ -71,18 +71,18 @@ def model_folder(
     than MOST_MODELS.
     """
     files = {f.relative_to(path).as_posix(): f for f in sorted(path.rglob("*")) if f.is_file()}
-    stored = store / f"index-{_key(path, files)}.json" if store is not None else None
+    stored = store / f"index-{_key_of_folder(path, files)}.json" if store is not None else None
     found = _read_index(stored) if stored is not None else None
     if found is None:
         own = LibraryNotes()
         pieces = tuple(_index(path, own))
-        found = _digest(files), pieces, tuple(own.found)
+        found = _digest_of_folder(files), pieces, tuple(own.found)
         if stored is not None:
             _write_index(stored, *found)
     digest, pieces, said = found
     for note in said:
         notes.add(note.kind, note.place, note.text)
-    return digest, tuple(_piece(path, one, notes) for one in pieces)
+    return digest, tuple(_piece_of_model(path, one, notes) for one in pieces)
 
 
 def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
@@ -113,11 +113,13 @@ def _indexed(model: ObjectModel, file: str, told: Told, notes: LibraryNotes) -> 
     place = f"{model.root.name}#{file.rpartition('.')[0]}"
     name = told.name or model.name.replace("_", " ")
     try:
-        size = told.size or _measured(model)
+        size = told.size or _measure_model(model)
     except _FAULTS as error:
         notes.add("unusable-model", place, f"{error}: left out")
         return None
-    rule, size = _fitting(name, told, model.category, _turned(size, told.quarters), place, notes)
+    rule, size = _find_rule_and_size(
+        name, told, model.category, _turn_size(size, told.quarters), place, notes
+    )
     if rule is None:
         return None
     return _Indexed(
@@ -126,7 +128,7 @@ def _indexed(model: ObjectModel, file: str, told: Told, notes: LibraryNotes) -> 
     )  # fmt: skip
 
 
-def _fitting(
+def _find_rule_and_size(
     name: str, told: Told, category: str, size: Size, place: str, notes: LibraryNotes
 ) -> tuple[GroupRule | None, Size]:
     """(the rule, the size in metres) of a piece; None, with a note, where none has that size."""
@@ -135,7 +137,7 @@ def _fitting(
         if rule is None:
             notes.add("unmapped-class", place, f"no group {told.group!r}: left out")
         return rule, size
-    rule = _rule(name, told, category, size)
+    rule = _rule_by_words(name, told, category, size)
     if rule is not None and rule.fits("", size):
         return rule, size
     # A model of another unit is a thing of a usual size in it.
@@ -143,20 +145,22 @@ def _fitting(
         for unit, words in _UNITS.items():
             width, depth, height = size
             smaller = (width * unit, depth * unit, height * unit)
-            other = _rule(name, told, category, smaller)
+            other = _rule_by_words(name, told, category, smaller)
             if other is not None and other.fits("", smaller):
                 notes.add("other-unit", place, f"is told in {words}")
                 return other, smaller
     if rule is None:
-        notes.add("unmapped-class", place, f"no group for {name!r} of {_text(size)}: left out")
+        notes.add("unmapped-class", place, f"no group for {name!r} of {_size_text(size)}: left out")
     else:
         notes.add(
-            "wrong-size", place, f"{_text(size)} is no {rule.group.replace('_', ' ')}: left out"
+            "wrong-size",
+            place,
+            f"{_size_text(size)} is no {rule.group.replace('_', ' ')}: left out",
         )
     return None, size
 
 
-def _rule(name: str, told: Told, category: str, size: Size) -> GroupRule | None:
+def _rule_by_words(name: str, told: Told, category: str, size: Size) -> GroupRule | None:
     """By the table's word, then the folder's, then the name's."""
     if told.group:
         return group_rule(name, "", size, group=told.group)
@@ -173,16 +177,16 @@ def _is_of(rule: GroupRule, label: str) -> bool:
     return NYU40_NAMES[rule.nyu40] == label
 
 
-def _text(size: Size) -> str:
+def _size_text(size: Size) -> str:
     return " x ".join(f"{v:.3g}" for v in size) + " m"
 
 
-def _turned(size: Size, quarters: int) -> Size:
+def _turn_size(size: Size, quarters: int) -> Size:
     width, depth, height = size
     return (depth, width, height) if quarters % 2 else size
 
 
-def _measured(model: ObjectModel) -> Size:
+def _measure_model(model: ObjectModel) -> Size:
     bounds = _bounds_of_glb(model.path) if model.path.suffix.lower() == ".glb" else None
     low, high = read_object(model, _FIELDS).items[0].bounds if bounds is None else bounds
     width, height, depth = (float(v) for v in np.maximum(high - low, 1e-4))
@@ -228,7 +232,7 @@ def _bounds_of_glb(path: Path) -> Any:
     return np.array([np.min(corners, 0), np.max(corners, 0)]) if is_whole else None
 
 
-def _key(path: Path, files: dict[str, Path]) -> str:
+def _key_of_folder(path: Path, files: dict[str, Path]) -> str:
     """Of the folder's name and its files' names, sizes and times: what is cheap to ask of thousands."""
     digest = hashlib.sha256(f"{INDEX_VERSION} {path.name}\n".encode())
     for name, file in files.items():
@@ -238,7 +242,7 @@ def _key(path: Path, files: dict[str, Path]) -> str:
     return digest.hexdigest()[:32]
 
 
-def _digest(files: dict[str, Path]) -> str:
+def _digest_of_folder(files: dict[str, Path]) -> str:
     digest = hashlib.sha256(f"{INDEX_VERSION}\n".encode())
     for name, file in files.items():
         digest.update(f"{name} {digest_of_regular(file)}\n".encode("utf-8", "surrogateescape"))
@@ -265,7 +269,7 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
         return None
 
 
-def _piece(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
+def _piece_of_model(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
     piece = Piece(
         id=f"{path.name}#{one.file.rpartition('.')[0]}", name=one.name, group=one.group,
         place=Place(one.place), nyu40=one.nyu40, size=one.size, kind=ItemKind(one.kind),
@@ -277,7 +281,7 @@ def _piece(path: Path, one: _Indexed, notes: LibraryNotes) -> FolderPiece:
 
 
 def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: LibraryNotes) -> Shape | None:
-    width, depth, height = _turned(piece.size, quarters)
+    width, depth, height = _turn_size(piece.size, quarters)
     try:
         house = read_object(replace(model, size_m=(width, height, depth)), _FIELDS)
     except PbrsError as error:

@@ -72,12 +72,14 @@ def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
     ):
         for name in names:
             if (path / name).exists():
-                return _table(path, name, read, notes)
+                return _read_model_table(path, name, read, notes)
     others = [f for f in sorted(path.glob("*.csv"))[:8] if _names_files(f)]
-    return _table(path, others[0].name, _own, notes) if len(others) == 1 else ModelTable({})
+    return (
+        _read_model_table(path, others[0].name, _own, notes) if len(others) == 1 else ModelTable({})
+    )
 
 
-def _table(path: Path, name: str, read: Any, notes: LibraryNotes) -> ModelTable:
+def _read_model_table(path: Path, name: str, read: Any, notes: LibraryNotes) -> ModelTable:
     try:
         table: ModelTable = read(path, name, notes)
     except (BadHouse, BadInput, OSError, ValueError, KeyError, csv.Error, EOFError) as error:

@@ -110,20 +110,20 @@ def group_rules() -> tuple[GroupRule, ...]:
             r["group"], Place(r["place"]), NYU40_NAMES.index(r["nyu40"]), r["category"],
             _range(r["side_cm"]), _range(r["height_cm"]), tuple(r["words"].split("|")),
         )
-        for r in _rows("groups.csv")
+        for r in _rows_of_table("groups.csv")
     )  # fmt: skip
 
 
 @cache
-def verdicts() -> Mapping[str, PieceVerdict]:
+def piece_verdicts() -> Mapping[str, PieceVerdict]:
     """Piece id (`<library>#<id>`) -> what was seen of it: the rows of exceptions.csv."""
     return {
         r["id"]: PieceVerdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
-        for r in _rows("exceptions.csv")
+        for r in _rows_of_table("exceptions.csv")
     }
 
 
-def _rows(name: str) -> list[dict[str, str]]:
+def _rows_of_table(name: str) -> list[dict[str, str]]:
     text = files("pbrs_farm.read.catalogue").joinpath(name).read_text("utf-8")
     return list(csv.DictReader(text.splitlines()))
 
@@ -133,7 +133,7 @@ def _range(text: str) -> tuple[float, float]:
     return float(low) / 100, float(high) / 100
 
 
-def _words(text: str) -> list[str]:
+def _words_of_rule(text: str) -> list[str]:
     # Whole words without accents, plurals made singular, "12-oz" parted; numbers are left out.
     words = re.findall(r"[a-z]+|&", plain(text))
     return [w[:-1] if len(w) > 3 and w.endswith("s") and not w.endswith("ss") else w for w in words]
@@ -144,16 +144,16 @@ def _by_phrase() -> Mapping[str, tuple[GroupRule, ...]]:
     found: dict[str, list[GroupRule]] = {}
     for rule in group_rules():
         for phrase in rule.words:
-            found.setdefault(" ".join(_words(phrase)), []).append(rule)
+            found.setdefault(" ".join(_words_of_rule(phrase)), []).append(rule)
     return {phrase: tuple(rules) for phrase, rules in found.items()}
 
 
 def _rules_of(phrase: str) -> list[GroupRule]:
-    return list(_by_phrase().get(" ".join(_words(phrase)), ()))
+    return list(_by_phrase().get(" ".join(_words_of_rule(phrase)), ()))
 
 
 def _rule_by_words(text: str, category: str, size: Size) -> GroupRule | None:
-    for phrase in _phrases(_words(text)):
+    for phrase in _phrases(_words_of_rule(text)):
         for rule in _by_phrase().get(phrase, ()):
             if rule.fits(category, size):
                 return rule

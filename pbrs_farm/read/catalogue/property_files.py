@@ -33,7 +33,7 @@ def parse_properties(data: bytes) -> dict[str, str]:
         match = _ENTRY.fullmatch(whole)
         whole = ""
         if match is not None:
-            found[_plain(match[1])] = _plain(match[2]).strip()
+            found[_unescape(match[1])] = _unescape(match[2]).strip()
     return found
 
 
@@ -52,7 +52,7 @@ def numbers(text: str) -> list[float]:
     return [float(word) for word in text.split()]
 
 
-def _plain(text: str) -> str:
+def _unescape(text: str) -> str:
     def letter(match: re.Match[str]) -> str:
         code = match[1]
         if len(code) == 5:

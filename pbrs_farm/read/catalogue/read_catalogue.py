@@ -24,7 +24,12 @@ from pbrs_farm.read.catalogue.library_files import (
 )
 from pbrs_farm.read.catalogue.library_shapes import library_shape
 from pbrs_farm.read.catalogue.model_folder import model_folder
-from pbrs_farm.read.catalogue.piece_groups import GroupRule, PieceVerdict, group_rule, verdicts
+from pbrs_farm.read.catalogue.piece_groups import (
+    GroupRule,
+    PieceVerdict,
+    group_rule,
+    piece_verdicts,
+)
 from pbrs_farm.read.catalogue.shape_store import ShapeStore
 from pbrs_farm.read.catalogue.surface_pictures import (
     JAR_TEXTURES,
@@ -65,9 +70,9 @@ def catalogue_from(
     notes = LibraryNotes()
     found = []
     if jar is not None:
-        found.append(_furniture(jar, notes, JAR_FURNITURE))
+        found.append(_read_furniture_library(jar, notes, JAR_FURNITURE))
         found.append(_textures(jar, notes, JAR_TEXTURES))
-    found += [_furniture(path, notes, FURNITURE) for path in libraries]
+    found += [_read_furniture_library(path, notes, FURNITURE) for path in libraries]
     found += [_given(path, notes, store, may_be_empty=may_be_empty) for path in given]
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
@@ -77,7 +82,7 @@ def catalogue_from(
     for library in held:
         for piece, loader in library.pieces:
             pieces[piece.id] = piece
-            loaders[piece.id] = _stored(shapes, library.sha256, piece, loader)
+            loaders[piece.id] = _load_through_store(shapes, library.sha256, piece, loader)
     return Catalogue(
         pieces=tuple(pieces.values()),
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
@@ -87,7 +92,9 @@ def catalogue_from(
     )
 
 
-def _stored(shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader) -> Loader:
+def _load_through_store(
+    shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader
+) -> Loader:
     if shapes is None:
         return load
     key = (VERSION, sha256, piece.id, piece.group, piece.place.value)
@@ -102,11 +109,11 @@ def _given(
     found: Found | None
     n_before = len(notes.found)
     if path.is_dir():
-        found = _folder(path, notes, store)
+        found = _read_folder(path, notes, store)
     elif path.suffix.lower() == ".sh3t":
         found = _textures(path, notes, TEXTURES)
     elif path.suffix.lower() == ".sh3f":
-        found = _furniture(path, notes, FURNITURE)
+        found = _read_furniture_library(path, notes, FURNITURE)
     else:
         hint = ".sh3f, .sh3t or a folder of OBJ and GLB, or of pictures, is read"
         raise BadInput(path, "", "is no catalogue", hint=hint)
@@ -116,7 +123,7 @@ def _given(
     return found
 
 
-def _folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
+def _read_folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
     """Models; pictures for the walls where there are no models."""
     try:
         sha256, pieces = model_folder(path, notes, store)
@@ -133,29 +140,31 @@ def _textures(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
     return Found(found[0], pictures=found[1]) if found else None
 
 
-def _furniture(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
+def _read_furniture_library(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
     library = furniture_library(path, notes, catalogue)
     if library is None:
         return None
     pieces = []
     for entry in library.entries:
         # Go by what people decided of this very piece, else by its name and size.
-        seen = verdicts().get(entry.id)
-        rule = None if seen and not seen.group else _rule(entry, seen.group if seen else "")
+        seen = piece_verdicts().get(entry.id)
+        rule = (
+            None if seen and not seen.group else _rule_of_entry(entry, seen.group if seen else "")
+        )
         if rule is not None:
-            pieces.append(_piece(library, entry, rule, seen or _AS_WRITTEN, notes))
+            pieces.append(_piece_of_entry(library, entry, rule, seen or _AS_WRITTEN, notes))
     if not pieces:
         notes.add("no-classes", library.name, "no piece of the library has a known class")
     pictures = pictures_of_models(library.name, library.contents, library.licence, notes)
     return Found(library.sha256, tuple(pieces), pictures)
 
 
-def _rule(entry: Entry, group: str) -> GroupRule | None:
+def _rule_of_entry(entry: Entry, group: str) -> GroupRule | None:
     piece, inner = entry.piece, entry.id.partition("#")[2]
     return group_rule(piece.name, entry.category, piece.size, inner=inner, group=group)
 
 
-def _piece(
+def _piece_of_entry(
     library: Library, entry: Entry, rule: GroupRule, seen: PieceVerdict, notes: LibraryNotes
 ) -> tuple[Piece, Loader]:
     # Turn the size with a piece that is turned a quarter.

@@ -45,7 +45,7 @@ class ShapeStore:
         """The shape stored under key, else what make gives, which is stored; None is, too."""
         path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
-            return _read(path)
+            return _read_shape(path)
         shape = make()
         with suppress(OSError):
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -68,18 +68,18 @@ def _arrays(shape: Shape) -> dict[str, NDArray[Any]]:
         tuple((t.id, t.name, t.media_type) for t in textures),
         shape.lights,
     )
-    arrays: dict[str, NDArray[Any]] = {"described": _bytes(_DESCRIBED.dump_json(described))}
+    arrays: dict[str, NDArray[Any]] = {"described": _byte_array(_DESCRIBED.dump_json(described))}
     for k, s in enumerate(shape.surfaces):
         parts = {"p": s.positions, "f": s.faces, "u": s.uvs, "n": s.normals}
         arrays |= {f"{name}{k}": part for name, part in parts.items() if part is not None}
-    return arrays | {f"t{k}": _bytes(t.data) for k, t in enumerate(textures)}
+    return arrays | {f"t{k}": _byte_array(t.data) for k, t in enumerate(textures)}
 
 
-def _bytes(data: bytes) -> NDArray[np.uint8]:
+def _byte_array(data: bytes) -> NDArray[np.uint8]:
     return np.frombuffer(data, np.uint8)
 
 
-def _read(path: Path) -> Shape | None:
+def _read_shape(path: Path) -> Shape | None:
     with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     if not arrays:

@@ -80,10 +80,10 @@ def pictures_of_models(
 ) -> tuple[Picture, ...]:
     """The surface pictures that a library of the packages holds among its models."""
     found = []
-    for row in _seen().get(library, ()):
-        texture = _texture(contents, row.image, f"{library}#{row.image}", notes)
+    for row in _seen_pictures().get(library, ()):
+        texture = _read_texture(contents, row.image, f"{library}#{row.image}", notes)
         if texture is not None:
-            texture = _turned(texture) if row.is_turned else texture
+            texture = _turn_texture(texture) if row.is_turned else texture
             found.append(Picture(texture, row.group, row.size, library, licence))
     return tuple(found)
 
@@ -99,19 +99,21 @@ def texture_library(
     opened = opened_library(path, catalogue, notes)
     if opened is None:
         return None
-    found = tuple(_pictures(opened, path.stem, notes))
+    found = tuple(_pictures_of_library(opened, path.stem, notes))
     if not found:
         notes.add("no-classes", path.name, "no picture of the library is of a known kind")
     return opened.sha256, found
 
 
-def _pictures(opened: OpenedLibrary, library: str, notes: LibraryNotes) -> Iterator[Picture]:
+def _pictures_of_library(
+    opened: OpenedLibrary, library: str, notes: LibraryNotes
+) -> Iterator[Picture]:
     licence, count = licence_of(opened.properties), Counter[str]()
     for row in numbered_entries(opened.properties):
         group = surface_group(row.get("name", ""), row.get("category", ""))
         if not group or count[group] >= MOST_OF_A_GROUP:
             continue
-        picture = _picture(row, group, opened.contents, library, licence, notes)
+        picture = _picture_of_row(row, group, opened.contents, library, licence, notes)
         if picture is not None:
             count[group] += 1
             yield picture
@@ -128,7 +130,7 @@ def surface_group(name: str, category: str) -> str:
     return ""
 
 
-def _picture(
+def _picture_of_row(
     row: dict[str, str], group: str, contents: Resources, library: str, licence: str,
     notes: LibraryNotes,
 ) -> Picture | None:  # fmt: skip
@@ -140,14 +142,16 @@ def _picture(
     except (KeyError, ValueError) as error:
         notes.add("unreadable-entry", place, f"{error}: left out")
         return None
-    texture = _texture(contents, row.get("image", "").lstrip("/"), place, notes)
+    texture = _read_texture(contents, row.get("image", "").lstrip("/"), place, notes)
     if texture is None:
         return None
     texture = small_texture(texture, _EDGE_PX)
     return Picture(texture, group, (width, height), row.get("creator", library), licence)
 
 
-def _texture(contents: Resources, image: str, place: str, notes: LibraryNotes) -> Texture | None:
+def _read_texture(
+    contents: Resources, image: str, place: str, notes: LibraryNotes
+) -> Texture | None:
     try:
         data = contents.read(image)
         if data is None:
@@ -158,7 +162,7 @@ def _texture(contents: Resources, image: str, place: str, notes: LibraryNotes) -
         return None
 
 
-def _turned(texture: Texture) -> Texture:
+def _turn_texture(texture: Texture) -> Texture:
     picture = Image.open(io.BytesIO(texture.data)).convert("RGB")
     buffer = io.BytesIO()
     picture.transpose(Image.Transpose.ROTATE_90).save(buffer, "JPEG", quality=92)
@@ -166,7 +170,7 @@ def _turned(texture: Texture) -> Texture:
 
 
 @cache
-def _seen() -> dict[str, list[_Seen]]:
+def _seen_pictures() -> dict[str, list[_Seen]]:
     folder = files("pbrs_farm.read.catalogue")
     text = folder.joinpath("surface-pictures.csv").read_text("utf-8")
     found: dict[str, list[_Seen]] = {}
@@ -188,7 +192,7 @@ def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture,
         place = f"{path.name}/{file.relative_to(path).as_posix()}"
         try:
             data = read_regular(file, _MAX_BYTES)
-            texture, aspect = _upright(data, file.name)
+            texture, aspect = _bounded_picture(data, file.name)
         except (OSError, ValueError, PbrsError, Image.DecompressionBombError) as error:
             notes.add("unreadable-texture", place, f"{error}: left out")
             continue
@@ -199,7 +203,7 @@ def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture,
     return digest.hexdigest(), tuple(found)
 
 
-def _upright(data: bytes, name: str) -> tuple[Texture, float]:
+def _bounded_picture(data: bytes, name: str) -> tuple[Texture, float]:
     """The picture at most _EDGE_PX wide and high, and its width over its height."""
     source: Image.Image = Image.open(io.BytesIO(data))
     source.draft(

@@ -23,7 +23,7 @@ from pbrs_farm.read.common.json_values import (
     Override,
     Overrides,
     Vector,
-    numbers,
+    number_array,
 )
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.placed_mesh import placed
@@ -66,7 +66,7 @@ class Arch:
 
 
 _Length = Annotated[Finite, Field(ge=0, lt=1000)]
-_Corner = Annotated[F64, numbers(2)]
+_Corner = Annotated[F64, number_array(2)]
 
 
 class _Common(Given):
@@ -94,7 +94,7 @@ class _Wall(_Common):
     holes: Annotated[tuple[_Hole, ...], FailFast(), Lenient] = ()
 
 
-def _rings(points: object) -> object:
+def _list_of_rings(points: object) -> object:
     # Tell one ring of corners from a list of rings by what the first entries hold.
     if not isinstance(points, list):
         return points
@@ -108,7 +108,7 @@ _Ring = Annotated[list[Vector], Field(min_length=3, fail_fast=True)]
 class _Slab(_Common):
     """A slab by its outline and holes in house coordinates, which may be one ring."""
 
-    points: Annotated[list[_Ring], FailFast(), BeforeValidator(_rings)]
+    points: Annotated[list[_Ring], FailFast(), BeforeValidator(_list_of_rings)]
     offset: Vector = np.zeros(3)
 
 
@@ -159,7 +159,7 @@ def _in_world(arch: Arch, surface: Surface) -> Surface | None:
     return placed(mesh, arch.world_from_house, name=surface.name, material=surface.material)
 
 
-def _kept(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
+def _surfaces_with_area(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
     return tuple(s for s in (_in_world(arch, surface) for surface in surfaces) if s is not None)
 
 
@@ -184,7 +184,7 @@ def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Su
     ]
     if e.depth_m > 0:
         parts.append(quads_surface("side", np.array(sides), material))
-    return _kept(arch, parts)
+    return _surfaces_with_area(arch, parts)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -226,7 +226,7 @@ def wall_surfaces(
     right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]
     quads = box_quads(frame.start + frame.axes @ half, half, right_handed)
     edge = materials.material(_EDGE, None, place=e.place, clear=MaterialKind.GLASS)
-    return _kept(
+    return _surfaces_with_area(
         arch,
         [
             quads_surface("inside", quads[4:5], _material(materials, e, 0)),

@@ -98,14 +98,17 @@ class PieceClass:
         return CLASS_TAG + self.rule
 
 
-def _rows(name: str) -> list[dict[str, str]]:
+def _rows_of_csv(name: str) -> list[dict[str, str]]:
     text = files("pbrs_farm.read.common").joinpath(name).read_text("utf-8")
     return list(csv.DictReader(text.splitlines()))
 
 
 @cache
-def _catalogue() -> Mapping[str, int]:
-    return {r["catalogId"]: NYU40_NAMES.index(r["class"]) for r in _rows("sweethome3d-classes.csv")}
+def _classes_of_catalogue_ids() -> Mapping[str, int]:
+    return {
+        r["catalogId"]: NYU40_NAMES.index(r["class"])
+        for r in _rows_of_csv("sweethome3d-classes.csv")
+    }
 
 
 @cache
@@ -114,7 +117,7 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
     # A phrase with "-" before it also ends compound words ("-tisch": Esstisch).
     return {
         plain(phrase): (r["class"], r["language"] in _HEAD_FIRST)
-        for r in _rows("words.csv")
+        for r in _rows_of_csv("words.csv")
         for phrase in r["words"].split("|")
     }
 
@@ -140,7 +143,7 @@ def _found_candidates(name: str) -> Iterator[tuple[str, bool]]:
     aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
     # A phrase from the first word may hold an aside: "table de nuit".
     for n in range(min(_LONGEST_PHRASE, len(words)), 1, -1):
-        whole = _known(" ".join(words[:n]))
+        whole = _class_of_phrase(" ".join(words[:n]))
         if whole is not None and n > aside:
             yield whole[0], True
     yield from _from_the_noun(words[:aside], is_head=True)
@@ -153,7 +156,7 @@ def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[tuple[str, bo
     # The last known word says what the thing is; more words go before one.
     while k > 0:
         for n in range(min(_LONGEST_PHRASE, k), 0, -1):
-            known = _known(" ".join(words[k - n : k]))
+            known = _class_of_phrase(" ".join(words[k - n : k]))
             if known is not None and (k == len(words) or words[k - 1] not in _MODIFIERS):
                 is_first = known[1] and k == n
                 found.append((known[0], is_first or k == len(words), is_first))
@@ -165,7 +168,7 @@ def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[tuple[str, bo
         yield label, is_noun and is_head
 
 
-def _known(phrase: str) -> tuple[str, bool] | None:
+def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
     known = _vocabulary()
     singular = phrase[: -2 if phrase.endswith(("shes", "ches", "xes", "sses")) else -1]
     for form in (phrase, singular if phrase.endswith("s") else phrase):
@@ -179,7 +182,7 @@ def _known(phrase: str) -> tuple[str, bool] | None:
     return None
 
 
-def _fits(label: str, place: PieceSize | None) -> bool:
+def _fits_its_size(label: str, place: PieceSize | None) -> bool:
     if place is None or label not in _SIZES:
         return True
     long_min, long_max, height_min, height_max = _SIZES[label]
@@ -195,7 +198,7 @@ def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
     for label, is_noun in _candidates(name[:_LONGEST_NAME]):
-        if not _fits(label, place):
+        if not _fits_its_size(label, place):
             refused = True
             continue
         stands_for = {_PLANT: "otherprop", _STAIRS: "otherstructure"}
@@ -212,7 +215,7 @@ def class_of_piece(
     A bare box, cylinder or triangle is what its name says, else its group's: people build with
     them. Every class must fit the place, where it is given; a table 5 cm high is none.
     """
-    known = _catalogue().get(catalogue_id)
+    known = _classes_of_catalogue_ids().get(catalogue_id)
     inner = catalogue_id.partition("#")[2]
     if catalogue_id in _PRIMITIVES:
         is_named = name.lower() not in _PRIMITIVE_NAMES
@@ -221,7 +224,7 @@ def class_of_piece(
             own = _by_words(group, place, "group")
         return own if own.nyu40 is not None else PieceClass(known, "catalogue")
     # The catalogue is the surest, as long as the size agrees.
-    if known is not None and _fits(NYU40_NAMES[known], place):
+    if known is not None and _fits_its_size(NYU40_NAMES[known], place):
         word = next((label for label, _ in (*_candidates(inner), *_candidates(name))), "")
         return PieceClass(known, "catalogue", word)
     own = _by_words(name, place, "name")

@@ -37,7 +37,7 @@ class GivenClass(NamedTuple):
 
 def given_class(source: str, name: str) -> GivenClass | None:
     """The row of a source's name, whatever its case; None where the table has none."""
-    return _table().get((source, _key(name)))
+    return _classes_by_name().get((source, _key_of_name(name)))
 
 
 def class_by_words(*names: str) -> GivenClass | None:
@@ -51,15 +51,15 @@ def class_by_words(*names: str) -> GivenClass | None:
     return None
 
 
-def _key(name: str) -> str:
+def _key_of_name(name: str) -> str:
     return " ".join(name.lower().replace("_", " ").split())
 
 
 @cache
-def _table() -> dict[tuple[str, str], GivenClass]:
+def _classes_by_name() -> dict[tuple[str, str], GivenClass]:
     text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
     return {
-        (row["source"], _key(row["name"])): GivenClass(row["kind"], _nyu40(row["nyu40"]))
+        (row["source"], _key_of_name(row["name"])): GivenClass(row["kind"], _nyu40(row["nyu40"]))
         for row in csv.DictReader(text.splitlines())
     }
 

@@ -82,8 +82,10 @@ def joinery_of(
     if hole.kind == "open":
         return None
     is_window = hole.kind == "window"
-    boxes = _window(hole) if is_window else _door(hole)
-    surfaces = tuple(_surface(name, some, hole, library) for name, some in boxes.items() if some)
+    boxes = _window_boxes(hole) if is_window else _door(hole)
+    surfaces = tuple(
+        _boxes_surface(name, some, hole, library) for name, some in boxes.items() if some
+    )
     half = np.array(hole.size) / 2 + [0, 0, _LINING_M]
     return Item(
         id=hole.id, name=hole.name or hole.kind, kind=ItemKind.WINDOW if is_window else ItemKind.DOOR,
@@ -93,7 +95,7 @@ def joinery_of(
     )  # fmt: skip
 
 
-def _surface(
+def _boxes_surface(
     name: str, boxes: list[tuple[tuple[float, float, float], tuple[float, float, float]]],
     hole: Hole, library: MaterialLibrary,
 ) -> Surface:  # fmt: skip
@@ -129,14 +131,16 @@ def _door(hole: Hole) -> _Boxes:
         lap = 0.03 if slides else -0.0015
         low = edges[k] - (lap if k else -0.002)
         high = edges[k + 1] + (lap if k < n - 1 else -0.002)
-        _leaf(boxes, (float(low), float(high)), (-h + 0.006, top - 0.003), track, hole.is_glazed)
+        _add_door_leaf(
+            boxes, (float(low), float(high)), (-h + 0.006, top - 0.003), track, hole.is_glazed
+        )
         hinged_right = hole.is_hinged_right if n == 1 else k % 2 == 1
         at = low + 0.07 if hinged_right else high - 0.07
         _handle(boxes, float(at), -h + min(_HANDLE_Y, h), track)
     return boxes
 
 
-def _leaf(
+def _add_door_leaf(
     boxes: _Boxes, x: tuple[float, float], y: tuple[float, float], z: float, is_glazed: bool
 ) -> None:
     t = _LEAF_M / 2
@@ -162,7 +166,7 @@ def _handle(boxes: _Boxes, x: float, y: float, z: float) -> None:
         )
 
 
-def _window(hole: Hole) -> _Boxes:
+def _window_boxes(hole: Hole) -> _Boxes:
     w, h, post, _ = _lining(hole)
     d = min(_SASH_M / 2, hole.size[2] / 2 + _LINING_M)
     frame = [

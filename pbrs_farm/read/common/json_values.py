@@ -30,7 +30,7 @@ _LAST_ROW: Final = np.array([0.0, 0.0, 0.0, 1.0])
 Number = Annotated[Finite, Field(gt=-1e12, lt=1e12)]
 
 
-def numbers(n: int, then: Callable[[F64], F64] = np.asarray) -> PlainValidator:
+def number_array(n: int, then: Callable[[F64], F64] = np.asarray) -> PlainValidator:
     """In Annotated[F64, ...]: (n,) of a list of n numbers, as `then` makes it."""
     lists = TypeAdapter(Annotated[list[Number], exactly(n)])
     return PlainValidator(lambda value: then(np.array(lists.validate_python(value), np.float64)))
@@ -42,7 +42,7 @@ def _file_name(value: str) -> str:
     return value
 
 
-def _rgb(value: Any) -> Any:
+def _parse_hex_colour(value: Any) -> Any:
     if not isinstance(value, str) or not _COLOUR.fullmatch(value):
         raise ValueError(f"{str(value)[:40]!r} is no #rrggbb")
     return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
@@ -59,7 +59,7 @@ def affine(column_major: F64) -> F64:
 
 FileName = Annotated[str, AfterValidator(_file_name)]
 Label = Annotated[str, BeforeValidator(lambda value: str(value)[:60])]
-Vector = Annotated[F64, numbers(3)]
+Vector = Annotated[F64, number_array(3)]
 Lenient: Final = BeforeValidator(lambda value: value if isinstance(value, list) else [])
 
 
@@ -74,7 +74,7 @@ class Override(Given):
 
     name: Label = ""
     texture: FileName | None = None
-    diffuse: Annotated[tuple[float, float, float], BeforeValidator(_rgb)] | None = None
+    diffuse: Annotated[tuple[float, float, float], BeforeValidator(_parse_hex_colour)] | None = None
 
 
 Overrides = Annotated[tuple[Override, ...], FailFast(), Lenient]

@@ -42,7 +42,7 @@ def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
             warnings.simplefilter("ignore")  # of odd metadata in a picture that decodes
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_TRIED)
-            return _texture(picture, data, name)
+            return _texture_of_picture(picture, data, name)
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ValueError("the picture is too large") from None
     except UnidentifiedImageError:
@@ -51,7 +51,7 @@ def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
         raise ValueError("the picture cannot be decoded: damaged or cut short") from None
 
 
-def _texture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:
+def _texture_of_picture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:
     width, height = picture.size
     if max(width, height) > MAX_EDGE_PX or width * height > MAX_TEXTURE_PIXELS:
         raise ValueError(f"the picture is too large: {width} x {height}")

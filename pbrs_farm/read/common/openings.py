@@ -44,7 +44,7 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     found = []
     for item in items:
         if item.kind in (ItemKind.DOOR, ItemKind.WINDOW) and item.box is not None:
-            opening = _opening(item, item.box, frames)
+            opening = _opening_of_leaf(item, item.box, frames)
             if opening is not None:
                 found.append(opening)
     return tuple(found)
@@ -70,21 +70,26 @@ def _frames(item: Item) -> list[_WallFrame]:
     return found
 
 
-def _axes(normal: F64) -> F64:
+def _axes_of_wall(normal: F64) -> F64:
     """(3, 3) columns: along the wall, up, across."""
     return np.stack([np.cross(_UP, normal), _UP, normal], 1)
 
 
-def _opening(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Opening | None:
+def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Opening | None:
     normal = leaf.axes[:, 2] * [1, 0, 1]  # a model's front is +z, whatever its leaf does
     if np.linalg.norm(normal) < 0.5:
         return None  # lies flat: a roof window, which no wall holds
     normal = normal / np.linalg.norm(normal)
-    axes = _axes(normal)
+    axes = _axes_of_wall(normal)
     # Bound the door in the axes along, up and across, and find the walls it stands in.
     corners = leaf.corners @ axes
     low, high = corners.min(0), corners.max(0)
-    standing = [p for f in frames if f.level_id == item.level_id for p in _wall(f, axes, low, high)]
+    standing = [
+        p
+        for f in frames
+        if f.level_id == item.level_id
+        for p in _wall_points_around(f, axes, low, high)
+    ]
     if not standing:
         return None
     # Take the size of the holes where walls have some, else the door's own.
@@ -115,7 +120,7 @@ def _opening(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Opening | N
     )
 
 
-def _wall(frame: _WallFrame, axes: F64, low: F64, high: F64) -> list[F64]:
+def _wall_points_around(frame: _WallFrame, axes: F64, low: F64, high: F64) -> list[F64]:
     """The wall's points in axes, if it is the one (or one of those) that low..high stands in."""
     if abs(frame.normal @ axes[:, 2]) < 0.999:
         return []

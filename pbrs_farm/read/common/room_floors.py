@@ -29,13 +29,13 @@ _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
     """World y of the walkable surface: of the highest upward faces; None if there are none."""
-    corners = _facing(surfaces, 1)
+    corners = _faces_looking(surfaces, 1)
     return None if not len(corners) else float(corners[..., 1].mean(1).max())
 
 
 def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
     """World y of the lowest downward faces; None if there are none."""
-    corners = _facing(surfaces, -1)
+    corners = _faces_looking(surfaces, -1)
     return None if not len(corners) else float(corners[..., 1].mean(1).min())
 
 
@@ -44,23 +44,25 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | N
 
     None if the floor has no area.
     """
-    corners = _facing(floor, 1)
+    corners = _faces_looking(floor, 1)
     if not len(corners):
         return None
     # Take the topmost faces as the floor, and what no wall stands on as walkable.
     y = corners[..., 1].mean(1)
-    area = _outline(corners[y > y.max() - _SAME_HEIGHT_M])
-    standing = _facing(walls, 1), _facing(walls, -1)
-    between = shapely.difference(area, _outline(np.concatenate(standing)))
+    area = _outline_from_above(corners[y > y.max() - _SAME_HEIGHT_M])
+    standing = _faces_looking(walls, 1), _faces_looking(walls, -1)
+    between = shapely.difference(area, _outline_from_above(np.concatenate(standing)))
     return polygon_of(between if not between.is_empty else area)
 
 
-def coverage(surface: Surface, polygon: F64) -> float:
+def covered_share(surface: Surface, polygon: F64) -> float:
     """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
     # A planar ceiling may look either way.
-    both = np.concatenate([_facing([surface], 1), _facing([surface], -1)])
+    both = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
     area: Any = shapely.Polygon(polygon)
-    return float(shapely.area(shapely.intersection(_outline(both), area)) / max(area.area, 1e-9))
+    return float(
+        shapely.area(shapely.intersection(_outline_from_above(both), area)) / max(area.area, 1e-9)
+    )
 
 
 def floor_polygons(
@@ -70,12 +72,14 @@ def floor_polygons(
 
     Each as floor_polygon gives it, largest first.
     """
-    corners = _facing(floor, 1)
+    corners = _faces_looking(floor, 1)
     if not len(corners):
         return []
     # Cut closed walls by their footprint, planar walls by a strip along them.
-    between = shapely.difference(_outline(corners), _outline(_facing(walls, 1)))
-    between = shapely.difference(between, _outline(_facing(walls, -1)))
+    between = shapely.difference(
+        _outline_from_above(corners), _outline_from_above(_faces_looking(walls, 1))
+    )
+    between = shapely.difference(between, _outline_from_above(_faces_looking(walls, -1)))
     pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
     # Keep pieces that are large and wide enough; give back what the strips took.
     narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
@@ -105,7 +109,9 @@ def _traces(walls: Sequence[Surface]) -> Any:
 def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
     """The largest piece of plan between walls, for a room without a floor; None if there is none."""
     # What the walls' hull encloses and no wall covers lies between them.
-    footprint = _outline(np.concatenate([_facing(walls, 1), _facing(walls, -1)]))
+    footprint = _outline_from_above(
+        np.concatenate([_faces_looking(walls, 1), _faces_looking(walls, -1)])
+    )
     return polygon_of(shapely.difference(footprint.convex_hull, footprint))
 
 
@@ -127,7 +133,7 @@ def _largest(area: Any, otherwise: Any) -> Any:
     return max(pieces, key=lambda g: (g.area, g.bounds), default=otherwise)
 
 
-def _facing(surfaces: Sequence[Surface], sign: int) -> F64:
+def _faces_looking(surfaces: Sequence[Surface], sign: int) -> F64:
     """(F, 3, 3) corners of the faces that look up (sign 1) or down (-1)."""
     found = [np.zeros((0, 3, 3))]
     for surface in surfaces:
@@ -136,7 +142,7 @@ def _facing(surfaces: Sequence[Surface], sign: int) -> F64:
     return np.concatenate(found)
 
 
-def _outline(corners: F64) -> Any:
+def _outline_from_above(corners: F64) -> Any:
     """The union of triangles seen from above, as a shapely area."""
     if not len(corners):
         return shapely.Polygon()

@@ -31,7 +31,7 @@ def check_rooms(rooms: Sequence[Room], file: str) -> None:
 def check_outlines(by_level: Mapping[str, Sequence[Points2]], file: str) -> None:
     """The same for outlines (N, 2) in plan, a list for each level."""
     check_number(sum(map(len, by_level.values())), file)
-    n_overlaps = sum(map(_overlaps, by_level.values()))
+    n_overlaps = sum(map(_count_overlaps, by_level.values()))
     if n_overlaps > MAX_OVERLAPS:
         text = f"{n_overlaps} pairs of rooms overlap, at most {MAX_OVERLAPS} are taken apart"
         raise BadHouse(file, "rooms", text, hint=HINT)
@@ -62,7 +62,7 @@ def check_number(n_rooms: int, file: str) -> None:
         raise BadHouse(file, "", f"{n_rooms} rooms, at most {MAX_ROOMS} are read", hint=HINT)
 
 
-def _overlaps(outlines: Sequence[Points2]) -> int:
+def _count_overlaps(outlines: Sequence[Points2]) -> int:
     found = [shapely.make_valid(shapely.Polygon(p)) for p in outlines if len(p) > 2]
     areas = np.array(found, object)
     first, second = shapely.STRtree(found).query(areas, predicate="intersects")

@@ -99,17 +99,17 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
     bounds = bounds_of_shells(corners, shell_of_face)
     large = np.flatnonzero(_is_large(bounds[:, 0], bounds[:, 1]))  # a plant has 60,000 leaves
     shells = [shell_of_face == k for k in large]
-    facing = [_facing(corners[faces], others) for faces in shells]
+    facing = [_which_way_faces_look(corners[faces], others) for faces in shells]
     sign = min((f for f in facing if f), default=0)
     rooms = [faces for faces, f in zip(shells, facing, strict=True) if sign and f == sign]
     # Take sheets that do not touch together.
-    if not rooms and (sign := _facing(corners, others)):
+    if not rooms and (sign := _which_way_faces_look(corners, others)):
         rooms = [np.ones(len(corners), np.bool_)]
     if not rooms:
         return (item,)
     shown = np.any(rooms, axis=0)
     rest = ~shown & ~_encloses(corners, bounds, shown)[shell_of_face]
-    parts = _parts(_turned(item, shown) if sign > 0 else item, shown)
+    parts = _parts_by_plane(_turn_faces(item, shown) if sign > 0 else item, shown)
     # Leave walls that stand around a room and are nothing else as they are.
     if sign < 0 and {p.kind for p in parts} == {item.kind}:
         return (item,)
@@ -129,7 +129,7 @@ def components(corners: F64) -> I64:
     return np.asarray(np.unique(label, return_inverse=True)[1], np.int64)
 
 
-def _facing(corners: F64, others: F64) -> int:
+def _which_way_faces_look(corners: F64, others: F64) -> int:
     """-1: the faces show a room from inside; 1: they would if they were turned; 0: no room."""
     low, high = corners.min((0, 1)), corners.max((0, 1))
     if not _is_large(low, high):
@@ -181,7 +181,7 @@ def picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
     return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
 
 
-def _turned(item: Item, outward: Bools) -> Item:
+def _turn_faces(item: Item, outward: Bools) -> Item:
     """The item with some faces turned round; normals with those of surfaces turned as a whole."""
     surfaces = []
     for s, own in zip(item.surfaces, _split(item, outward), strict=True):
@@ -193,7 +193,7 @@ def _turned(item: Item, outward: Bools) -> Item:
     return replace(item, surfaces=tuple(surfaces))
 
 
-def _parts(item: Item, shown: Bools) -> tuple[Item, ...]:
+def _parts_by_plane(item: Item, shown: Bools) -> tuple[Item, ...]:
     """An item per plane of the faces shown: what looks up is a floor, what looks down a ceiling."""
     corners = corners_of_surfaces(item.surfaces)
     plane = plane_of_faces(item.surfaces)

@@ -21,7 +21,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Level, Room, Surface
 from pbrs_farm.read.common.room_floors import (
     ceiling_height,
-    coverage,
+    covered_share,
     floor_height,
     floor_polygons,
     polygon_of,
@@ -51,7 +51,7 @@ def rooms_from_value(value: Any, file: str, items: Sequence[Item]) -> list[Room]
     hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
     rows = checked(_RoomFile, value, file, error=BadHouse, hint=hint).rooms
     check_number(len(rows), file)
-    return [_room(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
+    return [_room_of_row(row, file, f"rooms[{i}]", items) for i, row in enumerate(rows)]
 
 
 _Metres = Annotated[Finite, Field(gt=-1e6, lt=1e6)]
@@ -71,7 +71,7 @@ class _RoomFile(BaseModel):
     rooms: list[_GivenRoom] = Field(min_length=1, fail_fast=True)
 
 
-def _room(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room:
+def _room_of_row(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room:
     area = shapely.Polygon(row.polygon)
     polygon = polygon_of(area) if area.is_valid else None
     if polygon is None:
@@ -83,7 +83,7 @@ def _room(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) -> Room
 
 def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
     """A room for every piece of floor that walls part from the others."""
-    walls = _surfaces(items, ItemKind.WALL)
+    walls = _surfaces_of_kind(items, ItemKind.WALL)
     found: list[Room] = []
     for item in items:
         height = floor_height(item.surfaces) if item.kind is ItemKind.FLOOR else None
@@ -93,7 +93,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
         standing = [w for w in walls if w.positions[:, 1].max() > height + 1.0]
         standing = [w for w in standing if w.positions[:, 1].min() < height + 1.0]
         low, high = item.bounds[:, [0, 2]]
-        standing = _within(standing, low - _EDGE_M, high + _EDGE_M)
+        standing = _surfaces_within(standing, low - _EDGE_M, high + _EDGE_M)
         pieces = floor_polygons(
             item.surfaces, standing, min_area_m2=MIN_ROOM_M2, min_width_m=MIN_ROOM_WIDTH_M
         )
@@ -117,7 +117,7 @@ def _with_heights(
     low = 0.0 if low is None else low
     # Leave out ceilings that belong to the next room.
     above = [s for s in _over(items, ItemKind.CEILING, polygon) if s.positions[:, 1].min() > low]
-    shares = [coverage(s, polygon) for s in above]
+    shares = [covered_share(s, polygon) for s in above]
     above = [s for s, share in zip(above, shares, strict=True) if share > _NEXT_ROOM]
     ceiling = ceiling_height(above)
     if ceiling is None and above:
@@ -139,7 +139,7 @@ def _with_heights(
     )
 
 
-def _surfaces(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
+def _surfaces_of_kind(items: Sequence[Item], kind: ItemKind) -> list[Surface]:
     return [s for item in items if item.kind is kind for s in item.surfaces]
 
 
@@ -148,10 +148,10 @@ def _over(
 ) -> list[Surface]:
     """The surfaces of a kind whose bounds meet the polygon's in plan."""
     low, high = polygon.min(0) - slack_m, polygon.max(0) + slack_m
-    return _within(_surfaces(items, kind), low, high)
+    return _surfaces_within(_surfaces_of_kind(items, kind), low, high)
 
 
-def _within(surfaces: Sequence[Surface], low: F64, high: F64) -> list[Surface]:
+def _surfaces_within(surfaces: Sequence[Surface], low: F64, high: F64) -> list[Surface]:
     """The surfaces whose plan bounds meet low..high."""
     plans = [(s, s.positions[:, [0, 2]]) for s in surfaces]
     return [s for s, p in plans if (p.max(0) > low).all() and (p.min(0) < high).all()]

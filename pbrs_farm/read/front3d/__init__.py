@@ -8,16 +8,16 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_front3d(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.front3d import front_house
 
-    return front_house.read(given, fields)
+    return front_house.read_front3d(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.front3d import front_house
 
-    return front_house.companions(given, files)
+    return front_house.companions_of_front3d(given, files)
 
 
 FORMAT = Format(
@@ -25,5 +25,5 @@ FORMAT = Format(
     brings="walls, floors, ceilings, holes, furniture by --models, lamps",
     where="mirrors; the publisher's pages no longer answer", licence="research only",
     keys=(("furniture", "mesh"),), tells_boxes=True,
-    read=_read, companions=_companions,
+    read=_read_front3d, companions=_companions_of_front3d,
 )  # fmt: skip

@@ -99,15 +99,17 @@ def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
     if not value.get("mesh") or not isinstance(scene, dict) or not scene.get("room"):
         missing = next(k for k in ("mesh", "scene.room") if k != "mesh" or not value.get("mesh"))
         raise BadHouse(file, missing, "is missing or empty: there is no house in it", hint=_HINT)
-    rows = {k: _rows(value, k, file) for k in ("mesh", "furniture", "material", "lights")}
-    rooms, children = _rooms(scene, file, notes)
+    rows = {k: _rows_of_key(value, k, file) for k in ("mesh", "furniture", "material", "lights")}
+    rooms, children = _parse_front_rooms(scene, file, notes)
     room_of = {str(c["ref"]): room for room, c, _ in reversed(children)}
     meshes = _meshes(rows["mesh"], room_of, file, notes)
     entries: dict[str, dict[str, Any]] = {}
     for row in rows["furniture"]:
         entries.setdefault(str(row.get("uid")), row)
     lamps = {str(row.get("instanceid", "")) for row in rows["lights"]}
-    pieces, places = _pieces(children, entries, {m.uid for m in meshes}, lamps, file, notes)
+    pieces, places = _parse_front_pieces(
+        children, entries, {m.uid for m in meshes}, lamps, file, notes
+    )
     extension = value.get("extension")
     doors = extension.get("door") if isinstance(extension, dict) else None
     return FrontFile(
@@ -118,12 +120,12 @@ def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
         doors=tuple(_door(d) for d in doors if isinstance(d, dict))
         if isinstance(doors, list)
         else (),
-        lights=tuple(_lights(rows["lights"], places)),
+        lights=tuple(_parse_front_lights(rows["lights"], places)),
         materials={str(m.get("uid")): m for m in rows["material"]},
     )
 
 
-def _rows(value: dict[str, Any], key: str, file: str) -> list[dict[str, Any]]:
+def _rows_of_key(value: dict[str, Any], key: str, file: str) -> list[dict[str, Any]]:
     rows = value.get(key)
     rows = [] if rows is None else checked(list, rows, file, key, error=BadHouse)
     if len(rows) > MAX_ENTRIES:
@@ -131,19 +133,19 @@ def _rows(value: dict[str, Any], key: str, file: str) -> list[dict[str, Any]]:
     return [checked(dict, r, file, f"{key}[{k}]", error=BadHouse) for k, r in enumerate(rows)]
 
 
-def _rooms(
+def _parse_front_rooms(
     scene: dict[str, Any], file: str, notes: Notes
 ) -> tuple[tuple[FrontRoom, ...], list[tuple[str, dict[str, Any], str]]]:
     found: dict[str, FrontRoom] = {}
     children: list[tuple[str, dict[str, Any], str]] = []
-    for k, row in enumerate(_rows(scene, "room", file)):
+    for k, row in enumerate(_rows_of_key(scene, "room", file)):
         place = f"scene.room[{k}]"
         name = str(row.get("instanceid") or f"room {k}")[:80]
         if name in found:
             notes.add("duplicate-id", place, f"a second room is called {name!r}")
             name = f"{name}.{k}"
         found[name] = FrontRoom(name, str(row.get("type", ""))[:60], row.get("empty") in (1, True))
-        for j, child in enumerate(_rows(row, "children", file)):
+        for j, child in enumerate(_rows_of_key(row, "children", file)):
             if child.get("ref") is not None:
                 children.append((name, child, f"{place}.children[{j}]"))
         if len(children) > MAX_ENTRIES:
@@ -196,7 +198,7 @@ def _meshes(
     return tuple(found.values())
 
 
-def _pieces(
+def _parse_front_pieces(
     children: Sequence[tuple[str, dict[str, Any], str]], entries: dict[str, dict[str, Any]],
     meshes: set[str], lamps: set[str], file: str, notes: Notes,
 ) -> tuple[tuple[FrontPiece, ...], list[tuple[str, F64, str]]]:  # fmt: skip
@@ -228,7 +230,7 @@ def _pieces(
         found.append(
             FrontPiece(
                 ref, str(entry.get("jid") or "")[:100], str(entry.get("title") or "")[:100],
-                str(entry.get("category") or "")[:100], _size(entry), world, scale, room, place,
+                str(entry.get("category") or "")[:100], _size_of_entry(entry), world, scale, room, place,
             )
         )  # fmt: skip
     for n, why in ((n_missing, "name no entry"), (n_invalid, "name an invalid piece"), (n_flat, "are flat or huge")):  # fmt: skip
@@ -247,7 +249,7 @@ def _rotation(q: F64) -> F64:
     ])  # fmt: skip
 
 
-def _size(entry: dict[str, Any]) -> tuple[float, float, float] | None:
+def _size_of_entry(entry: dict[str, Any]) -> tuple[float, float, float] | None:
     """Width, height, depth: `size` has depth before height; `bbox` alone has them in order."""
     for key, order in (("size", (0, 2, 1)), ("bbox", (0, 1, 2))):
         value = entry.get(key)
@@ -269,7 +271,7 @@ def _door(row: dict[str, Any]) -> FrontDoor:
     )
 
 
-def _lights(
+def _parse_front_lights(
     rows: Sequence[dict[str, Any]], places: Sequence[tuple[str, F64, str]]
 ) -> list[FrontLight]:
     by_ref: dict[str, list[tuple[str, F64, str]]] = {}

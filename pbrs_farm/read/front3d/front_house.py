@@ -72,7 +72,7 @@ _STOREY_M: Final = 2.7
 _LIGHT_BAND_LM: Final = 800.0
 
 
-def companions(given: GivenFile, files: SourceFiles) -> str:
+def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and textures that reading may open; "" where there is none."""
     path, models = given.path, given.models
     try:
@@ -93,7 +93,7 @@ def companions(given: GivenFile, files: SourceFiles) -> str:
     return keys.digest(*found) if any(found) else ""
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_front3d(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. models: 3D-FUTURE's folder, "" = beside or above the file.
 
     Raises BadHouse naming the entry that is wrong, and for a file without meshes or rooms.
@@ -132,14 +132,14 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     items = [*walls, *parts, *structure.trim(), *furniture]
     areas = {r.id: float(shapely.Polygon(r.polygon).area) for r in rooms}
     items += light_items(house.lights, items, areas, {r.id: r.ceiling_y for r in rooms})
-    builder.items += [_in_room(i, builder, id_of_room) for i in items]
+    builder.items += [_sort_by_names(i, builder, id_of_room) for i in items]
     for hole in holes:
         builder.add_hole(hole)
     source = Source("front3d", path.name, keys.sha256(data), licence="research only")
     return builder.house(path.stem, source, name=house.uid)
 
 
-def _in_room(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
+def _sort_by_names(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
     """The item with its level and its room, both of which it knows by the file's names alone."""
     tags = []
     for tag in item.tags:
@@ -196,7 +196,7 @@ class _Paints:
 
     def _material(self, uid: str) -> Material:
         row = self._house.materials.get(uid, {})
-        colour = _colour(row.get("color"))
+        colour = _parse_front_colour(row.get("color"))
         jid = str(row.get("jid") or "")
         found = None
         if (
@@ -215,7 +215,7 @@ class _Paints:
         return Material(uid[:60], diffuse=colour or (1.0, 1.0, 1.0), is_default=colour is None)
 
 
-def _colour(value: Any) -> tuple[float, float, float] | None:
+def _parse_front_colour(value: Any) -> tuple[float, float, float] | None:
     is_rgb = isinstance(value, list) and len(value) >= 3
     if not is_rgb or not all(isinstance(v, int | float) and 0 <= v <= 255 for v in value[:3]):
         return None
@@ -258,8 +258,12 @@ class _Structure:
                 high = high if high > low + 1.0 else low + _STOREY_M
                 material = self._paints.index("")
                 over = [horizontal("ceiling", [[polygon]], high, material, up=False)]
-            parts.append(_structure(f"{told.id}_floor", ItemKind.FLOOR, surfaces, told.id))
-            parts.append(_structure(f"{told.id}_ceiling", ItemKind.CEILING, over, told.id))
+            parts.append(
+                _front_structure_item(f"{told.id}_floor", ItemKind.FLOOR, surfaces, told.id)
+            )
+            parts.append(
+                _front_structure_item(f"{told.id}_ceiling", ItemKind.CEILING, over, told.id)
+            )
             word = given_room("3dfront", told.kind)
             name = parted(told.kind) or "Room"
             if word and named_kind(f"{word} {name}") is not named_kind(word):
@@ -312,7 +316,7 @@ class _Structure:
         room = self._paints.index(sheet.mesh.material)
         behind = room if piece.back is None else self._paints.index(piece.back.mesh.material)
         surfaces = solid_of(piece, pieces, (room, behind, room))
-        item = _structure(f"wall_{k}", ItemKind.WALL, surfaces, sheet.room)
+        item = _front_structure_item(f"wall_{k}", ItemKind.WALL, surfaces, sheet.room)
         return replace(item, source_class="WallInner", tags=(f"boundary_of:{sheet.room}",))
 
     def trim(self) -> list[Item]:
@@ -366,7 +370,9 @@ def _planar_uvs(points: F64) -> F64:
     return np.asarray(points[:, axes], np.float64)
 
 
-def _structure(item_id: str, kind: ItemKind, surfaces: Sequence[Surface], room: str) -> Item:
+def _front_structure_item(
+    item_id: str, kind: ItemKind, surfaces: Sequence[Surface], room: str
+) -> Item:
     nyu40 = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}[kind]
     return Item(
         id=item_id, name=kind.value, kind=kind, level_id="0", surfaces=tuple(surfaces), nyu40=nyu40,

@@ -42,7 +42,7 @@ def is_opening(piece: FrontPiece) -> bool:
 
 def told_holes(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
     """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too."""
-    told = _told(house)[:_MOST_TOLD]
+    told = _openings_by_name(house)[:_MOST_TOLD]
     found = []
     for hole, piece in holes:
         found.append(_kinded(hole, piece, _best(hole, told)))
@@ -55,7 +55,7 @@ def told_holes(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> lis
     return merged([*found, *extra])
 
 
-def _told(house: FrontFile) -> list[_Told]:
+def _openings_by_name(house: FrontFile) -> list[_Told]:
     doors = {ref: door for door in house.doors for ref in door.refs}
     found = []
     for mesh in house.meshes:

@@ -200,7 +200,7 @@ def light_items(
         flux = float(np.clip(flux_for_floor(areas[light.room], _LUX) / n, _LEAST_LM, _MOST_LM))
         at = light.at.copy()
         at[1] = min(at[1], ceilings[light.room] - _BELOW_M)
-        rgb = _rgb(light.kelvin) if light.kelvin else (1.0, 1.0, 1.0)
+        rgb = _rgb_of_kelvin(light.kelvin) if light.kelvin else (1.0, 1.0, 1.0)
         part = LightPart(
             triple(at), BULB_RADIUS_M, flux, PowerUnit.LUMEN, rgb_linear=rgb,
             is_coloured=bool(light.kelvin),
@@ -214,7 +214,7 @@ def light_items(
     return found
 
 
-def _rgb(kelvin: float) -> tuple[float, float, float]:
+def _rgb_of_kelvin(kelvin: float) -> tuple[float, float, float]:
     table: F64 = np.array(_RGB, np.float64)
     rgb = [float(np.interp(kelvin, _KELVIN, table[:, k])) for k in range(3)]
     return triple(np.array(rgb))

@@ -85,7 +85,7 @@ def sheets_of(
     outer: list[Sheet] = []
     tree, names = shapely.STRtree(list(floors.values())), list(floors)
     for mesh in meshes:
-        for corners, uvs in _planes(mesh):
+        for corners, uvs in _upright_planes(mesh):
             sheet = _sheet(mesh, corners, uvs)
             if sheet is None:
                 continue
@@ -98,7 +98,7 @@ def sheets_of(
     return inner, outer
 
 
-def _planes(mesh: FrontMesh) -> list[tuple[F64, F64 | None]]:
+def _upright_planes(mesh: FrontMesh) -> list[tuple[F64, F64 | None]]:
     """(corners (F, 3, 3), uv (F, 3, 2)) of each upright plane."""
     surface = Surface("", mesh.points.astype(np.float32), mesh.faces, 0)
     corners = mesh.points[mesh.faces]
@@ -244,10 +244,10 @@ def solid_of(
     top = np.full(2, y1)
     room, behind, rest = materials
     parts = wall_prism(np.array(back), np.array(front), y0, top, top, (behind, room, rest))
-    return tuple(_painted(s, sheet) if s.name == "right" else s for s in parts)
+    return tuple(_paint_inner_side(s, sheet) if s.name == "right" else s for s in parts)
 
 
-def _painted(surface: Surface, sheet: Sheet) -> Surface:
+def _paint_inner_side(surface: Surface, sheet: Sheet) -> Surface:
     """The side towards the room with the texture as the file lays it."""
     if sheet.uv is None:
         return surface

@@ -8,16 +8,16 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_gltf(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.gltf import scene
 
-    return scene.read(given, fields)
+    return scene.read_given_gltf(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_gltf(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.gltf import scene
 
-    return scene.companions(given, files)
+    return scene.companions_of_gltf(given, files)
 
 
 FORMAT = Format(
@@ -25,5 +25,5 @@ FORMAT = Format(
     brings="what its nodes and their names say", where="any modeller exports it", licence="of each scene",
     needs="the extra gltf for compressed files", suffixes=(".glb", ".gltf"),
     beside=("*.classes.json", "*.rooms.json"),
-    read=_read, companions=_companions,
+    read=_read_gltf, companions=_companions_of_gltf,
 )  # fmt: skip

@@ -69,7 +69,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
 
     Raises BadHouse for a damaged file, an extension not understood, a buffer that is missing.
     """
-    gltf = _parsed(data, file)
+    gltf = _parse_gltf(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
         raise BadHouse(file, "asset", "is missing; this is no glTF file")
     _check_extensions(gltf)
@@ -90,7 +90,7 @@ def _check_extensions(gltf: Gltf) -> None:
             raise BadHouse(gltf.file, "extensionsRequired", text, hint=hint)
 
 
-def _parsed(data: bytes, file: str) -> Gltf:
+def _parse_gltf(data: bytes, file: str) -> Gltf:
     # Tell the two forms by their content, whatever the file is called; by the name what is neither.
     is_text = data.lstrip()[:1] == b"{"
     if data[:4] == b"glTF" or (file.lower().endswith(".glb") and not is_text):
@@ -102,7 +102,7 @@ def _parsed(data: bytes, file: str) -> Gltf:
 def files_of_gltf(data: bytes, file: str) -> list[str]:
     """Relative names of the buffers and pictures outside a .glb or .gltf; [] if it is damaged."""
     try:
-        document = _parsed(data, file).document
+        document = _parse_gltf(data, file).document
     except BadHouse:
         return []
     lists = [document.get(key) for key in ("buffers", "images")]
@@ -262,7 +262,7 @@ def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int |
         place = f"meshes[{index}].primitives[{k}]"
         if not has_surface(primitive):
             continue
-        triangles = _mesh(gltf, primitive, place)
+        triangles = _mesh_of_primitive(gltf, primitive, place)
         if triangles is not None:
             n_triangles += len(triangles.faces)
             found.append((primitive.get("material"), triangles))
@@ -277,13 +277,15 @@ def has_surface(primitive: dict[str, Any]) -> bool:
     return primitive.get("mode", _TRIANGLES) in (_TRIANGLES, _STRIP, _FAN)
 
 
-def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
+def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise BadHouse(gltf.file, place, "has no positions", hint="or they are compressed")
     draco = draco_arrays(gltf, primitive, place)
     known = draco.attributes if draco else {}
-    positions = _floats(gltf, attributes["POSITION"], 3, f"{place}.POSITION", known.get("POSITION"))
+    positions = _accessor_floats(
+        gltf, attributes["POSITION"], 3, f"{place}.POSITION", known.get("POSITION")
+    )
     faces = _faces(gltf, primitive, len(positions), place, draco.order if draco else None)
     if not len(faces):
         return None
@@ -291,11 +293,13 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     leading = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
     name, uvs = f"TEXCOORD_{leading.get('texCoord', 0)}", None
     if name in attributes:
-        uvs = _floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
+        uvs = _accessor_floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
         uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up
     normals = np.zeros_like(positions)  # zero: flat, as glTF asks where there are none
     if "NORMAL" in attributes:
-        normals = _floats(gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", known.get("NORMAL"))
+        normals = _accessor_floats(
+            gltf, attributes["NORMAL"], 3, f"{place}.NORMAL", known.get("NORMAL")
+        )
     # One value per vertex, or none.
     for array in (uvs, normals):
         if array is not None and len(array) != len(positions):
@@ -303,7 +307,7 @@ def _mesh(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mesh | None:
     return Mesh("", "", positions, faces, uvs, normals)
 
 
-def _floats(
+def _accessor_floats(
     gltf: Gltf, accessor: Any, width: int, place: str, decoded: NDArray[Any] | None = None
 ) -> F64:
     raw = accessor_array(gltf, accessor) if decoded is None else decoded
@@ -378,15 +382,17 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     for name in used if isinstance(used, list) else []:
         if name not in UNDERSTOOD and name not in _UNSEEN:
             notes.add(UNREAD, "extensionsUsed", f"{name} is not read: what it adds is not shown")
-    primitives = [_rows(mesh.get("primitives")) for mesh in _rows(gltf.document.get("meshes"))]
+    primitives = [
+        _object_rows(mesh.get("primitives")) for mesh in _object_rows(gltf.document.get("meshes"))
+    ]
     for what, has in _PRIMITIVES.items():
         n = sum(any(map(has, rows)) for rows in primitives)
         if n:
             notes.add(UNREAD, "meshes", f"{n} of {len(primitives)} have {what}, which are not read")
-    n = sum("skin" in node for node in _rows(gltf.document.get("nodes")))
+    n = sum("skin" in node for node in _object_rows(gltf.document.get("nodes")))
     if n:
         notes.add(UNREAD, "nodes", f"{n} have a skin, which is not read: they stand as modelled")
 
 
-def _rows(value: Any) -> list[_Row]:
+def _object_rows(value: Any) -> list[_Row]:
     return [row for row in value if isinstance(row, dict)] if isinstance(value, list) else []

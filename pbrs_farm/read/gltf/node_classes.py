@@ -50,10 +50,12 @@ def mapping_from_json(data: bytes, file: str) -> Mapping:
     nodes = fields_json.get("nodes") if isinstance(fields_json, dict) else None
     if not isinstance(nodes, dict):
         raise BadHouse(file, "nodes", 'expected {"nodes": {"name or pattern": "class"}}')
-    return Mapping(tuple((pattern, _row(row, file, pattern)) for pattern, row in nodes.items()))
+    return Mapping(
+        tuple((pattern, _class_of_row(row, file, pattern)) for pattern, row in nodes.items())
+    )
 
 
-def _row(row: Any, file: str, pattern: str) -> NodeClass:
+def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
     fields_json = {"class": row} if isinstance(row, (str, int)) else row
     found = _tagged(fields_json) if isinstance(fields_json, dict) else None
     if found is None:

@@ -90,7 +90,7 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     if not len(corners):
         return item, ()
     said = _said(item.surfaces)
-    part_of_face = _parts(corners, said)
+    part_of_face = _connected_parts(corners, said)
     bounds = bounds_of_shells(corners, part_of_face)
     is_named = np.zeros(len(bounds), np.bool_)
     is_named[part_of_face[said > 0]] = True
@@ -100,12 +100,12 @@ def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ..
     chosen = fitted[part_of_face]
     if chosen.all() or not chosen.any():
         return item, ()
-    thing_of_part = _things(bounds, fitted)
+    thing_of_part = _join_touching_parts(bounds, fitted)
     found: list[Item] = []
     for thing in range(int(thing_of_part.max()) + 1):
         faces = chosen & (thing_of_part[part_of_face] == thing)
         if faces.any():
-            found.append(_fitting(item, faces, said[faces], len(found)))
+            found.append(_fitting_item(item, faces, said[faces], len(found)))
     return replace(item, surfaces=picked(item, ~chosen)), tuple(found)
 
 
@@ -128,7 +128,7 @@ def _of_name(name: str) -> int:
     return _FRAMED if words & _FRAME_WORDS else _UNSAID
 
 
-def _parts(corners: F64, said: I64) -> I64:
+def _connected_parts(corners: F64, said: I64) -> I64:
     """(F,) connected parts, those of fittings apart from the walls that they share corners with."""
     part = np.zeros(len(corners), np.int64)
     n = 0
@@ -155,7 +155,7 @@ def _is_board(corners: F64, part_of_face: I64, bounds: F64) -> Bools:
     return found
 
 
-def _things(bounds: F64, fitted: Bools) -> I64:
+def _join_touching_parts(bounds: F64, fitted: Bools) -> I64:
     """(P,) number of the thing each part belongs to: fitted parts whose boxes touch are one."""
     numbers = np.flatnonzero(fitted)
     if len(numbers) > _MOST_PARTS:
@@ -172,7 +172,7 @@ def _things(bounds: F64, fitted: Bools) -> I64:
     return thing
 
 
-def _fitting(item: Item, faces: Bools, said: I64, number: int) -> Item:
+def _fitting_item(item: Item, faces: Bools, said: I64, number: int) -> Item:
     """The item of some faces: what the names of its materials say most."""
     kind, nyu40, name = ItemKind.OBJECT, OTHERSTRUCTURE, "fitting"
     if (said == _DOORLIKE).any():

@@ -46,12 +46,12 @@ class Beside:
     rooms: bytes | None = None  # JSON, None = no file
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_given_gltf(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file, with the mapping and room files beside it; as read_gltf_file."""
     return read_gltf_file(given.path, fields)
 
 
-def companions(given: GivenFile, files: SourceFiles) -> str:
+def companions_of_gltf(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the mapping and room files, the buffers and the pictures of the scene."""
     path = given.path
     names = [*side_files(path), *files_of_gltf(read_given(path, error=BadHouse), path.name)]
@@ -138,7 +138,7 @@ def house_of_gltf(
     # Sort rooms into levels and items into rooms.
     builder = HouseBuilder(name, fields, notes, materials.library)
     builder.set_rooms(found)
-    builder.items += [_in_room(item, builder) for item in items]
+    builder.items += [_sort_by_place(item, builder) for item in items]
     return builder.house(stem, source, openings=openings(items))
 
 
@@ -159,7 +159,7 @@ def _of_its_size(items: Sequence[Item], kind: str) -> str:
     return "" if is_usual else f"it is {wide:.3g} m large, {unit}; or "
 
 
-def _in_room(item: Item, builder: HouseBuilder) -> Item:
+def _sort_by_place(item: Item, builder: HouseBuilder) -> Item:
     """The item with its level, and its room unless it is a wall."""
     extent = _extent(item)
     room_id = None if item.kind is ItemKind.WALL else builder.room_at(extent.mean(0))

@@ -37,7 +37,7 @@ from pbrs_farm.read.mesh.obj import Mesh
 _UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)  # what no name tells
 
 
-def _place(gltf: Gltf, thing: _Thing) -> str:
+def _place_in_file(gltf: Gltf, thing: _Thing) -> str:
     """Where a thing stands in its file: a node, or what another format calls it."""
     is_gltf = gltf.file.lower().endswith((".glb", ".gltf"))
     if not is_gltf and "item" in thing.extras:
@@ -64,11 +64,11 @@ def items_of_scene(
     taken: set[str] = set()  # ids
     n_faces = n_items = 0
     found: list[tuple[_Thing, str, Item]] = []  # with the place that notes name
-    for thing in _things(gltf, mapping):
+    for thing in _gather_things(gltf, mapping):
         item = _item(gltf, thing, materials, notes, known, fields)
         if item is None:
             continue
-        place = _place(gltf, thing)
+        place = _place_in_file(gltf, thing)
         # Bound the extent, the triangles and the items.
         if item.surfaces and not float(np.abs(item.bounds).max()) <= fields.max_extent_m:
             text = f"stands farther than {fields.max_extent_m:g} m from the origin"
@@ -122,7 +122,7 @@ def _glazed(part: Item, whole: Item, materials: SceneMaterials) -> Item:
     return replace(part, surfaces=tuple(surfaces))
 
 
-def _things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
+def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
     """The scene's nodes gathered by the item they are part of.
 
     A node belongs to the nearest node above it (or itself) that is an item: the outermost whose
@@ -175,7 +175,7 @@ def _item(
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
     # What lets light through is a pane in an opening, glass elsewhere.
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
-    lights = _lights(gltf, thing)
+    lights = _punctual_lights(gltf, thing)
     parts = list(_meshes(gltf, thing, notes, known, fields))
     numbers = [number for _, meshes in parts for number, _ in meshes]
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
@@ -208,7 +208,7 @@ def _item(
         lights = _with_surfaces(lights, surfaces, unknown)
         shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
-    return _finished(thing, surfaces, lights, _box(thing, parts))
+    return _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
 
 
 def _with_surfaces(
@@ -224,7 +224,9 @@ def _with_surfaces(
     return [replace(light, emitting=tuple(owned.get(n, ()))) for n, light in enumerate(lights)]
 
 
-def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> Box | None:
+def _box_of_thing(
+    thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]
+) -> Box | None:
     """The box of an item of one mesh in its node's frame; of a door or window all parts' box."""
     filled = [(part, [m for _, m in meshes]) for part, meshes in parts if meshes]
     if len(filled) == 1:
@@ -248,7 +250,7 @@ def _box(thing: _Thing, parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]
     return across_last(box) if box else None
 
 
-def _lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
+def _punctual_lights(gltf: Gltf, thing: _Thing) -> list[LightPart]:
     found = [
         punctual_light(gltf, entry(gltf, "nodes", p.index), p.world_from_node, f"nodes[{p.index}]")
         for p in thing.parts
@@ -278,7 +280,7 @@ def _meshes(
         yield part, known[node["mesh"]]
 
 
-def _finished(
+def _finish_item(
     thing: _Thing, surfaces: list[Surface], lights: list[LightPart], box: Box | None
 ) -> Item:
     seen = thing.seen

@@ -64,28 +64,28 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
         kind = seen.kind if seen and seen.kind in _STRUCTURE else None
         groups.setdefault(None if kind is item.kind else kind, []).append(surface)
     if set(groups) == {None}:
-        return (_named(item, kinds),)
+        return (_name_by_materials(item, kinds),)
     found = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
     for kind, surfaces in groups.items():
         assert kind is not None
         part = replace(
             item, id=f"{item.id}.{kind}" if found else item.id, kind=kind,
             nyu40=CLASS_OF_STRUCTURE[kind], surfaces=tuple(surfaces), box=None,
-            lights=() if found else item.lights, tags=_known(item),
+            lights=() if found else item.lights, tags=_tags_of_known(item),
         )  # fmt: skip
         found.append(part)
     return tuple(found)
 
 
-def _named(item: Item, classes: Sequence[object]) -> Item:
+def _name_by_materials(item: Item, classes: Sequence[object]) -> Item:
     # An unknown thing is what all of its materials say.
     one = class_of_node_name(item.surfaces[0].name) if item.surfaces else None
     if UNMAPPED not in item.tags or one is None or any(c != one for c in classes):
         return item
     if one.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
         return item  # needs more than a class: light, a place in a wall
-    return replace(item, nyu40=one.nyu40, kind=one.kind, tags=_known(item))
+    return replace(item, nyu40=one.nyu40, kind=one.kind, tags=_tags_of_known(item))
 
 
-def _known(item: Item) -> tuple[str, ...]:
+def _tags_of_known(item: Item) -> tuple[str, ...]:
     return tuple(t for t in item.tags if t != UNMAPPED)

@@ -8,16 +8,16 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_habitat(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.habitat import scene_instance
 
-    return scene_instance.read(given, fields)
+    return scene_instance.read_habitat(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.habitat import scene_instance
 
-    return scene_instance.companions(given, files)
+    return scene_instance.companions_of_habitat(given, files)
 
 
 FORMAT = Format(
@@ -25,5 +25,5 @@ FORMAT = Format(
     brings="a stage, objects, regions", where="HSSD-hab, ReplicaCAD, ai2thor-hab",
     licence="of each data set", needs="the extra gltf for compressed files",
     keys=(("stage_instance",),), tells_boxes=True,
-    read=_read, companions=_companions,
+    read=_read_habitat, companions=_companions_of_habitat,
 )  # fmt: skip

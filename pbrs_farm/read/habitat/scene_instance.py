@@ -54,7 +54,7 @@ _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", 
                   "samplers", "nodes")  # fmt: skip
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_habitat(given: GivenFile, fields: ReadFields) -> House:
     """The House of a scene instance. Raises BadHouse naming file and place."""
     path, models = given.path, given.models
     dataset = _Dataset(path, models)
@@ -94,13 +94,13 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     data = dataset.folder.read(dataset.scene, max_bytes=_MOST_JSON_BYTES) or b""
     source = Source("habitat", path.name, keys.sha256(data))
     stem = path.name.split(".")[0]
-    rooms = _rooms(dataset, scene.get("semantic_scene_instance"), stem)
+    rooms = _rooms_of_regions(dataset, scene.get("semantic_scene_instance"), stem)
     return house_of_gltf(
         gltf, source, stem, fields, notes, mapping=Mapping(), fetch=built.fetch, rooms=rooms
     )
 
 
-def companions(given: GivenFile, files: SourceFiles) -> str:
+def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the configs and models that the scene names; "" where there is none."""
     path, models = given.path, given.models
     try:
@@ -343,7 +343,7 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
     found = built.asset(dataset, name)
     if found is None:
         raise BadHouse(config, "render_asset", f"{name} does not exist")
-    matrix = _upright(row, found[1], config)
+    matrix = _upright_matrix(row, found[1], config)
     # Each root of the stage stays by itself, so that its names and extras tell what it is.
     for root in found[0]:
         built.place([root], matrix, "", {})
@@ -372,7 +372,7 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     matrix = np.eye(4)
     matrix[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes)
     matrix[:3, 3] = moved
-    inner = _upright(settings, gltf, config or "")
+    inner = _upright_matrix(settings, gltf, config or "")
     if str(row.get("translation_origin", origin)).lower() != "asset_local":
         centre = _centre(gltf, inner, settings, config or "")
         inner = inner.copy()
@@ -431,7 +431,7 @@ def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F6
     return np.asarray((every.min(0) + every.max(0)) / 2)
 
 
-def _upright(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
+def _upright_matrix(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
     """(4, 4) that turns an asset's up and front to +y and -z and scales it."""
     where = Gltf({}, (), config)
     up = numbers(where, row.get("up", [0, 1, 0]), 3, "up")
@@ -447,7 +447,7 @@ def _upright(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
     return matrix
 
 
-def _rooms(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
+def _rooms_of_regions(dataset: _Dataset, named: Any, stem: str) -> bytes | None:
     """The regions of the scene's semantic config as a room file; None where there are none."""
     base = posixpath.basename(named) if isinstance(named, str) else stem
     base = base.removesuffix(".semantic_config.json")

@@ -7,15 +7,15 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import Format, GivenFile
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_ifc(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.ifc import building
 
-    return building.read(given, fields)
+    return building.read_ifc(given, fields)
 
 
 FORMAT = Format(
     kind="ifc", title="IFC", files=".ifc or .ifczip", order=80,
     brings="storeys, spaces, walls, doors, windows, fittings", where="any BIM program exports it",
     licence="of each building", needs="the extra ifc", library="ifcopenshell", suffixes=(".ifc", ".ifczip"),
-    read=_read,
+    read=_read_ifc,
 )  # fmt: skip

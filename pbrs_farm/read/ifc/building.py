@@ -41,7 +41,7 @@ from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
-from pbrs_farm.read.common.room_floors import coverage, floor_polygon
+from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
@@ -62,7 +62,7 @@ _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
 _ROOF: Final = frozenset({"roof", "attic", "dach", "dachraum", "dachboden", "loft", "чердак"})
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_ifc(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the place."""
     need("ifcopenshell")
     return _Building(given.path, fields).house()
@@ -105,7 +105,7 @@ class _Building:
         builder.set_rooms(rooms)
         builder.levels = self._named(builder.levels)
         items += self._covers(builder.rooms, items)
-        builder.items += [_in_room(item, builder) for item in items]
+        builder.items += [_sort_product(item, builder) for item in items]
         source = Source("ifc", self._path.name, keys.sha256(self._path.read_bytes()))
         return builder.house(self._path.stem, source, openings=openings(builder.items))
 
@@ -322,21 +322,21 @@ class _Building:
         found: list[Item] = []
         for room in rooms:
             is_open = named_kind(" ".join((*room.types, room.name))) is RoomKind.OUTDOOR
-            floors = _heights(items, ItemKind.FLOOR, room, room.floor_y, _top)
+            floors = _heights_of_covers(items, ItemKind.FLOOR, room, room.floor_y, _top_of_item)
             if not floors:
                 surface = horizontal("floor", [[room.polygon]], room.floor_y, white, up=True)
-                found.append(_cover(room, ItemKind.FLOOR, surface))
-            ceilings = _heights(items, ItemKind.CEILING, room, room.ceiling_y, _bottom)
-            slabs = _heights(items, ItemKind.FLOOR, room, room.ceiling_y, _bottom)
+                found.append(_floor_or_ceiling_item(room, ItemKind.FLOOR, surface))
+            ceilings = _heights_of_covers(items, ItemKind.CEILING, room, room.ceiling_y, _bottom)
+            slabs = _heights_of_covers(items, ItemKind.FLOOR, room, room.ceiling_y, _bottom)
             if ceilings or (is_open and not slabs):
                 continue
             y = min([room.ceiling_y, *slabs]) - _BELOW_SLAB_M
             surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
-            found.append(_cover(room, ItemKind.CEILING, surface))
+            found.append(_floor_or_ceiling_item(room, ItemKind.CEILING, surface))
         return found
 
 
-def _in_room(item: Item, builder: HouseBuilder) -> Item:
+def _sort_product(item: Item, builder: HouseBuilder) -> Item:
     """The item with its level, and its room unless it is a wall."""
     level_id = builder.level_of(float(item.bounds[0, 1]))
     room_id = None if item.kind is ItemKind.WALL else builder.room_at(item.bounds.mean(0))
@@ -450,7 +450,7 @@ def _glass_parts(mesh: ProductMesh) -> Any:
     return panes
 
 
-def _top(item: Item) -> float:
+def _top_of_item(item: Item) -> float:
     return float(item.bounds[1, 1])
 
 
@@ -458,7 +458,9 @@ def _bottom(item: Item) -> float:
     return float(item.bounds[0, 1])
 
 
-def _heights(items: Sequence[Item], kind: ItemKind, room: Room, y: float, of: Any) -> list[float]:
+def _heights_of_covers(
+    items: Sequence[Item], kind: ItemKind, room: Room, y: float, of: Any
+) -> list[float]:
     """The heights (of: an item's top or bottom) near y of the items that cover the room."""
     low, high = room.polygon.min(0), room.polygon.max(0)
     found = []
@@ -467,13 +469,13 @@ def _heights(items: Sequence[Item], kind: ItemKind, room: Room, y: float, of: An
             continue
         plan = item.bounds[:, [0, 2]]
         if (plan[0] < high).all() and (plan[1] > low).all():
-            share = sum(coverage(s, room.polygon) for s in item.surfaces)
+            share = sum(covered_share(s, room.polygon) for s in item.surfaces)
             if share > _COVERED:
                 found.append(of(item))
     return found
 
 
-def _cover(room: Room, kind: ItemKind, surface: Surface) -> Item:
+def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item:
     nyu40 = FLOOR if kind is ItemKind.FLOOR else CEILING
     return Item(
         id=f"{kind}_{room.id}", name=f"{room.name} {kind}".strip(), kind=kind, level_id="",

@@ -71,7 +71,7 @@ def meshes_of_products(
     n_faces = 0
     while True:
         shape = iterator.get()
-        mesh = _mesh(shape)
+        mesh = _mesh_of_shape(shape)
         if mesh is not None:
             n_faces += len(mesh.faces)
             place = f"#{shape.id} {shape.name}"[:80]
@@ -86,7 +86,7 @@ def meshes_of_products(
             return found
 
 
-def _mesh(shape: Any) -> ProductMesh | None:
+def _mesh_of_shape(shape: Any) -> ProductMesh | None:
     geometry = shape.geometry
     positions = np.asarray(geometry.verts, np.float64).reshape(-1, 3)
     faces = np.asarray(geometry.faces, np.int64).reshape(-1, 3)

@@ -30,7 +30,7 @@ def model_of(path: Path) -> Any:
     import ifcopenshell
 
     data = _bytes_of(path)
-    _check(data, path)
+    _check_step_file(data, path)
     try:
         model = ifcopenshell.file.from_string(data.decode("utf-8", "replace"))
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
@@ -52,7 +52,7 @@ def _bytes_of(path: Path) -> bytes:
     return archive.read(names[0]) or b""
 
 
-def _check(data: bytes, path: Path) -> None:
+def _check_step_file(data: bytes, path: Path) -> None:
     """Raise BadHouse for what is no IFC in STEP's form, or damaged so that the library may not end."""
     head = data[:2000].lstrip(b"\xef\xbb\xbf \r\n\t")
     hint = "export it as IFC (.ifc, STEP), IFC2x3 or IFC4"

@@ -51,15 +51,15 @@ def _append_material(fields: dict[str, object] | None, materials: list[ObjMateri
 
 def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) -> None:
     if key in ("kd", "ks"):
-        rgb = [_number(w) for w in words[:3]]
+        rgb = [_mtl_number(w) for w in words[:3]]
         # One number means a grey.
         if len(rgb) == 1:
             rgb *= 3
         if len(rgb) == 3 and all(v is not None for v in rgb):
-            fields[key] = _rgb([v or 0.0 for v in rgb])
+            fields[key] = _parse_mtl_colour([v or 0.0 for v in rgb])
     elif key in ("ns", "d", "tr"):
         # Take the last word: "d -halo 0.5" has an option before it.
-        value = _number(words[-1]) if words else None
+        value = _mtl_number(words[-1]) if words else None
         if value is not None:
             if key == "ns":
                 fields["ns"] = max(0.0, value)
@@ -71,7 +71,7 @@ def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) 
         fields[key] = _picture_name(words, raw)
 
 
-def _number(word: str) -> float | None:
+def _mtl_number(word: str) -> float | None:
     try:
         value = float(word)
     except ValueError:
@@ -91,7 +91,7 @@ def _picture_name(words: list[str], raw: str) -> str:
         most = _OPTIONS[words[at].lower()]
         at += 1
         n = 0
-        while n < most and at < len(words) and (most == 1 or _number(words[at]) is not None):
+        while n < most and at < len(words) and (most == 1 or _mtl_number(words[at]) is not None):
             at, n = at + 1, n + 1
     if at == 0:
         return raw.split(None, 1)[1].strip()
@@ -109,14 +109,14 @@ def builtin_materials() -> dict[str, ObjMaterial]:
             continue
         table[name] = ObjMaterial(
             name,
-            _rgb(m.get("Kd", (0.8, 0.8, 0.8))),
-            _rgb(m.get("Ks", (0.0, 0.0, 0.0))),
+            _parse_mtl_colour(m.get("Kd", (0.8, 0.8, 0.8))),
+            _parse_mtl_colour(m.get("Ks", (0.0, 0.0, 0.0))),
             float(m.get("Ns", 0.0)),
             float(m.get("d", 1.0)),
         )
     return table
 
 
-def _rgb(values: Sequence[float]) -> Rgb:
+def _parse_mtl_colour(values: Sequence[float]) -> Rgb:
     r, g, b = (min(max(float(v), 0.0), 1.0) for v in values)
     return r, g, b

@@ -80,16 +80,16 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
         data = data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
     found = _statements(data)
     pools = (
-        _numbers(found.vertices, 3, file, "v"),
-        _numbers(found.uvs, 2, file, "vt"),
-        _numbers(found.normals, 3, file, "vn"),
+        _parse_rows(found.vertices, 3, file, "v"),
+        _parse_rows(found.uvs, 2, file, "vt"),
+        _parse_rows(found.normals, 3, file, "vn"),
     )
     # Bound what n-gons triangulate to.
     parts = found.parts.values()
     n_triangles = sum(max(0, len(x.split()) - 2) for p in parts for x in p.lines)
     if n_triangles > max_triangles:
         raise _too_many(file, n_triangles, b"", max_triangles)
-    built = [_mesh(p, pools, file) for p in parts]
+    built = [_mesh_of_part(p, pools, file) for p in parts]
     meshes = tuple(mesh for mesh, _ in built if mesh is not None)
     n_dropped = sum(dropped for _, dropped in built)
     return ObjModel(meshes, tuple(found.libraries), n_dropped, _is_cut(data))
@@ -122,13 +122,13 @@ def _statements(data: bytes) -> _Statements:
         elif b"\t" in key:
             return _statements(data.replace(b"\t", b" "))
         elif key in (b"g", b"o"):
-            group, part = _text(rest), None
+            group, part = _decoded_name(rest), None
         elif key == b"usemtl":
-            material, part = _text(rest), None
+            material, part = _decoded_name(rest), None
         elif key == b"s":
             is_flat, part = rest.strip() in (b"off", b"0"), None
         elif key == b"mtllib":
-            found.libraries.append(_text(rest))
+            found.libraries.append(_decoded_name(rest))
     return found
 
 
@@ -139,11 +139,11 @@ def _too_many(file: str, n: int, key: bytes, most: int) -> BadHouse:
     )
 
 
-def _text(rest: bytes) -> str:
+def _decoded_name(rest: bytes) -> str:
     return rest.strip().decode("utf-8", "replace")
 
 
-def _numbers(lines: list[bytes], n: int, file: str, what: str) -> F64:
+def _parse_rows(lines: list[bytes], n: int, file: str, what: str) -> F64:
     if not lines:
         return np.zeros((0, n))
     # Parse all lines at once where each has as many numbers; else pad or cut them.
@@ -218,7 +218,7 @@ def _indices(part: _Part, pools: tuple[F64, ...], file: str) -> I64:
     return indices - 1
 
 
-def _mesh(part: _Part, pools: tuple[F64, ...], file: str) -> tuple[Mesh | None, int]:
+def _mesh_of_part(part: _Part, pools: tuple[F64, ...], file: str) -> tuple[Mesh | None, int]:
     sizes = np.array([len(x.split()) for x in part.lines], np.int64)
     if not sizes.sum():
         return None, len(sizes)

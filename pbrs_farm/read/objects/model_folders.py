@@ -129,10 +129,10 @@ def _library(path: Path) -> list[ObjectModel]:
     if len(data) > _MAX_CATALOGUE_BYTES:
         raise BadInput(path, FURNITURE, "the catalogue is too large")
     rows, names = numbered_entries(parse_properties(data)), set(archive.names())
-    return [m for row in rows if (m := _piece(path, row, names)) is not None]
+    return [m for row in rows if (m := _model_of_row(path, row, names)) is not None]
 
 
-def _piece(path: Path, row: dict[str, str], names: set[str]) -> ObjectModel | None:
+def _model_of_row(path: Path, row: dict[str, str], names: set[str]) -> ObjectModel | None:
     entry = row.get("model", "").lstrip("/")
     if entry not in names or not entry.lower().endswith(".obj"):
         return None

@@ -75,7 +75,7 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
     if (keys.sha256(data), companions_digest(path)) != (model.sha256, model.companions):
         raise BadInput(path, "", "changed since the home was made", hint="make the home again")
     shape = _from_trimesh(path, data) if _is_plain(path) else _from_reader(path, model, fields)
-    return _checked(path, _scaled(shape, model.scale), fields)
+    return _check_shape_limits(path, _scaled(shape, model.scale), fields)
 
 
 def companions_digest(path: Path) -> str:
@@ -148,7 +148,7 @@ def _coloured(surface: Surface, visual: Any, library: MaterialLibrary, path: Pat
     picture = getattr(getattr(visual, "material", None), "image", None)
     uvs = getattr(visual, "uv", None)
     if picture is not None and uvs is not None and np.isfinite(uvs).all():
-        texture = _texture(library, picture.convert("RGB"), path.stem)
+        texture = _add_vertex_colours(library, picture.convert("RGB"), path.stem)
         material = Material(path.stem, texture_id=texture)
         return replace(
             surface, uvs=np.asarray(uvs, np.float32)[:, :2], material=library.index(material)
@@ -175,7 +175,7 @@ def _with_colour_a_face(
     row, column = np.divmod(of_face.reshape(-1), side)
     uv = np.stack([(column + 0.5) / side, 1 - (row + 0.5) / side], axis=1)
     corners = surface.faces.reshape(-1)
-    texture = _texture(library, Image.fromarray(picture), path.stem)
+    texture = _add_vertex_colours(library, Image.fromarray(picture), path.stem)
     return replace(
         surface,
         positions=surface.positions[corners],
@@ -186,7 +186,7 @@ def _with_colour_a_face(
     )
 
 
-def _texture(library: MaterialLibrary, picture: Image.Image, name: str) -> str:
+def _add_vertex_colours(library: MaterialLibrary, picture: Image.Image, name: str) -> str:
     buffer = io.BytesIO()
     picture.save(buffer, "PNG")
     loaded = library.texture(name, name=f"{name}.png", place=name, load=buffer.getvalue)
@@ -205,7 +205,7 @@ def _scaled(shape: ModelShape, scale: float) -> ModelShape:
     return replace(shape, surfaces=surfaces)
 
 
-def _checked(path: Path, shape: ModelShape, fields: ReadFields) -> ModelShape:
+def _check_shape_limits(path: Path, shape: ModelShape, fields: ReadFields) -> ModelShape:
     if not np.isfinite(shape.points).all():
         raise BadInput(path, "", "a coordinate is not finite")
     n_faces = sum(len(s.faces) for s in shape.surfaces)

@@ -187,10 +187,10 @@ def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None)
     low, high = points.min(0), points.max(0)
     extent = np.where(high - low > 1e-9, high - low, 1.0)
     scale = np.ones(3) if size_m is None else np.asarray(size_m) / extent
-    return [_moved(surface, (low + high) / 2, scale) for surface in surfaces]
+    return [_move_and_scale(surface, (low + high) / 2, scale) for surface in surfaces]
 
 
-def _moved(surface: Surface, origin: F64, scale: F64) -> Surface:
+def _move_and_scale(surface: Surface, origin: F64, scale: F64) -> Surface:
     normals = surface.normals
     if normals is not None:
         turned = normals / scale  # by the inverse transpose

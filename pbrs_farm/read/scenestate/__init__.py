@@ -8,21 +8,21 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_scenestate(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.scenestate import scene_state
 
-    return scene_state.read(given, fields)
+    return scene_state.read_scenestate(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.scenestate import scene_state
 
-    return scene_state.companions(given, files)
+    return scene_state.companions_of_scenestate(given, files)
 
 
 FORMAT = Format(
     kind="scenestate", title="sceneState", files="*.scenestate.json or *.scene.json", order=40,
     brings="walls, floors, holes, furniture by --models", where="HSSD-200: huggingface.co/datasets/hssd",
     licence="CC BY-NC 4.0", keys=(("scene", "object", "arch"), ("format", "scene")), tells_boxes=True,
-    read=_read, companions=_companions,
+    read=_read_scenestate, companions=_companions_of_scenestate,
 )  # fmt: skip

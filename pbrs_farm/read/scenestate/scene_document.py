@@ -21,7 +21,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.read.common.arch_elements import Element, element_of
 from pbrs_farm.read.common.bounded_json import bounded_json
-from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affine, numbers
+from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affine, number_array
 from pbrs_farm.read.common.material_library import LoadedTexture
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
@@ -33,11 +33,11 @@ _LEVEL_M: Final = 1e-6  # walls whose points differ less in z are drawn in a pla
 _HINT: Final = "a sceneState has scene.arch.elements"
 
 
-def _listed(value: Any) -> Any:
+def _as_list(value: Any) -> Any:
     return [value.get(k) for k in "xyz"] if isinstance(value, dict) else value
 
 
-_Direction = Annotated[F64, numbers(3), BeforeValidator(_listed)]
+_Direction = Annotated[F64, number_array(3), BeforeValidator(_as_list)]
 _Scale = Annotated[Finite, Field(gt=1e-6, lt=1e6)]
 
 
@@ -51,11 +51,11 @@ class AssetTransform(Given):
 
     align: _Align = Field(_Align(), alias="alignTo")
     scale: _Scale = Field(1.0, alias="scaleTo")
-    centre: Annotated[F64, numbers(3)] | None = Field(None, alias="centerTo")
+    centre: Annotated[F64, number_array(3)] | None = Field(None, alias="centerTo")
 
 
 class _Matrix(Given):
-    data: Annotated[F64, numbers(16, affine)]
+    data: Annotated[F64, number_array(16, affine)]
 
 
 class _Object(Given):
@@ -133,7 +133,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
             value = inner
     scene = checked(_Document, value, file, error=BadHouse, hint=_HINT).scene
     arch = scene.arch
-    up, front = _axes(scene)
+    up, front = _scene_axes(scene)
     world = Axes.model_construct(up=up, front=front, scale=scene.unit).world_from_house(file)
     arch_scale = arch.scale or scene.unit
     world_from_arch = Axes.model_construct(up=up, front=front, scale=arch_scale).world_from_house(
@@ -156,7 +156,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
             name = f"{name}.{i}"
         taken.add(name)
         elements.append(
-            ToldElement(name, _in_world(found, world_from_arch, arch_scale), _rooms(raw))
+            ToldElement(name, _in_world(found, world_from_arch, arch_scale), _rooms_of_element(raw))
         )
     objects = []
     for k, raw in enumerate(scene.objects):
@@ -172,7 +172,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
     )
 
 
-def _axes(scene: _Scene) -> tuple[F64, F64]:
+def _scene_axes(scene: _Scene) -> tuple[F64, F64]:
     """Up and front of the scene: told, else of the architecture, else z up where walls are level in z."""
     up = next((v for v in (scene.up, scene.arch.up) if v is not None), None)
     front = next((v for v in (scene.front, scene.arch.front) if v is not None), None)
@@ -204,7 +204,7 @@ def _in_world(e: Element, world_from_arch: F64, scale: float) -> Element:
     )
 
 
-def _rooms(raw: dict[str, Any]) -> tuple[str, ...]:
+def _rooms_of_element(raw: dict[str, Any]) -> tuple[str, ...]:
     told = raw.get("roomId")
     names = told if isinstance(told, list) else [told]
     return tuple(dict.fromkeys(str(name)[:60] for name in names if name not in (None, "")))

@@ -90,7 +90,7 @@ class SceneModels:
     ) -> None:
         self._roots, self._library, self._notes, self._fields = roots, library, notes, fields
         self._known: dict[str, tuple[Surface, ...]] = {}
-        self._rows = _table(roots)
+        self._rows = _find_objects_csv(roots)
         self.missing: Counter[str] = Counter()  # ids without a model whose class is not known
 
     def item(self, one: PlacedModel, item_id: str) -> Item | None:
@@ -100,7 +100,7 @@ class SceneModels:
         surfaces = self._surfaces(one.model, one.place)
         if not surfaces:
             return self._told(one, row, seen, item_id)
-        meshes = [_mesh(s) for s in surfaces]
+        meshes = [_mesh_of_surface(s) for s in surfaces]
         world = one.world_from_scene @ one.scene_from_model @ _scene_from_file(one, meshes)
         found = [
             placed(m, world, name=s.name, material=s.material)
@@ -175,7 +175,7 @@ class SceneModels:
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "none", "opening-reveal")
 
 
-def _mesh(s: Surface) -> Mesh:
+def _mesh_of_surface(s: Surface) -> Mesh:
     normals = np.zeros((len(s.positions), 3)) if s.normals is None else s.normals
     uvs = None if s.uvs is None else s.uvs.astype(np.float64)
     return Mesh(
@@ -199,7 +199,7 @@ def _scene_from_file(one: PlacedModel, meshes: list[Mesh]) -> F64:
     return found
 
 
-def _table(roots: list[RootFolder]) -> dict[str, _Row]:
+def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
     """The rows of objects.csv by id: HSSD's has the id first and the category 15th."""
     for root in roots:
         for name in _TABLES:
@@ -208,11 +208,11 @@ def _table(roots: list[RootFolder]) -> dict[str, _Row]:
             except BadHouse:
                 data = None
             if data is not None:
-                return _rows(data)
+                return _parse_objects_csv(data)
     return {}
 
 
-def _rows(data: bytes) -> dict[str, _Row]:
+def _parse_objects_csv(data: bytes) -> dict[str, _Row]:
     rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
     found: dict[str, _Row] = {}
     try:
@@ -222,14 +222,14 @@ def _rows(data: bytes) -> dict[str, _Row]:
         at_size = next((k for k, h in enumerate(head) if h.endswith("dims")), -1)
         for row in rows:
             if len(row) > max(at_id, at_category) and row[at_category].strip():
-                size = _size(row[at_size]) if 0 <= at_size < len(row) else None
+                size = _parse_size_cm(row[at_size]) if 0 <= at_size < len(row) else None
                 found[row[at_id].strip()] = _Row(row[at_category].strip(), size)
     except csv.Error:
         return found
     return found
 
 
-def _size(text: str) -> tuple[float, float, float] | None:
+def _parse_size_cm(text: str) -> tuple[float, float, float] | None:
     """Width, height, depth in metres of centimetres written with commas."""
     try:
         width, depth, height = (float(v) / 100 for v in text.replace("\\", "").split(","))

@@ -60,7 +60,7 @@ _LEAST_SILL_M: Final = 0.2  # a hole of no type that begins lower is a door's
 _AREA_M2: Final = 0.05  # of a floor that is one
 
 
-def companions(given: GivenFile, files: SourceFiles) -> str:
+def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and tables that reading may open; "" where there is none."""
     path, models = given.path, given.models
     notes = Notes(path.name, strict=False)
@@ -74,7 +74,7 @@ def companions(given: GivenFile, files: SourceFiles) -> str:
     return keys.digest(*digests) if any(digests) else ""
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_scenestate(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the element that is wrong, and for a file without walls and floors."""
     path, models = given.path, given.models
     folder = RootFolder(path.parent)
@@ -91,8 +91,10 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     id_of_room = builder.set_rooms(rooms)
     structure = [*shell.walls(), *parts]
     holes = shell.holes(builder.rooms)
-    objects, missing = _objects(document, path, models, shell, notes, fields)
-    builder.items += [_in_room(i, builder, id_of_room) for i in (*structure, *objects)]
+    objects, missing = _object_items(document, path, models, shell, notes, fields)
+    builder.items += [
+        _sort_by_name_or_place(i, builder, id_of_room) for i in (*structure, *objects)
+    ]
     for hole in holes:
         low = hole.centre[1] - hole.size[1] / 2
         builder.add_hole(hole, foot_y=low + 0.1, cut_y=hole.centre[1])
@@ -102,7 +104,7 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     return builder.house(path.stem, source, name=document.id)
 
 
-def _objects(
+def _object_items(
     document: SceneDocument, path: Path, models: str, shell: _Shell, notes: Notes, fields: ReadFields
 ) -> tuple[list[Item], str]:  # fmt: skip
     """The objects, and what to say of those that have neither a model nor a known class."""
@@ -142,7 +144,9 @@ def _check_number(document: SceneDocument, file: str) -> None:
             raise BadHouse(file, "scene.arch.elements", f"{n} {what}, at most {most} are read")
 
 
-def _in_room(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
+def _sort_by_name_or_place(
+    item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]
+) -> Item:
     """The item with its level, and its room by the one it names, else by where it stands."""
     box = item.oriented_box if item.surfaces or item.box else None
     at = np.zeros(3) if box is None else box.centre
@@ -175,7 +179,7 @@ class _Shell:
         for k, e in enumerate(floors):
             names = e.rooms or (f"floor {k}",)
             self._floors.setdefault(names[0], []).append(e)
-        areas = {name: _plan(some) for name, some in self._floors.items()}
+        areas = {name: _plan_of_floors(some) for name, some in self._floors.items()}
         told = [e for e in elements if e.element.kind == "Wall"]
         self._drawn, self._standing = standing_walls(told, areas)
 
@@ -204,7 +208,7 @@ class _Shell:
             if surfaces:
                 own = wall.rooms[0] if len(wall.rooms) == 1 else None
                 tags = tuple(f"boundary_of:{room}" for room in wall.rooms)
-                found.append(_structure(wall.id, ItemKind.WALL, surfaces, own, tags))
+                found.append(_scene_structure_item(wall.id, ItemKind.WALL, surfaces, own, tags))
         return found
 
     def rooms(self, file: str) -> tuple[list[Room], list[Item]]:
@@ -245,14 +249,14 @@ class _Shell:
             surfaces = slab_surfaces(_AS_IT_STANDS, told.element, self.materials)
             if surfaces:
                 item_id = told.id if k == 0 else f"{told.id}.{k}"
-                parts.append(_structure(item_id, ItemKind.FLOOR, surfaces, name))
+                parts.append(_scene_structure_item(item_id, ItemKind.FLOOR, surfaces, name))
         faces = [s for part in parts for s in part.surfaces]
         low = floor_height(faces)
         if low is None:
             self._notes.add("empty-room", f"room {name}", "its floor has no area; left out")
             return None
         plan = np.concatenate([s.positions[:, [0, 2]] for s in faces]).astype(float)
-        near = [(w, s) for w, s in walls if _meets(s, plan.min(0) - 0.3, plan.max(0) + 0.3)]
+        near = [(w, s) for w, s in walls if _meets_in_plan(s, plan.min(0) - 0.3, plan.max(0) + 0.3)]
         near = [(w, s) for w, s in near if _stands_on(w, low)]
         polygon = floor_polygon(faces, [s for _, s in near])
         if polygon is None or shapely.Polygon(polygon).area < _AREA_M2:
@@ -270,17 +274,25 @@ class _Shell:
         if own:
             for e, _ in own:
                 surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
-                parts += [_structure(e.id, ItemKind.CEILING, surfaces, name)] if surfaces else []
+                parts += (
+                    [_scene_structure_item(e.id, ItemKind.CEILING, surfaces, name)]
+                    if surfaces
+                    else []
+                )
         elif not above:
             for k, told in enumerate(floors):
                 made = _ceiling_over(told.element, max(top, low + 1.0))
                 surfaces = slab_surfaces(_AS_IT_STANDS, made, self.materials)
-                parts.append(_structure(f"{told.id}_ceiling{k}", ItemKind.CEILING, surfaces, name))
+                parts.append(
+                    _scene_structure_item(f"{told.id}_ceiling{k}", ItemKind.CEILING, surfaces, name)
+                )
         else:
             for e in above:
                 if not e.rooms:
                     surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
-                    parts.append(_structure(f"{e.id}_{name}", ItemKind.CEILING, surfaces, name))
+                    parts.append(
+                        _scene_structure_item(f"{e.id}_{name}", ItemKind.CEILING, surfaces, name)
+                    )
         high = ceiling_height([s for p in parts if p.kind is ItemKind.CEILING for s in p.surfaces])
         high = top if high is None else high
         types = self._document.room_types.get(name, ())
@@ -328,7 +340,7 @@ class _Shell:
         )  # fmt: skip
 
 
-def _structure(
+def _scene_structure_item(
     item_id: str, kind: ItemKind, surfaces: tuple[Surface, ...], room: str | None,
     tags: tuple[str, ...] = (),
 ) -> Item:  # fmt: skip
@@ -343,12 +355,12 @@ def _ceiling_over(floor: Element, top: float) -> Element:
     return replace(floor, kind="Ceiling", points=points, overrides=(), depth_m=SLAB_DEPTH_M)
 
 
-def _plan(floors: Sequence[ToldElement]) -> Any:
+def _plan_of_floors(floors: Sequence[ToldElement]) -> Any:
     rings = [shapely.Polygon(e.element.points[0][:, [0, 2]]) for e in floors]
     return shapely.union_all([shapely.make_valid(r) for r in rings])
 
 
-def _meets(surface: Surface, low: F64, high: F64) -> bool:
+def _meets_in_plan(surface: Surface, low: F64, high: F64) -> bool:
     plan = surface.positions[:, [0, 2]]
     return bool((plan.max(0) > low).all() and (plan.min(0) < high).all())
 

@@ -45,11 +45,11 @@ def standing_walls(
     """
     tree = shapely.STRtree(list(floors.values()))
     names = list(floors)
-    drawn = [w for one in told if (w := _standing(one, tree, names)) is not None]
+    drawn = [w for one in told if (w := _stand_wall(one, tree, names)) is not None]
     lines: dict[tuple[int, int], list[int]] = defaultdict(list)
     for k, wall in enumerate(drawn):
         if wall.is_between:
-            lines[_line(wall)].append(k)
+            lines[_line_key(wall)].append(k)
     # Unite what lies on one line; everything else stands as it is told.
     united = {k: pieces for ks in lines.values() if len(ks) > 1 for k, pieces in _united(drawn, ks)}
     standing: list[StandingWall] = []
@@ -58,7 +58,7 @@ def standing_walls(
     return drawn, standing
 
 
-def _standing(told: ToldElement, tree: Any, names: list[str]) -> StandingWall | None:
+def _stand_wall(told: ToldElement, tree: Any, names: list[str]) -> StandingWall | None:
     e = told.element
     if e.depth_m <= 0:
         e = replace(e, depth_m=WALL_DEPTH_M)
@@ -96,7 +96,7 @@ def _rooms_beside(start: F64, end: F64, side: F64, tree: Any, names: list[str]) 
     return []
 
 
-def _line(wall: StandingWall) -> tuple[int, int]:
+def _line_key(wall: StandingWall) -> tuple[int, int]:
     along, _up, _out = wall.frame.axes.T
     if (along[0], along[2]) < (0.0, 0.0) or (abs(along[0]) < 1e-9 and along[2] < 0):
         along = -along
@@ -135,7 +135,7 @@ def _united(
         runs = pieces[k]
         # A wall that nobody else tells keeps its id and its ends.
         whole = len(runs) == 1 and runs[0][2] == (k,)
-        found.append((k, [drawn[k]] if whole else _pieces(drawn, k, runs, origin, axis)))
+        found.append((k, [drawn[k]] if whole else _cut_at_crossings(drawn, k, runs, origin, axis)))
     return found
 
 
@@ -150,7 +150,7 @@ def _same_height(a: StandingWall, b: StandingWall) -> bool:
     return bool(high - low > 0.5 * min(a.element.height_m, b.element.height_m))
 
 
-def _pieces(
+def _cut_at_crossings(
     drawn: Sequence[StandingWall], k: int, runs: list[tuple[float, float, tuple[int, ...]]],
     origin: F64, axis: F64,
 ) -> list[StandingWall]:  # fmt: skip

@@ -9,13 +9,13 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_suncg(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.suncg.suncg_house import read_suncg
 
     return read_suncg(given.path.parent.parent, given.path.name, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_suncg(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.suncg.suncg_house import suncg_companions
 
     root = RootFolder(given.path.parent.parent)
@@ -26,5 +26,5 @@ FORMAT = Format(
     kind="suncg", title="SUNCG", files="ROOT/house/ID", order=20,
     brings="walls, rooms, furniture, lamps", where="no longer published",
     licence="of the copy you have", main_file="house.json", travels=False,
-    read=_read, companions=_companions,
+    read=_read_suncg, companions=_companions_of_suncg,
 )  # fmt: skip

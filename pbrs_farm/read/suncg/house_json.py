@@ -23,7 +23,7 @@ from pbrs_farm.read.common.json_values import (
     Overrides,
     Vector,
     affine,
-    numbers,
+    number_array,
 )
 
 NODE_TYPES: Final = ("Room", "Object", "Ground", "Box")
@@ -36,7 +36,7 @@ def _flag(value: Any) -> bool:
     return value not in (0, "0", False, None, "")
 
 
-def _state(value: Any) -> int:
+def _parse_state(value: Any) -> int:
     text = str(int(value) if isinstance(value, bool) else "0" if value is None else value)
     if not re.fullmatch(r"\d{1,3}", text):
         raise ValueError(f"{text[:40]!r} is no state")
@@ -67,11 +67,11 @@ class Node(Given):
     index: int  # its position in the level
     model_id: FileName = Field("", alias="modelId")
     # (4, 4), identity for rooms and grounds
-    house_from_model: Annotated[F64, numbers(16, affine)] = Field(np.eye(4), alias="transform")
+    house_from_model: Annotated[F64, number_array(16, affine)] = Field(np.eye(4), alias="transform")
     bbox: Annotated[Bounds | None, BeforeValidator(_bounds)] = None
     overrides: Overrides = Field((), alias="materials")  # by position in the model's MTL
     # Of a door or curtain, 0 = as modelled.
-    state: Annotated[int, BeforeValidator(_state)] = 0
+    state: Annotated[int, BeforeValidator(_parse_state)] = 0
     # As written; the transform decides.
     is_mirrored: Annotated[bool | None, BeforeValidator(_flag)] = Field(None, alias="isMirrored")
     dimensions: Annotated[tuple[_Size, _Size, _Size], exactly(3)] = (0.0, 0.0, 0.0)  # of a Box, m

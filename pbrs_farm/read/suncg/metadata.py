@@ -71,8 +71,8 @@ class Tables:
 def read_tables(folder: RootFolder, notes: Notes) -> Tables:
     """The tables in metadata/ of the root, or beside it in the root itself."""
     return Tables(
-        classes=_classes(folder, notes),
-        lights=_lights(folder, notes),
+        classes=_read_class_table(folder, notes),
+        lights=_read_light_table(folder, notes),
         lamps=_lamps(folder, notes),
         variants=_variants(folder),
     )
@@ -83,7 +83,7 @@ def table_places(name: str) -> tuple[str, str]:
     return f"metadata/{name}", name
 
 
-def _table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
+def _find_light_table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
     for name in names:
         for place in table_places(name):
             data = folder.read(place, max_bytes=_MAX_TABLE_BYTES)
@@ -92,7 +92,7 @@ def _table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
     return None
 
 
-def _rows(name: str, data: bytes) -> list[dict[str, str]]:
+def _parse_csv(name: str, data: bytes) -> list[dict[str, str]]:
     try:
         text = data.decode("utf-8-sig")
         rows = list(csv.DictReader(io.StringIO(text)))
@@ -103,12 +103,12 @@ def _rows(name: str, data: bytes) -> list[dict[str, str]]:
     return [{k: v for k, v in row.items() if isinstance(v, str)} for row in rows]
 
 
-def _classes(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
-    found = _table(folder, *CLASS_TABLES)
+def _read_class_table(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
+    found = _find_light_table(folder, *CLASS_TABLES)
     if found is None:
         notes.add("missing-table", "metadata/ModelCategoryMapping.csv", "every object is otherprop")
         return {}
-    return {row["model_id"]: _class(row) for row in _rows(*found) if row.get("model_id")}
+    return {row["model_id"]: _class(row) for row in _parse_csv(*found) if row.get("model_id")}
 
 
 def _class(row: dict[str, str]) -> ModelClass:
@@ -130,15 +130,15 @@ def _class(row: dict[str, str]) -> ModelClass:
 
 
 def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
-    found = _table(folder, VARIANT_TABLE)
+    found = _find_light_table(folder, VARIANT_TABLE)
     if found is None:
         return {}
-    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _rows(*found)]
+    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _parse_csv(*found)]
     return {model: tuple(v.strip() for v in ids.split(",")) for model, ids in rows if ids}
 
 
 def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
-    found = _table(folder, LAMP_TABLE)
+    found = _find_light_table(folder, LAMP_TABLE)
     if found is None:
         text = "no lamp's bulb material is known; repair adds bulbs"
         notes.add("missing-table", "metadata/light_geometry_compact.txt", text)
@@ -160,8 +160,8 @@ def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
     return lamps
 
 
-def _lights(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
-    found = _table(folder, LIGHT_TABLE)
+def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
+    found = _find_light_table(folder, LIGHT_TABLE)
     if found is None:
         text = "no lamp's light is known; bulbs get an assumed power"
         notes.add("missing-table", "metadata/suncgModelLights.json", text)
@@ -186,7 +186,7 @@ _FORMS: Final = {
 }
 
 
-def _colour(value: object) -> tuple[float, ...]:
+def _parse_light_colour(value: object) -> tuple[float, ...]:
     try:
         rgb = np.array([int(str(value)[k : k + 2], 16) for k in (1, 3, 5)]) / 255
     except ValueError:
@@ -204,7 +204,11 @@ class _Light(BaseModel):
     type: Literal["PointLight", "SpotLight", "LineLight"]
     position: _Triple
     power: _Amount
-    color: Annotated[tuple[float, float, float], BeforeValidator(_colour)] = (1.0, 1.0, 1.0)
+    color: Annotated[tuple[float, float, float], BeforeValidator(_parse_light_colour)] = (
+        1.0,
+        1.0,
+        1.0,
+    )
     direction: _Triple | None = None
     cutoff: _Amount = Field(math.pi, alias="cutoffAngle")
     dropoff: _Amount = Field(0.0, alias="dropoffRate")

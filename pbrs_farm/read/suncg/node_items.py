@@ -69,22 +69,22 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
         context.notes.add("missing-model", node.place, text)
         return None
     variant, model = found
-    known = _row(context.tables.classes, variant, node.model_id)
+    known = _row_of_model(context.tables.classes, variant, node.model_id)
     seen = known or ModelClass(node.model_id, OTHERPROP, ItemKind.OBJECT)
     if known is None and context.tables.classes:
         text = "is not in ModelCategoryMapping.csv; it is otherprop"
         context.notes.add("unmapped-class", f"object/{node.model_id}", text)
     # Place the meshes; bulbs stay apart, so that lights can own them.
-    lamp = _row(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
+    lamp = _row_of_model(context.tables.lamps, variant, node.model_id) or LampMaterials((), ())
     world_from_model = context.world_from_house @ node.house_from_model
-    surfaces, bulbs = _surfaces(context, node, model, seen, lamp)
+    surfaces, bulbs = _surfaces_and_bulbs(context, node, model, seen, lamp)
     if not surfaces:
         context.notes.add(
             "empty-model", node.place, f"object/{node.model_id} has no area; left out"
         )
         return None
     # Pair the lights of the table with the bulbs of the mesh.
-    lights = _row(context.tables.lights, variant, node.model_id) or ()
+    lights = _row_of_model(context.tables.lights, variant, node.model_id) or ()
     placed_lights: tuple[LightPart, ...] = ()
     if lights or bulbs:
         in_world = [placed_light(light, world_from_model) for light in lights]
@@ -104,7 +104,7 @@ def object_item(context: ReaderContext, node: Node, room_id: str | None) -> Item
     )
 
 
-def _row(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
+def _row_of_model(table: dict[str, _T], variant: str, model_id: str) -> _T | None:
     """The row of a model; a variant such as 122_0 has the row of its model (docs/spec/suncg.md section 2)."""
     for name in (variant, model_id, re.sub(r"_\d$", "", model_id)):
         if name in table:
@@ -128,7 +128,7 @@ def _object_model(context: ReaderContext, node: Node) -> tuple[str, ParsedModel]
     return None
 
 
-def _surfaces(
+def _surfaces_and_bulbs(
     context: ReaderContext, node: Node, model: ParsedModel, seen: ModelClass, lamp: LampMaterials
 ) -> tuple[tuple[Surface, ...], list[int]]:
     """(surfaces in the model's order, the indices of those that are bulbs)."""
@@ -278,7 +278,7 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
             continue
         surfaces = room_surfaces(context, node, part, default_walls=False)
         if surfaces:
-            yield _structure(node, room_id, part, kind, tuple(s for _, s in surfaces))
+            yield _suncg_structure_item(node, room_id, part, kind, tuple(s for _, s in surfaces))
     # The inside and outside slabs of one wall share its number, so they are one item.
     walls: dict[str, list[Surface]] = {}
     if "Walls" not in node.hidden:
@@ -286,10 +286,12 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
             found = _WALL_GROUP.fullmatch(group)
             walls.setdefault(found[1] if found else "", []).append(surface)
     for number, parts_of_wall in walls.items():
-        yield _structure(node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall))
+        yield _suncg_structure_item(
+            node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall)
+        )
 
 
-def _structure(
+def _suncg_structure_item(
     node: Node, room_id: str, part: str, kind: ItemKind, surfaces: tuple[Surface, ...]
 ) -> Item:
     return Item(

@@ -69,7 +69,7 @@ def suncg_companions(folder: RootFolder, house_id: str, files: SourceFiles) -> I
     yield arch_file(house_id)
     # Collect what the house's own JSON files name.
     documents = (f"house/{house_id}/house.json", arch_file(house_id))
-    named = [pair for name in documents for pair in _named(_document(folder, name))]
+    named = [pair for name in documents for pair in _names_in_document(_document(folder, name))]
     models = {value for key, value in named if key == "modelId"}
     folders = [f"room/{house_id}", *(f"object/{model}" for model in sorted(models))]
     # A model's folder holds its meshes in every state; a material library names its pictures.
@@ -89,7 +89,7 @@ def _document(folder: RootFolder, name: str) -> Any:
         return {}  # the reader will say what is wrong with it
 
 
-def _named(document: Any) -> Iterator[tuple[str, str]]:
+def _names_in_document(document: Any) -> Iterator[tuple[str, str]]:
     """(key, value) of every model and texture named anywhere in a JSON document."""
     waiting = [document]
     while waiting:
@@ -135,7 +135,7 @@ def read_suncg(root: Path, house_id: str, fields: ReadFields) -> House:
         id=house_id,
         name=house_id,
         source=Source("suncg", file, folder.sha256, attribution="SUNCG (Song et al. 2017)"),
-        levels=_levels(record, rooms, items),
+        levels=_levels_in_use(record, rooms, items),
         rooms=tuple(rooms),
         items=tuple(items),
         materials=context.materials.library.materials,
@@ -225,8 +225,8 @@ def _level_contents(
         room_id = room_of_index.get(node.index)
         item: Item | None = None
         if node.kind == "Room":
-            parts = list(room_items(context, node, _room_id(number, node)))
-            room = _room(context, node, _room_id(number, node), parts)
+            parts = list(room_items(context, node, _room_id_of_node(number, node)))
+            room = _room_of_node(context, node, _room_id_of_node(number, node), parts)
             if room is not None and room.id not in taken:
                 rooms.append(room)
                 taken.add(room.id)
@@ -241,13 +241,13 @@ def _level_contents(
             yield node, item
 
 
-def _room_id(number: int, node: Node) -> str:
+def _room_id_of_node(number: int, node: Node) -> str:
     return node.id if _ROOM_ID.fullmatch(node.id) else f"{number}_{node.index}"
 
 
 def _room_nodes(record: HouseRecord) -> Iterator[tuple[Node, str]]:
     for number, (_, nodes) in enumerate(record.levels):
-        yield from ((node, _room_id(number, node)) for node in nodes if node.kind == "Room")
+        yield from ((node, _room_id_of_node(number, node)) for node in nodes if node.kind == "Room")
 
 
 def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...]) -> dict[int, str]:
@@ -261,7 +261,7 @@ def _room_of_index(context: ReaderContext, number: int, nodes: tuple[Node, ...])
                     "room-in-room", node.place, f"lists node {index}, a room; ignored"
                 )
             elif index in kinds:
-                found.setdefault(index, _room_id(number, node))
+                found.setdefault(index, _room_id_of_node(number, node))
     return found
 
 
@@ -273,10 +273,13 @@ def _check_extent(item: Item, node: Node, fields: ReadFields, file: str) -> None
         raise BadHouse(file, node.place, text, hint="limit: read.max_extent_m")
 
 
-def _room(context: ReaderContext, node: Node, room_id: str, parts: list[Item]) -> Room | None:
+def _room_of_node(
+    context: ReaderContext, node: Node, room_id: str, parts: list[Item]
+) -> Room | None:
     # Sort the room's surfaces by what they are.
     floor, ceiling, walls = (
-        _surfaces(parts, kind) for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
+        _surfaces_of_parts(parts, kind)
+        for kind in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.WALL)
     )
     # The plan between the walls: of the floor, else of the space the walls enclose.
     polygon = floor_polygon(floor, walls)
@@ -303,11 +306,11 @@ def _room(context: ReaderContext, node: Node, room_id: str, parts: list[Item]) -
     )
 
 
-def _surfaces(parts: Iterable[Item], kind: ItemKind) -> list[Surface]:
+def _surfaces_of_parts(parts: Iterable[Item], kind: ItemKind) -> list[Surface]:
     return [s for p in parts if p.kind is kind for s in p.surfaces]
 
 
-def _levels(record: HouseRecord, rooms: list[Room], items: list[Item]) -> tuple[Level, ...]:
+def _levels_in_use(record: HouseRecord, rooms: list[Room], items: list[Item]) -> tuple[Level, ...]:
     """The levels that hold something."""
     used = {room.level_id for room in rooms} | {item.level_id for item in items}
     return tuple(

@@ -10,16 +10,16 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_sweethome3d(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.sweethome3d import packaged_home
 
-    return packaged_home.read(given, fields)
+    return packaged_home.read_packaged_home(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_sweethome3d(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.sweethome3d import packaged_home
 
-    return packaged_home.companions(given, files)
+    return packaged_home.companions_of_home(given, files)
 
 
 FORMAT = Format(
@@ -27,5 +27,5 @@ FORMAT = Format(
     brings="walls, rooms, furniture, lamps", where="sweethome3d.com, or your own",
     licence="of each home", suffixes=(".sh3d", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
     contains=re.compile(rb"\A\s*(<\?xml[^>]*>\s*)?<home\b|\APK.{28}(Home|ContentDigests)", re.DOTALL),
-    read=_read, companions=_companions, uses_packages=True,
+    read=_read_sweethome3d, companions=_companions_of_sweethome3d, uses_packages=True,
 )  # fmt: skip

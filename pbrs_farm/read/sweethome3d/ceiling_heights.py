@@ -48,7 +48,7 @@ class CeilingHeights:
         if level.index != self._top or edges is None:
             height = level.height if level.id else self._wall_height
             return np.full(len(points), height)
-        found = np.array([_nearest(p, *edges) for p in points])
+        found = np.array([_nearest_wall_top(p, *edges) for p in points])
         return np.full(len(points), found.max()) if is_flat else found
 
     def surface(
@@ -88,7 +88,7 @@ class CeilingHeights:
         return np.array(points)
 
 
-def _nearest(point: Points2, segments: F64, tops: F64) -> float:
+def _nearest_wall_top(point: Points2, segments: F64, tops: F64) -> float:
     # Height of the top of the wall edge nearest to a plan point, at the nearest spot; the lowest
     # of those equally near, so that no wall ends below the ceiling.
     a, d = segments[:, :2], segments[:, 2:] - segments[:, :2]

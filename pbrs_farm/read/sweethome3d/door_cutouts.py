@@ -96,8 +96,8 @@ def _depth_span(
     low_y, high_y = frame.origin[1] - half_y, frame.origin[1] + half_y
     if min(half_x, half_y) < MIN_HALF_M:
         return None
-    piece = _rectangle(frame, half_x, max(half_z, MIN_HALF_M))
-    strip = _rectangle(frame, half_x * 0.98, half_z + WALL_REACH_M)
+    piece = _rectangle_cutout(frame, half_x, max(half_z, MIN_HALF_M))
+    strip = _rectangle_cutout(frame, half_x * 0.98, half_z + WALL_REACH_M)
     spans = []
     for standing in walls:
         # Skip walls above or below the piece, and those its plan rectangle does not touch.
@@ -130,7 +130,7 @@ def _is_along(wall: HomeWall, frame: PieceFrame) -> bool:
     return abs(float(direction @ across)) < PARALLEL_SINE * max(float(np.linalg.norm(across)), 1e-6)
 
 
-def _rectangle(frame: PieceFrame, half_x: float, half_z: float) -> shapely.Polygon:
+def _rectangle_cutout(frame: PieceFrame, half_x: float, half_z: float) -> shapely.Polygon:
     local = np.array(
         [[-half_x, 0, -half_z], [half_x, 0, -half_z], [half_x, 0, half_z], [-half_x, 0, half_z]]
     )

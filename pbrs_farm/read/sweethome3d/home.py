@@ -132,7 +132,7 @@ def read_home(
     fields, file = fields or ReadFields(), PurePath(name).name
     container = open_container(data, file, resources)
     notes = Notes(file, strict=fields.strict)
-    plan = _plan(container.root, file, fields, notes)
+    plan = _read_plan(container.root, file, fields, notes)
     if package_note:
         notes.add("package-version", package, package_note)
     # Read walls and rooms in plan; without a room there is nothing to render.
@@ -154,14 +154,14 @@ def read_home(
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, *cuts)
     # Place the furniture last: it stands in rooms and cuts walls.
-    pieces, openings = _furniture(plan, materials, outlines, rooms, house_level, file, fields)
+    pieces, openings = _read_pieces(plan, materials, outlines, rooms, house_level, file, fields)
     items = _numbered((*structure, *pieces), file)
     sha, stem = keys.sha256(data), PurePath(file).stem
     return House(
         id=keys.house_id(stem, sha),
         name=PurePath(plan.name).stem or stem,
-        source=_source(plan, file, sha, package),
-        levels=_levels(plan, house_level),
+        source=_source_of_plan(plan, file, sha, package),
+        levels=_levels_of_plan(plan, house_level),
         rooms=room_nouns(rooms, ceilings),
         items=items,
         materials=materials.library.materials,
@@ -172,7 +172,7 @@ def read_home(
     )
 
 
-def _plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> HomePlan:
+def _read_plan(root: Element, file: str, fields: ReadFields, notes: Notes) -> HomePlan:
     """The plan: levels that are hidden go, what is absurd is refused."""
     plan = _shown(parse_plan(root, file, fields.max_extent_m), fields, notes)
     check_plan_bounds(plan, file)
@@ -218,7 +218,7 @@ def _place_of(level: PlanLevel) -> str:
     return f"level {level.id} '{level.name}'"
 
 
-def _levels(plan: HomePlan, house_level: dict[str, str]) -> tuple[Level, ...]:
+def _levels_of_plan(plan: HomePlan, house_level: dict[str, str]) -> tuple[Level, ...]:
     if not plan.levels:
         return (Level("0", "", 0.0, plan.wall_height),)
     return tuple(
@@ -238,7 +238,7 @@ def _house_levels(plan: HomePlan, notes: Notes) -> dict[str, str]:
     return {level.id: str(k) for k, level in enumerate(visible)} | {"": "0"}
 
 
-def _furniture(
+def _read_pieces(
     plan: HomePlan,
     materials: HomeMaterials,
     outlines: dict[str, Outline],
@@ -301,7 +301,7 @@ def _standing_walls(plan: HomePlan, outlines: dict[str, Outline]) -> list[Standi
     return walls
 
 
-def _source(plan: HomePlan, file: str, sha: str, package: str) -> Source:
+def _source_of_plan(plan: HomePlan, file: str, sha: str, package: str) -> Source:
     author = plan.properties.get("Author", "")
     licence = plan.properties.get("License", "")
     owner = f"{author} {plan.properties.get('Copyright', '')}".lower()

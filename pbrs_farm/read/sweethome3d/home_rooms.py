@@ -168,7 +168,7 @@ def plane_items(
         later = _later(rooms, k)
         if room.plan.has_floor:
             floors = [r.outline for r in later if r.plan.has_floor]
-            items += _floor(room, _left_of(room, floors, floor_cuts), materials)
+            items += _floor_items(room, _left_of(room, floors, floor_cuts), materials)
         if room.plan.has_ceiling:
             covers = [r.outline for r in later if r.plan.has_ceiling]
             items += _ceiling(room, _left_of(room, covers, ceiling_cuts), ceilings, materials)
@@ -183,11 +183,13 @@ def _left_of(
     return _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
 
 
-def _floor(room: ReadRoom, parts: list[shapely.Polygon], materials: HomeMaterials) -> list[Item]:
+def _floor_items(
+    room: ReadRoom, parts: list[shapely.Polygon], materials: HomeMaterials
+) -> list[Item]:
     if not parts:
         return []
     material = materials.painted(room.plan.floor, "floor", f"{room.plan.place} floor")
-    rings = [_rings(p) for p in parts]
+    rings = [_rings_of_polygon(p) for p in parts]
     surface = horizontal("floor", rings, room.level.elevation, material, up=True)
     surface = _textured(surface, room.plan.floor)
     return [_item(room, ItemKind.FLOOR, FLOOR, surface)]
@@ -200,7 +202,10 @@ def _ceiling(
         return []
     material = materials.painted(room.plan.ceiling, "ceiling", f"{room.plan.place} ceiling")
     surface = ceilings.surface(
-        room.level, [_rings(p) for p in parts], material, is_flat=room.plan.is_ceiling_flat
+        room.level,
+        [_rings_of_polygon(p) for p in parts],
+        material,
+        is_flat=room.plan.is_ceiling_flat,
     )
     return [_item(room, ItemKind.CEILING, CEILING, _textured(surface, room.plan.ceiling))]
 
@@ -225,7 +230,7 @@ def _textured(surface: Surface, paint: Paint) -> Surface:
     return replace(surface, uvs=uvs)
 
 
-def _rings(polygon: shapely.Polygon) -> list[Points2]:
+def _rings_of_polygon(polygon: shapely.Polygon) -> list[Points2]:
     return [_ring(polygon.exterior), *(_ring(r) for r in polygon.interiors)]
 
 

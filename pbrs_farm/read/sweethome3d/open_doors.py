@@ -61,11 +61,11 @@ def shut_leaves(meshes: Iterable[Mesh], matrix: F64) -> tuple[Leaf, ...]:
                 kind = hinges if word.startswith(HINGE) else leaves
                 kind.setdefault(joint, []).append(points)
                 break
-    found = [_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
+    found = [_find_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
     return tuple(leaf for leaf in found if leaf is not None)
 
 
-def _leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:
+def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:
     points, hinge = np.concatenate(parts), np.concatenate(hinge_parts)
     axis = (hinge.min(0) + hinge.max(0))[[0, 2]] / 2
     low, high = points.min(0), points.max(0)

@@ -18,7 +18,7 @@ from pbrs_farm.read.sweethome3d.home_file.container import needs_program
 from pbrs_farm.regular_files import read_given
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_packaged_home(given: GivenFile, fields: ReadFields) -> House:
     """The House of a home's file, with the program's own models where they are cached."""
     cached = homes_package.cached()
     resources = cached.resources() if cached else None
@@ -26,7 +26,7 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     return read_home(data, given.path.name, resources=resources, fields=fields)
 
 
-def companions(given: GivenFile, _files: SourceFiles) -> str:
+def companions_of_home(given: GivenFile, _files: SourceFiles) -> str:
     """Digest of the package whose models the home names; "" for none, and for the tested version."""
     needs = needs_program(read_given(given.path, error=BadHouse), given.path.name)
     return package_digest(homes_package.cached()) if needs else ""

@@ -56,7 +56,7 @@ def piece_item(
     surfaces = [placed_surface(m, p, frame, at, matrix) for m, p, at in shown]
     emitting = [k for k, (_, p, _) in enumerate(shown) if p.emits]
     by_rule = _piece_class(piece)
-    nyu40, tags = _label(piece, by_rule, model, materials)
+    nyu40, tags = _label_of_piece(piece, by_rule, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
     if not surfaces and not lights:
         materials.notes.add("empty-model", piece.place, "nothing to see in it: left out")
@@ -88,7 +88,7 @@ def _piece_class(piece: PlanPiece) -> PieceClass:
     return class_of_piece(piece.catalogue_id, piece.name, piece.group, place)
 
 
-def _label(
+def _label_of_piece(
     piece: PlanPiece, by_rule: PieceClass, model: PieceModel, materials: HomeMaterials
 ) -> tuple[int, tuple[str, ...]]:
     tags = ["mirrored"] if piece.is_mirrored else []

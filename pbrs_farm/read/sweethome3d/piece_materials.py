@@ -42,7 +42,7 @@ def piece_material(
             piece.paint.shininess if paint.shininess is None else paint.shininess,
         )
     emits = role == LIGHT or mesh.material in piece.light_materials
-    loaded, picture = _texture(piece, paint, base, mesh, model, materials)
+    loaded, picture = _texture_of_mesh(piece, paint, base, mesh, model, materials)
     diffuse = (1.0, 1.0, 1.0) if loaded else paint.colour or base.kd
     # The home's shininess replaces the model's highlights.
     specular, shininess = base.ks, base.ns
@@ -81,7 +81,7 @@ def _material_kind(
     return MaterialKind.OPAQUE
 
 
-def _texture(
+def _texture_of_mesh(
     piece: PlanPiece,
     paint: Paint,
     base: ObjMaterial,

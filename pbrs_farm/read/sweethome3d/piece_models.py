@@ -37,10 +37,10 @@ def joint_of(name: str) -> str:
 def moved(meshes: tuple[Mesh, ...], transformations: Transformations) -> tuple[Mesh, ...]:
     """The meshes with those on a moved joint moved; matrices are 3 x 4, row by row."""
     by_joint = {joint_of(name): matrix for name, matrix in transformations if joint_of(name)}
-    return tuple(_moved(mesh, by_joint) for mesh in meshes)
+    return tuple(_move_joints(mesh, by_joint) for mesh in meshes)
 
 
-def _moved(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
+def _move_joints(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
     for word in mesh.group.split():
         # The hinge or rail itself stays where it is.
         is_fixed = word.startswith(_FIXED)
@@ -146,7 +146,7 @@ class PieceModels:
         if data is None:
             note("missing-model", place, f"no content {what}: left out")
             return None
-        kind = _kind(data)
+        kind = _model_format(data)
         if kind != "obj":
             note("unsupported-model", place, f"{what} is {kind}, only OBJ is read: left out")
             return None
@@ -178,7 +178,7 @@ class PieceModels:
         unknown = sorted(used - set(materials))
         if unknown:
             note("unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}")
-        meshes = _merged(parsed.meshes)
+        meshes = _merge_meshes(parsed.meshes)
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
         return PieceModel(meshes, materials, folder, points.min(0), points.max(0))
@@ -196,7 +196,7 @@ def content_name(folder: str, name: str) -> str:
     return posixpath.join(folder, *parts) if parts else folder
 
 
-def _kind(data: bytes) -> str:
+def _model_format(data: bytes) -> str:
     # Tell the format by its first bytes.
     head = data[:4096].lstrip()
     if data[:2] == b"PK":
@@ -212,7 +212,7 @@ def _kind(data: bytes) -> str:
     return "obj" if b"\0" not in head else "of an unknown kind"
 
 
-def _merged(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
+def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
     # One mesh per material, role and (having texture coordinates), in order of first use.
     grouped: dict[tuple[str, str, bool], list[Mesh]] = {}
     for mesh in meshes:

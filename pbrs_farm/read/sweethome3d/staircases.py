@@ -47,10 +47,10 @@ def staircase_cuts(
             has_above = any(x.elevation >= ceiling - TOLERANCE_M for x in visible)
             if foot < ceiling and top >= ceiling - TOLERANCE_M and has_above:
                 ceilings.setdefault(house_level[level.id], []).append(hole)
-    return _joined(floors), _joined(ceilings)
+    return _join_cuts(floors), _join_cuts(ceilings)
 
 
-def _joined(cuts: dict[str, list[shapely.Geometry]]) -> Cuts:
+def _join_cuts(cuts: dict[str, list[shapely.Geometry]]) -> Cuts:
     return {level: shapely.union_all(holes) for level, holes in cuts.items()}
 
 

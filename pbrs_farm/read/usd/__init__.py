@@ -8,16 +8,16 @@ from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.source_files import SourceFiles
 
 
-def _read(given: GivenFile, fields: ReadFields) -> House:
+def _read_usd(given: GivenFile, fields: ReadFields) -> House:
     from pbrs_farm.read.usd import stage
 
-    return stage.read(given, fields)
+    return stage.read_usd(given, fields)
 
 
-def _companions(given: GivenFile, files: SourceFiles) -> str:
+def _companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.usd import stage
 
-    return stage.companions(given, files)
+    return stage.companions_of_usd(given, files)
 
 
 FORMAT = Format(
@@ -25,5 +25,5 @@ FORMAT = Format(
     brings="meshes, materials, labels, lights", where="GRScenes, InteriorAgent, SimReady homes",
     licence="of each data set", needs="the extra usd", library="pxr",
     suffixes=(".usd", ".usda", ".usdc", ".usdz"), beside=("*.classes.json", "*.rooms.json", "rooms.json"),
-    read=_read, companions=_companions,
+    read=_read_usd, companions=_companions_of_usd,
 )  # fmt: skip

@@ -151,7 +151,7 @@ class StageNodes:
             extras = json_from_bytes(str(told).encode(), self._file)
             node["extras"] |= extras if isinstance(extras, dict) else {}
             return class_of_node_name(str(node["extras"].get("class", "")))
-        label = _label(prim)
+        label = _own_label(prim)
         seen = class_of_node_name(label) if label else None
         is_shape = "mesh" in node
         if seen is None:
@@ -182,7 +182,7 @@ class StageNodes:
 
     def _component(self, prim: Any, node: _Row) -> None:
         own = class_of_node_name(prim.GetName())
-        inner = [class_of_node_name(p.GetName()) for p in _below(prim)]
+        inner = [class_of_node_name(p.GetName()) for p in _visible_children(prim)]
         found = {seen for seen in inner if seen is not None}
         if own is None and len(found) == 1:
             own = next(iter(found))
@@ -351,7 +351,7 @@ def _children(prim: Any) -> list[Any]:
     return list(prim.GetFilteredChildren(Usd.TraverseInstanceProxies()))
 
 
-def _below(prim: Any) -> list[Any]:
+def _visible_children(prim: Any) -> list[Any]:
     return list(Usd.PrimRange(prim, Usd.TraverseInstanceProxies()))[1:2000]
 
 
@@ -385,14 +385,14 @@ def _holders(stage: Any) -> set[str]:
         seen = class_of_node_name(prim.GetName()) if prim.IsA(UsdGeom.Gprim) else None
         is_building = seen is not None and (seen.kind in _STRUCTURE or seen.kind is ItemKind.GROUND)
         is_light = prim.IsA(UsdLux.BoundableLightBase)
-        if is_building or is_light or _is_component(prim) or _label(prim):
+        if is_building or is_light or _is_component(prim) or _own_label(prim):
             while parent and str(parent.GetPath()) not in found:
                 found.add(str(parent.GetPath()))
                 parent = parent.GetParent()
     return found
 
 
-def _label(prim: Any) -> str:
+def _own_label(prim: Any) -> str:
     """The class that a prim is labelled with itself, "" where it is not."""
     for taxonomy in ("class", "category"):
         words = prim.GetAttribute(f"semantics:labels:{taxonomy}").Get()

@@ -83,16 +83,16 @@ class Shaders:
     def _preview(self, name: str, shader: Any) -> _Row:
         colour, picture = self._colour(shader, "diffuseColor", (0.18, 0.18, 0.18))
         roughness, rough_picture = self._input(shader, "roughness", 0.5)
-        metallic = _number(self._input(shader, "metallic", 0.0)[0], 0.0)
+        metallic = _input_number(self._input(shader, "metallic", 0.0)[0], 0.0)
         opacity, opacity_picture = self._input(shader, "opacity", 1.0)
-        threshold = _number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
-        alpha = _number(opacity, 1.0) if opacity_picture is None else 1.0
-        row = _pbr(name, [*colour, alpha], _number(roughness, 0.5), metallic)
+        threshold = _input_number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
+        alpha = _input_number(opacity, 1.0) if opacity_picture is None else 1.0
+        row = _pbr(name, [*colour, alpha], _input_number(roughness, 0.5), metallic)
         pbr = row["pbrMetallicRoughness"]
         if picture is not None:
             pbr["baseColorTexture"] = picture
         if rough_picture is not None:
-            times = _number((rough_picture.pop("scale_rgb", None) or (1.0,))[0], 1.0)
+            times = _input_number((rough_picture.pop("scale_rgb", None) or (1.0,))[0], 1.0)
             pbr |= {"metallicRoughnessTexture": rough_picture, "roughnessFactor": times}
         normal = self._input(shader, "normal", None)[1]
         if normal is not None:
@@ -163,9 +163,9 @@ class Shaders:
         factor = (tint if picture else tint * np.array(colour)).tolist()
         alpha = 1.0
         if self._input(shader, "enable_opacity", False)[0]:
-            alpha = _number(self._input(shader, "opacity_constant", 1.0)[0], 1.0)
-        roughness = _number(self._input(shader, "reflection_roughness_constant", 0.5)[0], 0.5)
-        metallic = _number(self._input(shader, "metallic_constant", 0.0)[0], 0.0)
+            alpha = _input_number(self._input(shader, "opacity_constant", 1.0)[0], 1.0)
+        roughness = _input_number(self._input(shader, "reflection_roughness_constant", 0.5)[0], 0.5)
+        metallic = _input_number(self._input(shader, "metallic_constant", 0.0)[0], 0.0)
         row = _pbr(name, [*factor, alpha], roughness, metallic)
         pbr = row["pbrMetallicRoughness"]
         if alpha < 1:
@@ -240,7 +240,7 @@ def _transform(
     }  # fmt: skip
 
 
-def _number(value: Any, default: float) -> float:
+def _input_number(value: Any, default: float) -> float:
     return float(np.clip(_finite(value, default), 0, 1))
 
 

@@ -36,12 +36,12 @@ class Shape:
 def mesh_shape(prim: Any, time: Any, file: str) -> Shape | None:
     """The triangles of a UsdGeom.Mesh; None where it has none. BadHouse where they are damaged."""
     mesh = UsdGeom.Mesh(prim)
-    points = _floats(mesh.GetPointsAttr().Get(time), 3)
+    points = _float_rows(mesh.GetPointsAttr().Get(time), 3)
     sizes = _ints(mesh.GetFaceVertexCountsAttr().Get(time))
     indices = _ints(mesh.GetFaceVertexIndicesAttr().Get(time))
     if not len(points) or not len(sizes):
         return None
-    _check(points, sizes, indices, file, str(prim.GetPath()))
+    _check_mesh(points, sizes, indices, file, str(prim.GetPath()))
     triangles = triangulated_corners(points[indices], sizes)
     polygon = np.repeat(np.arange(len(sizes)), sizes)[triangles[:, 0]]
     holes = _ints(mesh.GetHoleIndicesAttr().Get(time))
@@ -65,7 +65,7 @@ def mesh_shape(prim: Any, time: Any, file: str) -> Shape | None:
     return Shape(points, np.ascontiguousarray(faces), polygon, uvs, normals)
 
 
-def _check(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None:
+def _check_mesh(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None:
     if not (np.abs(points) < 1e9).all():
         raise BadHouse(file, place, "holds a number that is not finite")
     if sizes.min() < 0 or int(sizes.sum()) != len(indices):
@@ -77,7 +77,7 @@ def _check(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None
         raise BadHouse(file, place, "a face names a point that does not exist")
 
 
-def _floats(value: Any, width: int) -> F64:
+def _float_rows(value: Any, width: int) -> F64:
     if value is None:
         return np.zeros((0, width))
     return np.asarray(value, np.float64).reshape(-1, width)
@@ -96,7 +96,7 @@ def _texture_coordinates(prim: Any, time: Any) -> tuple[F64 | None, str]:
     if not found:
         return None, ""
     values = found[0].ComputeFlattened(time)
-    return (None, "") if values is None else (_floats(values, 2), found[0].GetInterpolation())
+    return (None, "") if values is None else (_float_rows(values, 2), found[0].GetInterpolation())
 
 
 def _is_pair(primvar: Any) -> bool:
@@ -115,7 +115,7 @@ def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:
         interpolation = primvar.GetInterpolation()
     else:
         values, interpolation = mesh.GetNormalsAttr().Get(time), mesh.GetNormalsInterpolation()
-    return (None, "") if values is None else (_floats(values, 3), interpolation)
+    return (None, "") if values is None else (_float_rows(values, 3), interpolation)
 
 
 def _of_points(values: F64 | None, interpolation: str, n_points: int) -> F64 | None:
@@ -154,7 +154,7 @@ def solid_shape(prim: Any, time: Any) -> Shape | None:
         w, d = value("width", 2.0) / 2, value("length", 2.0) / 2
         # In the plane of lathes, y across it.
         quad = [[-w, 0, d], [w, 0, d], [w, 0, -d], [-w, 0, -d]]
-        return _along(quads_surface("", np.array([quad]), 0), prim)
+        return _turned_to_axis(quads_surface("", np.array([quad]), 0), prim)
     profiles: dict[str, Any] = {
         "Cylinder": [[0, -h / 2], [r, -h / 2], [r, h / 2], [0, h / 2]],
         "Cone": [[0, -h / 2], [r, -h / 2], [0, h / 2]],
@@ -162,7 +162,9 @@ def solid_shape(prim: Any, time: Any) -> Shape | None:
     }
     if kind not in profiles:
         return None
-    return _along(lathe("", np.array(profiles[kind], np.float64), origin, 0, n=_ROUND), prim)
+    return _turned_to_axis(
+        lathe("", np.array(profiles[kind], np.float64), origin, 0, n=_ROUND), prim
+    )
 
 
 def _capsule(r: float, h: float) -> F64:
@@ -171,7 +173,7 @@ def _capsule(r: float, h: float) -> F64:
     return np.column_stack([r * np.cos(angles), r * np.sin(angles) + lift])
 
 
-def _along(surface: Surface, prim: Any) -> Shape:
+def _turned_to_axis(surface: Surface, prim: Any) -> Shape:
     """The shape turned about y, turned to the prim's axis."""
     axis = str(prim.GetAttribute("axis").Get() or "Z")
     order = {"Z": [2, 0, 1], "X": [1, 2, 0]}.get(axis, [0, 1, 2])

@@ -35,7 +35,7 @@ ROOMS_ATTRIBUTE: Final = "pbrs:rooms"
 """Of the default prim: JSON of the rooms, as our own exports say them."""
 
 
-def read(given: GivenFile, fields: ReadFields) -> House:
+def read_usd(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the place."""
     path, models = given.path, given.models
     need("pxr")
@@ -49,7 +49,7 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     folder = StageFolder.of(path, models)
     stage = opened_stage(folder, notes)
     time = _time()
-    shaders = Shaders(notes, lambda asset: _text(folder, asset), time)
+    shaders = Shaders(notes, lambda asset: _material_text(folder, asset), time)
     nodes = StageNodes(stage, path.name, notes, shaders, fields)
     scale = float(UsdGeom.GetStageMetersPerUnit(stage))
     is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
@@ -66,10 +66,10 @@ def read(given: GivenFile, fields: ReadFields) -> House:
     )  # fmt: skip
     if rooms:
         return house
-    return replace(house, rooms=tuple(_named(room, house.items) for room in house.rooms))
+    return replace(house, rooms=tuple(_name_by_scope(room, house.items) for room in house.rooms))
 
 
-def companions(given: GivenFile, files: SourceFiles) -> str:
+def companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     """Digest of what reading opens beside the file; "" where there is none."""
     path, models = given.path, given.models
     if not is_installed("pxr"):
@@ -77,7 +77,7 @@ def companions(given: GivenFile, files: SourceFiles) -> str:
     from pbrs_farm.read.usd.stage_files import StageFolder, files_of_stage, try_out
 
     folder = StageFolder.of(path, models)
-    beside = [_beside(folder, path, name) for name in (*side_files(path), "rooms.json")]
+    beside = [_name_beside_stage(folder, path, name) for name in (*side_files(path), "rooms.json")]
     try:
         try_out(folder)
         names = [name for name, _ in files_of_stage(folder)]
@@ -99,13 +99,13 @@ def _credit(stage: Any) -> str:
     return str(data.get("copyright") or "")[:500]
 
 
-def _text(folder: StageFolder, asset: Any) -> str:
+def _material_text(folder: StageFolder, asset: Any) -> str:
     """The text of a material's own file, "" where it is not there."""
     data = folder.picture(asset) if asset is not None and hasattr(asset, "resolvedPath") else None
     return "" if data is None else data[: 2**20].decode("utf-8", "replace")
 
 
-def _beside(folder: StageFolder, path: Path, name: str) -> str:
+def _name_beside_stage(folder: StageFolder, path: Path, name: str) -> str:
     """The name below the root of a file beside the stage."""
     own = folder.name_of(str(folder.path)) or path.name
     return str(Path(own).with_name(name))
@@ -113,7 +113,7 @@ def _beside(folder: StageFolder, path: Path, name: str) -> str:
 
 def _mapping(folder: StageFolder, path: Path) -> Mapping:
     name = side_files(path)[0]
-    data = folder.root.read(_beside(folder, path, name), max_bytes=_MOST_JSON_BYTES)
+    data = folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)
     return Mapping() if data is None else mapping_from_json(data, name)
 
 
@@ -127,14 +127,16 @@ def _told_rooms(
         value = json_from_bytes(str(own).encode(), path.name)
         return value if isinstance(value, list) else []
     name = side_files(path)[1]
-    data = folder.root.read(_beside(folder, path, name), max_bytes=_MOST_JSON_BYTES)
+    data = folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)
     if data is not None:
         value = json_from_bytes(data, name)
         rooms = value.get("rooms") if isinstance(value, dict) else None
         if not isinstance(rooms, list):
             raise BadHouse(name, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}]}')
         return rooms
-    data = folder.root.read(_beside(folder, path, "rooms.json"), max_bytes=_MOST_JSON_BYTES)
+    data = folder.root.read(
+        _name_beside_stage(folder, path, "rooms.json"), max_bytes=_MOST_JSON_BYTES
+    )
     if data is None:
         return []
     value = json_from_bytes(data, "rooms.json")
@@ -160,7 +162,7 @@ def _of_stage(row: Any, place: str, scale: float, *, is_z_up: bool) -> dict[str,
     return {"name": word, "types": [word] if word else [], "polygon": points.tolist()}
 
 
-def _named(room: Room, items: Sequence[Item]) -> Room:
+def _name_by_scope(room: Room, items: Sequence[Item]) -> Room:
     """The room with the name of the scope that most of what stands in it lies below."""
     area: Any = shapely.Polygon(room.polygon)
     votes: Counter[str] = Counter()

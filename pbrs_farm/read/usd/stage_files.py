@@ -77,7 +77,7 @@ def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
         name = todo.pop()
         yield name, True
         for asset in _named_in(folder.root.root / name):
-            found = _below(folder, name, asset)
+            found = _name_below_root(folder, name, asset)
             if found is None or found in seen:
                 continue
             seen.add(found)
@@ -96,7 +96,7 @@ def _named_in(path: Path) -> list[str]:
         return []
 
 
-def _below(folder: StageFolder, layer: str, asset: str) -> str | None:
+def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
     """The name below the root that an asset of a layer means; None where it does not exist."""
     if "://" in asset or "[" in asset or "\0" in asset:
         return None

@@ -4,7 +4,7 @@ import pytest
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.read.catalogue.piece_groups import group_rule, group_rules, verdicts
+from pbrs_farm.read.catalogue.piece_groups import group_rule, group_rules, piece_verdicts
 
 
 @pytest.mark.parametrize(
@@ -71,4 +71,4 @@ def test_what_hangs_on_walls_is_measured_along_them() -> None:
 
 def test_every_exception_has_a_reason_and_a_group_that_exists() -> None:
     groups = {r.group for r in group_rules()} | {""}
-    assert all(v.reason and v.group in groups for v in verdicts().values())
+    assert all(v.reason and v.group in groups for v in piece_verdicts().values())

@@ -40,9 +40,9 @@ def open_container(data: bytes, file: str, resources: Resources | None) -> Conta
             if java is None:
                 raise BadHouse(file, "", "holds no Home.xml and no Home", hint=RESAVE)
             return Container(root_from_java(java, file), Layered(archive, resources))
-        return Container(_parsed(xml, file, "Home.xml"), Layered(archive, resources))
+        return Container(_parse_xml(xml, file, "Home.xml"), Layered(archive, resources))
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return Container(_parsed(data, file, ""), Layered(resources))
+        return Container(_parse_xml(data, file, ""), Layered(resources))
     raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=RESAVE)
 
 
@@ -58,7 +58,7 @@ def needs_program(data: bytes, file: str) -> bool:
         return False  # the reader will say what is wrong with it
 
 
-def _parsed(xml: bytes, file: str, entry: str) -> Element:
+def _parse_xml(xml: bytes, file: str, entry: str) -> Element:
     if len(xml) > MAX_XML_BYTES:
         raise BadHouse(file, entry, f"{len(xml)} bytes of XML, at most {MAX_XML_BYTES} are read")
     try:
@@ -73,12 +73,12 @@ def _parsed(xml: bytes, file: str, entry: str) -> Element:
         raise BadHouse(file, entry, text, hint=RESAVE) from None
     if root.tag != "home":
         raise BadHouse(file, entry, f"the root element is <{root.tag[:40]}>, not <home>")
-    if _depth(root) > MAX_DEPTH:
+    if _tree_depth(root) > MAX_DEPTH:
         raise BadHouse(file, entry, f"elements nested deeper than {MAX_DEPTH}")
     return root
 
 
-def _depth(root: Element) -> int:
+def _tree_depth(root: Element) -> int:
     # Go down level by level: no recursion that a deep file could exhaust.
     depth, level = 0, [root]
     while level and depth <= MAX_DEPTH:

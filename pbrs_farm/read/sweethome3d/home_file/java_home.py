@@ -66,7 +66,7 @@ def _is(value: Any, *names: str) -> bool:
     return isinstance(value, JavaObject) and value.class_name.removeprefix(_MODEL) in names
 
 
-def _objects(value: Any) -> list[Any]:
+def _elements_of_list(value: Any) -> list[Any]:
     """The elements of a Java list or array."""
     if isinstance(value, list):
         return value
@@ -82,16 +82,16 @@ def _objects(value: Any) -> list[Any]:
     return [v for v in value.written if not isinstance(v, bytes)]  # bytes: its capacity
 
 
-def _plain(value: Any) -> Any:
+def _unbox(value: Any) -> Any:
     """A boxed number as a number."""
     if isinstance(value, JavaObject) and value.class_name.startswith("java.lang."):
         return value.fields.get("value")
     return value
 
 
-def _text(value: Any) -> str | None:
+def _attribute_text(value: Any) -> str | None:
     """As an XML attribute; None = left out. Floats have 32 bits in Java: shortest text of those."""
-    value = _plain(value)
+    value = _unbox(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -117,12 +117,12 @@ class _Converter:
     def root(self) -> Element:
         """The element <home> with everything in it."""
         # Write what stands on the element itself, then the properties.
-        version = _plain(self._home.get("version"))
+        version = _unbox(self._home.get("version"))
         root = Element("home", version=str(version or ""))
-        _put(root, "name", self._home.get("name"))
-        _put(root, "wallHeight", self._home.get("wallHeight"))
+        _set_attribute(root, "name", self._home.get("name"))
+        _set_attribute(root, "wallHeight", self._home.get("wallHeight"))
         properties = self._home.get("properties")
-        texts = [t for t in _objects(properties) if isinstance(t, str)]
+        texts = [t for t in _elements_of_list(properties) if isinstance(t, str)]
         for name, value in zip(texts[::2], texts[1::2], strict=False):
             SubElement(root, "property", name=name, value=value)
         # Write cameras and levels first: furniture, walls and rooms refer to levels.
@@ -139,7 +139,7 @@ class _Converter:
         return root
 
     def _all(self, name: str, *classes: str) -> list[JavaObject]:
-        return [o for o in _objects(self._home.get(name)) if _is(o, *classes)]
+        return [o for o in _elements_of_list(self._home.get(name)) if _is(o, *classes)]
 
     def _id(self, thing: JavaObject) -> str:
         # Old versions wrote no ids.
@@ -157,7 +157,7 @@ class _Converter:
         lists = (self._home.get(n) for n in names)
         pieces = next((x for x in lists if x is not None), None)
         # Walk the groups without recursion; an object that comes again is left out.
-        stack = [(piece, root, 0) for piece in reversed(_objects(pieces))]
+        stack = [(piece, root, 0) for piece in reversed(_elements_of_list(pieces))]
         seen: set[int] = set()
         while stack:
             piece, parent, depth = stack.pop()
@@ -169,7 +169,7 @@ class _Converter:
             if tag == "furnitureGroup":
                 _fields(element, piece, "name visible")
                 self._refer(element, "level", piece.fields.get("level"))
-                members = _objects(piece.fields.get("furniture"))
+                members = _elements_of_list(piece.fields.get("furniture"))
                 stack += [(member, element, depth + 1) for member in reversed(members)]
             else:
                 self._piece(element, piece)
@@ -178,34 +178,34 @@ class _Converter:
         _fields(element, piece, _PIECE)
         f = piece.fields
         self._refer(element, "level", f.get("level"))
-        _put(element, "model", _content_name(f.get("model")))
+        _set_attribute(element, "model", _content_name(f.get("model")))
         # Leave out what says nothing: a height as the piece's own, a rotation by nothing.
         in_plan = f.get("heightInPlan")
         if in_plan and in_plan != f.get("height"):
-            _put(element, "heightInPlan", in_plan)
+            _set_attribute(element, "heightInPlan", in_plan)
         if f.get("modelRotation") != _UPRIGHT:
-            _numbers(element, "modelRotation", f.get("modelRotation"))
-        _colours(element, piece, "color")
-        _texture(element, None, f.get("texture"))
+            _add_points(element, "modelRotation", f.get("modelRotation"))
+        _set_colours(element, piece, "color")
+        _add_texture_element(element, None, f.get("texture"))
         # Write what the home changed of the model: materials, moved parts, light sources.
-        for material in _objects(f.get("modelMaterials")):
+        for material in _elements_of_list(f.get("modelMaterials")):
             if _is(material, "HomeMaterial"):
                 inner = SubElement(element, "material")
                 _fields(inner, material, "name key shininess")
-                _colours(inner, material, "color")
-                _texture(inner, None, material.fields.get("texture"))
-        for moved in _objects(f.get("modelTransformations")):
+                _set_colours(inner, material, "color")
+                _add_texture_element(inner, None, material.fields.get("texture"))
+        for moved in _elements_of_list(f.get("modelTransformations")):
             if _is(moved, "Transformation"):
                 inner = SubElement(element, "transformation")
                 _fields(inner, moved, "name")
-                _numbers(inner, "matrix", moved.fields.get("matrix"))
-        for source in _objects(f.get("lightSources")):
+                _add_points(inner, "matrix", moved.fields.get("matrix"))
+        for source in _elements_of_list(f.get("lightSources")):
             if _is(source, "LightSource"):
                 inner = SubElement(element, "lightSource")
                 _fields(inner, source, "x y z diameter")
-                _colours(inner, source, "color")
-        for name in _objects(f.get("lightSourceMaterialNames")):
-            _put(SubElement(element, "lightSourceMaterial"), "name", name)
+                _set_colours(inner, source, "color")
+        for name in _elements_of_list(f.get("lightSourceMaterialNames")):
+            _set_attribute(SubElement(element, "lightSourceMaterial"), "name", name)
 
     def _wall(self, element: Element, wall: JavaObject) -> None:
         element.set("id", self._id(wall))
@@ -214,60 +214,60 @@ class _Converter:
         for name in ("wallAtStart", "wallAtEnd", "level"):
             self._refer(element, name, f.get(name))
         # Write what each side wears.
-        _colours(element, wall, "leftSideColor rightSideColor topColor")
+        _set_colours(element, wall, "leftSideColor rightSideColor topColor")
         for side in ("leftSide", "rightSide"):
-            _put(element, f"{side}Shininess", f.get(f"{side}Shininess") or None)
-            _texture(element, f"{side}Texture", f.get(f"{side}Texture"))
+            _set_attribute(element, f"{side}Shininess", f.get(f"{side}Shininess") or None)
+            _add_texture_element(element, f"{side}Texture", f.get(f"{side}Texture"))
             board = f.get(f"{side}Baseboard")
             if isinstance(board, JavaObject) and _is(board, "Baseboard"):
                 inner = SubElement(element, "baseboard", attribute=f"{side}Baseboard")
                 _fields(inner, board, "thickness height")
-                _colours(inner, board, "color")
-                _texture(inner, None, board.fields.get("texture"))
+                _set_colours(inner, board, "color")
+                _add_texture_element(inner, None, board.fields.get("texture"))
 
     def _room(self, element: Element, room: JavaObject) -> None:
         _fields(element, room, _ROOM)
         self._refer(element, "level", room.fields.get("level"))
-        _colours(element, room, "floorColor ceilingColor")
+        _set_colours(element, room, "floorColor ceilingColor")
         for part in ("floor", "ceiling"):
-            _put(element, f"{part}Shininess", room.fields.get(f"{part}Shininess") or None)
-            _texture(element, f"{part}Texture", room.fields.get(f"{part}Texture"))
-        for point in _objects(room.fields.get("points")):
+            _set_attribute(element, f"{part}Shininess", room.fields.get(f"{part}Shininess") or None)
+            _add_texture_element(element, f"{part}Texture", room.fields.get(f"{part}Texture"))
+        for point in _elements_of_list(room.fields.get("points")):
             if isinstance(point, list) and len(point) == 2:
                 inner = SubElement(element, "point")
-                _put(inner, "x", point[0])
-                _put(inner, "y", point[1])
+                _set_attribute(inner, "x", point[0])
+                _set_attribute(inner, "y", point[1])
 
 
-def _put(element: Element, name: str, value: Any) -> None:
-    text = _text(value)
+def _set_attribute(element: Element, name: str, value: Any) -> None:
+    text = _attribute_text(value)
     if text is not None:
         element.set(name, text)
 
 
 def _fields(element: Element, thing: JavaObject, names: str) -> None:
     for name in names.split():
-        _put(element, name, thing.fields.get(name))
+        _set_attribute(element, name, thing.fields.get(name))
 
 
-def _colours(element: Element, thing: JavaObject, names: str) -> None:
+def _set_colours(element: Element, thing: JavaObject, names: str) -> None:
     for name in names.split():
-        value = _plain(thing.fields.get(name))
+        value = _unbox(thing.fields.get(name))
         if isinstance(value, int):
             element.set(name, f"{value & 0xFFFFFFFF:08X}")
 
 
-def _numbers(element: Element, name: str, rows: Any) -> None:
-    flat = [v for row in _objects(rows) for v in (row if isinstance(row, list) else [row])]
-    texts: Iterable[str | None] = map(_text, flat)
+def _add_points(element: Element, name: str, rows: Any) -> None:
+    flat = [v for row in _elements_of_list(rows) for v in (row if isinstance(row, list) else [row])]
+    texts: Iterable[str | None] = map(_attribute_text, flat)
     if flat:
         element.set(name, " ".join(t for t in texts if t is not None))
 
 
-def _texture(element: Element, attribute: str | None, texture: Any) -> None:
+def _add_texture_element(element: Element, attribute: str | None, texture: Any) -> None:
     if not _is(texture, "HomeTexture"):
         return
     inner = SubElement(element, "texture")
-    _put(inner, "attribute", attribute)
+    _set_attribute(inner, "attribute", attribute)
     _fields(inner, texture, _TEXTURE)
-    _put(inner, "image", _content_name(texture.fields.get("image")))
+    _set_attribute(inner, "image", _content_name(texture.fields.get("image")))

@@ -72,13 +72,13 @@ def java_objects(data: bytes) -> list[Any]:
     found = []
     try:
         while not reader.is_done:
-            found.append(_run(reader.content()))
+            found.append(_run_calls(reader.content()))
     except struct.error:
         raise JavaStreamError(f"byte {reader.at}: the stream ends early") from None
     return found
 
 
-def _run(call: _Call) -> Any:
+def _run_calls(call: _Call) -> Any:
     stack, result = [call], None
     while stack:
         try:

@@ -31,8 +31,8 @@ def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
         paint=piece_paint(a),
         materials=_materials(a),
         transformations=_transformations(a),
-        frame=_frame(a) if _is_opening(a) else None,
-        lights=_lights(a) if element.tag == "light" else (),
+        frame=_parse_door_frame(a) if _is_opening(a) else None,
+        lights=_parse_lights(a) if element.tag == "light" else (),
         light_materials=tuple(e.get("name", "") for e in element.findall("lightSourceMaterial")),
         power=a.within("power", 0.5, 0.0, 10.0) if element.tag == "light" else 0.0,
         staircase_cut_out=a.text("staircaseCutOutShape"),
@@ -64,7 +64,7 @@ def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]
     return tuple(found)
 
 
-def _frame(a: Attributes) -> DoorFrame:
+def _parse_door_frame(a: Attributes) -> DoorFrame:
     return DoorFrame(
         cut_out=a.text("cutOutShape", FULL_CUT_OUT),
         wall_width=a.within("wallWidth", 1.0, -1.0, 2.0),
@@ -79,7 +79,7 @@ def _fraction(a: Attributes, name: str) -> float:
     return a.within(name, 0.5, -10.0, 10.0)
 
 
-def _lights(a: Attributes) -> tuple[PlanLight, ...]:
+def _parse_lights(a: Attributes) -> tuple[PlanLight, ...]:
     lights = []
     for k, element in enumerate(a.element.findall("lightSource")):
         inner = Attributes(a.file, f"{a.place} lightSource #{k}", element, a.max_extent_m)

@@ -45,20 +45,20 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
 
     # Read each kind in the file's order, since ids and messages count by it.
     walls = tuple(
-        _wall(open_(e, f"wall {e.get('id', f'#{k}')}"), k, wall_height)
+        _parse_wall(open_(e, f"wall {e.get('id', f'#{k}')}"), k, wall_height)
         for k, e in enumerate(root.findall("wall"))
     )
     rooms = tuple(
-        _room(open_(e, f"room #{k} '{e.get('name', '')}'"))
+        _parse_room(open_(e, f"room #{k} '{e.get('name', '')}'"))
         for k, e in enumerate(root.findall("room"))
     )
     pieces = tuple(
         parse_piece(open_(e, f"{e.tag} #{k} '{e.get('name', '')}'"), level, group)
-        for k, (e, level, group) in enumerate(_furniture(root, file))
+        for k, (e, level, group) in enumerate(_furniture_elements(root, file))
         if e.get("visible", "true") != "false"
     )
     cameras = tuple(
-        _camera(open_(e, f"camera '{e.get('name', '')}'"), k)
+        _parse_camera(open_(e, f"camera '{e.get('name', '')}'"), k)
         for k, e in enumerate(
             e for e in root if e.get("attribute") == "storedCamera" and "amera" in e.tag
         )
@@ -68,7 +68,7 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
         version=root.get("version", ""),
         wall_height=wall_height,
         properties={e.get("name", ""): e.get("value", "") for e in root.findall("property")},
-        levels=_levels([open_(e, f"level {e.get('id', '')}") for e in root.findall("level")]),
+        levels=_parse_levels([open_(e, f"level {e.get('id', '')}") for e in root.findall("level")]),
         walls=walls,
         rooms=rooms,
         pieces=pieces,
@@ -76,7 +76,7 @@ def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
     )
 
 
-def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
+def _furniture_elements(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
     # Pieces in document order with level and group; a group's pieces have absolute coordinates.
     n = 0
     stack = [(e, "", "") for e in reversed(list(root))]
@@ -94,7 +94,7 @@ def _furniture(root: Element, file: str) -> Iterator[tuple[Element, str, str]]:
             yield element, level, group
 
 
-def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
+def _parse_levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     # Sort by height, then by the order that the program keeps for levels of one height.
     found = [
         (a.metres("elevation", 0.0), a.number("elevationIndex", 0.0), k)
@@ -114,7 +114,7 @@ def _levels(elements: list[Attributes]) -> tuple[PlanLevel, ...]:
     return tuple(levels)
 
 
-def _wall(a: Attributes, number: int, wall_height: float) -> HomeWall:
+def _parse_wall(a: Attributes, number: int, wall_height: float) -> HomeWall:
     boards = [b for e in a.element.findall("baseboard") if (b := baseboard_of(a, e)) is not None]
     return HomeWall(
         id=a.text("id", f"#{number}"),
@@ -134,7 +134,7 @@ def _wall(a: Attributes, number: int, wall_height: float) -> HomeWall:
     )
 
 
-def _room(a: Attributes) -> HomeRoom:
+def _parse_room(a: Attributes) -> HomeRoom:
     points = [
         Attributes(a.file, f"{a.place} point #{k}", e, a.max_extent_m)
         for k, e in enumerate(a.element.findall("point"))
@@ -152,7 +152,7 @@ def _room(a: Attributes) -> HomeRoom:
     )
 
 
-def _camera(a: Attributes, number: int) -> PlanCamera:
+def _parse_camera(a: Attributes, number: int) -> PlanCamera:
     return PlanCamera(
         name=a.text("name", f"camera {number}"),
         at=(a.metres("x"), a.metres("y"), a.metres("z")),

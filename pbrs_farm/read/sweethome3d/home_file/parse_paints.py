@@ -11,25 +11,25 @@ from pbrs_farm.read.sweethome3d.home_file.xml_attributes import Attributes
 def wall_paint(a: Attributes, side: str) -> Paint:
     """The paint of a wall's "left" or "right" side, or of its "top"."""
     if side == "top":
-        return _paint(a, "topColor", None, None)
-    return _paint(a, f"{side}SideColor", f"{side}SideTexture", f"{side}SideShininess")
+        return _paint_of(a, "topColor", None, None)
+    return _paint_of(a, f"{side}SideColor", f"{side}SideTexture", f"{side}SideShininess")
 
 
 def room_paint(a: Attributes, part: str) -> Paint:
     """The paint of a room's "floor" or "ceiling"."""
-    return _paint(a, f"{part}Color", f"{part}Texture", f"{part}Shininess")
+    return _paint_of(a, f"{part}Color", f"{part}Texture", f"{part}Shininess")
 
 
 def piece_paint(a: Attributes) -> Paint:
     """The paint that overrides a whole piece, or one of its materials."""
-    paint = _paint(a, "color", "", "shininess")
+    paint = _paint_of(a, "color", "", "shininess")
     alpha = a.argb("color")
     # A material of alpha 0 is how the program hides a part.
     is_hidden = a.element.tag == "material" and alpha is not None and alpha[0] == 0
     return Paint(paint.colour, paint.picture, paint.shininess, is_hidden)
 
 
-def _paint(a: Attributes, colour: str, texture: str | None, shininess: str | None) -> Paint:
+def _paint_of(a: Attributes, colour: str, texture: str | None, shininess: str | None) -> Paint:
     argb = a.argb(colour)
     picture = None
     if texture is not None:
@@ -70,5 +70,5 @@ def baseboard_of(wall: Attributes, element: Element) -> Baseboard | None:
         is_left=side.startswith("left"),
         thickness=thickness,
         height=height,
-        paint=_paint(a, "color", "", None),
+        paint=_paint_of(a, "color", "", None),
     )
