@@ -12,7 +12,7 @@ from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
 from tests.example_homes import example_homes
 from tests.sample.sampled_rooms import IndependentLook
-from tests.sample.test_rules import hold_the_rules
+from tests.sample.test_paper_rules import hold_the_rules
 
 pytestmark = pytest.mark.homes
 SMALL = {"score_width_px": 160, "score_height_px": 120, "coarse_width_px": 80, "cell_m": 0.4}
