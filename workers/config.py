@@ -68,7 +68,12 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class FarmConfig:
-    """Everything a coordinator, a worker or a client needs to know. Raises BadInput."""
+    """Everything a coordinator, a worker or a client needs to know.
+
+    `config_from_environment` makes it from PBRS_* and PBRS_FARM_* (docs/farm.md lists them);
+    tests give the fields. Only redis_url is needed to look at a farm; what stores something
+    needs store_url. Raises BadInput for a value out of its range.
+    """
 
     redis_url: Secret
     redis_ca: str = ""  # file of the CA for rediss://, "" = the system's

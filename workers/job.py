@@ -32,7 +32,11 @@ def work_version() -> str:
 
 
 class HouseEntry(Record):
-    """A house of a job."""
+    """A house of a job: its id, and what its geometry task reads.
+
+    house_id: unique in the job, and a folder of the store. The source is text for the runner
+    alone: the farm passes it on unread.
+    """
 
     house_id: str
     source: str = ""  # JSON the runner understands; it travels to the geometry task only

@@ -21,7 +21,11 @@ OnText = Callable[[str], None]
 
 
 class Request(Record):
-    """A task for the runner."""
+    """A task for the runner, as it crosses to the render process.
+
+    unit: "-" for the house or job as a whole, a number for a batch of views, "s3" for shard 3
+    (workers/ids.py).
+    """
 
     job_id: str
     house: str

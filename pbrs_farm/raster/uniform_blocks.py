@@ -16,7 +16,7 @@ _EMISSION = {MaterialKind.BULB: 1.0, MaterialKind.SHADE: 0.5}
 
 
 def material_blocks(house: House) -> F32:
-    """(n_materials, 16) the Material block of each material."""
+    """(n_materials, 16) float32: the Material block of each material, in the layout that shaders read (std140)."""
     rows = [_material_block(m) for m in house.materials]
     return np.array(rows, np.float32).reshape(-1, BLOCK_FLOATS)
 

@@ -22,7 +22,11 @@ from pbrs_farm.raycast.variant import mitsuba
 
 
 class ScalarTracer:
-    """RayTracer of scalar_rgb; the same answers as JitTracer but for ties."""
+    """RayTracer of scalar_rgb; the same answers as JitTracer but for ties.
+
+    About 20 times slower, ray by ray in Python: for machines where neither LLVM nor CUDA is
+    found. Ties are rays through an edge, where either face is right.
+    """
 
     def __init__(self, variant: str, positions: F32, faces: I32) -> None:
         self._variant = variant

@@ -99,7 +99,11 @@ def choose_variant() -> str:
 
 
 def mitsuba(variant: str | None = None) -> Any:
-    """The mitsuba module with the variant set; the chosen one when None. Raises MachineFailed."""
+    """The mitsuba module with a variant set; that of `choose_variant` when None.
+
+    Call it before anything of mitsuba or drjit is used: the variant is the process's, and the
+    last call counts. Raises MachineFailed when the variant cannot be loaded here.
+    """
     name = choose_variant() if variant is None else variant
     module = _module("mitsuba")
     if module.variant() != name:

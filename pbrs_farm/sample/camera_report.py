@@ -66,7 +66,10 @@ def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
 
 
 class Verdict(IntEnum):
-    """The first rule that rejected a candidate, in the order the rules are tried, or its success."""
+    """What became of a candidate viewpoint: the first rule that rejected it, or its success.
+
+    The numbers are the order in which rules are tried; maps and reports use the label.
+    """
 
     OUTSIDE_ROOM = 0  # not inside the room's polygon
     NEAR_OBSTACLE = 1  # closer to a triangle than the clearance

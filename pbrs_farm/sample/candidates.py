@@ -19,7 +19,11 @@ from pbrs_farm.core.recipe import CameraFields
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """N viewpoints of one room, sector by sector, cells in order of z, then x."""
+    """N candidate viewpoints of one room, sector by sector, cells in order of z, then x.
+
+    Arrays rather than cameras: a room has thousands, of which few are looked at; `cameras`
+    makes those.
+    """
 
     eye: F64  # (N, 3) metres
     towards: F64  # (N, 3) unit

@@ -18,8 +18,10 @@ _POINTS: Final = 1 << 12  # points asked of the tree at once
 def near_any_triangle(points: F64, geometry: Geometry, distance_m: float) -> Bools:
     """(N,) bool: a triangle comes within distance_m of the point (paper section 3.1: 10 cm).
 
-    points: (N, 3) metres. The exact point-to-triangle distance in float64; triangles whose box
-    lies farther away are left out by a tree over their plan boxes. Memory is bounded.
+    points: (N, 3) metres. geometry: the whole house's. Computed exactly, point to triangle,
+    in float64; triangles whose box lies farther away are left out by a tree over their plan
+    boxes, and pairs are taken in portions that bound memory. False everywhere for a distance
+    of 0 or less.
     """
     near = np.zeros(len(points), np.bool_)
     if distance_m <= 0 or not len(points) or not len(geometry.faces):

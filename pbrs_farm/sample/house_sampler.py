@@ -23,7 +23,10 @@ from pbrs_farm.sample.view_overlap import DepthOf
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """The views of a house, the report for cameras.json, and all candidates room by room."""
+    """The outcome of sampling a house: its views, the report for cameras.json, every candidate by room.
+
+    The traces are for the camera map alone and are not stored.
+    """
 
     views: tuple[View, ...]
     report: CameraReport

@@ -20,7 +20,11 @@ _TILES = 8  # along each side of the picture
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LightResult:
-    """The linear AOVs of one view, raw (not denoised); images are (H, W, 3) float32."""
+    """The linear AOVs (arbitrary output variables) of one view, raw, not denoised; (H, W, 3) float32.
+
+    A mode's picture is a sum of light groups (`mode`); `develop` makes displayable pictures
+    of it. Metropolis and `path` give the same fields, so readers need not know which it was.
+    """
 
     outdoor: RadianceImage  # W m-2 sr-1, finite, >= 0
     indoor: RadianceImage
@@ -129,7 +133,11 @@ class GroupSums(Protocol):
 def result_from_sums(
     sums: GroupSums, camera: Camera, spp: int, facts: dict[str, Any]
 ) -> LightResult:
-    """Means of spp samples per pixel, with the noise estimated from even and odd samples."""
+    """The result of sums over spp samples per pixel, with the noise estimated from even and odd samples.
+
+    sums: of W * H lanes, row by row. facts: what view.json says of the render. With one
+    sample the two halves cannot be separated and the noise is meaningless.
+    """
     shape = (camera.intrinsics.height_px, camera.intrinsics.width_px, 3)
     n_even = max((spp + 1) // 2, 1)
     n_odd = max(spp - n_even, 1)

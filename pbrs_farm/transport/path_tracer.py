@@ -160,7 +160,13 @@ def trace(
     *,
     max_depth: int | None = None,
 ) -> SampleSums:
-    """Trace n_samples paths for every lane; max_depth replaces the recipe's."""
+    """The sums over lanes.n_samples paths of every lane, from lanes.first_sample on.
+
+    Sums of consecutive ranges of samples add up to those of the whole range, so a render can be cut
+    into launches. max_depth: segments of a path, the
+    camera's among them, instead of the recipe's: 2 is light that met one surface. Equal
+    arguments give equal bits on one machine.
+    """
     # The pilot asks for one technique at a time: sunlit points are none of them. Trace them before
     # anything of the kernel is there, or it is another kernel where there are some.
     sunlit, n_samples = emitters.sunlit, lanes.n_lanes * lanes.n_samples

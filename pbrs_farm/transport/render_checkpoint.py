@@ -13,8 +13,10 @@ Arrays = Mapping[str, NDArray[Any]]
 class RenderCheckpoint(Protocol):
     """Where a render says how far it is, and what it could go on from.
 
-    A render has parts (light that meets one surface, the chains ...), each with a state of its own
-    from which it goes on to the same picture.
+    A render has parts ("path"; "direct" and the chains of Metropolis), each with a state of
+    its own from which it goes on to the same picture. The render calls `kept` once when a
+    part begins and `keep` after each launch; the checkpoint decides how often the state is
+    really stored. States are arrays by name, as np.savez takes them.
     """
 
     @property
@@ -35,7 +37,7 @@ class RenderCheckpoint(Protocol):
 
 
 class NoCheckpoint:
-    """A render that nobody goes on with."""
+    """A render that is not kept: nothing was stored before, and nothing is stored."""
 
     spent_s = 0.0
 

@@ -26,7 +26,11 @@ _SPP: Final = "spp"  # in what is kept: samples of each pixel so far
 
 @dataclass(frozen=True, slots=True)
 class SampledView:
-    """What is sampled, and how."""
+    """A view to be sampled: the scene, its emitters with that view's weights, camera, fields and seed.
+
+    The emitters must be those of this view now (`LightScene.emitters`): another view's
+    weights leave the mean right, but the picture noisier.
+    """
 
     scene: DeviceScene
     emitters: Emitters

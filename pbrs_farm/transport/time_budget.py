@@ -10,7 +10,19 @@ _FIRST_SPP: Final = 4  # samples of the first launch, which measures the pace
 
 
 class TimeBudget:
-    """A budget of seconds that counts down from now, spent_s of it gone; 0 sets no limit."""
+    """A budget of seconds that counts down from its making on; 0 sets no limit.
+
+    Ask `n_that_fit` before each launch and call `record` after it: the pace of one launch
+    decides how many samples the next may have. The first launch has few samples, to measure
+    the pace, and always fits.
+
+        budget = TimeBudget(60.0)
+        while spp < goal and (n := budget.n_that_fit(goal - spp)):
+            render(n)
+            budget.record(n)
+
+    spent_s: seconds of the budget that an earlier, killed run of the same render used.
+    """
 
     def __init__(self, budget_s: float, spent_s: float = 0.0) -> None:
         self.is_limited = budget_s > 0

@@ -439,7 +439,11 @@ class Farm:
 def completed(
     houses: Sequence[HouseEntry], spec: JobSpec
 ) -> tuple[tuple[HouseEntry, ...], JobSpec]:
-    """Houses sorted and the spec with its id; BadInput for no house or one named twice."""
+    """(houses sorted by id, the spec with its number of houses and its job id).
+
+    The id is a digest of both, so that the same work submitted twice is one job. Raises
+    BadInput for no house, or for one that is named twice.
+    """
     from workers.job import job_id
 
     if not houses:
@@ -454,7 +458,13 @@ def completed(
 
 
 def new_spec(recipe: Recipe, **fields: Any) -> JobSpec:
-    """A JobSpec of this version; its id is set by submit."""
+    """A JobSpec of this program's version, to be given to `Farm.submit`, which sets its id.
+
+    fields: any field of JobSpec but job_id, version and recipe. Raises pydantic's
+    ValidationError for others.
+
+        new_spec(recipe_from_name("fast"), priority=2, layers=("albedo",))
+    """
     from workers.job import JobSpec, work_version
 
     return JobSpec.model_validate(

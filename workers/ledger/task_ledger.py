@@ -56,7 +56,7 @@ class LedgerUnavailable(PbrsError, Transient):
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The answer to a claim."""
+    """The answer to a claim of one task; only verdict "run" grants it. docs/farm.md explains each verdict."""
 
     verdict: ClaimAnswer
     detail: str = ""  # the attempt's number for "run", otherwise the reason
@@ -66,7 +66,11 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A task that ended badly, as the ledger keeps it."""
+    """A task that ended badly, as the ledger keeps it.
+
+    Faults of one class whose messages differ only in numbers and paths have one fingerprint:
+    `failures` groups by it, and a job with too many of one pauses itself.
+    """
 
     fault: FaultClass
     fingerprint: str  # equal for faults alike
@@ -89,7 +93,7 @@ def fault_from_json(text: str) -> Fault:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """How a task ended well."""
+    """How a task ended well: what it took and what it found, for what follows it."""
 
     seconds: float
     batches: tuple[tuple[str, ...], ...] = ()  # of views, only after geometry
@@ -125,7 +129,11 @@ def hold_from_text(job: str, task: str, text: str) -> Hold:
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """Somebody who may ask the farm for work."""
+    """Somebody who may ask the farm for work, with what he may take of it.
+
+    Limits of 0 mean none. The share counts only against others who want slots at the same
+    time.
+    """
 
     name: str
     token_sha256: str = ""
@@ -150,7 +158,13 @@ class HouseState:
 
 @dataclass(frozen=True, slots=True)
 class JobView:
-    """A job as the ledger sees it now, from O(1) reads."""
+    """A job as the ledger sees it at one moment; its properties are what others ask of it.
+
+    It is read in a handful of O(1) calls whatever the job's size, and does not follow later
+    changes. counts has "<stage>:<letter>" (STATES), "done:<stage>", "seconds:<stage>",
+    "houses:<how>", "batches", "views" and "failures:<class>"; what never happened is missing,
+    so read by `counts.get(name, 0)`.
+    """
 
     job_id: str
     fields: Mapping[str, str]  # what it was entered with, its state and the reason for it

@@ -28,7 +28,7 @@ _NUMBER_OF_PROPERTIES = 8  # x y z, u v, nx ny nz
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """What a face is part of."""
+    """What a face is part of: carried through every boolean, so that results go back to their items."""
 
     item: int  # index into House.items
     surface: str  # name, one of its item's
@@ -37,7 +37,7 @@ class Tag:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """Triangles of one tag."""
+    """Triangles of one tag: the form in which surfaces enter and leave boolean work."""
 
     tag: Tag
     positions: F64  # (V, 3) metres
@@ -47,7 +47,11 @@ class Patch:
 
 
 class TagTable:
-    """Which original id of manifold3d stands for which tag; grows as solids are made."""
+    """Which original id of manifold3d stands for which tag; grows as solids are made.
+
+    One table serves one repair: solids of two tables must not meet in a boolean, since ids
+    are looked up in one.
+    """
 
     def __init__(self) -> None:
         self._tags: dict[int, Tag] = {}
@@ -64,7 +68,12 @@ class TagTable:
 
 
 def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | None:
-    """The closed solid the patches bound, faces turned outward; None if they bound none."""
+    """The closed solid that patches bound, faces turned outward; None if they bound none.
+
+    Corners are welded where they are equal and, only if that closes nothing, where they are
+    within WELD_M. Open patches give None rather than a crash of manifold3d: only
+    closed meshes are handed to it.
+    """
     patches = [p for p in patches if len(p.faces)]
     if not patches:
         return None

@@ -29,7 +29,10 @@ _SAME_FACING = 1.0 - 1e-6  # cosine between normals of one plane
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarSurface:
-    """The faces of a planar floor or ceiling that lie in one plane."""
+    """The faces of a planar floor or ceiling that lie in one plane, as an area and that plane.
+
+    Thickened to a slab by slabs.py. What is solid already never becomes one.
+    """
 
     item: int  # index into House.items
     room_id: str | None

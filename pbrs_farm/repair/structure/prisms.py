@@ -24,7 +24,7 @@ _CRUMBS_M = (1e-5, 1e-4, 1e-3)
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """The heights y = a x + b z + c."""
+    """The heights y = a x + b z + c of a plane that is not upright; metres."""
 
     a: float
     b: float
@@ -72,7 +72,11 @@ def _affine_columns(positions: F64) -> F64:
 
 
 def polygons_of(shape: plan.Shape, *, min_area_m2: float = 1e-6) -> list[shapely.Polygon]:
-    """The polygons in any shapely geometry that are worth keeping, in a fixed order."""
+    """The polygons in any shapely geometry, larger than min_area_m2, in a fixed order.
+
+    Lines and points that intersections leave are dropped. The order (by bounds, then area)
+    makes repair deterministic whatever order shapely gives.
+    """
     found = [
         p
         for p in shapely.get_parts(shapely.get_parts(shape)).tolist()
@@ -130,7 +134,11 @@ def solid_prisms(
     table: TagTable,
     uv: UvMap | None = None,
 ) -> list[Manifold]:
-    """The prisms over polygons as solids, those left out that have no volume."""
+    """The prisms over polygons between two planes as solids; those without volume are left out.
+
+    tags: of bottom, top and sides. uv: texture coordinates of top and bottom,
+    None = metres in plan.
+    """
     solids = (solid_from_patches(prism(p, low, high, tags, uv), table) for p in polygons)
     return [s for s in solids if s is not None]
 

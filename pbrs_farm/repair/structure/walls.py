@@ -60,7 +60,11 @@ def with_metric_uv(patch: Patch) -> Patch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wall:
-    """A wall's solid, uncut."""
+    """A wall's solid before openings are cut, with its footprint and heights.
+
+    An item whose shells are several walls gives several. Joints and cuts take `item` and
+    `material` from here.
+    """
 
     item: int  # index into House.items
     solid: Manifold

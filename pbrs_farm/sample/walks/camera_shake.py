@@ -19,7 +19,11 @@ _STEP_M: Final = 0.006  # up and down with every step
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shake:
-    """What is added to a steady camera at N times."""
+    """What is added to a steady camera at N times.
+
+    The two speeds bound how fast the shake alone may move and turn a camera, so that a walk
+    can keep below a limit with it: subtract them from what the path may use.
+    """
 
     moved: F64  # (N, 3) metres, world
     turned: F64  # (N, 3) radians: azimuth, tilt, roll
@@ -29,7 +33,12 @@ class Shake:
 
 
 def shake(times: F64, strength: float, rng: np.random.Generator) -> Shake:
-    """The shake at times (N,) s; strength: 1 = a steady hand's, 0 = none."""
+    """The shake at times (N,) s, from slow sine waves of random phase on every axis.
+
+    strength: 1 = a steady hand's, 0 = none; it scales all amplitudes. rng: decides the
+    phases, six times the number of waves, so equal generators give equal shakes. With each
+    step the camera also goes up and down.
+    """
     frequency = np.asarray(_WAVES_HZ)
     phases = rng.uniform(0, 2 * math.pi, (6, len(frequency)))
     waves = np.sin(2 * math.pi * frequency * times[:, None, None] + phases).sum(-1)  # (N, 6)

@@ -23,7 +23,11 @@ _WRAPPED_PX: Final = 64  # beyond a panorama's edges, more than a denoiser looks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearAovs:
-    """The linear AOVs (arbitrary output variables) of radiance.exr, (H, W, 3) each."""
+    """The linear AOVs of radiance.exr, (H, W, 3) float32 each: what `develop` makes pictures of.
+
+    albedo and normal are means over the pixel, filtered as the radiance is, and guide the
+    denoiser.
+    """
 
     outdoor: RadianceImage  # raw radiance of each light group, W m-2 sr-1
     indoor: RadianceImage

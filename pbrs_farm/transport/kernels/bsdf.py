@@ -26,7 +26,11 @@ _MIN_RECONNECT_ALPHA = 0.1
 
 
 class Bsdf(NamedTuple):
-    """The parameters of the reflectance model at a point, lane by lane."""
+    """The parameters of the reflectance model at a point, lane by lane.
+
+    A diffuse base, diffuse transmission and a GGX coat above (Ashikhmin and Shirley's
+    coupling keeps energy).
+    """
 
     kd: Any  # Color3f, diffuse reflectance
     f0: Any  # Color3f, the coat's reflectance at normal incidence; of a mirror its reflectance
@@ -41,7 +45,12 @@ def luminance(rgb: Any) -> Any:
 
 
 def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
-    """(f |cos wo|, pdf of sample_bsdf() per solid angle); local directions, wi.z > 0."""
+    """(f |cos wo| as Color3f, pdf of sample_bsdf per solid angle) of two local directions.
+
+    wi, wo: unit, in the shading frame (z is the normal), pointing away from the surface, wi.z
+    > 0; wo.z < 0 is transmission. Mirrors and thin glass give 0: their directions are deltas,
+    which only sample_bsdf draws.
+    """
     above = wo.z > 0
     cos_o = dr.abs(wo.z)
     has_coat = bsdf.alpha > 0

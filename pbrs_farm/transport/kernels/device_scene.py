@@ -48,7 +48,10 @@ _MAP_PACKET = FIRST_MAP_TEXEL // 4  # the last one, of the maps
 
 
 class SurfaceInteraction(NamedTuple):
-    """The first surface along each ray, lane by lane. Normals point to the side the ray comes from."""
+    """The first surface along each ray, lane by lane; fields are valid where `valid` is.
+
+    Both normals point to the side that the ray comes from.
+    """
 
     valid: Any  # Bool: the ray meets a surface
     p: Any  # Point3f
@@ -64,7 +67,13 @@ class SurfaceInteraction(NamedTuple):
 
 
 class DeviceScene:
-    """The geometry and materials of a house on the device: Mitsuba scenes and buffers."""
+    """The geometry and materials of a house on the device: Mitsuba scenes and buffers.
+
+    `intersect` is for paths, `transmittance` for shadow rays. Kernels gather from its buffers
+    and hold no number of the house, so they are compiled once for all houses. It is not for
+    scalar variants, which have no arrays. Building it builds one or two trees over all faces;
+    keep it as long as the house is rendered.
+    """
 
     def __init__(self, tables: SceneTables, *, one_scene: bool = False) -> None:
         """one_scene: all rays go through one Mitsuba scene, for OptiX, which takes one in a kernel.
@@ -256,13 +265,21 @@ class DeviceScene:
 
 
 def bend_normal(n: Any, d: Any) -> Any:
-    """A shading normal turned so that a ray of direction d comes from its front."""
+    """A unit shading normal, bent where a ray of direction d would come from behind it.
+
+    A normal map or interpolation may turn the shading normal from the viewer; at least
+    LEAST_COS is left between both, so that the reflectance model is defined.
+    """
     towards = -dr.dot(n, d)
     return dr.select(towards < LEAST_COS, dr.normalize(n - (LEAST_COS - towards) * d), n)
 
 
 def offset_ray_origin(p: Any, n: Any) -> Any:
-    """p moved off its surface along n, so that a ray from there does not meet it again."""
+    """p (Point3f) moved off its surface along n (unit), so that a ray from there does not meet it again.
+
+    n: towards the side that the ray goes to. The step grows with the coordinates, as
+    float32's spacing does.
+    """
     return mi.Point3f(p + n * (_RAY_OFFSET * (1 + dr.max(dr.abs(p)))))
 
 

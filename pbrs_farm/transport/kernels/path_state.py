@@ -45,7 +45,7 @@ class EmitterFilter(NamedTuple):
 
 
 class PathContext(NamedTuple):
-    """What all paths of a launch share."""
+    """What all paths of a launch share: scene, emitters, limits and which emitters count."""
 
     scene: DeviceScene
     emitters: Emitters

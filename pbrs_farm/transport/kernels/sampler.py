@@ -21,7 +21,12 @@ VERTEX_DIMS = 10  # of each vertex (path_step.py)
 
 
 class Sampler(Protocol):
-    """Uniform numbers of one path in [0, 1); dim may vary from lane to lane."""
+    """Uniform numbers of one path in [0, 1), each a pure function of stream, sample and dimension.
+
+    Dimensions are given out by hand: each decision of a vertex has one of its own
+    (direct_light.py, path_step.py), and dim may differ from lane to lane. Asking twice gives
+    the same number.
+    """
 
     def get_1d(self, dim: Any) -> Any:
         """Float of one dimension."""
@@ -91,7 +96,11 @@ def opaque3(kind: Any, values: Any) -> Any:
 
 
 def stream_key(lane: Any, seed: Any) -> Any:
-    """A 32-bit key of a pixel (or chain) under a seed."""
+    """A UInt32 key of a pixel (or chain, or point) under a seed, for a sampler.
+
+    Neighbouring keys are unrelated. Reserved streams (sun_rays.py) use numbers that no pixel
+    has.
+    """
     mixer: Any = mi.sample_tea_32
     return mixer(mi.UInt32(lane), mi.UInt32(seed), 4)[0]
 

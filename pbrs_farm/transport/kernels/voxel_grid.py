@@ -17,7 +17,10 @@ _MAX_VOXELS: Final = 1 << 16
 
 
 class VoxelGrid:
-    """Cubes that fill a home's box; the kernel is the same for every home."""
+    """Cubes that fill a home's box, numbered; what a view counts by place is counted in them.
+
+    The numbers on the device are opaque, so that the kernel is the same for every home.
+    """
 
     def __init__(self, positions: F32) -> None:
         """positions: (N, 3) of all that there is."""

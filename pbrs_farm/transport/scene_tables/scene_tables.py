@@ -40,7 +40,11 @@ _FACES_AT_ONCE: Final = 1 << 13  # in the making of rows, against memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneTables:
-    """The arrays that the kernels gather from."""
+    """A house as the arrays that the kernels gather from; plain numpy.
+
+    `tables_from_house` makes them; `DeviceScene` and `Emitters` copy them to the device. V
+    vertices, F faces, M materials, L lamps with T triangles.
+    """
 
     positions: F32  # (V, 3) vertices of Mitsuba's mesh
     faces: I32  # (F, 3), without degenerate ones
@@ -62,7 +66,11 @@ class SceneTables:
 def tables_from_house(
     house: House, textures: dict[str, NDArray[np.uint8]], recipe: Recipe
 ) -> SceneTables:
-    """The tables of a house without its panes. Raises BadHouse when it has no surface."""
+    """The tables of a house without its window panes, which would only cost rays.
+
+    textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top. Degenerate faces are left
+    out, with a note. Raises BadHouse when no surface is left.
+    """
     # Leave out panes, which would only cost rays, and faces without a plane.
     geometry = geometry_from_house(house, with_panes=False)
     keep = _solid_faces(geometry)

@@ -47,7 +47,10 @@ _SUN_FACTOR: Final = 20  # the sun is brighter than that ring by this
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sky:
-    """Light from outside, in the world frame."""
+    """Light from outside, in the world frame: a dome of radiance and a sun apart from it.
+
+    `sky_for_house` makes that of a recipe; `dark_sky` and `uniform_sky` are for tests.
+    """
 
     name: str  # of view.json
     dome: F32  # (H, W, 3) radiance in W m-2 sr-1, sun removed
@@ -230,7 +233,12 @@ def _direction(elevation_rad: float, azimuth_rad: float) -> F64:
 
 
 def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
-    """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place."""
+    """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place.
+
+    elevation_rad: above the horizon. azimuth_rad: as all azimuths here, about +y. The dome is
+    scaled so that open level ground gets emission.sky_lx, the sun to emission.sun_lx at the
+    zenith, less the lower it stands.
+    """
     # Evaluate the model and scale its upper half to sky_lx.
     sun = _direction(elevation_rad, azimuth_rad)
     dome, sun_rgb = _hosek(sun)
