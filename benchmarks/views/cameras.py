@@ -32,7 +32,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
 from pbrs_farm.sample import sample_cameras
 from pbrs_farm.sample.camera_report import Verdict
-from pbrs_farm.sample.eye_probes import counted
+from pbrs_farm.sample.eye_probes import count_items
 from pbrs_farm.sample.view_score import object_columns, paper_score
 
 HOME = "2BedroomApartmentWithBowWindow"
@@ -49,7 +49,7 @@ def main() -> None:
     columns = object_columns(house)
 
     def score() -> None:
-        for _part, rows in counted(caster.item_counts, cameras, len(house.items)):
+        for _part, rows in count_items(caster.item_counts, cameras, len(house.items)):
             paper_score(rows, columns, 0.01)
 
     seconds = _best(score)

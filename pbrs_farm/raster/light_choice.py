@@ -29,11 +29,11 @@ _N_FLOOR_POINTS = 2000  # of a house, for its scale
 
 def light_table(house: House) -> F32:
     """(L, 16) every light of the house, columns as above."""
-    rows = [_row(part) for item in house.items for part in item.lights]
+    rows = [_row_of_light(part) for item in house.items for part in item.lights]
     return np.array(rows, np.float32).reshape(-1, LIGHT_FLOATS)
 
 
-def _row(part: LightPart) -> list[float]:
+def _row_of_light(part: LightPart) -> list[float]:
     # Take a form that lacks a line's end or a spot's angle for a point that shines everywhere.
     candela = flux_lm(part.power, part.unit, part.share) / (4 * math.pi)
     intensity = [candela * c for c in part.rgb_linear]

@@ -40,20 +40,20 @@ def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samp
     defines |= dict.fromkeys(features, 1)
     head = _VERSION + "".join(f"#define {name} {value}\n" for name, value in defines.items())
     return context.program(
-        vertex_shader=_VERSION + _source("surface.vert.glsl"),
-        fragment_shader=head + _source("surface.frag.glsl"),
+        vertex_shader=_VERSION + _shader_source("surface.vert.glsl"),
+        fragment_shader=head + _shader_source("surface.frag.glsl"),
     )
 
 
 def depth_program(context: Any) -> Any:
     """Program that writes depth alone."""
     return context.program(
-        vertex_shader=_VERSION + _source("surface.vert.glsl"),
-        fragment_shader=_VERSION + _source("depth.frag.glsl"),
+        vertex_shader=_VERSION + _shader_source("surface.vert.glsl"),
+        fragment_shader=_VERSION + _shader_source("depth.frag.glsl"),
     )
 
 
-def _source(name: str) -> str:
+def _shader_source(name: str) -> str:
     return (files("pbrs_farm.raster") / name).read_text("utf-8")
 
 

@@ -40,9 +40,9 @@ def section_svg(before: House, after: House, level_id: str) -> str:
     element(root, "rect", width="100%", height="100%", fill="white")
     left = _panel(root, "before", low)
     for segments in parts:
-        _walls(left, segments, fill="#c98b4a", fill_opacity="0.45", stroke="#5a3210")
+        _draw_walls(left, segments, fill="#c98b4a", fill_opacity="0.45", stroke="#5a3210")
     right = element(root, "g", transform=f"translate({size[0] + _GAP_M:.3f} 0)")
-    _walls(_panel(right, "after", low), solid, fill="#3d3d3d", fill_opacity="1", stroke="none")
+    _draw_walls(_panel(right, "after", low), solid, fill="#3d3d3d", fill_opacity="1", stroke="none")
     return svg_text(root) + "\n"
 
 
@@ -51,7 +51,7 @@ def _panel(parent: Element, title: str, low: F64) -> Element:
     return element(parent, "g", transform=f"translate({-low[0]:.3f} {-low[1]:.3f})")
 
 
-def _walls(panel: Element, segments: F64, **style: str) -> None:
+def _draw_walls(panel: Element, segments: F64, **style: str) -> None:
     # Fill a closed cut; draw an open one, of a planar wall, as a red line.
     polygons = solid_polygons(segments)
     if polygons:

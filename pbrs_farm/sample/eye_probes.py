@@ -35,7 +35,7 @@ _CAMERAS_PER_CALL: Final = 384  # a multiple of the six faces of a cube
 _AXES: Final = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
 
 
-def counted(
+def count_items(
     counter: ItemCounter, cameras: Sequence[Camera], n_items: int, *, group: int = 1
 ) -> Iterator[tuple[slice, NDArray[np.uint32]]]:
     """(which cameras, their rows (n, n_items + 1)) in parts of bounded size.
@@ -64,7 +64,7 @@ def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     cameras = cameras_looking(pencil, eyes, np.broadcast_to(down, eyes.shape), (0.0, 0.0, 1.0))
     bad = [i + 1 for i, x in enumerate(house.items) if x.kind in (ItemKind.WALL, ItemKind.CEILING)]
     above = np.zeros(len(eyes), np.bool_)
-    for part, rows in counted(counter, cameras, len(house.items)):
+    for part, rows in count_items(counter, cameras, len(house.items)):
         above[part] = rows[:, bad].sum(1) > 0
     return above | _in_standing_wall(house, eyes)
 
@@ -99,7 +99,7 @@ def enclosed(house: House, eyes: F64, counter: ItemCounter) -> Bools:
     held = np.flatnonzero(_held_by(bounds, eyes))
     cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
     cameras = [Camera(cube, pose) for pose in _cube_poses(eyes[held])]
-    for part, rows in counted(counter, cameras, len(house.items), group=6):
+    for part, rows in count_items(counter, cameras, len(house.items), group=6):
         # Add up the six faces, and compare with what encloses each item's kind.
         share = rows[:, 1:].reshape(-1, 6, len(house.items)).sum(1) / (6 * _CUBE_PX**2)
         which = held[part.start // 6 : part.stop // 6]

@@ -61,7 +61,7 @@ def sample_cameras(
     released in order of falling score, as published. fields.source "stored": see stored_views.
     """
     if fields.source == "stored":
-        return _stored(house, fields, counter)
+        return _sample_stored_views(house, fields, counter)
     geometry = geometry_from_house(house)
     if fields.preset == "photo":
         if depth_of is None:
@@ -86,7 +86,7 @@ def sample_cameras(
     # Order as published: best views of the house first.
     if fields.preset == "released":
         views.sort(key=lambda view: -view.score)
-    return Sampling(tuple(views), _report(fields, views, tuple(rooms)), tuple(traces))
+    return Sampling(tuple(views), _camera_report(fields, views, tuple(rooms)), tuple(traces))
 
 
 def _photographed(sampler: PhotoSampler) -> Sampling:
@@ -110,16 +110,18 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
         views += found
     traces = tuple(RoomTrace(s.room.id, s.candidates, s.verdict) for s in scored)
     return Sampling(
-        tuple(views), _report(fields, views, tuple(reports[r.id] for r in house.rooms)), traces
+        tuple(views),
+        _camera_report(fields, views, tuple(reports[r.id] for r in house.rooms)),
+        traces,
     )
 
 
-def _stored(house: House, fields: CameraFields, counter: ItemCounter) -> Sampling:
+def _sample_stored_views(house: House, fields: CameraFields, counter: ItemCounter) -> Sampling:
     views, notes = stored_views(house, fields, counter)
-    return Sampling(views, _report(fields, list(views), (), notes), ())
+    return Sampling(views, _camera_report(fields, list(views), (), notes), ())
 
 
-def _report(
+def _camera_report(
     fields: CameraFields,
     views: list[View],
     rooms: tuple[RoomReport, ...],

@@ -18,7 +18,7 @@ from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import grid_candidates
-from pbrs_farm.sample.eye_probes import ItemCounter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_choice import PhotoChoice, RoomCandidates
 from pbrs_farm.sample.photo_score import (
@@ -78,7 +78,9 @@ class PhotoSampler:
         full = self._intrinsics(f.score_width_px, f.score_height_px)
         cameras = scored.candidates.cameras(np.array(chosen, np.intp), full)
         columns = np.flatnonzero(item_roles(self.house).furniture)
-        counts = [r for _part, rows in counted(self.counter, cameras, self._n_items) for r in rows]
+        counts = [
+            r for _part, rows in count_items(self.counter, cameras, self._n_items) for r in rows
+        ]
         return [
             View(
                 id=keys.view_id(scored.room.id, sector, k if f.per_sector > 1 else None),
@@ -97,7 +99,7 @@ class PhotoSampler:
 
     def _shares(self, cameras: list[Camera]) -> PhotoShares:
         """What small pictures of these cameras show."""
-        rows = [part for _which, part in counted(self.counter, cameras, self._n_items)]
+        rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
         depth = self.depth_of([camera.with_size(*DEPTH_SIZE) for camera in cameras])
         flat = depth.reshape(len(cameras), DEPTH_SIZE[0] * DEPTH_SIZE[1])

@@ -76,7 +76,7 @@ def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools,
     floor_top = max((i.bounds[1, 1] for i in floors), default=room.floor_y)
     ceiling_bottom = min((i.bounds[0, 1] for i in ceilings), default=room.ceiling_y)
     if floors:
-        floor = _near(nodes, _plan_shapes(_triangles(floors)), 0.0)
+        floor = _nodes_near_shapes(nodes, _plan_shapes(_triangles(floors)), 0.0)
     else:
         floor = shapely.intersects_xy(room_shape(room), nodes[:, 0], nodes[:, 1])
 
@@ -87,7 +87,7 @@ def viewpoint_mask(house: House, room: Room, clearance_m: float) -> tuple[Bools,
     plan_low, plan_high = triangles.min(1)[:, [0, 2]], triangles.max(1)[:, [0, 2]]
     met = (y.max(1) > floor_top + eps) & (y.min(1) < ceiling_bottom - eps)
     met &= (plan_low >= (xs[0], zs[0])).all(1) & (plan_high <= (xs[-1], zs[-1])).all(1)
-    blocked = _near(nodes, _plan_shapes(triangles[met]), cell / 2)
+    blocked = _nodes_near_shapes(nodes, _plan_shapes(triangles[met]), cell / 2)
 
     # Erode by the clearance.
     allowed = (floor & ~blocked).reshape(shape)
@@ -128,7 +128,7 @@ def _plan_shapes(triangles: F64) -> NDArray[np.object_]:
     return shapes
 
 
-def _near(nodes: F64, shapes: NDArray[np.object_], distance: float) -> Bools:
+def _nodes_near_shapes(nodes: F64, shapes: NDArray[np.object_], distance: float) -> Bools:
     near = np.zeros(len(nodes), np.bool_)
     if len(shapes):
         points = shapely.points(nodes)

@@ -21,7 +21,7 @@ from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample import paper_rules, released_rules
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid, grid_candidates, n_cells
-from pbrs_farm.sample.eye_probes import ItemCounter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.sector_search import (
     COARSE_MARGIN_PX,
     COARSE_SLACK,
@@ -140,7 +140,7 @@ class RoomSampler:
         share = np.zeros((n, len(columns) if keep else 0), np.float32)
         image_verdicts = np.zeros(n, np.uint8)
         cameras = candidates.cameras(which, self._intrinsics(coarse=True))
-        for part, rows in counted(self.counter, cameras, len(self.house.items)):
+        for part, rows in count_items(self.counter, cameras, len(self.house.items)):
             # Let pass what the full-size picture might still accept.
             lenient = paper_score(rows, columns, fraction * COARSE_SLACK)
             enough = lenient.n_objects >= self.fields.min_objects
@@ -156,7 +156,7 @@ class RoomSampler:
         self, candidates: Candidates, which: NDArray[np.intp]
     ) -> tuple[Bools, F64, NDArray[np.uint32]]:
         cameras = candidates.cameras(which, self._intrinsics(coarse=False))
-        parts = [rows for _part, rows in counted(self.counter, cameras, len(self.house.items))]
+        parts = [rows for _part, rows in count_items(self.counter, cameras, len(self.house.items))]
         rows = np.concatenate(parts)
         return self._image_verdicts(rows) == Verdict.LOWER_SCORE, self._scored(rows).score, rows
 
@@ -214,7 +214,7 @@ class RoomSampler:
     ) -> View:
         several = self.fields.per_sector > 1
         camera = candidates.cameras(np.array([index]), self._intrinsics(coarse=False))[0]
-        # List every object in the view, whatever the score counted.
+        # List every object in the view, whatever the score count_items.
         columns = object_columns(self.house)
         return View(
             id=keys.view_id(self.room.id, sector, k if several else None),

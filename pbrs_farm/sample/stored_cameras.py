@@ -14,7 +14,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.geometry.plan_surfaces import room_shape
-from pbrs_farm.sample.eye_probes import ItemCounter, counted
+from pbrs_farm.sample.eye_probes import ItemCounter, count_items
 from pbrs_farm.sample.view_score import object_columns
 
 OUTSIDE = "out"  # room id in the views of cameras that stand in no room
@@ -72,7 +72,7 @@ def views_from_cameras(
         k = used[place] = used.get(place, -1) + 1
         views.append(View(keys.view_id(*place, k), *place, camera, origin))
     # Count what each sees, as the sampler does.
-    for part, rows in counted(counter, [v.camera for v in views], len(house.items)):
+    for part, rows in count_items(counter, [v.camera for v in views], len(house.items)):
         score = rows[:, columns].sum(1)
         for row, number in enumerate(range(part.start, part.stop)):
             objects = {int(i): int(rows[row, i]) for i in columns if rows[row, i]}

@@ -41,7 +41,7 @@ def guiding_targets(
 
     # Keep the sides that are bright enough, ordered by lamp.
     flux = np.array([lamp.flux_lm for lamp in tables.lamps])
-    areas = face_areas(_corners(tables, faces))
+    areas = face_areas(_corners_of_faces(tables, faces))
     lumens = _exitance(scene, emitters, tables, faces, lamps, seed) * LM_PER_W
     keep = np.flatnonzero((lumens > MIN_EXITANCE * flux[lamps]).ravel())
     keep = keep[np.argsort(np.tile(lamps, 2)[keep], kind="stable")]
@@ -65,7 +65,9 @@ def guiding_targets(
 def _lamp_interiors(tables: SceneTables, faces: I64, lamps: I64, probabilities: F64) -> F64:
     """(L, 4) spheres around each bulb that hold INTERIOR_SHARE of what its faces send out."""
     spheres = bounding_spheres(tables)
-    reach = np.linalg.norm(_corners(tables, faces) - spheres[lamps, None, :3], axis=2).max(1)
+    reach = np.linalg.norm(_corners_of_faces(tables, faces) - spheres[lamps, None, :3], axis=2).max(
+        1
+    )
     for k, bulb_m in enumerate(spheres[:, 3].tolist()):
         # Take the lamp's faces from the nearest on until the share is reached.
         own = np.flatnonzero(lamps == k)
@@ -94,7 +96,7 @@ def pdfs_by_face(targets: GuidingTargets) -> FacePdfs:
     return FacePdfs(faces, values[0], values[1], lamps)
 
 
-def _corners(tables: SceneTables, faces: I64) -> F64:
+def _corners_of_faces(tables: SceneTables, faces: I64) -> F64:
     return triangle_corners(tables.positions, tables.faces[faces])
 
 
@@ -126,7 +128,7 @@ def _candidates(tables: SceneTables) -> tuple[I64, I64]:
     near = np.isfinite(nearest)
     # Keep the faces that look largest from their lamp, should there be very many.
     faces, lamps = faces[near], lamps[near]
-    size = face_areas(_corners(tables, faces)) / np.maximum(nearest[near], 0.02) ** 2
+    size = face_areas(_corners_of_faces(tables, faces)) / np.maximum(nearest[near], 0.02) ** 2
     kept = np.sort(np.argsort(-size, kind="stable")[: _MAX_FACES * max(len(tables.lamps), 1)])
     return faces[kept], lamps[kept]
 
@@ -137,7 +139,7 @@ def _exitance(
     """(2, K) W m-2 of luminance that the fronts and the backs of faces send out, by their lamp."""
     # Choose points uniform over each face, the same for front and back.
     rng = np.random.default_rng(seed)
-    corners = _corners(tables, faces)
+    corners = _corners_of_faces(tables, faces)
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = unit_normals(corners)
     uv = np.sort(rng.random((_POINTS, len(faces), 2)), axis=2)

@@ -112,7 +112,7 @@ def _with_bulbs(
 
 def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, float]:
     """Centre and radius of a sphere near position that touches none of the triangles (F, 3, 3)."""
-    free = _is_free(position, corners)
+    free = _distance_to_lamp(position, corners)
     if free >= _LEAST_RADIUS_M / _CLEARANCE:
         return position, min(radius, _CLEARANCE * free)
     # Move the bulb to the roomiest place within its radius: a mesh passes through its centre.
@@ -120,12 +120,12 @@ def _fitting_sphere(position: F64, radius: float, corners: F64) -> tuple[F64, fl
     rng = np.random.default_rng(0)  # fixed: repair is a function of the house
     steps = rng.normal(size=(_N_MOVES, 3))
     steps *= (radius * rng.random((_N_MOVES, 1)) ** (1 / 3)) / np.linalg.norm(steps, axis=1, keepdims=True)  # fmt: skip
-    room = [_is_free(position + step, near) for step in steps]
+    room = [_distance_to_lamp(position + step, near) for step in steps]
     best = int(np.argmax(room))
     return position + steps[best], max(min(radius, _CLEARANCE * room[best]), _LEAST_RADIUS_M / 4)
 
 
-def _is_free(point: F64, corners: F64) -> float:
+def _distance_to_lamp(point: F64, corners: F64) -> float:
     return float(distances_to_triangles(point, corners).min()) if len(corners) else np.inf
 
 

@@ -34,9 +34,9 @@ def furniture_audit(house: House) -> FurnitureAudit:
     everything = [i for i in house.items if _is_furniture(i)]
     pieces = everything[:_MAX_PIECES]
     boxes = np.array([i.bounds for i in pieces]).reshape(-1, 2, 3)
-    pairs = list(islice(_pairs(boxes, -_SAME_M), _MAX_PAIRS + 1))
+    pairs = list(islice(_pairs_of_boxes(boxes, -_SAME_M), _MAX_PAIRS + 1))
     return FurnitureAudit(
-        overlaps=tuple(_overlaps(pieces, pairs[:_MAX_PAIRS])),
+        overlaps=tuple(_find_overlaps(pieces, pairs[:_MAX_PAIRS])),
         floating=tuple(_floating(house, pieces, boxes)),
         duplicates=tuple(islice(_duplicates(pieces, boxes), _MAX_PAIRS)),
         n_unaudited=len(everything) - len(pieces),
@@ -49,7 +49,7 @@ def _is_furniture(item: Item) -> bool:
     return not fixed and item.n_faces > 0
 
 
-def _pairs(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
+def _pairs_of_boxes(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
     """Indices i < j of boxes (N, 2, 3) that meet when grown by by_m together."""
     for i in range(len(boxes)):
         apart = (boxes[i + 1 :, 0] > boxes[i, 1] + by_m) | (boxes[i + 1 :, 1] < boxes[i, 0] - by_m)
@@ -57,7 +57,7 @@ def _pairs(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
             yield i, i + 1 + int(j)
 
 
-def _overlaps(pieces: Sequence[Item], pairs: Sequence[tuple[int, int]]) -> Iterator[Overlap]:
+def _find_overlaps(pieces: Sequence[Item], pairs: Sequence[tuple[int, int]]) -> Iterator[Overlap]:
     solids: dict[int, Manifold | None] = {}
     for i, j in pairs:
         # Build the solid of a piece when its box first meets another.

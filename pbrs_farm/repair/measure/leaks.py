@@ -77,7 +77,7 @@ def leaks_of_house(
         inside = [a for r in (*space.rooms, *space.wells) for a in interiors[r]]
         origins, directions = _rays(inside, meter, rng)
         assert occluder is not None
-        found.append(_measured(space, origins, directions, normals, occluder, meter, rng))
+        found.append(_measure_space(space, origins, directions, normals, occluder, meter, rng))
     areas = {r.id: float(shapely.area(plan.polygon_of_room(r.polygon))) for r in house.rooms}
     in_closed = sum(areas[r] for s in closed for r in s.rooms)
     return LeakReport(
@@ -106,7 +106,7 @@ def _rays(
     areas = np.array([a.area.area for a in interiors])
     shares = rng.multinomial(meter.n_inside, areas / areas.sum())
     inside = np.concatenate(
-        [_inside(a, int(n), rng) for a, n in zip(interiors, shares, strict=True)]
+        [_points_in_interior(a, int(n), rng) for a, n in zip(interiors, shares, strict=True)]
     )
     origins = np.concatenate(
         [np.repeat(edges, meter.per_start, 0), np.repeat(inside, meter.per_inside, 0)]
@@ -119,12 +119,12 @@ def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator
     inset = 0.5 * WITHIN_M
     knee = interior.low.raised(interior.foot_m + inset)  # top of the baseboards
     found = [
-        *_along(interior.foot, interior.low.raised(inset), step_m, rng),
-        *_along(interior.area, interior.high.raised(-inset), step_m, rng),
-        *_upright(interior.area, knee, interior.high.raised(-inset), step_m, rng),
+        *_points_along_edges(interior.foot, interior.low.raised(inset), step_m, rng),
+        *_points_along_edges(interior.area, interior.high.raised(-inset), step_m, rng),
+        *_points_on_sides(interior.area, knee, interior.high.raised(-inset), step_m, rng),
     ]
     if interior.foot_m > 0:
-        found += _upright(
+        found += _points_on_sides(
             interior.foot, interior.low.raised(inset), knee.raised(-2 * inset), step_m, rng
         )
     # Scatter the starts, but less than their distance from the edge.
@@ -132,15 +132,17 @@ def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator
     return np.asarray(points + rng.uniform(-0.4, 0.4, points.shape) * WITHIN_M)
 
 
-def _rings(area: Shape) -> list[shapely.LinearRing]:
+def _inner_rings(area: Shape) -> list[shapely.LinearRing]:
     # Draw the outline back from the walls by half that distance.
     inner = shapely.buffer(area, -0.5 * WITHIN_M, join_style="mitre", mitre_limit=2.0)
     return [r for p in polygons_of(inner) for r in (p.exterior, *p.interiors)]
 
 
-def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -> list[F64]:
+def _points_along_edges(
+    area: Shape, plane: Plane, step_m: float, rng: np.random.Generator
+) -> list[F64]:
     found = []
-    for ring in _rings(area):
+    for ring in _inner_rings(area):
         n = max(int(ring.length / step_m), 8)
         steps = ring.length * (np.arange(n) + rng.random()) / n  # stratified, one random shift
         points = shapely.get_coordinates(shapely.line_interpolate_point(ring, steps))
@@ -148,11 +150,11 @@ def _along(area: Shape, plane: Plane, step_m: float, rng: np.random.Generator) -
     return found
 
 
-def _upright(
+def _points_on_sides(
     area: Shape, low: Plane, high: Plane, step_m: float, rng: np.random.Generator
 ) -> list[F64]:
     found = []
-    for ring in _rings(area):
+    for ring in _inner_rings(area):
         corners = np.asarray(ring.coords)[:-1]
         for corner, y0, y1 in zip(corners, low.at(corners), high.at(corners), strict=True):
             n = max(int((y1 - y0) / step_m), 2)
@@ -161,7 +163,7 @@ def _upright(
     return found
 
 
-def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
+def _points_in_interior(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
     area = shapely.buffer(interior.foot, -0.02)
     if n == 0 or shapely.is_empty(area):
         return np.zeros((0, 3))
@@ -176,7 +178,7 @@ def _inside(interior: RoomInterior, n: int, rng: np.random.Generator) -> F64:
     return lifted(found, low + rng.random(n) * (high - low))
 
 
-def _measured(
+def _measure_space(
     space: Space,
     origins: F64,
     directions: F64,

@@ -77,7 +77,9 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
         if shells is not None:
             found.solid[index] = [solid for solid, _ in shells]
             if item.kind is not ItemKind.GROUND:
-                found.covers.extend(_cover(item, solid, patches) for solid, patches in shells)
+                found.covers.extend(
+                    _cover_of_solid(item, solid, patches) for solid, patches in shells
+                )
         # Leave the ground around the house alone, unless it is solid.
         elif item.kind is ItemKind.GROUND:
             continue
@@ -90,7 +92,7 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
     return found
 
 
-def _cover(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Cover:
+def _cover_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Cover:
     # Take the side that looks into the room: a ceiling's lowest, a floor's highest.
     low, high = bounds(solid)
     is_ceiling = item.kind is ItemKind.CEILING

@@ -43,9 +43,9 @@ def footprints_of_surfaces(
     for surface in surfaces:
         # Close the gaps between neighbours at this height and the walls between them.
         others = plan.near_to(surface.area, surfaces, lambda s: s.area, 1.0)
-        mates = [s.area for s in others if _beside(surface, s)]
+        mates = [s.area for s in others if _is_level_with(surface, s)]
         near = plan.near_to(surface.area, walls, lambda w: w.footprint, 1.0)
-        feet = [w.footprint for w in near if _meets(surface, w)]
+        feet = [w.footprint for w in near if _wall_meets_surface(surface, w)]
         whole = plan.closed(plan.union([*mates, *feet]), 2 * GAP_M)
         # Grow into walls, and for a floor through the thresholds of its doors.
         reach = plan.grown(surface.area, thickness_m)
@@ -57,7 +57,7 @@ def footprints_of_surfaces(
     return footprints
 
 
-def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
+def _is_level_with(a: PlanarSurface, b: PlanarSurface) -> bool:
     if a.is_ceiling != b.is_ceiling:
         return False
     # Compare heights in the middle of the other one.
@@ -65,7 +65,7 @@ def _beside(a: PlanarSurface, b: PlanarSurface) -> bool:
     return bool(abs(a.plane.at(middle)[0] - b.plane.at(middle)[0]) < 0.5)
 
 
-def _meets(surface: PlanarSurface, wall: Wall) -> bool:
+def _wall_meets_surface(surface: PlanarSurface, wall: Wall) -> bool:
     # Ask whether the wall comes within GAP_M of the surface's plane.
     corners = shapely.get_coordinates(wall.footprint)
     heights = surface.plane.at(corners)

@@ -96,7 +96,7 @@ def walls_from_house(
             continue
         shells = shells_from_item(item, index, table)
         if shells is not None:
-            walls += [_wall(item, index, solid, patches) for solid, patches in shells]
+            walls += [_wall_of_solid(item, index, solid, patches) for solid, patches in shells]
             continue
         # Thicken what is planar, and leave the rest.
         thick = _thickened(item, index, table, rooms, thickness_m)
@@ -107,7 +107,7 @@ def walls_from_house(
     return walls, left
 
 
-def _wall(
+def _wall_of_solid(
     item: Item, index: int, solid: Manifold, patches: Sequence[Patch], *, thickened: bool = False
 ) -> Wall:
     # The first surface of a name counts.
@@ -167,7 +167,7 @@ def _thickened(
     if patches is None:
         return None
     solid = solid_from_patches(patches, table)
-    return None if solid is None else _wall(item, index, solid, patches, thickened=True)
+    return None if solid is None else _wall_of_solid(item, index, solid, patches, thickened=True)
 
 
 def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:

@@ -48,7 +48,7 @@ def poses_from_tum(text: str, file: str) -> list[Pose]:
             continue
         if len(poses) == MAX_ROWS:
             raise BadInput(file, f"line {number}", f"more than {MAX_ROWS} rows")
-        poses.append(_pose(words, number, file))
+        poses.append(_pose_of_line(words, number, file))
         if len(poses) > 1 and poses[-1].time_s <= poses[-2].time_s:
             text = f"time {poses[-1].time_s:g} is not after {poses[-2].time_s:g} of the row before"
             raise BadInput(file, f"line {number}", text)
@@ -57,7 +57,7 @@ def poses_from_tum(text: str, file: str) -> list[Pose]:
     return poses
 
 
-def _pose(words: list[str], line: int, file: str) -> Pose:
+def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
     place = f"line {line}"
     if len(words) != 8:
         hint = "t x y z qx qy qz qw"

@@ -135,12 +135,12 @@ def camera_ray(
         time += (sampler.get_1d(mi.UInt32(_TIME_DIM)) - 0.5) * camera.exposure
     # Stand where the camera is at that time.
     moved, angle = camera.velocity * time, camera.turn * time
-    d = _turned(camera, local, angle)
-    origin = mi.Point3f(camera.eye + moved + _turned(camera, start, angle))
+    d = _turn_camera_vector(camera, local, angle)
+    origin = mi.Point3f(camera.eye + moved + _turn_camera_vector(camera, start, angle))
     return origin, dr.normalize(d)
 
 
-def _turned(camera: LensCamera, v: Any, angle: Any) -> Any:
+def _turn_camera_vector(camera: LensCamera, v: Any, angle: Any) -> Any:
     """A vector of the camera's axes in the world, when the camera has turned by an angle."""
     world = camera.right * v.x + camera.up * v.y + camera.back * v.z
     axis, c, s = camera.turn_axis, dr.cos(angle), dr.sin(angle)

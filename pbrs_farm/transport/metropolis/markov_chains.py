@@ -167,7 +167,10 @@ def mutate(context: ChainContext, chains: Chains, how: Mutations) -> tuple[Chain
         _record_round(how, lane, step, x, x_suffix, done)
 
     _splat_state(film, lane, x, True)
-    samples, suffixes = _store(x_samples, STORED_DIMS, lane), _store(x_suffix, SUFFIX_FLOATS, lane)
+    samples, suffixes = (
+        _store_chains(x_samples, STORED_DIMS, lane),
+        _store_chains(x_suffix, SUFFIX_FLOATS, lane),
+    )
     return Chains(samples, x.light, x.target, x.pixel, x.shared, suffixes), sums
 
 
@@ -189,7 +192,7 @@ def draw_paths(context: ChainContext, sampler: HashedSampler, n: int) -> Chains:
     target = target_function(film, pixel, light)
     target = dr.select(dr.isfinite(target), target, 0)
     finish_suffix(suffix, light, y, y.shared > 0)
-    suffixes = _store(suffix, SUFFIX_FLOATS, dr.arange(mi.UInt32, n))
+    suffixes = _store_chains(suffix, SUFFIX_FLOATS, dr.arange(mi.UInt32, n))
     return Chains(mi.Float(0), light, target, pixel, y.shared, suffixes)
 
 
@@ -306,7 +309,7 @@ def _load(rows: Any, n: int, chain: Any) -> Any:
 
 
 @dr.syntax
-def _store(local: Any, n: int, chain: Any) -> Any:
+def _store_chains(local: Any, n: int, chain: Any) -> Any:
     """(n * N,) numbers of all chains, from local memory."""
     rows, n_chains = dr.empty(mi.Float, n * dr.width(chain)), dr.opaque(mi.UInt32, dr.width(chain))
     k = mi.UInt32(0)

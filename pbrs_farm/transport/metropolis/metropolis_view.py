@@ -46,7 +46,7 @@ def render_groups(
     direct = result_from_sums(sums, view.camera, max(fields.direct_spp, 1), {})
 
     # Run the chains of both groups in turns, so that the noise of their sum can decide.
-    runs = _runs(view, checkpoint.kept("chains"))
+    runs = _chain_runs(view, checkpoint.kept("chains"))
     n_steps = min((run.n_steps for run in runs.values()), default=0)
     wanted = max((run.n_wanted for run in runs.values()), default=0)
     goal = _NO_END if runs and budget.is_limited else wanted
@@ -64,7 +64,7 @@ def render_groups(
     return direct, {g: _estimate(view, runs, g) for g in Group}
 
 
-def _runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
+def _chain_runs(view: SampledView, kept: Arrays) -> dict[Group, ChainRun]:
     """The chains of each group that has light, started or as they were kept."""
     first = 3 if view.fields.direct_spp > 0 else 1
     runs = {}

@@ -235,7 +235,7 @@ def _direction(elevation_rad: float, azimuth_rad: float) -> F64:
 def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place.
 
-    elevation_rad: above the horizon. azimuth_rad: as all azimuths here, about +y. The dome is
+    elevation_rad: above the horizon. azimuth_rad: from -z towards +x. The dome is
     scaled so that open level ground gets emission.sky_lx, the sun to emission.sun_lx at the
     zenith, less the lower it stands.
     """

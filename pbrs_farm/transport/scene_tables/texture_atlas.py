@@ -95,7 +95,7 @@ def _packed_colours(picture: Picture) -> NDArray[np.uint32]:
     alpha = picture[..., 3] if picture.shape[-1] == 4 else None
     # Encode by the square root of linear light; cut alpha at one half.
     linear = linear_from_srgb(np.arange(256) / 255)
-    if _step(picture) > 1:
+    if _reduction_of(picture) > 1:
         small = _shrunk(rgb, linear.astype(np.float32))
         bits = np.round(np.sqrt(small) * 1023).astype(np.uint32)
         packed = bits[..., 0] | bits[..., 1] << np.uint32(10) | bits[..., 2] << np.uint32(20)
@@ -128,25 +128,27 @@ def _packed_maps(
         bent = normals_from_picture(_shrunk(normal[..., :3], plain), scale)
     # Bring both to one size, and pack.
     height, width = np.maximum(rough.shape[:2], bent.shape[:2])
-    rough, bent = _resized(rough, height, width), _resized(bent, height, width)
+    rough, bent = _resize_repeating(rough, height, width), _resize_repeating(bent, height, width)
     length = np.sqrt(np.maximum(np.einsum("ijk,ijk->ij", bent, bent), 1e-12))
-    x, y = (_rounded(bent[..., k] / length * np.float32(1023) + NORMAL_ZERO) for k in range(2))
-    r = _rounded(np.clip(rough[..., 0], 0, 255) * np.float32(1023 / 255))
+    x, y = (
+        _round_to_uint(bent[..., k] / length * np.float32(1023) + NORMAL_ZERO) for k in range(2)
+    )
+    r = _round_to_uint(np.clip(rough[..., 0], 0, 255) * np.float32(1023 / 255))
     packed: NDArray[np.uint32] = x | y << np.uint32(11) | r << np.uint32(22)
     return packed
 
 
-def _rounded(values: F32) -> NDArray[np.uint32]:
+def _round_to_uint(values: F32) -> NDArray[np.uint32]:
     return (values + np.float32(0.5)).astype(np.uint32)
 
 
-def _step(picture: Picture) -> int:
+def _reduction_of(picture: Picture) -> int:
     return int(-(-max(picture.shape[:2]) // _MAX_TEXTURE_PX))
 
 
 def _shrunk(picture: Picture, value_of_byte: F32) -> F32:
     """(H, W, C) values of the bytes, averaged over blocks where the picture is too large."""
-    step = _step(picture)
+    step = _reduction_of(picture)
     if step == 1:
         return value_of_byte[picture]
     height, width = (-(-n // step) for n in picture.shape[:2])
@@ -167,7 +169,7 @@ def _edges(n: int, parts: int) -> I32:
     return np.round(np.linspace(0, n, parts + 1)).astype(np.int32)
 
 
-def _resized(values: F32, height: int, width: int) -> F32:
+def _resize_repeating(values: F32, height: int, width: int) -> F32:
     """(height, width, C) values between the four nearest, repeating."""
     for axis, n in ((0, height), (1, width)):
         old = values.shape[axis]

@@ -130,7 +130,7 @@ def _furnace(fields: LightFields, name: str, albedo: float) -> Callable[[str], L
     return measure
 
 
-def _floor(variant: str) -> LightClaim:
+def _floor_claim(variant: str) -> LightClaim:
     ground = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
     house = rooms.house(
         [ground], [rooms.matte("floor", 0.5), rooms.BULB], lamps=[rooms.bulb((0, 1, 0), 1, 1000.0)]
@@ -140,7 +140,7 @@ def _floor(variant: str) -> LightClaim:
     # Expect I cos / d^2 at 1 m beside the foot point, 1 m below: I / (4 pi) / 2^1.5.
     lux = 1000 / (4 * math.pi) / 2**1.5
     measured = float((result.indoor @ LUMINANCE).mean()) * math.pi / 0.5 * _LM_PER_W
-    return _near(
+    return _claim_near(
         "a bulb of 1,000 lm lights a floor by distance and cosine", measured, lux, 0.01, "lx"
     )
 
@@ -152,7 +152,7 @@ def _open_ground(variant: str) -> LightClaim:
     sky = sunsky(Recipe(), elevation_rad=math.radians(40), azimuth_rad=0.5)
     lux = LightScene.load(house, {}, Recipe(), sky, variant=variant).floor_lux(house)["0_0"]
     text = "open ground has the sky's 10,000 lx and the sun's"
-    return _near(text, lux["outdoor"], sky.sky_lx + sky.sun_lx, 0.02, "lx")
+    return _claim_near(text, lux["outdoor"], sky.sky_lx + sky.sun_lx, 0.02, "lx")
 
 
 def _normal_map(variant: str) -> LightClaim:
@@ -167,10 +167,12 @@ def _normal_map(variant: str) -> LightClaim:
     result = scene.render(camera, "0_0", _spp(256), 1)
     measured = float((result.outdoor @ LUMINANCE).mean()) / 0.5
     text = "a normal map takes of a white sky what a tilted floor sees above the ground"
-    return _near(text, measured, (1 + math.cos(math.pi / 3)) / 2, 0.01, "of it")
+    return _claim_near(text, measured, (1 + math.cos(math.pi / 3)) / 2, 0.01, "of it")
 
 
-def _near(text: str, measured: float, expected: float, tolerance: float, unit: str) -> LightClaim:
+def _claim_near(
+    text: str, measured: float, expected: float, tolerance: float, unit: str
+) -> LightClaim:
     return LightClaim(
         text,
         f"{measured:.6g} {unit}",
@@ -179,7 +181,7 @@ def _near(text: str, measured: float, expected: float, tolerance: float, unit: s
     )
 
 
-def _window() -> tuple[House, Camera]:
+def _window_room() -> tuple[House, Camera]:
     return rooms.window_room(0.7, lumen=800)
 
 
@@ -202,8 +204,8 @@ def _metropolis_is_path(
 def _direct_and_indirect(variant: str) -> LightClaim:
     # Render with separate direct light, and all light by chains.
     whole = _CHAINS.model_copy(update={"direct_spp": 0, "mutations_per_pixel": 256})
-    a = _rendered(variant, _window(), _sun(), _CHAINS, 20, 21, 22, 23)
-    b = _rendered(variant, _window(), _sun(), whole, 30, 31, 32, 33)
+    a = _rendered(variant, _window_room(), _sun(), _CHAINS, 20, 21, 22, 23)
+    b = _rendered(variant, _window_room(), _sun(), whole, 30, 31, 32, 33)
     return _one_mean("direct by path + the rest by chains = all light by chains", a, b)
 
 
@@ -227,7 +229,7 @@ def _one_mean(text: str, a: list[LightResult], b: list[LightResult]) -> LightCla
 def _groups_sum(variant: str) -> LightClaim:
     # Keep the bulb's geometry in the room without lamp light: the paths must be the same.
     dim = rooms.window_room(0.7, lumen=1e-30)
-    room = _window()
+    room = _window_room()
     (both,) = _rendered(variant, room, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (day,) = _rendered(variant, dim, uniform_sky(_SKY_OF_ONE), _spp(16), 1)
     (night,) = _rendered(variant, room, dark_sky(), _spp(16), 1)
@@ -242,7 +244,7 @@ def _groups_sum(variant: str) -> LightClaim:
 
 def _doubled_emitters(variant: str) -> LightClaim:
     # Double the sky and the bulb: powers of two keep every bit of the mantissa.
-    (one,) = _rendered(variant, _window(), uniform_sky((1, 1, 1)), _spp(16), 1)
+    (one,) = _rendered(variant, _window_room(), uniform_sky((1, 1, 1)), _spp(16), 1)
     (two,) = _rendered(
         variant, rooms.window_room(0.7, lumen=1600), uniform_sky((2, 2, 2)), _spp(16), 1
     )
@@ -267,7 +269,7 @@ def _sealed_room(variant: str) -> LightClaim:
 
 def _window_pane(variant: str) -> LightClaim:
     glazed = rooms.window_room(0.7, lumen=800, pane=True)
-    (a,) = _rendered(variant, _window(), _sun(), _spp(16), 1)
+    (a,) = _rendered(variant, _window_room(), _sun(), _spp(16), 1)
     (b,) = _rendered(variant, glazed, _sun(), _spp(16), 1)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     return LightClaim(
@@ -277,7 +279,7 @@ def _window_pane(variant: str) -> LightClaim:
 
 def _repeats(variant: str) -> LightClaim:
     # Render twice with one seed, then with another.
-    a, b, c = _rendered(variant, _window(), _sun(), _spp(16), 7, 7, 8)
+    a, b, c = _rendered(variant, _window_room(), _sun(), _spp(16), 7, 7, 8)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     differs = bool((a.indoor != c.indoor).any())
     return LightClaim(
@@ -305,10 +307,10 @@ def _nonfinite(variant: str) -> LightClaim:
 _CLAIMS: Final[tuple[Callable[[str], LightClaim], ...]] = (
     *(_furnace(_spp(128), "path", albedo) for albedo in (0.0, 0.3, 0.8)),
     *(_furnace(_FEW_CHAINS, "Metropolis", albedo) for albedo in (0.3, 0.8)),
-    _floor,
+    _floor_claim,
     _open_ground,
     _normal_map,
-    _metropolis_is_path("sun through a window", _window, _sun),
+    _metropolis_is_path("sun through a window", _window_room, _sun),
     _metropolis_is_path("door ajar", rooms.door_ajar, dark_sky),
     _direct_and_indirect,
     _groups_sum,

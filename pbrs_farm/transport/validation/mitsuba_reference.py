@@ -94,7 +94,7 @@ class ReferenceScene:
             if group is Group.INDOOR and tag >> 16 != NO_LAMP:
                 radiance = [float(v) for v in t.lamp_rows[int(tag >> 16), :3]]
                 fields["emitter"] = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
-            shapes[f"mesh_{tag}_{int(flipped)}"] = _mesh(mi, t.face_rows[faces], fields)
+            shapes[f"mesh_{tag}_{int(flipped)}"] = _mitsuba_mesh(mi, t.face_rows[faces], fields)
         return shapes
 
 
@@ -103,7 +103,7 @@ def _is_mirrored(rows: F32) -> Bools:
     return np.asarray(a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0])
 
 
-def _mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
+def _mitsuba_mesh(mi: Any, rows: F32, fields: dict[str, Any]) -> Any:
     # Give every face corners of its own; a mesh takes its BSDF and emitter when it is made.
     n = len(rows)
     properties = mi.Properties()

@@ -54,7 +54,7 @@ def noisy(result: LightResult) -> LightResult:
 
 FAULTS = [
     (claims._furnace(claims._spp(128), "path", 0.3), brighter),
-    (claims._floor, brighter),
+    (claims._floor_claim, brighter),
     (claims._normal_map, brighter),
     (claims._sealed_room, leaking),
     (claims._groups_sum, mixed),
