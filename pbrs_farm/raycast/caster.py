@@ -22,7 +22,7 @@ from pbrs_farm.raycast.tracer import JitTracer, RayTracer
 from pbrs_farm.raycast.variant import choose_variant
 
 _FACES_PER_CHUNK: Final = 1 << 18  # bounds the memory of the area test
-_MIN_AREA_M2: Final = 0.5e-12  # below it float32 cannot tell a triangle from a line
+_MIN_AREA_M2: Final = 0.5e-12  # a smaller triangle is a line in float32
 
 
 class Caster:
@@ -75,7 +75,7 @@ class Caster:
     def depth_pictures(self, cameras: Sequence[Camera]) -> F32:
         """(N, H, W) depth_z in metres at the pixels' centres, 0 = nothing.
 
-        cameras: N of one size. For small pictures: all rays are made at once.
+        cameras: N of one size. For small pictures: all rays are in memory at once.
         """
         if not cameras:
             return np.zeros((0, 0, 0), np.float32)

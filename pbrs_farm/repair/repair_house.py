@@ -104,7 +104,7 @@ def _with_light(
 
 
 def _lost(report: StructureReport) -> list[Note]:
-    # A wall that repair lost is told wherever the house's notes are.
+    # A wall that repair lost is shown wherever the house's notes are.
     return [
         Note("wall-lost", w.item_id, f"repair left {w.after_m2:.1f} of {w.before_m2:.1f} m2 of it")
         for w in report.walls_lost

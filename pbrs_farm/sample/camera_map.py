@@ -33,8 +33,8 @@ COLOURS: Final = {
     Verdict.ENCLOSED: "#000000",
     Verdict.FILLED_BY_ONE: "#c2a500",
     Verdict.FEW_OBJECTS: "#d7263d",
-    Verdict.WEAK: "#e8a0bf",
-    Verdict.TWIN: "#8fd3fe",
+    Verdict.BELOW_MIN_SCORE: "#e8a0bf",
+    Verdict.NEAR_DUPLICATE: "#8fd3fe",
     Verdict.LOWER_SCORE: "#5aa469",
     Verdict.WINNER: "#0b5fff",
 }

@@ -77,8 +77,8 @@ class Verdict(IntEnum):
     ENCLOSED = 3  # inside a piece of furniture or a wall
     FILLED_BY_ONE = 4  # one object or wall covers more of the picture than it may
     FEW_OBJECTS = 5  # too few objects cover enough of the picture
-    WEAK = 6  # preset photo: scores less than the least score
-    TWIN = 7  # preset photo: shows what a better view of the home shows
+    BELOW_MIN_SCORE = 6  # preset photo: scores less than the least score
+    NEAR_DUPLICATE = 7  # preset photo: shows what a better view of the home shows
     LOWER_SCORE = 8  # kept every rule; another one of its sector was taken
     WINNER = 9
 

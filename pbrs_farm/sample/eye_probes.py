@@ -132,7 +132,7 @@ def _cube_poses(eyes: F64) -> F64:
 def _enclosing(house: House) -> tuple[F64, F64]:
     """Each item's bounds (I, 2, 3) and the share of all directions (I,) that makes it enclose."""
     bounds = np.array([item.bounds for item in house.items], np.float64).reshape(-1, 2, 3)
-    bounds[[item.is_outside for item in house.items]] = np.nan  # it encloses nobody
+    bounds[[item.is_outside for item in house.items]] = np.nan  # it encloses no eye
     structure = np.array([item.kind.is_structure for item in house.items], np.bool_)
     with np.errstate(invalid="ignore"):
         shell = np.prod(bounds[:, 1] - bounds[:, 0], axis=1) > MAX_OBJECT_M3

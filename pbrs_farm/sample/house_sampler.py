@@ -102,7 +102,7 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
             reports[room.id] = RoomReport(room_id=room.id, name=room.name, reason=reason)
         else:
             scored.append(sampler.room_candidates(room))
-    # Choose among all of them, so that of two twins the better one stays.
+    # Choose among all of them, so that of two near-duplicates the better one stays.
     chosen = sampler.choose(scored)
     views: list[View] = []
     for of_room in scored:

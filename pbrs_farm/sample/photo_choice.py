@@ -35,10 +35,10 @@ _PHOTOGRAPHS: Final[F64] = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU
 # (14,) the same of the labelled pixels alone.
 _OF_LABELLED: Final[F64] = _PHOTOGRAPHS / _PHOTOGRAPHS.sum()
 MOST_OVERLAP: Final = 0.8
-"""A view that shares more than this with a better one is its twin."""
+"""A view that shares more than this with a better one is its near-duplicate."""
 
 _TRIES: Final = 12
-"""Candidates of a sector that are asked, best first, before the sector is given up as a twin."""
+"""Candidates of a sector that are tried, best first, before the sector stays without a view."""
 
 _ROUNDS: Final = 3
 """How often every view may be exchanged for another of its sector."""
@@ -97,7 +97,7 @@ class _Sector:
 
 @dataclass(slots=True, eq=False)
 class PhotoChoice:
-    """The choice among all candidates of one home, made once.
+    """The choice among all candidates of one home.
 
     lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures.
     """
@@ -112,7 +112,7 @@ class PhotoChoice:
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
         """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
 
-        Sectors take turns by their best score, over all rooms, so that of two twins the better
+        Sectors take turns by their best score, over all rooms, so that of two near-duplicates the better
         one stays.
         """
         # Let every sector that has a candidate take its turn, the best first.
@@ -126,7 +126,7 @@ class PhotoChoice:
         # Give each its views, compared with those of all rooms that are taken already.
         with_view: set[str] = set()
         for sector in sectors:
-            self._leave_out_weak(sector, is_first=sector.scored.room.id not in with_view)
+            self._leave_out_low_scores(sector, is_first=sector.scored.room.id not in with_view)
             self._fill(sector)
             if sector.taken:
                 with_view.add(sector.scored.room.id)
@@ -138,21 +138,21 @@ class PhotoChoice:
             sector.scored.verdict[sector.taken] = Verdict.WINNER
         return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
 
-    def _leave_out_weak(self, sector: _Sector, *, is_first: bool) -> None:
-        """Close a sector to weak candidates; a room's first view, its best, may be weaker."""
+    def _leave_out_low_scores(self, sector: _Sector, *, is_first: bool) -> None:
+        """Reject candidates below min_score; a room's first view, its best, needs min_room_score alone."""
         f, scored = self.fields, sector.scored
-        weak = scored.score[sector.candidates] < f.min_score
+        is_low = scored.score[sector.candidates] < f.min_score
         if is_first and scored.score[sector.candidates[0]] >= f.min_room_score:
-            weak[0] = False
-        scored.verdict[sector.candidates[weak]] = Verdict.WEAK
-        sector.candidates = sector.candidates[~weak]
+            is_low[0] = False
+        scored.verdict[sector.candidates[is_low]] = Verdict.BELOW_MIN_SCORE
+        sector.candidates = sector.candidates[~is_low]
         # Likeness chooses among the better ones.
         if f.likeness > 0 and len(sector.candidates):
             score = scored.score[sector.candidates]
             sector.candidates = sector.candidates[score >= score[0] - MOST_WORSE]
 
     def _fill(self, sector: _Sector) -> None:
-        """Take a sector's views, the candidate that adds most first, leaving out twins."""
+        """Take a sector's views, the candidate that adds most first, leaving out near-duplicates."""
         left = sector.candidates
         for _ in range(_TRIES * self.fields.per_sector):
             if len(sector.taken) == self.fields.per_sector or not len(left):
@@ -160,8 +160,8 @@ class PhotoChoice:
             # Rank again after each: what a view adds depends on those that are taken.
             at = int(np.argmax(self._gain(sector.scored, left)))
             number, left = int(left[at]), np.delete(left, at)
-            if self._is_twin(sector.scored, number):
-                sector.scored.verdict[number] = Verdict.TWIN
+            if self._is_near_duplicate(sector.scored, number):
+                sector.scored.verdict[number] = Verdict.NEAR_DUPLICATE
             else:
                 self._take(sector, number)
 
@@ -172,10 +172,10 @@ class PhotoChoice:
             self._give_up(sector, number)
             others = np.setdiff1d(sector.candidates, sector.taken)
             gain = self._gain(sector.scored, others)
-            # Try the better ones from the best down; itself is no twin of any.
+            # Try the better ones from the best down; a view is no near-duplicate of itself.
             order = others[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
             better = order[: order.index(number)] if number in order else order
-            free = (k for k in better if not self._is_twin(sector.scored, k))
+            free = (k for k in better if not self._is_near_duplicate(sector.scored, k))
             self._take(sector, next(free, number))
         return set(before) != set(sector.taken)
 
@@ -198,7 +198,7 @@ class PhotoChoice:
         del self._taken[sector.scored.room.id, number]
         self._shown = self._shown - sector.scored.nyu13[number]
 
-    def _is_twin(self, scored: RoomCandidates, number: int) -> bool:
+    def _is_near_duplicate(self, scored: RoomCandidates, number: int) -> bool:
         camera, depth = self._look(scored, number)
         return any(overlap(camera, depth, *o) > MOST_OVERLAP for o in self._taken.values())
 

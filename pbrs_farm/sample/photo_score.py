@@ -142,7 +142,7 @@ def photo_score(seen: PhotoShares) -> F64:
     score += SCORE_OF_OBJECT * np.minimum(seen.n_objects, MOST_OBJECTS)
     score += SCORE_OF_CLASS * np.minimum(seen.n_classes, MOST_CLASSES)
     score += np.minimum(seen.floor, MOST_FLOOR)
-    # Charge what fills a picture without telling of the room.
+    # Charge what fills a picture without showing the room.
     score -= OPENING_COST * np.maximum(seen.opening - MOST_OPENING, 0)
     score -= np.maximum(seen.largest - MOST_OF_ONE, 0)
     score -= np.maximum(seen.wall - MOST_OF_A_WALL, 0)

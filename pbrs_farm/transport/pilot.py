@@ -101,7 +101,7 @@ def pilot_weights(
     lamps = _with_floors(strength[:n_lamps], lamp_floors(n_lamps))
     outdoor = outdoor_weights(strength[n_lamps:], brought[:, n_lamps:].mean(0))
     weights = EmitterWeights(lamps, outdoor)
-    # Choose outdoor techniques by place, cast weak shadow rays by chance; Metropolis does neither.
+    # Choose outdoor techniques by place, cast shadow rays that can bring little by chance; Metropolis does neither.
     if fields.integrator != "path":
         return weights
     assert sums.counts is not None
@@ -176,7 +176,7 @@ def _apart(whole: F32, even: F32) -> F64:
 def outdoor_weights(strength: F64, brought: NDArray[np.floating]) -> F64:
     """Shares of sun, dome and portals from each one's strength and mean contribution.
 
-    Dome and portals are techniques for one emitter, the sky: the better of the two tells how
+    Dome and portals are techniques for one emitter, the sky: the better of the two says how
     strong it is, and portals take most of it where most of its light comes through them.
     """
     # Measure how much of the dome's light comes through the portals.

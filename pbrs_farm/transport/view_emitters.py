@@ -1,7 +1,7 @@
 """The emitters of a scene, prepared for one view after another. Effects: holds and fills device buffers.
 
 They are built once for a scene; then each view sets the portals near it and how often each emitter is
-sampled. Each step needs those before it, so their order stands here alone:
+sampled. Each step needs those before it, so their order is written here alone:
 
     build   1. lamps and sky, every lamp weighted alike
             2. the light that lampshades send out, measured with these

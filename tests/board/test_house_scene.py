@@ -38,7 +38,7 @@ def test_a_scene_has_rooms_cameras_and_counts_and_leaves_out_what_is_damaged(
         {"id": "bad", "room": "0_0", "intrinsics": SIZE, "world_from_camera_opengl": [[1]]},
         {"id": "worse"},
     ]
-    report = {"refused": {"near_obstacle": 7, "weak": 2}}
+    report = {"refused": {"near_obstacle": 7, "below_min_score": 2}}
     folder = root / "houses/a-1"
     (folder / "cameras.json").write_text(json.dumps({"views": views, "report": report}))
     (folder / "house.glb").write_bytes(b"glTF")

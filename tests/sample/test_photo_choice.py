@@ -109,7 +109,7 @@ def test_every_room_has_a_view_however_unlike_photographs() -> None:
 def test_a_weak_view_is_not_taken_for_its_likeness() -> None:
     scored = room([(0, FIELDS.min_score, WALLS), (0, FIELDS.min_score - 0.01, LIKE_ALL)])
     assert chosen(scored, likeness=50.0) == {("0_0", 0): [0]}
-    assert scored.verdict[1] == Verdict.WEAK
+    assert scored.verdict[1] == Verdict.BELOW_MIN_SCORE
 
 
 def test_a_badly_framed_view_is_not_taken_for_its_likeness() -> None:

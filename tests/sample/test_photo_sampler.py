@@ -164,13 +164,13 @@ def test_of_views_of_one_spot_one_counts_across_rooms_too() -> None:
     for sector in range(FIELDS.n_sectors):
         both = set(chosen.get(("0_0", sector), [])) & set(chosen.get(("0_1", sector), []))
         assert not both
-    assert (twin.verdict == Verdict.TWIN).any()
+    assert (twin.verdict == Verdict.NEAR_DUPLICATE).any()
 
 
 def test_an_empty_room_has_its_best_view_alone_and_the_others_are_called_weak() -> None:
     sampling = sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.05)
     assert len(sampling.views) == 1
-    assert sampling.report.refused["weak"] > 0
+    assert sampling.report.refused["below_min_score"] > 0
     assert not sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.5).views
 
 

@@ -14,7 +14,7 @@ from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of
 from pbrs_farm.repair.structure.walls import Wall
 
-_BESIDE_M = 0.1  # what stands farther from a room bounds nothing of it
+_BESIDE_M = 0.1  # walls farther from a room do not bound it
 _SLIVER_M = 0.02  # narrower parts of a room hold no starts
 
 

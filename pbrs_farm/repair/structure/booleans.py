@@ -3,7 +3,7 @@
 No effects. The only way into manifold3d, which gets closed meshes alone: some open ones kill the
 process (3.5: fans of an odd number of faces). Every patch (one surface of one item) is a run
 with its own original id and carries texture coordinates and normals as vertex properties, so
-after any union or difference each face still knows its item, surface, material and uv.
+after any union or difference each face still has its item, surface, material and uv.
 """
 
 from __future__ import annotations
@@ -137,12 +137,12 @@ def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
         positions = positions[canonical]
     faces = faces_of_patches(patches)
     # List the vertices to merge with an earlier one.
-    twins = np.flatnonzero(canonical != np.arange(len(canonical)))
+    duplicates = np.flatnonzero(canonical != np.arange(len(canonical)))
     uvs = np.concatenate([p.uvs for p in patches])
     normals = np.concatenate([p.normals for p in patches])
     vertices = np.concatenate([positions, uvs, normals], 1)
-    merge_to = canonical[twins].astype(np.uint64)
-    return _Welded(vertices, faces, twins.astype(np.uint64), merge_to)
+    merge_to = canonical[duplicates].astype(np.uint64)
+    return _Welded(vertices, faces, duplicates.astype(np.uint64), merge_to)
 
 
 def united(solids: Iterable[Manifold]) -> Manifold:

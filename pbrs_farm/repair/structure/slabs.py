@@ -22,7 +22,7 @@ GAP_M = 0.05
 """A gap narrower than this between rooms, walls and floors is a fault of the drawing, and closed."""
 
 SAME_HEIGHT_M = 0.01
-"""Floors (or ceilings) nearer in height than this are one level, told apart in plan."""
+"""Floors (or ceilings) nearer in height than this are one level, and separated in plan."""
 
 _FACE_M = 0.02  # thickness of the layer with the visible face
 _BASE_BEHIND_M = 0.01  # the base begins this far behind the face, inside that layer

@@ -1,4 +1,4 @@
-"""Walls, floors and ceilings made one solid that light cannot pass, openings cut; no effects."""
+"""Walls, floors and ceilings united to one solid that light cannot pass, with openings cut; no effects."""
 
 from __future__ import annotations
 

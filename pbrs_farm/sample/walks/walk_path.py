@@ -17,7 +17,7 @@ _DENSE_M: Final = 0.005  # between the points that speed is measured at
 _ACROSS_MPS2: Final = 0.8  # acceleration in a turn, at most
 _ALONG_MPS2: Final = 0.6  # of setting off and slowing down, at most
 _LEAST_MPS: Final = 0.05  # also at rest, so that the way ends
-_CURVE_M: Final = 0.05  # of way before and after a place that tell its curvature
+_CURVE_M: Final = 0.05  # of way before and after a place over which its curvature is measured
 _HEADING_M: Final = 0.2  # and its heading
 
 

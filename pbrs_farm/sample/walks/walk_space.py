@@ -51,7 +51,7 @@ class WalkSpace:
     grid: FloorGrid
     room: NDArray[np.int32]  # (H, W) index of the room in House.rooms, -1 = none
     floor_y: F64  # (H, W) world y of the floor, NaN where there is none
-    clearance: F64  # (H, W) metres to the nearest cell where nobody can be
+    clearance: F64  # (H, W) metres to the nearest cell that is not free
     ways: NDArray[np.int32]  # (H, W) number of the connected way, 0 = none
     doors: tuple[DoorWay, ...]
     way: int = 0  # the one that is walked, 0 where none is large enough

@@ -24,7 +24,7 @@ def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: floa
 
     The illuminant is radiance over albedo, which is known here: the median of its logarithm over
     pixels that are neither dark nor overexposed. strength: 0 leaves the colour, 1 makes it
-    neutral. Ones when fewer than 16 pixels tell it. Where one colour fills the view, the light that
+    neutral. Ones when fewer than 16 pixels are usable. Where one colour fills the view, the light that
     its walls reflect at each other has that colour, and no camera would take it for a lamp's: the
     illuminant is then clamped to colours that lamps and skies have.
     """

@@ -1,6 +1,6 @@
 """Importances of the lamps near a vertex, for shadow rays and guided rays; kernels, no effects.
 
-A home has a dozen lamps. The pilot's weights (pilot.py) tell which of them matter to a view, not
+A home has a dozen lamps. The pilot's weights (pilot.py) say which of them matter to a view, not
 where in the view. Here the strongest few are weighted again at every vertex: by distance, by
 whether they stand in front of the surface and, in views with a trial, by flux and by how often rays
 to them arrive (outdoor_choice.py). Inside a shade its own bulb is nearly always taken.
@@ -159,7 +159,7 @@ class NearbyLampSampler:
         return NearbyLamps(reference, lamps, closeness, chances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
-        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for the weak ones."""
+        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for those that are not among the strongest."""
         sphere = dr.gather(mi.Vector4f, self._spheres, lamp, active)
         strength = dr.gather(mi.Vector4f, self._strengths, lamp, active)
         rows = _LampRows(sphere, strength, None)

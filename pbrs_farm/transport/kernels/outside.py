@@ -29,7 +29,7 @@ GLOW_CD_M2: Final = 45.0
 """Luminance of what shines by itself, times its hue: a room seen through its window at night."""
 
 STREET_LX: Final = 2.5
-"""Of street lamps on whatever lies outside, at any hour: by day nobody sees it."""
+"""Of street lamps on whatever lies outside, at any hour: by day it cannot be seen."""
 STREET_RGB: Final = (1.0, 0.72, 0.42)  # linear, its largest 1
 
 # Convolution of a clamped cosine with each order of spherical harmonics.

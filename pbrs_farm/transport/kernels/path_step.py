@@ -171,7 +171,7 @@ def _strategy(
     """How the rays that leave a vertex are sampled."""
     is_independent, beta = False, path.beta
     if may_reconnect is not False:
-        # Guide by what the suffix itself knows; cast all shadow rays.
+        # Guide by the suffix alone; cast all shadow rays.
         is_independent = may_reconnect & vertex.is_rough & is_reconnectable(vertex.si.bsdf)
         beta = dr.select(is_independent, mi.Color3f(1), beta)
     if vertex.near is None:

@@ -80,7 +80,7 @@ def used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64)
     plane = SunPlane(sun.direction, (centres[:, None] + corners).reshape(-1, 3))
     wanted = device_array(mi.Float, (vertices / vertices.sum()).astype(np.float32))
     places, worth = reached_by_cells(scene, sun, plane, grid, wanted, _CELL_SEED)
-    # Let a cell count for its neighbours, too: a ray of each has told little.
+    # Let a cell count for its neighbours, too: one ray a cell is a noisy estimate.
     picture = worth.astype(np.float64).reshape(plane.shape)
     smooth = np.asarray(uniform_filter(picture, _SMOOTH, mode="constant"), np.float64).ravel()
     # Round, so that the last bits of a sum never change a picture.

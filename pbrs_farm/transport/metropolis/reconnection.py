@@ -53,7 +53,7 @@ from pbrs_farm.transport.metropolis.film import (
 from pbrs_farm.transport.metropolis.prefixes import PREFIX_PACKETS, Prefixes, PrefixSchedule
 from pbrs_farm.transport.metropolis.suffixes import SUFFIX_PACKETS, SuffixRecords, shared_share
 
-_MIN_DISTANCE2: Final = 1e-10  # m2; nearer, float32 knows no direction
+_MIN_DISTANCE2: Final = 1e-10  # m2; nearer, float32 has no direction between them
 
 
 class Rounds(NamedTuple):
@@ -105,8 +105,8 @@ def reconnect(
         return
     pixels = mi.UInt32(np.concatenate([g.pixels for g in groups]))
     slots = mi.UInt32(np.concatenate([g.slots for g in groups]))
-    # Name the limit in the kernel: Dr.Jit 1.5 tells kernels apart by their code, in which the size of
-    # local memory does not stand, and would take one with less of it.
+    # Use the limit as a literal: Dr.Jit 1.5 caches kernels by their code, which does not contain the size
+    # of local memory, and would take a kernel with less of it.
     n = dr.minimum(dr.opaque(mi.UInt32, groups[0].n), mi.UInt32(rounds.max_n))
     launch = _Launch(scene, film, prefixes.rows, pixels, n)
     n_slots = dr.opaque(mi.UInt32, len(groups[0].pixels))

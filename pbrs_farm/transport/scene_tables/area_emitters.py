@@ -100,7 +100,7 @@ def _flux_and_rgb(
 
 
 def lamp_rgb(part: LightPart, name: str, fields: EmissionFields, seed: int) -> F64:
-    """(3,) colour of luminance 1: the source's, or a seeded warm white where it tells none."""
+    """(3,) colour of luminance 1: the source's, or a seeded warm white where it gives none."""
     rgb = np.maximum(np.asarray(part.rgb_linear, np.float64), 0.0)
     if (part.is_coloured or np.ptp(rgb) > 0.02) and rgb @ LUMINANCE > 0:
         return np.asarray(rgb / (rgb @ LUMINANCE))
@@ -125,7 +125,7 @@ def _bulb_emitter(
     flux, rgb = flux_and_rgb
     outside = outside_area(corners)
     radiance = rgb * (flux / (LM_PER_W * math.pi * outside))
-    # Replace both by the published radiance, which knows no size.
+    # Replace both by the published radiance, which is the same for every size.
     if recipe.emission.preset == "released":
         radiance = np.full(3, recipe.emission.released_bulb)
         flux = LM_PER_W * math.pi * outside * recipe.emission.released_bulb

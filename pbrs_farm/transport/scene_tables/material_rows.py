@@ -27,7 +27,7 @@ NULL = 3  # Mitsuba's null BSDF: rays pass as if there were nothing
 
 MAX_ALBEDO: Final = 0.9  # in the preset `physical`: the whitest paints; paths in 1 would never end
 
-_MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source tells no colour
+_MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source gives no colour
 MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
 _DARKEST_METAL: Final = 0.06  # Ks of a metal whose roughness is known: more than a dielectric's
 _MIN_F0: Final = 0.04  # of a surface whose roughness is known: a dielectric of index 1.5

@@ -30,7 +30,7 @@ _SUN_ELEVATION_DEG: Final = (15.0, 60.0)  # range from which a house's sun is dr
 _DUSK_DEG: Final = (-6.0, -1.5)  # range from which a house's dusk is drawn
 _NIGHT_DEG: Final = -30.0
 _NIGHT_FROM_DEG: Final = 12.0  # below the horizon: nautical twilight is over
-_HORIZON_RAD: Final = math.radians(1.0)  # of the sun whose sky stands for sunset
+_HORIZON_RAD: Final = math.radians(1.0)  # elevation of the sun whose sky is used at sunset
 _BLUE_DEG: Final = 8.0  # below the horizon, where no glow is left
 # Degrees below the horizon -> log10 lx of a clear sky without a moon, after the twilight tables
 # of the US Naval Observatory.
@@ -41,7 +41,9 @@ _TOWN: Final = (1.0, 0.8, 0.6)
 _CLOUDS: Final = (0.94, 0.98, 1.06)
 _OPTICAL_DEPTH: Final = 0.21  # of clear air at the zenith, for the sun's light
 _SUN_RAD: Final = math.radians(4)  # around a panorama's brightest texel, where its sun is sought
-_RING_RAD: Final = math.radians(6)  # outer edge of the ring that tells the sky around the sun
+_RING_RAD: Final = math.radians(
+    6
+)  # outer edge of the ring in which the sky around the sun is measured
 _SUN_FACTOR: Final = 20  # the sun is brighter than that ring by this
 
 
@@ -140,7 +142,7 @@ def _sun_of_house(recipe: Recipe, house_id: str) -> tuple[float, float, bool]:
     azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
     time, is_overcast = str(fields.time), fields.overcast
     is_told = fields.hour is not None or fields.sun_elevation_deg is not None
-    # A told sun is no drawn one: dusk, night and clouds are then as the recipe says.
+    # The recipe gives the sun: dusk, night and clouds are then as it says, not drawn.
     if time == "drawn" and not is_told:
         time, drawn_overcast = drawn_time(house_id, recipe.seed)
         is_overcast |= drawn_overcast

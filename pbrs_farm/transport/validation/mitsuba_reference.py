@@ -58,7 +58,7 @@ class ReferenceScene:
         self._variant = variant
         self._tables = tables
         self._sky = sky
-        self._scenes: dict[Group, Any] = {}  # made at the first use of each group
+        self._scenes: dict[Group, Any] = {}  # built at the first use of each group
 
     def render(self, camera: Camera, group: Group, fields: LightFields, seed: int) -> F32:
         """(H, W, 3) radiance of one group; fields.spp, max_depth and rr_depth count."""
