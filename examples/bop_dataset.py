@@ -1,12 +1,10 @@
 """Training data for 6-D poses: models on a real table, in the layout of the BOP challenge."""
 
 import sys
-from pathlib import Path
 
 import trimesh
 
 import pbrs_farm as pf
-from pbrs_farm.export.export_views import export
 
 trimesh.creation.cylinder(radius=33, height=122).export("obj_000001.ply")
 home = pf.load(*sys.argv[1:2] or ["Studio"], recipe="preview")
@@ -15,4 +13,4 @@ for seed in range(2):
     scene = home.scatter([can], n=4, on="table", seed=seed)
     views = scene.cameras_around(n=2, size=(320, 240), seed=seed)
     pf.render(scene, views, modes=["opengl_dl"]).save("out/bop/views")
-print(export(Path("out/bop/views"), Path("out/bop/bop"), "bop"))
+print(pf.export("out/bop/views", "out/bop/bop", "bop"))

@@ -4,9 +4,8 @@ import sys
 from pathlib import Path
 
 import pbrs_farm as pf
-from pbrs_farm.export.export_views import export
 
 home = pf.load(*sys.argv[1:2] or ["Studio"], recipe="preview")
 pf.render(home, home.cameras(n=2), modes=["opengl_dl"]).save("out/captions/views")
-export(Path("out/captions/views"), Path("out/captions/text"), "captions")
+pf.export("out/captions/views", "out/captions/text", "captions")
 print(Path("out/captions/text/captions.jsonl").read_text()[:400])

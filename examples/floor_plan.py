@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pbrs_farm as pf
-from pbrs_farm.cli import main
 
 living = {"type": "living", "polygon": [[0, 0], [5, 0], [5, 4], [0, 4]]}
 bedroom = {"type": "bedroom", "polygon": [[5, 0], [9, 0], [9, 4], [5, 4]]}
@@ -12,6 +11,5 @@ doors = [{"at": [5, 2], "width": 0.9}, {"at": [0, 2], "entrance": True}]
 windows = [{"at": [2.5, 0], "width": 1.5}, {"at": [7, 0], "width": 1.3}]
 plan = {"rooms": [living, bedroom], "doors": doors, "windows": windows}
 Path("mine.json").write_text(json.dumps(plan))
-main(["homes", "make", "1", "--plan", "mine.json", "--empty", "--out", "homes"])
-home = pf.load("homes/mine.sh3d", recipe="preview")
+home = pf.load("mine.json", recipe="preview")
 print(home.rooms)

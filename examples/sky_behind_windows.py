@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import pbrs_farm as pf
-from pbrs_farm.images import exr_from_layers
+from pbrs_farm.plugin import exr_from_layers
 
 row = np.linspace(3.0, 0.05, 64, dtype=np.float32)[:, None]
 rgb = {name: np.tile(row * k, (1, 128)) for name, k in zip("RGB", (0.6, 0.8, 1.2), strict=True)}

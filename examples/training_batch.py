@@ -5,11 +5,9 @@ import sys
 import numpy as np
 
 import pbrs_farm as pf
-from pbrs_farm.study.packing.pack_shards import pack
-from pbrs_farm.study.packing.packing_plan import Packing
 
 home = pf.load(*sys.argv[1:2] or ["Studio"], recipe="preview")
 pf.render(home, home.cameras(n=2)).save("out/batch/views")
-pack(pf.open("out/batch/views"), "out/batch/shards", Packing((64, 48), modes=("mlt_il_ol",)))
+pf.pack(pf.open("out/batch/views"), "out/batch/shards", pf.Packing((64, 48), modes=("mlt_il_ol",)))
 samples = [frame.sample() for frame in pf.open("out/batch/shards")]
 print(np.stack([s.colour for s in samples]).shape, np.stack([s.normal for s in samples]).shape)

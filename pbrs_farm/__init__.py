@@ -7,7 +7,8 @@
     frame = pf.render(home, camera, layers=["albedo"])
     frame.colour, frame.depth, frame.instances
 
-Names are imported when they are first used: importing the package itself takes milliseconds.
+The names of this module and of `pbrs_farm.plugin` stay from version to version; all others may move. Names are
+imported when they are first used: importing the package itself takes milliseconds.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from pbrs_farm.core.camera import Camera as Camera
     from pbrs_farm.core.recipe import Recipe as Recipe
+    from pbrs_farm.export.export_views import export as export
     from pbrs_farm.scene.home import Home as Home
     from pbrs_farm.scene.home import load as load
     from pbrs_farm.scene.home import make as make
@@ -26,7 +28,10 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.models import models as models
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
+    from pbrs_farm.study.packing.pack_shards import pack as pack
+    from pbrs_farm.study.packing.packing_plan import Packing as Packing
     from pbrs_farm.views.open_views import open_views as open
+    from pbrs_farm.views.view_sample import SampleRequest as SampleRequest
     from pbrs_farm.views.views import Frame as Frame
 
     __version__: str
@@ -37,11 +42,15 @@ _PUBLIC: Final = {
     "Frame": "pbrs_farm.views.views:Frame",
     "Home": "pbrs_farm.scene.home:Home",
     "Model": "pbrs_farm.scene.models:Model",
+    "Packing": "pbrs_farm.study.packing.packing_plan:Packing",
     "Recipe": "pbrs_farm.core.recipe:Recipe",
+    "SampleRequest": "pbrs_farm.views.view_sample:SampleRequest",
+    "export": "pbrs_farm.export.export_views:export",
     "load": "pbrs_farm.scene.home:load",
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
     "models": "pbrs_farm.scene.models:models",
+    "pack": "pbrs_farm.study.packing.pack_shards:pack",
     "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",
@@ -52,13 +61,17 @@ __all__ = [
     "Frame",
     "Home",
     "Model",
+    "Packing",
     "Recipe",
+    "SampleRequest",
     "__version__",
+    "export",
     "load",
     "make",
     "model",
     "models",
     "open",
+    "pack",
     "render",
     "render_homes",
 ]

@@ -19,8 +19,8 @@ from pbrs_farm.regular_files import fault_of, read_regular
 
 
 def export(
-    folder: Path,
-    out: Path,
+    folder: str | Path,
+    out: str | Path,
     name: str,
     *,
     selection: str | None = None,
@@ -36,8 +36,12 @@ def export(
     classes, a folder without finished views, a selection that does not exist, or an out that holds
     something.
 
-        export(Path("out/studio"), Path("out/coco"), "coco", choice=Choice(size=(320, 240)))
+    >>> frame.save("out/detect")
+    >>> n_views, n_files = pf.export("out/detect", "out/coco", "coco")
+    >>> n_views
+    1
     """
+    folder, out = Path(folder), Path(out)
     form = form_of(name)
     if not isinstance(form, ViewForm):
         raise BadInput("--to", name, "is a form of homes", hint="export_homes writes it")

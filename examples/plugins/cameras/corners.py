@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core import keys
-from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.plugin import Camera, Intrinsics, View, view_id
 
 
 def corners(house: Any, fields: Any, _seed: int, _caster: Any) -> list[View]:
@@ -23,5 +22,5 @@ def corners(house: Any, fields: Any, _seed: int, _caster: Any) -> list[View]:
         eye = np.array([x, room.floor_y + 1.5, z])
         target = np.array([middle[0], room.floor_y + 0.8, middle[1]])
         camera = Camera.look(Intrinsics.from_hfov(*size, fields.hfov_rad), eye, target - eye)
-        views.append(View(keys.view_id(room.id, 0), room.id, 0, camera))
+        views.append(View(view_id(room.id, 0), room.id, 0, camera))
     return views

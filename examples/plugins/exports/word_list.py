@@ -9,7 +9,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.plugin import ViewForm
 
 
 def write_word_list(views: list[Any], out: Path, _choice: Any) -> int:

@@ -7,10 +7,7 @@ from __future__ import annotations
 
 from itertools import product
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import OTHERFURNITURE
-from pbrs_farm.dress.things.bodies import bevelled, tube, vessel
-from pbrs_farm.dress.things.maker import Maker, Size, family
+from pbrs_farm.plugin import OTHERFURNITURE, Maker, Place, Size, bevelled, family, tube, vessel
 
 
 @family(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core.layers import optional_layer
+from pbrs_farm.plugin import optional_layer
 
 
 class Height:

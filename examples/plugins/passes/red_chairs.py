@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.core.house import Material
+from pbrs_farm.plugin import NYU40_NAMES, Material
 
 _CHAIR = NYU40_NAMES.index("chair")
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pbrs_farm.transport.develop.mode_pictures import develop
+from pbrs_farm.plugin import develop
 
 SKY = (0.002, 0.003, 0.006)  # of the day's outdoor light, red, green and blue
 

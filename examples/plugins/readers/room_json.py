@@ -10,13 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core import keys
-from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Room, Source
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.geometry.solids import boxes_surface
-from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.plugin import (
+    NYU40_NAMES,
+    BadHouse,
+    Format,
+    GivenFile,
+    House,
+    Item,
+    ItemKind,
+    Level,
+    Material,
+    ReadFields,
+    Room,
+    Source,
+    boxes_surface,
+    sha256,
+)
 
 
 def read_room(given: GivenFile, _fields: ReadFields) -> House:
@@ -41,7 +50,7 @@ def read_room(given: GivenFile, _fields: ReadFields) -> House:
     plan = np.array([[0, 0], [0, d], [w, d], [w, 0]], np.float64)
     data = path.read_bytes()
     return House(
-        id=path.stem, name=path.stem, source=Source("room", path.name, keys.sha256(data)),
+        id=path.stem, name=path.stem, source=Source("room", path.name, sha256(data)),
         levels=(Level("0", "", 0.0, h),), rooms=(Room("0_0", "Room", "0", plan, 0.0, h),),
         items=tuple(items), materials=(Material("paint", diffuse=(0.8, 0.8, 0.75)),), textures={},
     )  # fmt: skip

@@ -49,6 +49,11 @@ def pack(
 
     tell: called with a line as each shard is written. Raises BadInput for a root that cannot be
     packed, a view that is damaged, or an out that holds something.
+
+    >>> frame.save("out/batch")
+    >>> packing = pf.Packing(layers=("colour", "depth"), modes=("opengl_dl",))
+    >>> pf.pack(pf.open("out/batch"), "out/shards", packing).n_views
+    {'all': 1}
     """
     if form not in FORMS:
         raise BadInput("--to", form, "no such form", hint=f"of {', '.join(FORMS)}")

@@ -1,0 +1,89 @@
+"""What a plugin is written with: the names of this module, and those of `pbrs_farm`, stay from version to version.
+
+Everything else in the package may move or change with any version. docs/plugins.md says what each kind
+of plugin gives; examples/plugins has a package of each. A name that must go is kept for one minor
+version, in which its use warns, and the changelog says what replaces it.
+
+    from pbrs_farm.plugin import BadHouse, Format, House
+
+Names are imported when they are first used. No effects.
+"""
+
+from __future__ import annotations
+
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from pbrs_farm.core.camera import Camera as Camera
+    from pbrs_farm.core.camera import Intrinsics as Intrinsics
+    from pbrs_farm.core.camera import View as View
+    from pbrs_farm.core.catalogue import Place as Place
+    from pbrs_farm.core.classes import NYU40_NAMES as NYU40_NAMES
+    from pbrs_farm.core.classes import OTHERFURNITURE as OTHERFURNITURE
+    from pbrs_farm.core.errors import BadHouse as BadHouse
+    from pbrs_farm.core.errors import BadInput as BadInput
+    from pbrs_farm.core.house import House as House
+    from pbrs_farm.core.house import Item as Item
+    from pbrs_farm.core.house import ItemKind as ItemKind
+    from pbrs_farm.core.house import Level as Level
+    from pbrs_farm.core.house import LightPart as LightPart
+    from pbrs_farm.core.house import Material as Material
+    from pbrs_farm.core.house import Note as Note
+    from pbrs_farm.core.house import Opening as Opening
+    from pbrs_farm.core.house import Room as Room
+    from pbrs_farm.core.house import Source as Source
+    from pbrs_farm.core.house import Surface as Surface
+    from pbrs_farm.core.keys import sha256 as sha256
+    from pbrs_farm.core.keys import view_id as view_id
+    from pbrs_farm.core.layers import Layer as Layer
+    from pbrs_farm.core.layers import optional_layer as optional_layer
+    from pbrs_farm.core.recipe import ReadFields as ReadFields
+    from pbrs_farm.dress.things.bodies import bevelled as bevelled
+    from pbrs_farm.dress.things.bodies import tube as tube
+    from pbrs_farm.dress.things.bodies import vessel as vessel
+    from pbrs_farm.dress.things.maker import Maker as Maker
+    from pbrs_farm.dress.things.maker import Size as Size
+    from pbrs_farm.dress.things.maker import family as family
+    from pbrs_farm.export.form import HomeForm as HomeForm
+    from pbrs_farm.export.form import ViewForm as ViewForm
+    from pbrs_farm.geometry.solids import boxes_surface as boxes_surface
+    from pbrs_farm.images import exr_from_layers as exr_from_layers
+    from pbrs_farm.read.common.format import Format as Format
+    from pbrs_farm.read.common.format import GivenFile as GivenFile
+    from pbrs_farm.transport.develop.mode_pictures import develop as develop
+
+# Module -> the names of it that a plugin may use.
+_MODULES: Final = {
+    "core.camera": ("Camera", "Intrinsics", "View"),
+    "core.catalogue": ("Place",),
+    "core.classes": ("NYU40_NAMES", "OTHERFURNITURE"),
+    "core.errors": ("BadHouse", "BadInput"),
+    "core.house": (
+        "House", "Item", "ItemKind", "Level", "LightPart", "Material", "Note", "Opening", "Room", "Source", "Surface",
+    ),
+    "core.keys": ("sha256", "view_id"),
+    "core.layers": ("Layer", "optional_layer"),
+    "core.recipe": ("ReadFields",),
+    "dress.things.bodies": ("bevelled", "tube", "vessel"),
+    "dress.things.maker": ("Maker", "Size", "family"),
+    "export.form": ("HomeForm", "ViewForm"),
+    "geometry.solids": ("boxes_surface",),
+    "images": ("exr_from_layers",),
+    "read.common.format": ("Format", "GivenFile"),
+    "transport.develop.mode_pictures": ("develop",),
+}  # fmt: skip
+_PLACES: Final = {name: f"pbrs_farm.{m}:{name}" for m, names in _MODULES.items() for name in names}
+
+__all__ = [*_PLACES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'pbrs_farm.plugin' has no attribute {name!r}")
+    globals()[name] = found = resolve_name(_PLACES[name])
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PLACES})
