@@ -24,14 +24,16 @@ from benchmarks.memory import peak_mb
 from pbrs_farm.core import keys
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
-from pbrs_farm.curate.selection_run import PAPER_VIEWS, json_lines, select
+from pbrs_farm.curate.selection_run import json_lines, select
+from pbrs_farm.curate.selection_summary import PAPER_VIEWS
 from pbrs_farm.formats.histogram_json import SceneQuality
 from pbrs_farm.selection import histogram, quality
+from pbrs_farm.selection.binning import BINNINGS
 from pbrs_farm.selection.histogram_pack import HistogramPack, bytes_from_pack, pack_from_bytes
 from pbrs_farm.selection.histograms import normalised
 from pbrs_farm.selection.reference_set import Reference, ReferenceFacts
 from pbrs_farm.selection.scores import Scorer, merged
-from pbrs_farm.selection.similarity import BINNINGS, best_match
+from pbrs_farm.selection.similarity import best_match
 from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store import MemoryStore
 

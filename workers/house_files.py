@@ -110,7 +110,7 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
     """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
-    from pbrs_farm.curate.photographs import read_reference
+    from pbrs_farm.curate.reference_build import read_reference
     from pbrs_farm.selection.reference_set import bytes_from_reference
 
     reference = read_reference(path)

@@ -12,7 +12,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from pbrs_farm.run.request import ModelsOption, Request, Wanted, option
-from pbrs_farm.store import laid_out
+from pbrs_farm.store.pack import FORMAT
 from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
 
 
@@ -28,7 +28,7 @@ def work_version() -> str:
 
     steps = {name: step.version for name, step in plan.STEPS.items()}
     # Workers that do not know how a root lies would not find what others made.
-    return keys.digest(steps, versions_of_passes(), laid_out.FORMAT)[:12]
+    return keys.digest(steps, versions_of_passes(), FORMAT)[:12]
 
 
 class HouseEntry(Record):

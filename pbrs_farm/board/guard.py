@@ -24,10 +24,24 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.sessions import COOKIE, Sessions
 
-# How often an address may ask: a bucket of tokens each. Effects: reads the clock.
-
-
 _MAX_ADDRESSES: Final = 4096  # that are remembered
+LOGIN: Final = "/login"
+HEALTH: Final = "/health"
+_READS: Final = ("GET", "HEAD")
+_OPEN: Final = ("/static/", HEALTH, LOGIN)  # readable by everybody who may reach the board
+_CSP: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
+    " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+)
+HEADERS: Final = {
+    "Content-Security-Policy": _CSP,
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
+}
 
 
 class Buckets:
@@ -57,28 +71,6 @@ class Buckets:
         now = self._clock()
         left, since = self._left.get(address, (self._burst, now))
         return min(self._burst, left + (now - since) * self._per_s)
-
-
-# What every request passes before a route sees it.
-
-
-LOGIN: Final = "/login"
-HEALTH: Final = "/health"
-_READS: Final = ("GET", "HEAD")
-_OPEN: Final = ("/static/", HEALTH, LOGIN)  # readable by everybody who may reach the board
-_CSP: Final = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:;"
-    " connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
-)
-HEADERS: Final = {
-    "Content-Security-Policy": _CSP,
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Referrer-Policy": "same-origin",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Permissions-Policy": "camera=(), microphone=(), geolocation=()",
-}
 
 
 class Guard:

@@ -25,11 +25,12 @@ if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
 T = TypeVar("T")
-
 _KEPT_S: Final = 2.0  # an answer that Redis gave
 _MAX_KEPT: Final = 200  # answers
 _MAX_LOG: Final = 200_000  # characters of a log, its end
 _COMMAND: Final = re.compile(r"\[reproduce: (.+?)\]")
+_LOG: Final = logging.getLogger(__name__)
+_SHOWN: Final = 20  # lines that the page shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,13 +174,6 @@ def _with_command(kind: dict[str, Any]) -> dict[str, Any]:
     task = kind["tasks"][0] if kind["tasks"] else ""
     command = found[1] if found else kind["command"]
     return {**kind, "example": example, "task": task, "command": command}
-
-
-# The lines that say who changed what of a farm. Effects: appends to a file, writes to the log.
-
-
-_LOG: Final = logging.getLogger(__name__)
-_SHOWN: Final = 20  # lines that the page shows
 
 
 class Audit:

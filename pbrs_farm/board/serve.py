@@ -21,15 +21,13 @@ from starlette.types import ASGIApp
 from pbrs_farm.board.board_state import Board
 from pbrs_farm.board.connections import connection_class
 from pbrs_farm.board.guard import Guard
-from pbrs_farm.board.pages import farming, house_scene, lists, relighting, viewing
+from pbrs_farm.board.pages import farming, house_scene, lists, login, relighting, viewing
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.core.errors import BadInput, PbrsError
 
-# The board as an ASGI application: its routes behind the guard. Effects: those of its routes.
-
-
 _THREADS: Final = 8  # that answer at once: each holds a connection to the index
 _VIEW: Final = "/homes/{house}/views/{view}"
+_BACKLOG = 256
 
 
 def application(board: Board) -> ASGIApp:
@@ -76,11 +74,11 @@ def _routes() -> list[Route]:
         Route("/farm/do", farming.steer, methods=["POST"]),
         Route("/farm/jobs/{job}", farming.job),
         Route("/farm/jobs/{job}/log", farming.log),
-        Route("/login", lists.login),
-        Route("/login", lists.log_in, methods=["POST"]),
-        Route("/logout", lists.log_out, methods=["POST"]),
-        Route("/static/{name}", lists.asset),
-        Route("/health", lists.health),
+        Route("/login", login.login),
+        Route("/login", login.log_in, methods=["POST"]),
+        Route("/logout", login.log_out, methods=["POST"]),
+        Route("/static/{name}", login.asset),
+        Route("/health", login.health),
     ]
 
 
@@ -97,12 +95,6 @@ def _failed(request: Request, error: Exception) -> Response:
 def _broken(_request: Request, _error: Exception) -> Response:
     # The traceback is in the log; a browser is told nothing of it.
     return PlainTextResponse("the board failed at this: its log says why\n", 500)
-
-
-# Serves a board over HTTP until it is told to end.
-
-
-_BACKLOG = 256
 
 
 class _Server(uvicorn.Server):

@@ -6,11 +6,8 @@ one's (an edge that two casters see differently) is left to the checks of its ow
 
 from __future__ import annotations
 
-import io
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,10 +16,9 @@ from numpy.typing import NDArray
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
 from pbrs_farm.check.lens_rays import StoredLens
-from pbrs_farm.check.stored_view import BadFile, StoredView, stored_bytes, stored_object
+from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
-
 FLOW_PX = 0.02  # beside half a step of what stores it
 SEEN, OUTSIDE, HIDDEN = 0, 128, 255
 BORDER_PX = 0.01  # of the other picture: on it a point is in or out
@@ -35,8 +31,9 @@ FLOW_LAYERS = {
     "next": ("flow_forward", "flow_forward_kitti", "occlusion_forward"),
     "previous": ("flow_backward", "flow_backward_kitti", "occlusion_backward"),
 }
-
 MOTION_LAYERS = {name for names in FLOW_LAYERS.values() for name in names}
+
+
 MOTION_LAYERS |= {"disparity", "occlusion_stereo"}
 
 
@@ -222,93 +219,3 @@ def check_partners(views: list[StoredView], tally: Tally) -> None:
             )
             what = f"the {relation} view {other.folder.name} has another camera"
             tally.expect("partners", view.place, same, what)
-
-
-# pairs.parquet against points that are followed from one stored camera to the other, by Embree.
-# Effects: reads files.
-
-
-SHARE = 0.01  # of 768 points: those on edges may fall either way
-GRID = (32, 24)  # rays of a view, across and down
-MOST_PAIRS = 40  # of a house, chosen by its name
-PAIR_REACH_M = 1e-3  # how far before a point the ray to it may end
-COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_m", "angle_deg")
-
-
-def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
-    """Recompute the shares of some pairs of a house that has the file."""
-    file = house / "pairs.parquet"
-    if not file.is_file():
-        return
-    # Here, since it loads slowly and few homes have the file.
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        rows = pq.read_table(io.BytesIO(stored_bytes(file))).select(list(COLUMNS)).to_pylist()
-        views = {row["id"]: row for row in stored_object(house / "cameras.json")["views"]}
-    except (BadFile, pa.ArrowException, KeyError, TypeError) as error:
-        tally.expect("pairs", house.name, False, f"cannot be read: {error}")
-        return
-    named = {row[key] for row in rows for key in ("view_a", "view_b")}
-    if not tally.expect("pairs", house.name, named <= views.keys(), "names views that are none"):
-        return
-    rng = np.random.default_rng(zlib.crc32(house.name.encode()))
-    chosen = rng.permutation(len(rows))[:MOST_PAIRS]
-    for row in (rows[int(k)] for k in sorted(chosen)):
-        a, b = views[row["view_a"]], views[row["view_b"]]
-        for key, one, other in (("a_in_b", a, b), ("b_in_a", b, a)):
-            share = _share(_Camera(one), _Camera(other), rays)
-            place = f"{house.name}: {row['view_a']}, {row['view_b']}"
-            right = abs(row[key] - share) <= SHARE
-            tally.expect("pairs", place, right, f"{key} is {row[key]:.3f}, here {share:.3f}")
-
-
-class _Camera:
-    """A camera of cameras.json with the grid's pixels."""
-
-    def __init__(self, row: dict[str, Any]) -> None:
-        i = row["intrinsics"]
-        x, y = GRID[0] / i["width_px"], GRID[1] / i["height_px"]
-        self.f = np.array([i["fx"] * x, i["fy"] * y])
-        self.c = np.array([i["cx"] * x, i["cy"] * y])
-        self.lens = StoredLens.of(i["lens"]) if "lens" in i else None
-        # OpenGL axes to x right, y down, z forward.
-        pose = np.array(row["world_from_camera_opengl"], np.float64) @ np.diag([1.0, -1, -1, 1])
-        self.rotation, self.eye = pose[:3, :3], pose[:3, 3]
-
-    def directions(self) -> Floats:
-        """(N, 3) through the middles of the grid's pixels that see anything, of unit depth."""
-        columns, rows = np.meshgrid(np.arange(GRID[0]) + 0.5, np.arange(GRID[1]) + 0.5)
-        plane = (np.stack([columns.ravel(), rows.ravel()], axis=1) - self.c) / self.f
-        if self.lens is None:
-            return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
-        local = self.lens.rays(plane)
-        return np.asarray(local[np.abs(local).sum(1) > 0] @ self.rotation.T)
-
-    def shows(self, points: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """(N,) points (N, 3) that fall into the picture."""
-        local = (points - self.eye) @ self.rotation
-        with np.errstate(divide="ignore", invalid="ignore"):
-            plane, depth = local[:, :2] / local[:, 2:], local[:, 2]
-            if self.lens is not None:
-                plane, depth = self.lens.plane_and_depth(local)
-            px = plane * self.f + self.c
-            inside = ((px >= 0) & (px < GRID)).all(axis=1)
-            return np.asarray(inside & (depth > 1e-3), bool)
-
-
-def _share(one: _Camera, other: _Camera, rays: Rays) -> float:
-    """The part of the ends of one's rays that other sees; 0 where they meet nothing."""
-    directions = one.directions()
-    face = rays.first(one.eye, directions)
-    z = rays.distance(face, one.eye, directions)
-    points = (one.eye + directions * z[:, None])[face >= 0]
-    if not len(points):
-        return 0.0
-    inside = points[other.shows(points)]
-    to = inside - other.eye
-    face = rays.first(other.eye, to)
-    t = rays.distance(face, other.eye, to)
-    seen = (face < 0) | ((1 - t) * np.linalg.norm(to, axis=1) <= PAIR_REACH_M)
-    return float(seen.sum() / len(points))

@@ -5,7 +5,6 @@ Effects: reads files. Knows nothing of the House or the Camera that made them.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,56 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
 from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.images import array_from_png, layers_from_exr
-from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
-
-# Stored files for `verify`, that a stranger may have put there: bytes, digests and JSON of
-# regular ones.
-# Effects: reads files. Every fault is a BadFile whose text says what is wrong with it.
-
-
-MAX_BYTES = 2 * 2**30  # of a house's geometry; every other stored file is smaller
-
-
-class BadFile(ValueError):
-    """A stored file cannot be read; the text says why."""
-
-
-def stored_bytes(file: Path) -> bytes:
-    """The file's bytes; raises BadFile."""
-    try:
-        return read_regular(file, MAX_BYTES)
-    except OSError as error:
-        raise BadFile(fault_of(error)) from None
-
-
-def stored_digest(file: Path) -> str:
-    """Hex sha256 of the file, whatever its size; raises BadFile."""
-    try:
-        return digest_of_regular(file)
-    except OSError as error:
-        raise BadFile(fault_of(error)) from None
-
-
-def stored_object(file: Path) -> dict[str, Any]:
-    """The JSON object in the file; raises BadFile."""
-    return object_from_json(stored_bytes(file))
-
-
-def object_from_json(data: bytes | str) -> dict[str, Any]:
-    """The JSON object that data says; raises BadFile."""
-    try:
-        value = json.loads(data)
-    except (ValueError, RecursionError):
-        raise BadFile("is no JSON, or is cut short") from None
-    if not isinstance(value, dict):
-        raise BadFile("is no JSON object")
-    return value
-
-
-# A finished view as its stored files say.
 
 
 @dataclass(frozen=True)

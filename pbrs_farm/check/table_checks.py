@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.stored_files import BadFile, stored_object
 from pbrs_farm.check.stored_mesh import Colours, Triangles
-from pbrs_farm.check.stored_view import BadFile, StoredView, stored_object
+from pbrs_farm.check.stored_view import StoredView
 
 BOX_M = 0.001  # by which a side of a box may differ from its triangles
 BORDER_PX = 0.02  # of the picture: a vertex there is in or out

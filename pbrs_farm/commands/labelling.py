@@ -168,7 +168,7 @@ def _is_home(word: str) -> bool:
 def _home_classes(args: argparse.Namespace) -> int:
     """What a home's pieces are and why, without rendering it."""
     from pbrs_farm.core.recipe import ReadFields
-    from pbrs_farm.gallery.class_statistics import class_decisions, decisions_text
+    from pbrs_farm.gallery.class_decisions import class_decisions, decisions_text
     from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.prepare.source import resolve
 

@@ -18,7 +18,7 @@ from pbrs_farm.core.recipe import (
 )
 
 if TYPE_CHECKING:
-    from pbrs_farm.curate.selection_run import SelectionSummary
+    from pbrs_farm.curate.selection_summary import SelectionSummary
     from pbrs_farm.selection.reference_set import Reference
 
 
@@ -66,15 +66,15 @@ def _built(
     args: argparse.Namespace, source: Path, histogram: HistogramFields, selection: SelectionFields
 ) -> Reference:
     """The reference of photographs, read as the options say."""
-    from pbrs_farm.curate.photographs import PhotoOptions, build_reference
+    from pbrs_farm.curate.reference_build import PhotoOptions, build_reference
 
     options = PhotoOptions(args.depth_scale, args.sun_rgbd, not args.no_crop)
     return build_reference(source, histogram, selection, options)
 
 
 def _reference(args: argparse.Namespace) -> int:
+    from pbrs_farm.selection.binning import table_text
     from pbrs_farm.selection.reference_set import bytes_from_reference
-    from pbrs_farm.selection.similarity import table_text
     from pbrs_farm.store.folder import FolderStore
 
     recipe = recipe_from_name("fast", _overrides(args.set))
@@ -89,7 +89,7 @@ def _reference(args: argparse.Namespace) -> int:
 
 
 def _select(args: argparse.Namespace) -> int:
-    from pbrs_farm.curate.photographs import read_reference
+    from pbrs_farm.curate.reference_build import read_reference
     from pbrs_farm.curate.selection_run import select
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url

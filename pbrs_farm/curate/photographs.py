@@ -9,7 +9,6 @@ import io
 import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +19,6 @@ from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.installation import install_command
 from pbrs_farm.regular_files import (
     MAX_DIGEST_BYTES,
@@ -29,15 +27,7 @@ from pbrs_farm.regular_files import (
     open_regular,
     read_given,
 )
-from pbrs_farm.selection.histograms import Histogram, histogram
-from pbrs_farm.selection.reference_set import (
-    Reference,
-    depth_mm_from_units,
-    reference_from_bytes,
-    reference_from_histograms,
-    registration_border,
-    sun_rgbd_depth,
-)
+from pbrs_farm.selection.reference_set import depth_mm_from_units, sun_rgbd_depth
 
 _RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
 _DEPTH_NAMES: Final = ("depth_bfx", "depth")  # the preferred first
@@ -272,64 +262,3 @@ def sha256_of_files(paths: list[Path]) -> str:
         except OSError as error:
             raise BadInput(path, "", fault_of(error)) from None
     return digests[0] if len(digests) == 1 else keys.sha256("".join(digests).encode())
-
-
-# `pbrs-farm reference build`: photographs -> a reference file. Effects: reads files.
-# The reference holds histograms only, so it can be shared where the photographs cannot.
-
-
-@dataclass(frozen=True, slots=True)
-class PhotoOptions:
-    """How photographs are read."""
-
-    depth_scale: float | None = None  # depth units per metre, None = by the file's kind
-    sun_rgbd: bool = False  # undo SUN RGB-D's rotation of depth bits
-    crop: bool = True  # peel off the registration border
-
-
-def build_reference(
-    source: Path,
-    settings: HistogramFields,
-    selection: SelectionFields,
-    options: PhotoOptions | None = None,
-) -> Reference:
-    """The reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
-
-    Raises BadInput naming the file that is wrong; docs/selection.md shows the layouts.
-    """
-    options = options or PhotoOptions()
-    if options.depth_scale is not None and not options.depth_scale > 0:
-        raise BadInput("--depth-scale", "", f"{options.depth_scale} is not above 0")
-    if not source.exists():
-        raise BadInput(source, "", "no such file or folder")
-    # Count the photographs of a .mat or of a folder of pairs, one at a time.
-    if source.is_file():
-        with NyuMat(source) as mat:
-            counted = _counted(mat.photos(), settings, options)
-            digest = sha256_of_files([source])
-    else:
-        pairs = pairs_in(source)
-        read = partial(photo_from_pair, depth_scale=options.depth_scale, sun_rgbd=options.sun_rgbd)
-        counted = _counted(map(read, pairs), settings, options)
-        digest = sha256_of_files([path for pair in pairs for path in (pair.rgb, pair.depth)])
-    return reference_from_histograms(
-        list(counted), list(counted.values()), settings, selection, source=(source.name, digest)
-    )
-
-
-def _counted(
-    photos: Iterator[Photo], settings: HistogramFields, options: PhotoOptions
-) -> dict[str, Histogram]:
-    counted: dict[str, Histogram] = {}
-    for photo in photos:
-        # Count what is left without the border; the picture itself is not kept.
-        rows, columns = registration_border(photo.rgb) if options.crop else (slice(None),) * 2
-        rgb, depth = photo.rgb[rows, columns], photo.depth_mm[rows, columns]
-        counted[photo.id] = histogram(rgb, depth, settings)
-    return counted
-
-
-def read_reference(path: Path) -> Reference:
-    """The reference in a file; BadInput naming it when it is missing or none."""
-    hint = "`pbrs-farm reference build` makes one"
-    return reference_from_bytes(read_given(path, hint=hint), str(path))

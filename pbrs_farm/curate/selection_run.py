@@ -17,14 +17,12 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
-from pbrs_farm.core.record import Record
+from pbrs_farm.curate.selection_summary import SelectionSummary, summary_of
 from pbrs_farm.formats.histogram_json import ViewRecord, record_from_json
 from pbrs_farm.formats.manifest import sha256_by_key
-from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.selection.histogram_pack import (
     HistogramPack,
     bytes_from_pack,
@@ -34,145 +32,11 @@ from pbrs_farm.selection.histogram_pack import (
 )
 from pbrs_farm.selection.reference_set import Reference, check_comparable
 from pbrs_farm.selection.scores import SCORES, Scorer, merged
-from pbrs_farm.selection.similarity import Binning, BinningRow
-from pbrs_farm.selection.verdicts import REASONS, verdicts
+from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store.laid_out import LaidOutStore
 from pbrs_farm.store.object_store import Store, get_or_none
 
-# The summary of a selection: yield, reasons, tallies per house and room type.
-
-
-THRESHOLDS: Final = tuple(round(0.01 * k, 2) for k in range(101))
-
-# What the paper kept of its own pictures at 0.70 (section 3.3): 73.0 %.
-PAPER_VIEWS: Final = 779_342
-PAPER_KEPT: Final = 568_793
-
-
-class KeptCount(Record):
-    """Views of one house or room type, and how many of them are kept."""
-
-    name: str
-    views: int
-    kept: int
-
-
-class ReferenceSummary(Record):
-    """Which photographs the views were compared with, and how."""
-
-    source: str
-    source_sha256: str
-    digest: str
-    photographs: int
-    binning: Binning
-    table: tuple[BinningRow, ...]
-
-
-class SelectionSummary(Record):
-    """selection.json: the counts of a run, and what they were made with."""
-
-    run: str
-    fields: SelectionFields
-    reference: ReferenceSummary
-    views: int
-    scored: int
-    kept: int
-    reasons: dict[str, int]  # rejected views by their first reason
-    modes: dict[str, int]  # scored views by the lighting mode they were scored on
-    colour_quartiles: tuple[float, ...]  # with minimum and maximum; empty without scores
-    depth_quartiles: tuple[float, ...]
-    # Share of all views that would be kept with both thresholds at each of THRESHOLDS, before caps.
-    yield_both: tuple[float, ...]
-    houses: tuple[KeptCount, ...]
-    room_types: tuple[KeptCount, ...]
-    n_scored_houses: int = 0  # houses scored in this very run; not stored
-
-
-def summary_of(
-    judged: Any, run: str, fields: SelectionFields, reference: Reference
-) -> SelectionSummary:
-    """The summary of a table of verdicts."""
-    # Views without a score are null there and count in no statistics of scores.
-    colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
-    counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
-    modes = pc.value_counts(judged["mode"].filter(judged["colour_score"].is_valid())).to_pylist()
-    facts = reference.facts
-    return SelectionSummary(
-        run=run,
-        fields=fields,
-        reference=ReferenceSummary(
-            source=facts.source,
-            source_sha256=facts.source_sha256,
-            digest=reference.digest,
-            photographs=len(facts.ids),
-            binning=facts.binning,
-            table=facts.table,
-        ),
-        views=judged.num_rows,
-        scored=len(colour),
-        kept=int(pc.sum(judged["kept"]).as_py() or 0),
-        reasons={reason: counts[reason] for reason in REASONS if reason in counts},
-        modes={m["values"]: m["counts"] for m in sorted(modes, key=lambda m: str(m["values"]))},
-        colour_quartiles=_quartiles(colour),
-        depth_quartiles=_quartiles(depth),
-        yield_both=tuple(yield_curve(np.minimum(*good_scores(judged)), judged.num_rows)),
-        houses=_tallies(judged, "house"),
-        room_types=_tallies(_with_types(judged), "room_type"),
-    )
-
-
-def good_scores(judged: Any) -> tuple[F64, F64]:
-    """Colour and depth scores of the views that nothing but thresholds, caps and balance can reject."""
-    of_quality = set(REASONS) - _OF_CHOICE
-    is_good = [
-        not of_quality.intersection(text.split(",")) for text in judged["reasons"].to_pylist()
-    ]
-    good = judged.filter(pa.array(is_good, pa.bool_()))
-    colour, depth = (good[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
-    return colour, depth
-
-
-_OF_CHOICE: Final = {"unlike-colour", "unlike-depth", "room-cap", "class-balance"}
-
-
-def yield_curve(scores: F64, n_views: int) -> list[float]:
-    """Share of n_views whose score is above each of THRESHOLDS; zeros where there are no scores."""
-    if not len(scores):
-        return [0.0] * len(THRESHOLDS)
-    # Count by sorting once: the scores above each threshold.
-    above = len(scores) - np.searchsorted(np.sort(scores), THRESHOLDS, side="right")
-    return [round(float(n) / n_views, 6) for n in above]
-
-
-def _quartiles(scores: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[float, ...]:
-    """Minimum, quartiles and maximum; empty where there are no scores."""
-    if not len(scores):
-        return ()
-    return tuple(round(float(q), 6) for q in np.percentile(scores, (0, 25, 50, 75, 100)))
-
-
-def _with_types(judged: Any) -> Any:
-    """The table with types of rooms for their names: "Bedroom 2" and "Chambre" are bedrooms."""
-    names = judged["room_type"].to_pylist()
-    kinds = {name: named_kind(name or "") for name in set(names)}
-    column = [kind.value if (kind := kinds[name]) else "" for name in names]
-    at = judged.schema.get_field_index("room_type")
-    return judged.set_column(at, "room_type", pa.array(column, pa.string()))
-
-
-def _tallies(judged: Any, column: str) -> tuple[KeptCount, ...]:
-    groups = judged.group_by(column).aggregate([("kept", "count"), ("kept", "sum")])
-    rows = sorted(groups.to_pylist(), key=lambda r: str(r[column]))
-    return tuple(
-        KeptCount(name=r[column] or "", views=r["kept_count"], kept=r["kept_sum"]) for r in rows
-    )
-
-
-# `pbrs-farm select`.
-
-
 _METADATA: Final = b"pbrs_farm"  # of the Parquet file: reference and mode of its scores
-
 Progress = Callable[[int, int], None]  # (houses done, houses in all)
 
 

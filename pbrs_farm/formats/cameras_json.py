@@ -78,12 +78,3 @@ def views_from_json(data: bytes, key: str) -> dict[str, View]:
         return {v["id"]: _view_from_json(v) for v in json.loads(data)["views"]}
     except (KeyError, TypeError, ValueError) as error:
         raise BadInput(key, "views", f"not a cameras.json: {error}") from None
-
-
-# illuminance.json: how bright every room's floor is, one a house, written by `illuminance`; pure.
-# No step reads the file: `light` repeats a room's row from the step's marker.
-
-
-def illuminance_json(record: Mapping[str, Any], sky: Mapping[str, Any]) -> bytes:
-    """The file. record: of transport.illuminance.illuminance_record; sky: the sky's facts."""
-    return json_bytes({**record, "sky": sky})

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import io
-import os
 import textwrap
-import unicodedata
 import zlib
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -21,129 +18,8 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.gallery.gallery_page import attributions, best_first
+from pbrs_farm.gallery.sheet_text import Font, draw_line
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
-
-# Draws a line of text in whatever script it is, each letter in the first font that has it.
-# Pillow's own font has Latin letters; what it lacks comes from fonts of the machine (`make setup`
-# installs two): DejaVu Sans (Latin, Greek, Cyrillic, Hebrew, Arabic, Armenian, Georgian and more)
-# and Droid Sans Fallback (Chinese, Japanese, Korean). Effects: opens font files, draws into a
-# picture.
-
-
-_Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
-
-_FILES: Final = (
-    "DejaVuSans.ttf", "DroidSansFallbackFull.ttf", "DroidSansFallback.ttf",
-    "NotoSans-Regular.ttf", "NotoSansCJK-Regular.ttc", "NotoSansThai-Regular.ttf",
-    "NotoSansDevanagari-Regular.ttf", "NotoSansSymbols2-Regular.ttf", "NotoEmoji-Regular.ttf",
-    "Loma.ttf", "FreeSans.ttf", "wqy-microhei.ttc", "unifont.otf", "unifont.ttf",
-)  # fmt: skip
-"""Fonts that are used where they are installed, the preferred first."""
-
-_MOST_LETTERS: Final = 1000  # of a line
-_ASCENT: Final = 0.78  # of the size: from the top of Pillow's own letters down to the base line
-_UNKNOWN: Final = "\u0378"  # an unassigned code point: drawn as a font's box for what it lacks
-
-
-def draw_line(
-    draw: ImageDraw.ImageDraw,
-    at: tuple[float, float],
-    text: str,
-    *,
-    fill: tuple[int, int, int],
-    size: int,
-) -> float:
-    """Draw a line whose letters' top left is at; its length in px.
-
-    A letter that no font has is "?"; joiners and variation selectors of pictographs are left out
-    where the font before them lacks them.
-    """
-    x, y = at
-    text = shown(text, _MOST_LETTERS)
-    if text.isascii():
-        draw.text(at, text, fill, _own(size))
-        return float(draw.textlength(text, _own(size)))
-    # Letters of several fonts share a baseline, not a top.
-    base = y + _own_ascent(size)
-    for name, part in _parts(text):
-        font = _font_of_script(name, size)
-        draw.text((x, base), part, fill, font, anchor="ls")
-        x += float(draw.textlength(part, font))
-    return x - at[0]
-
-
-def _parts(text: str) -> Iterator[tuple[str, str]]:
-    """(font file, "" for Pillow's own, and the letters to draw in it), from left to right."""
-    name, part = "", ""
-    for c in text:
-        # Keep marks, joiners and spaces with the letter before, so that shaping sees the whole.
-        follows = part and (c == " " or unicodedata.category(c) in ("Mn", "Mc", "Me", "Cf"))
-        if follows and _has(name, c):
-            part += c
-            continue
-        if follows and c != " ":
-            continue
-        found = next((f for f in ("", *_installed()) if _has(f, c)), None)
-        found, c = (name, "?") if found is None else (found, c)
-        if found != name and part:
-            yield name, part
-            part = ""
-        name, part = found, part + c
-    if part:
-        yield name, part
-
-
-@cache
-def _has(file: str, c: str) -> bool:
-    """Whether a font has a letter of its own for c, and not the box for what it lacks."""
-    if c.isascii():
-        return True
-    font = _font_of_script(file, 16)
-    letter, box = font.getmask(c), font.getmask(_UNKNOWN)
-    return letter.size != box.size or bytes(letter) != bytes(box)
-
-
-@cache
-def _font_of_script(file: str, size: int) -> _Font:
-    return ImageFont.truetype(file, size) if file else _own(size)
-
-
-@cache
-def _own(size: int) -> _Font:
-    return ImageFont.load_default(size)
-
-
-def _own_ascent(size: int) -> float:
-    font = _own(size)
-    if isinstance(font, ImageFont.FreeTypeFont):
-        return float(font.getmetrics()[0])
-    return _ASCENT * size
-
-
-@cache
-def _installed() -> tuple[str, ...]:
-    """The files of _FILES that the machine has, below the folders that fontconfig looks into."""
-    home = os.environ.get("XDG_DATA_HOME", str(Path.home() / ".local/share"))
-    shared = os.environ.get("XDG_DATA_DIRS", "/usr/local/share:/usr/share").split(":")
-    roots = [*(Path(s) / "fonts" for s in (home, *shared)), Path.home() / ".fonts"]
-    found: dict[str, str] = {}
-    for root in roots:
-        for folder, _folders, names in os.walk(root):
-            for name in set(names).intersection(_FILES):
-                found.setdefault(name, str(Path(folder) / name))
-    return tuple(found[name] for name in _FILES if name in found and _opens(found[name]))
-
-
-def _opens(file: str) -> bool:
-    try:
-        ImageFont.truetype(file, 16)
-    except OSError:
-        return False
-    return True
-
-
-# `pbrs-farm sheet`.
-
 
 TILE_PX: Final = 224  # longer edge
 _GAP_PX: Final = 6
@@ -152,8 +28,10 @@ PAPER: Final = (16, 18, 23)  # background, sRGB
 INK: Final = (236, 238, 242)  # text
 _FAINT: Final = (142, 149, 163)  # text of less weight
 _EMPTY: Final = (29, 32, 40)  # a tile that is missing
-
 _Chip = tuple[int, int]  # of the legend: left edge in px, NYU40 id
+_BETWEEN_PX: Final = 8
+_LINE_PX: Final = 16  # of the caption
+_MOST_LINES: Final = 6
 
 
 def contact_sheet(
@@ -237,7 +115,7 @@ def _credits(views: Sequence[ViewEntry]) -> list[str]:
     return [shown(line, 260) for line in attributions(views)]
 
 
-def _font(size: int) -> _Font:
+def _font(size: int) -> Font:
     return ImageFont.load_default(size)
 
 
@@ -311,14 +189,6 @@ def _draw_legend(draw: ImageDraw.ImageDraw, y: int, rows: Sequence[Sequence[_Chi
             draw.text((x + 22, y), NYU40_NAMES[nyu40], INK, _font(14))
         y += 28
     return y
-
-
-# Two pictures of one view side by side, with a line below.
-
-
-_BETWEEN_PX: Final = 8
-_LINE_PX: Final = 16  # of the caption
-_MOST_LINES: Final = 6
 
 
 def before_after_png(before: Srgb8Image, after: Srgb8Image, caption: str) -> bytes:

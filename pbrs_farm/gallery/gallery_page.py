@@ -7,7 +7,6 @@ relative to the folder.
 from __future__ import annotations
 
 import base64
-import functools
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,53 +15,20 @@ from typing import Any, Final
 from urllib.parse import quote
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from PIL import Image
 
 from pbrs_farm import images
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
-from pbrs_farm.core.shown_text import printable
 from pbrs_farm.formats.output_folder import ViewEntry, reasons_of, views_of
+from pbrs_farm.gallery.html_page import page
 from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
-
-# HTML pages from the jinja2 templates beside the code, every value escaped. Effects: reads them.
-
-
-def page(package: str, template: str, **values: Any) -> str:
-    """The template file of a package filled with values; only markupsafe.Markup is not escaped.
-
-    Raises jinja2.UndefinedError for a name the template uses and values lacks.
-    """
-    return compiled(package, template).render(values)
-
-
-@functools.cache
-def compiled(package: str, template: str) -> Template:
-    """The template file of a package, ready to be filled; each is compiled once a process."""
-    environment = Environment(
-        loader=PackageLoader(package, ""),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_finalized,
-    )
-    return environment.get_template(template)
-
-
-def _finalized(value: Any) -> Any:
-    """A string without what steers a browser's text: direction overrides, control characters."""
-    return printable(value) if type(value) is str else value
-
-
-# The HTML gallery of a finished output folder.
-
 
 TEMPLATE: Final = ("pbrs_farm.gallery", "gallery.html")  # package and file of the pages
 THUMBNAIL_PX: Final = 320  # longer edge
 MAX_TILE_BYTES: Final = 11_000  # of a thumbnail
 MAX_PAGE_BYTES: Final = 5_000_000
+
 # Views of a page: nine tiles each, with base64's third on top and 6 kB of words, stay below the bound.
 PAGE_VIEWS: Final = 35
 _BLACK_LX: Final = 0.05  # of daylight on a room's floor: a room without a window has less

@@ -55,7 +55,8 @@ class SheetParts:
 def _parts(view: ViewEntry) -> _Parts:
     # The thread loads what it needs: whoever starts a run waits for none of it.
     from pbrs_farm.gallery.contact_sheet import TILE_PX
-    from pbrs_farm.gallery.gallery_page import TEMPLATE, THUMBNAIL_PX, card_tiles, compiled
+    from pbrs_farm.gallery.gallery_page import TEMPLATE, THUMBNAIL_PX, card_tiles
+    from pbrs_farm.gallery.html_page import compiled
     from pbrs_farm.gallery.view_tiles import tiles_of_sizes
 
     compiled(*TEMPLATE)

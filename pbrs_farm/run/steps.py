@@ -25,7 +25,8 @@ from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.crash_notes import note_step
-from pbrs_farm.formats.cameras_json import cameras_json, illuminance_json
+from pbrs_farm.formats.cameras_json import cameras_json
+from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import Marker, read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR

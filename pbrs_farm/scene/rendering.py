@@ -35,7 +35,8 @@ from pbrs_farm.run.request import Wanted
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.scene.viewpoints import Viewpoint
-from pbrs_farm.store.object_store import MemoryStore, Store
+from pbrs_farm.store.memory_store import MemoryStore
+from pbrs_farm.store.object_store import Store
 from pbrs_farm.views.stored_root import StoredRoot
 from pbrs_farm.views.views import ViewRef, Views
 

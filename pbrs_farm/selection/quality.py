@@ -24,6 +24,9 @@ from pbrs_farm.selection.histograms import colour_counts, depth_counts
 
 _SATURATED: Final = 254  # of 255: a channel from here on is blown
 
+# Where a view was taken: ids of house, view and room, and the room's name.
+ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
+
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
     """Brightness and saturation of (H, W, 3) uint8."""
@@ -67,13 +70,6 @@ def scene_quality(
         missing_textures=missing_textures,
         classes={nyu40: round(classes[nyu40], 4) for nyu40 in sorted(classes)},
     )
-
-
-# A view's pictures and depth -> what selection needs of them (formats/histogram_json.py); pure.
-
-
-# Where a view was taken: ids of house, view and room, and the room's name.
-ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
 
 
 def view_record(

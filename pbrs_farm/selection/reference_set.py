@@ -20,6 +20,7 @@ from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.core.record import Record
+from pbrs_farm.selection.binning import Binning, BinningRow, binning_table, finest_passing
 from pbrs_farm.selection.histograms import (
     Counts,
     Histogram,
@@ -27,15 +28,15 @@ from pbrs_farm.selection.histograms import (
     coarser_depth,
     normalised,
 )
-from pbrs_farm.selection.similarity import (
-    Binning,
-    BinningRow,
-    Shares,
-    binning_table,
-    finest_passing,
-)
+from pbrs_farm.selection.similarity import Shares
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # the earliest a ZIP can say: equal content, equal bytes
+
+# A pixel of the registration border has all channels at least WHITE, or at most BLACK.
+WHITE: Final = 245
+BLACK: Final = 10
+_BORDER_SHARE: Final = 0.97  # of a row or column that is border
+_MAX_BORDER: Final = 1 / 8  # of the picture, at each side
 
 
 class ReferenceFacts(Record):
@@ -174,17 +175,6 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
         text = f"built with other settings than the views: {'; '.join(differing)}"
         hint = "build the reference with the views' --set histogram..."
         raise BadInput(name, "settings", text, hint=hint)
-
-
-# What photographs of depth cameras need before they are counted; arrays only.
-
-
-# A pixel of the registration border has all channels at least WHITE, or at most BLACK.
-WHITE: Final = 245
-BLACK: Final = 10
-
-_BORDER_SHARE: Final = 0.97  # of a row or column that is border
-_MAX_BORDER: Final = 1 / 8  # of the picture, at each side
 
 
 def sun_rgbd_depth(stored: NDArray[np.uint16]) -> NDArray[np.uint16]:

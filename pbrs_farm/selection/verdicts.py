@@ -6,76 +6,29 @@ Rejected views are marked, never dropped.
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from pbrs_farm.core.arrays import F32, F64, I64, Bools
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import SelectionFields
+from pbrs_farm.selection.class_balance import balanced, class_shares
 from pbrs_farm.selection.histogram_pack import BLACK
-
-# Which of the kept views to take so that rare classes are not drowned by walls.
-
-
-N_CLASSES: Final = len(NYU40_NAMES)
-_FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a class
-
-
-def class_shares(texts: Sequence[str]) -> F32:
-    """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts."""
-    shares = np.zeros((len(texts), N_CLASSES), np.float32)
-    for row, text in enumerate(texts):
-        for pair in text.split():
-            nyu40, _, share = pair.partition(":")
-            shares[row, int(nyu40)] = float(share)
-    return shares
-
-
-def balanced(shares: F32, n_views: int) -> Bools:
-    """(n,) bool: n_views rows of shares (n, classes) that cover all classes well.
-
-    Greedy for the sum over classes of the logarithm of the share gathered: what a class gains
-    counts less the more there is of it, so views with rare classes go first. The objective is
-    submodular, so greedy comes within 1 - 1/e of the best, and a gain that was computed earlier
-    bounds the present one (Minoux 1978). Ties go to the earlier row.
-    """
-    # Start from the gain of each view alone, the largest on top of the heap.
-    taken = np.zeros(len(shares), bool)
-    total = np.full(shares.shape[1], _FLOOR, np.float64)  # share gathered of each class
-    gains = np.log1p(shares / _FLOOR).sum(axis=1, dtype=np.float64)
-    # (-gain, row): an upper bound, since gains only fall as classes fill up.
-    heap = [(-float(gain), row) for row, gain in enumerate(gains)]
-    heapq.heapify(heap)
-    # Keep of each view the classes it has, and their shares.
-    held = [(np.nonzero(s)[0], s[s != 0].astype(np.float64)) for s in shares]
-    for _ in range(min(n_views, len(shares))):
-        # Compute the top view's gain anew; take it if no other bound is above.
-        while True:
-            _bound, row = heapq.heappop(heap)
-            classes, share = held[row]
-            gain = float(np.log1p(share / total[classes]).sum())
-            if not heap or (-gain, row) <= heap[0]:
-                break
-            heapq.heappush(heap, (-gain, row))
-        taken[row] = True
-        total[classes] += share
-    return taken
-
-
-# Scores -> which views are kept, and why the others are not.
-
 
 # Why a view is rejected, in the order in which the first is named.
 REASONS: Final = (
     "failed", "unscored", "black", "too-dark", "blown", "one-surface", "inside-object", "too-few-objects",
     "too-noisy", "missing-textures", "unlike-colour", "unlike-depth", "room-cap",
     "class-balance",
+)  # fmt: skip
+_LIGHT_MODES: Final = {str(mode) for mode in Mode if mode.groups}
+_NUMBERS: Final = (
+    "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
+    "colour_score", "depth_score",
 )  # fmt: skip
 
 
@@ -127,14 +80,6 @@ def _rejections(scores: Any, fields: SelectionFields) -> Mapping[str, Bools]:
             "unlike-colour": has_scores & ~(number["colour_score"] > fields.min_colour),
             "unlike-depth": has_scores & ~(number["depth_score"] > fields.min_depth),
         }
-
-
-_LIGHT_MODES: Final = {str(mode) for mode in Mode if mode.groups}
-
-_NUMBERS: Final = (
-    "brightness", "blown", "surface", "near", "n_objects", "noise", "missing_textures",
-    "colour_score", "depth_score",
-)  # fmt: skip
 
 
 def _black(scores: Any, brightness: F64, fields: SelectionFields) -> Bools:

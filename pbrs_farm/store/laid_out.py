@@ -14,7 +14,6 @@ member is an index; it is followed by the markers and by the files, small ones f
 
 from __future__ import annotations
 
-import io
 import json
 import tarfile
 import time
@@ -26,141 +25,29 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 from pbrs_farm.store.object_store import LAYOUT, Head, Store, check_key, check_prefix, get_or_none
+from pbrs_farm.store.pack import (
+    FORMAT,
+    GROUP_OF_STEP,
+    GROUPS,
+    TAR_BLOCK,
+    Pack,
+    file_or_marker,
+    groups_of,
+    house_folder,
+    key_of_object,
+    marker_of,
+    object_key,
+    pack_bytes,
+    pack_from_head,
+    pack_key,
+    steps_of,
+)
 
-FORMAT: Final = 1  # of layout.json and of packs; a reader refuses a later one
-# Group -> steps of a view that are written together.
-GROUPS: Final = {
-    "labels": ("truth", "opengl_dl", "opengl_il"),
-    "light": ("light",),
-    "pictures": ("develop", "view"),
-}
-_GROUP: Final = {step: group for group, steps in GROUPS.items() for step in steps}
 _ORDER: Final = tuple(GROUPS)
-
-_INDEX: Final = "index.json"
-_BLOCK: Final = 512  # of a tar
 _HEAD_BYTES: Final = 2**16  # read at first: the index, the markers, small files
 _WHOLE_BYTES: Final = 2**22  # read at first by a task, which needs labels and pictures anyway
 _RECENT_S: Final = 10.0  # an index read so lately is believed
 _MOST_RECENT: Final = 256
-
-
-# A pack: bytes <-> what the steps made.
-
-
-@dataclass(frozen=True, slots=True)
-class Pack:
-    """What is known of a pack: its index, and as much of its beginning as was read."""
-
-    rows: Mapping[str, tuple[str, int, int]]  # name -> step, first byte, number of bytes
-    head: bytes
-
-    def held(self, name: str) -> bytes | None:
-        """The bytes of a member, None where the beginning that was read ends before it does."""
-        _step, start, n_bytes = self.rows[name]
-        end = start + n_bytes
-        return self.head[start:end] if end <= len(self.head) else None
-
-
-def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
-    """The tar of what steps made: step -> name below the view's folder, or of its marker -> bytes."""
-    found = [
-        (name, step, data) for step, members in steps.items() for name, data in members.items()
-    ]
-    found.sort(key=lambda row: (not row[0].startswith("done/"), len(row[2]), row[0]))
-    # Places count from the index's end, so that its length does not depend on them.
-    rows, at = [], 0
-    for name, step, data in found:
-        at += _BLOCK
-        rows.append([name, step, at, len(data)])
-        at += _padded(len(data))
-    index = json.dumps({"format": FORMAT, "members": rows}, separators=(",", ":")).encode()
-    out = io.BytesIO()
-    with tarfile.open(fileobj=out, mode="w", format=tarfile.USTAR_FORMAT) as tar:
-        for name, data in [(_INDEX, index), *((name, data) for name, _step, data in found)]:
-            entry = tarfile.TarInfo(name)
-            entry.size = len(data)
-            tar.addfile(entry, io.BytesIO(data))
-    return out.getvalue()
-
-
-def pack_from_head(data: bytes, key: str) -> Pack | None:
-    """The pack that begins with data; None where its index is longer. StoreFailed where it is none."""
-    try:
-        entry = tarfile.TarInfo.frombuf(data[:_BLOCK], "ascii", "strict")
-        if entry.name != _INDEX:
-            raise ValueError(entry.name)
-        base = _BLOCK + _padded(entry.size)
-        if len(data) < _BLOCK + entry.size:
-            return None
-        index = json.loads(data[_BLOCK : _BLOCK + entry.size])
-        if index["format"] != FORMAT:
-            raise StoreFailed(key, "written by a newer pbrs_farm", hint="install that version")
-        rows = {
-            str(n): (str(step), base + int(at), int(size)) for n, step, at, size in index["members"]
-        }
-    except (tarfile.HeaderError, ValueError, KeyError, TypeError):
-        raise StoreFailed(key, "is no pack of a view", hint="remove it: it is made again") from None
-    return Pack(rows, data)
-
-
-def _padded(n_bytes: int) -> int:
-    return -(-n_bytes // _BLOCK) * _BLOCK
-
-
-# Which object holds a key.
-
-
-def marker_of(step: str) -> str:
-    """Name of a step's marker in a pack."""
-    return f"done/{step}.json"
-
-
-def house_folder(house: str) -> str:
-    """Where a house's objects lie in a packed root, with a trailing slash."""
-    top = keys.FOLDERS[keys.is_object(house)]
-    return f"{top}/{keys.sha256(house.encode())[:2]}/{house}/"
-
-
-def pack_key(house: str, view: str, group: str) -> str:
-    """The object that holds what a group of steps, or a step, made of a view."""
-    return f"{house_folder(house)}packs/{group}.{view}.tar"
-
-
-def _object_key(key: str) -> str:
-    """The object of a key that is of no view."""
-    top, _, rest = key.partition("/")
-    house, slash, below = rest.partition("/")
-    return f"{house_folder(house)}{below}" if top in keys.FOLDERS and slash else key
-
-
-def _key_of_object(found: str) -> str:
-    top, _, rest = found.partition("/")
-    return f"{top}/{rest.partition('/')[2]}" if top in keys.FOLDERS else found
-
-
-def _name_of(at: keys.HouseKey) -> str:
-    return marker_of(at.step) if at.step else at.file
-
-
-def _groups_of(at: keys.HouseKey) -> tuple[str, ...]:
-    """The groups that may hold a view's file or marker, the likeliest first."""
-    if at.step:
-        return (_GROUP.get(at.step, at.step),)
-    if at.file == "radiance.exr":
-        return ("light",)
-    if at.file in ("view.json", "histogram.json") or at.file.startswith("mlt_"):
-        return ("pictures",)
-    return ("labels", "pictures", "light")  # plugins write layers and pictures of any name
-
-
-def _steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:
-    """Steps of a group whose own packs may hold what its pack lacks."""
-    steps = (at.step,) if at.step else GROUPS[group]
-    return tuple(step for step in steps if step != group)
-
-
-# The store.
 
 
 @dataclass(slots=True)
@@ -175,7 +62,7 @@ class _Pending:
     def find(self, at: keys.HouseKey) -> bytes | None:
         if (at.house, at.view) != (self.house, self.view):
             return None
-        found = (members.get(_name_of(at)) for members in self.steps.values())
+        found = (members.get(file_or_marker(at)) for members in self.steps.values())
         return next((data for data in found if data is not None), None)
 
 
@@ -275,11 +162,11 @@ class LaidOutStore:
             return
         # Keep it for the pack of its group while the task makes the rest of that.
         assert at.view is not None
-        group = _GROUP.get(at.step, at.step)
+        group = GROUP_OF_STEP.get(at.step, at.step)
         self._flush_unless(at.house, at.view, group)
         task = self._task
         pending = (task and task.pending) or _Pending(at.house, at.view, group)
-        members = {_name_of(_parsed(file)): data for file, data in files.items()}
+        members = {file_or_marker(_parsed(file)): data for file, data in files.items()}
         pending.steps[at.step] = {marker_of(at.step): marker, **members}
         if task is not None:
             task.pending = pending
@@ -350,7 +237,7 @@ class LaidOutStore:
     def _object(self, key: str) -> str:
         check_key(key)
         is_of_house = key.partition("/")[0] in keys.FOLDERS
-        return _object_key(key) if is_of_house and self.is_packed else key
+        return object_key(key) if is_of_house and self.is_packed else key
 
     def _of_view(self, key: str) -> keys.HouseKey | None:
         """What the key of a view's file or marker says in a packed root, else None."""
@@ -362,8 +249,8 @@ class LaidOutStore:
 
     def _found(self, at: keys.HouseKey, *, is_fresh: bool = False) -> tuple[str, Pack, str] | None:
         """The object that holds a key, its index, and the key's name there."""
-        house, view, name = at.house, at.view or "", _name_of(at)
-        for group in _groups_of(at):
+        house, view, name = at.house, at.view or "", file_or_marker(at)
+        for group in groups_of(at):
             # Without the pack of its group no step of it is done.
             place = pack_key(house, view, group)
             pack = self._pack(place, is_fresh=is_fresh)
@@ -371,7 +258,7 @@ class LaidOutStore:
                 if pack is not None:
                     return place, pack, name
                 continue
-            for step in _steps_of(at, group):
+            for step in steps_of(at, group):
                 place = pack_key(house, view, step)
                 own = self._pack(place, is_fresh=is_fresh)
                 if own is not None and name in own.rows:
@@ -399,7 +286,7 @@ class LaidOutStore:
             return None
         is_same_view = (at.house, at.view) == (task.pending.house, task.pending.view)
         later = _ORDER[_ORDER.index(task.pending.group) + 1 :]
-        if at.step and (not is_same_view or _GROUP.get(at.step) in later):
+        if at.step and (not is_same_view or GROUP_OF_STEP.get(at.step) in later):
             self._flush()
             return None
         return task.pending.find(at)
@@ -452,14 +339,14 @@ class LaidOutStore:
             return held
         _step, start, n_bytes = pack.rows[name]
         try:
-            data = self.inner.get_range(place, start - _BLOCK, _BLOCK + n_bytes)
-            entry = tarfile.TarInfo.frombuf(data[:_BLOCK], "ascii", "strict")
+            data = self.inner.get_range(place, start - TAR_BLOCK, TAR_BLOCK + n_bytes)
+            entry = tarfile.TarInfo.frombuf(data[:TAR_BLOCK], "ascii", "strict")
         except (ObjectMissing, tarfile.HeaderError):
             entry = None
         if entry is None or (entry.name, entry.size) != (name, n_bytes):
             self._lose(place)
             return None
-        return data[_BLOCK:]
+        return data[TAR_BLOCK:]
 
     def _list(self, prefix: str) -> Iterator[str]:
         top, _, rest = prefix.partition("/")
@@ -475,7 +362,7 @@ class LaidOutStore:
         last = ""
         for folder in folders:
             for found in self.inner.list(folder):
-                key = _key_of_object(found)
+                key = key_of_object(found)
                 parts = key.split("/")
                 if len(parts) != 4 or parts[2] != "packs" or parts[0] not in keys.FOLDERS:
                     yield key
@@ -558,7 +445,7 @@ class LaidOutStore:
 
     def _take_out(self, house: str, view: str, step: str) -> None:
         """Take a step out of the packs that hold it, whole packs at a time; other steps stay."""
-        group = _GROUP.get(step, step)
+        group = GROUP_OF_STEP.get(step, step)
         place = pack_key(house, view, group)
         if step != group:
             self.inner.delete(pack_key(house, view, step))

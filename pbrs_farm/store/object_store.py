@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol, runtime_checkable
@@ -14,9 +13,7 @@ from pbrs_farm.core.errors import ObjectMissing, StoreFailed
 _SEGMENT: Final = re.compile(r"[A-Za-z0-9_\-+=@,~ ()\[\]!][A-Za-z0-9_.\-+=@,~ ()\[\]!]*")
 _MAX_KEY: Final = 900  # characters; S3 takes 1024 bytes with the prefix
 _MAX_SEGMENT: Final = 200  # characters; file systems take 255 bytes
-
 LAYOUT: Final = "layout.json"  # there where an output root is packed (store/laid_out.py)
-
 CONTENT_TYPES: Final = {
     "png": "image/png",
     "exr": "image/x-exr",
@@ -131,53 +128,3 @@ def content_type(key: str) -> str:
 
 def _is_segment(segment: str) -> bool:
     return len(segment) <= _MAX_SEGMENT and _SEGMENT.fullmatch(segment) is not None
-
-
-# A store in this process's memory, for tests and for looking without writing.
-
-
-class MemoryStore:
-    """Objects in a dictionary behind a lock; other processes do not see them."""
-
-    def __init__(self) -> None:
-        self._objects: dict[str, bytes] = {}  # key -> bytes
-        self._lock = threading.Lock()
-
-    @property
-    def url(self) -> str:
-        return "memory:"
-
-    def put(self, key: str, data: bytes | memoryview) -> None:
-        with self._lock:
-            self._objects[check_key(key)] = bytes(data)
-
-    def put_if_absent(self, key: str, data: bytes) -> bool:
-        with self._lock:
-            if check_key(key) in self._objects:
-                return False
-            self._objects[key] = bytes(data)
-            return True
-
-    def get(self, key: str) -> bytes:
-        try:
-            return self._objects[check_key(key)]
-        except KeyError:
-            raise ObjectMissing(key, "no such object in memory") from None
-
-    def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
-        return self.get(key)[start : start + n_bytes]
-
-    def head(self, key: str) -> Head | None:
-        data = self._objects.get(check_key(key))
-        return None if data is None else Head(n_bytes=len(data))
-
-    def list(self, prefix: str = "") -> Iterator[str]:
-        check_prefix(prefix)
-        with self._lock:
-            # Take a copy: the caller may put and delete while it lists.
-            found = [key for key in self._objects if key.startswith(prefix)]
-        return iter(sorted(found))
-
-    def delete(self, key: str) -> None:
-        with self._lock:
-            self._objects.pop(check_key(key), None)

@@ -9,7 +9,8 @@ from urllib.parse import unquote, urlsplit
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.object_store import LAYOUT, MemoryStore, Store
+from pbrs_farm.store.memory_store import MemoryStore
+from pbrs_farm.store.object_store import LAYOUT, Store
 from pbrs_farm.store.s3 import S3Settings, S3Store
 
 LAYOUTS: Final = ("files", "packed")

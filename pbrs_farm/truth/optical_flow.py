@@ -21,12 +21,12 @@ from pbrs_farm.core.frames import opencv_world_from_camera
 SEEN: Final = 0
 OUTSIDE: Final = 128  # outside the other picture, or behind the other camera
 HIDDEN: Final = 255  # behind another surface
-
 KITTI_FLOW_STEP: Final = 64  # steps a pixel, 2**15 is no motion
 KITTI_DISPARITY_STEP: Final = 256
 _MOST_PX: Final = 2.0**15  # of flow: 16-bit floats end at twice that
 _NEAREST_M: Final = 1e-3  # to the other camera's plane
 _SLACK: Final = 1e-4  # of the distance, and metres: how far before a point a ray may end
+Relation = Literal["next", "previous", "stereo"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,12 +133,6 @@ def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
     shift = np.abs(found.flow[..., 0])
     steps = np.clip(np.rint(shift * KITTI_DISPARITY_STEP), 1, 65535)
     return np.where(found.in_front, steps, 0).astype(np.uint16)
-
-
-# The views that a view is matched with: the next and previous frame, the other of a stereo pair.
-
-
-Relation = Literal["next", "previous", "stereo"]
 
 
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:

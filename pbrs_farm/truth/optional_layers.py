@@ -19,7 +19,7 @@ from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lenses import Lens
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
-from pbrs_farm.truth.depth_sensor import sensor_depth, stereo_depth, tof_depth
+from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
     Relation,
@@ -36,7 +36,9 @@ from pbrs_farm.truth.standard_layers import (
     normal_label,
     semantic_label,
 )
+from pbrs_farm.truth.stereo_sensor import stereo_depth
 from pbrs_farm.truth.surface_layers import albedo_label, hha_label, nocs_label, shading_normals
+from pbrs_farm.truth.tof_sensor import tof_depth
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 

@@ -14,7 +14,14 @@ from pbrs_farm.core.house import Geometry, House, Item, corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
 
-# Pictures looked up between the four nearest texels, repeating.
+_LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
+_STEPS = 4096  # entries of the encoding table: fine enough that every byte is rounded as by formula
+_BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
+_DISPARITY_CM = 31000.0  # disparity = this / depth in cm
+_NEAREST_CM = 100.0  # nearer depths count as this: the disparity fits into a byte
+_ANGLE_OFFSET = 128 - 90  # a wall, at 90 degrees, is 128
+_FLOOR_IN_VIEW_CM = -90.0  # the lowest point below this, from the eye, is taken for the floor
+_ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in view
 
 
 def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = None) -> F32:
@@ -43,14 +50,6 @@ def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = Non
     return np.asarray(upper * (1 - fy) + lower * fy, np.float32)
 
 
-# The albedo layer.
-
-
-_LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
-_STEPS = 4096  # entries of the encoding table: fine enough that every byte is rounded as by formula
-_BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
-
-
 def albedo_label(
     hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]],
     most: float = 1.0,
@@ -77,9 +76,6 @@ def albedo_label(
     # Encode by table: 8-bit sRGB.
     steps = np.rint(np.clip(linear, 0, most) * _STEPS).astype(np.int32)
     return np.asarray(_BYTE_OF_LINEAR[steps])
-
-
-# The shading normals that light follows: interpolated, and bent by normal maps.
 
 
 def shading_normals(
@@ -120,10 +116,6 @@ def _bent(geometry: Geometry, faces: I32, seen: F64, mapped: F64) -> F64:
     return np.where(is_defined[:, None], bent, seen)
 
 
-# The nocs layer: where on its model a point lies.
-# Source: Wang, Sridhar, Huang, Valentin, Song, Guibas 2019, Normalized Object Coordinate Space.
-
-
 def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
     """(H, W, 3) uint16: 65535 times the point's x, y, z in its model's frame; (0, 0, 0) = nothing.
 
@@ -153,18 +145,6 @@ def _model_box(item: Item, model_from_world: F64) -> tuple[F64, float]:
 
 def _moved(points: F64, matrix: F64) -> F64:
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-# The hha layer: horizontal disparity, height above ground, angle with gravity.
-# Source: Gupta, Girshick, Arbelaez, Malik 2014, with the constants of their published encoder,
-# and the paper's depth baseline. Gravity and normals are exact here, where theirs are estimated.
-
-
-_DISPARITY_CM = 31000.0  # disparity = this / depth in cm
-_NEAREST_CM = 100.0  # nearer depths count as this: the disparity fits into a byte
-_ANGLE_OFFSET = 128 - 90  # a wall, at 90 degrees, is 128
-_FLOOR_IN_VIEW_CM = -90.0  # the lowest point below this, from the eye, is taken for the floor
-_ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in view
 
 
 def hha_label(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:

@@ -12,10 +12,11 @@ import httpx
 import numpy as np
 import pytest
 
+from pbrs_farm.board.index.house_rows import HouseRow, ViewRow
 from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
 from pbrs_farm.board.index.refresh import Refresher
 from pbrs_farm.board.index.stored_houses import StoredHouses
-from pbrs_farm.board.index.view_index import HouseRow, ViewIndex, ViewRow
+from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core import keys
 from pbrs_farm.core.keys import canonical_json

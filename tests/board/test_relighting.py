@@ -11,7 +11,7 @@ import httpx
 import numpy as np
 import pytest
 
-from pbrs_farm.board.pages.relighting import lamp_rows, light_packet, packet, scale_of
+from pbrs_farm.board.pages.light_packet import lamp_rows, light_packet, packet, scale_of
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.transport.develop.tone_mapping import with_glare

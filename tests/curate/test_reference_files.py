@@ -11,14 +11,8 @@ import pytest
 from pbrs_farm import images
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
-from pbrs_farm.curate.photographs import (
-    NyuMat,
-    PhotoOptions,
-    build_reference,
-    pairs_in,
-    photo_from_pair,
-    read_reference,
-)
+from pbrs_farm.curate.photographs import NyuMat, pairs_in, photo_from_pair
+from pbrs_farm.curate.reference_build import PhotoOptions, build_reference, read_reference
 from pbrs_farm.selection.reference_set import (
     bytes_from_reference,
     registration_border,

@@ -10,7 +10,8 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.forms.captions import caption, counted, plural
+from pbrs_farm.export.forms.captions import caption
+from pbrs_farm.export.nouns import counted, plural
 from pbrs_farm.formats.class_map import ClassMap, ClassRule
 from tests.scene.homes import small_home
 

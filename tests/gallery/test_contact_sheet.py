@@ -17,8 +17,8 @@ from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.output_folder import views_of
-from pbrs_farm.gallery import contact_sheet, gallery_page, view_tiles
 from pbrs_farm.gallery import contact_sheet as sheet
+from pbrs_farm.gallery import gallery_page, sheet_text, view_tiles
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.gallery.gallery_page import MAX_TILE_BYTES, gallery, small_jpeg
 from pbrs_farm.gallery.view_tiles import TILES, Tile
@@ -240,7 +240,7 @@ def test_names_that_strangers_give_do_not_stop_the_sheet(tmp_path: Path) -> None
 def test_a_line_end_in_any_text_of_a_sheet_is_a_space() -> None:
     draw = ImageDraw.Draw(Image.new("RGB", (200, 40)))
     lengths = [
-        contact_sheet.draw_line(draw, (0, 0), text, fill=(0, 0, 0), size=12)
+        sheet_text.draw_line(draw, (0, 0), text, fill=(0, 0, 0), size=12)
         for text in ("one\ntwo", "one two", "é\r\nb")
     ]
     assert lengths[0] == lengths[1]
@@ -251,11 +251,11 @@ def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> No
     write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – Спальня")
     assert sheet.contact_sheet(tmp_path)
     assert "Modèle d’Élise – Спальня" in gallery(tmp_path)
-    assert not any("?" in part for _font, part in contact_sheet._parts("Modèle d’Élise –"))
+    assert not any("?" in part for _font, part in sheet_text._parts("Modèle d’Élise –"))
 
 
 def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
-    assert "".join(part for _font, part in contact_sheet._parts("a\u0378b\ufe0f")) == "a?b"
+    assert "".join(part for _font, part in sheet_text._parts("a\u0378b\ufe0f")) == "a?b"
 
 
 def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:

@@ -10,7 +10,8 @@ import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.made_home import MadeHome, made_homes
-from pbrs_farm.gallery.made_homes import make_homes, plan_svg
+from pbrs_farm.gallery.made_homes import make_homes
+from pbrs_farm.gallery.plan_svg import plan_svg
 from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, RoomType, Storey
 from pbrs_farm.generate.made import made
 

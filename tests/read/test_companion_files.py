@@ -20,7 +20,7 @@ from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
-from pbrs_farm.store.object_store import MemoryStore
+from pbrs_farm.store.memory_store import MemoryStore
 from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import picture
 from tests.read.suncg.test_suncg_arch import arch_json, write_v2

@@ -14,7 +14,7 @@ from pbrs_farm.formats.radiance_exr import FILE, radiance_exr
 from pbrs_farm.run import develop_step
 from pbrs_farm.run.house_cache import CachedHouse, HouseCache
 from pbrs_farm.run.step_cache import Work
-from pbrs_farm.store.object_store import MemoryStore
+from pbrs_farm.store.memory_store import MemoryStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs
 
 LAG = {

@@ -12,6 +12,14 @@ from hypothesis import strategies as st
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import HistogramFields, SelectionFields
+from pbrs_farm.selection.binning import (
+    BINNINGS,
+    Binning,
+    BinningRow,
+    binning_table,
+    finest_passing,
+    table_text,
+)
 from pbrs_farm.selection.histograms import Histogram, coarser_colour, coarser_depth, normalised
 from pbrs_farm.selection.reference_set import (
     bytes_from_reference,
@@ -19,15 +27,7 @@ from pbrs_farm.selection.reference_set import (
     reference_from_bytes,
     reference_from_histograms,
 )
-from pbrs_farm.selection.similarity import (
-    BINNINGS,
-    Binning,
-    BinningRow,
-    binning_table,
-    finest_passing,
-    intersection,
-    table_text,
-)
+from pbrs_farm.selection.similarity import intersection
 from tests.selection.histogram_sets import random_histogram, reference
 
 FINE = HistogramFields()

@@ -10,8 +10,9 @@ import pyarrow as pa
 import pytest
 
 from pbrs_farm.core.recipe import SelectionFields
+from pbrs_farm.selection.class_balance import balanced, class_shares
 from pbrs_farm.selection.scores import SCORES, merged, score
-from pbrs_farm.selection.verdicts import REASONS, balanced, class_shares, verdicts
+from pbrs_farm.selection.verdicts import REASONS, verdicts
 from tests.selection.histogram_sets import pack, reference
 
 GOOD: dict[str, Any] = {

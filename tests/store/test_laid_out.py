@@ -21,8 +21,9 @@ from pbrs_farm.run.output_root import as_files, claim_root, finish_house, pull
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
 from pbrs_farm.store import MemoryStore, Store, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.store.laid_out import GROUPS, LaidOutStore, one_task, pack_bytes, pack_key
+from pbrs_farm.store.laid_out import LaidOutStore, one_task
 from pbrs_farm.store.object_store import Head, put_done
+from pbrs_farm.store.pack import GROUPS, pack_bytes, pack_key
 from workers.coordinator.recover import done_steps
 
 RECIPE = recipe_from_name("fast")

@@ -11,7 +11,8 @@ from pbrs_farm.core.house import House, Material, MaterialKind, ModelPose, geome
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.truth.depth_sensor import stereo_depth, tof_depth
+from pbrs_farm.truth.stereo_sensor import stereo_depth
+from pbrs_farm.truth.tof_sensor import tof_depth
 from tests.truth.hits import camera, hit, house, square
 
 

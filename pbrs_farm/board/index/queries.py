@@ -9,7 +9,8 @@ from functools import lru_cache
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlencode
 
-from pbrs_farm.board.index.view_index import LAYER_BIT, ViewIndex
+from pbrs_farm.board.index.house_rows import LAYER_BIT
+from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.lighting import ALL_MODES

@@ -8,14 +8,9 @@ import time
 from dataclasses import dataclass
 from typing import Final
 
+from pbrs_farm.board.index.house_rows import HouseRow, read_house, selection_fingerprint, verdicts
 from pbrs_farm.board.index.stored_houses import FinishedHouses, StoredHouses
-from pbrs_farm.board.index.view_index import (
-    HouseRow,
-    ViewIndex,
-    read_house,
-    selection_fingerprint,
-    verdicts,
-)
+from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.store.folder import FolderStore

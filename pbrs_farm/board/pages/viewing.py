@@ -9,7 +9,6 @@ from __future__ import annotations
 import gzip
 import json
 import math
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -19,55 +18,16 @@ from starlette.responses import Response, StreamingResponse
 
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
+from pbrs_farm.board.pages.recipe_words import recipe_words
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.pictures import PLANES, packet, shown_png, thumbnail_jpeg
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput, BadRecipe, PbrsError
+from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.layers import LAYER, LAYERS
-from pbrs_farm.core.recipe import RECIPE_NAMES, differences, recipe_from_json, recipe_from_name
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.gallery.label_colours import instance_colours
 from pbrs_farm.store.object_store import content_type
-
-# The recipe of a root in the words of the command line. Effects: reads recipe.json.
-
-
-_MOST_BYTES: Final = 2**20
-
-
-@dataclass(frozen=True)
-class RecipeWords:
-    """What --recipe and --set would say: a preset and every field that differs, "light.spp=16"."""
-
-    preset: str
-    settings: tuple[str, ...]
-
-
-def recipe_words(reader: RootReader) -> RecipeWords | None:
-    """The root's recipe from the preset that it is nearest to; None without one of this version."""
-    # A root that is still empty, or of another version, has pages all the same.
-    data = reader.get_or_none(keys.RECIPE, _MOST_BYTES)
-    if data is None:
-        return None
-    try:
-        recipe = recipe_from_json(data, keys.RECIPE)
-    except BadRecipe:
-        return None
-    # The nearest preset has the fewest fields that differ; its own name decides between equals.
-    found = {name: differences(recipe_from_name(name), recipe) for name in RECIPE_NAMES}
-    preset = min(found, key=lambda name: (len(found[name]), name != recipe.name))
-    return RecipeWords(preset, tuple(_setting(line) for line in found[preset]))
-
-
-def _setting(difference: str) -> str:
-    """ "light.spp: 64 -> 16" as "light.spp=16"."""
-    path, _, values = difference.partition(": ")
-    return f"{path}={values.rpartition(' -> ')[2]}"
-
-
-# A view's page and the files it loads.
-
 
 FOREVER: Final = "private, max-age=31536000, immutable"  # of an address that holds a version
 _STEPS: Final = ("truth", "opengl_dl", "opengl_il", "light", "develop", "view")

@@ -9,7 +9,6 @@ things and how many, and where the largest of them are to each other.
 from __future__ import annotations
 
 import json
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,21 +22,24 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
 from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.nouns import counted, listed, noun_of
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 LEAST_VISIBLE: Final = 0.3
 """Share of a thing's own pixels that are seen, from which it counts."""
-
 LEAST_FRACTION: Final = 0.003
 """Share of the picture's pixels from which a thing counts."""
-
 _RELATED: Final = 6  # largest things of which relations are told
 _SAID: Final = 4  # relations that the text tells
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 _TOUCH_M: Final = 0.05  # between a thing and what it stands on
 _SLACK_M: Final = 0.02  # by which things that stand apart may overlap
-
-# Things.
+_ROOMS: Final = {
+    RoomKind.LIVING: "living room", RoomKind.BEDROOM: "bedroom", RoomKind.KITCHEN: "kitchen",
+    RoomKind.DINING: "dining room", RoomKind.BATHROOM: "bathroom", RoomKind.OFFICE: "study",
+    RoomKind.HALL: "hall", RoomKind.OUTDOOR: "place outdoors", RoomKind.STORE: "storeroom",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +71,7 @@ def _things(view: ChosenView) -> list[_Seen]:
     for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
         seen = row["visible_fraction"]
         is_seen = (seen is None or seen >= LEAST_VISIBLE) and row["fraction"] >= LEAST_FRACTION
-        noun = _noun(view, row) if is_seen and not _is_structure(row) else ""
+        noun = noun_of(view, row) if is_seen and not _is_structure(row) else ""
         if noun:
             world = _corners(row["box3d"])
             local = world @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
@@ -89,69 +91,6 @@ def _corners(box: dict[str, Any]) -> F64:
     return np.asarray(np.array(box["centre"]) + (signs * half) @ axes)
 
 
-# Nouns.
-
-
-# Classes of NYU40 whose names are no countable nouns, and what of each is counted.
-_COUNTED: Final = {
-    "shelves": "set of shelves", "blinds": "blind", "books": "row of books", "clothes": "piece of clothing",
-    "floor mat": "rug", "paper": "sheet of paper", "night stand": "nightstand",
-}  # fmt: skip
-# Classes of no class in particular, and what is said where the thing's name says nothing.
-_VAGUE: Final = {
-    "otherprop": "object", "otherfurniture": "piece of furniture", "otherstructure": "part of the building",
-    "none": "",
-}  # fmt: skip
-_NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
-_PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")
-_PLURALS: Final = {"person": "people", "bookshelf": "bookshelves", "shelf": "shelves"}
-_NUMBERS: Final = (
-    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
-    "twelve",
-)  # fmt: skip
-_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
-
-
-def _noun(view: ChosenView, row: dict[str, Any]) -> str:
-    """What a thing is called; "" for one without a class."""
-    if view.choice.classes is not None:
-        return str(row["own_class_name"])
-    name = str(row["class"])
-    if name not in _VAGUE:
-        return _COUNTED.get(name, name)
-    if row["kind"] in _NOUNS_OF_KINDS:
-        return _NOUNS_OF_KINDS[row["kind"]]
-    # A thing of no class is what it is called, where that is one word or two.
-    own = str(row["name"]).strip(" 0123456789")
-    return own.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(own) else _VAGUE[name]
-
-
-def plural(noun: str) -> str:
-    """Many of a noun: "chairs", "boxes", "sets of shelves", "people"."""
-    head, of, rest = noun.partition(" of ")
-    first, space, last = head.rpartition(" ")
-    if last in _PLURALS:
-        last = _PLURALS[last]
-    elif re.search(r"(s|x|ch|sh)$", last):
-        last += "es"
-    elif re.search(r"[^aeiou]y$", last):
-        last = f"{last[:-1]}ies"
-    else:
-        last += "s"
-    return f"{first}{space}{last}{of}{rest}"
-
-
-def counted(n: int, noun: str) -> str:
-    """ "a chair", "an armchair", "three chairs"."""
-    if n == 1:
-        return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
-    return f"{_NUMBERS[n] if n < len(_NUMBERS) else n} {plural(noun)}"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
-
-
 def _titles(things: Sequence[_Seen]) -> dict[int, str]:
     """Instance -> what tells it from the others: "the sofa", "the left chair", "the third lamp from the left"."""
     titles = {}
@@ -167,9 +106,6 @@ def _titles(things: Sequence[_Seen]) -> dict[int, str]:
                 title = f"the {ordinal} {noun} from the left"
             titles[thing.id] = title
     return titles
-
-
-# Relations.
 
 
 def _relation(a: _Seen, b: _Seen, *, by_axes: bool) -> str:
@@ -211,16 +147,6 @@ def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]
     return sorted(rows, key=lambda row: row["relation"] != "on top of")
 
 
-# The text of a view, and the file of all.
-
-
-_ROOMS: Final = {
-    RoomKind.LIVING: "living room", RoomKind.BEDROOM: "bedroom", RoomKind.KITCHEN: "kitchen",
-    RoomKind.DINING: "dining room", RoomKind.BATHROOM: "bathroom", RoomKind.OFFICE: "study",
-    RoomKind.HALL: "hall", RoomKind.OUTDOOR: "place outdoors", RoomKind.STORE: "storeroom",
-}  # fmt: skip
-
-
 def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """captions.jsonl, a line a view, and images/<house>/<view>.png; the number of files.
 
@@ -253,7 +179,7 @@ def caption(view: ChosenView) -> dict[str, Any]:
 def _first_sentence(view: ChosenView, things: Sequence[_Seen]) -> str:
     # In the order of the largest of each noun.
     counts = Counter(thing.noun for thing in things)
-    seen = _listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""
+    seen = listed([counted(n, noun) for noun, n in counts.items()]) if counts else ""
     room = _room(view)
     if not room:
         return f"The picture shows {seen or 'an object'}."

@@ -42,7 +42,7 @@ def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> 
 
 def error_page(run: Trained, evaluations: list[Evaluation]) -> str:
     """HTML without scripts; every picture is inside it."""
-    from pbrs_farm.gallery.gallery_page import page
+    from pbrs_farm.gallery.html_page import page
 
     return page(
         "pbrs_farm.study.judging",

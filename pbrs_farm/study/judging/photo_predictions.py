@@ -214,7 +214,7 @@ def _url(picture: Srgb8Image) -> str:
 
 def _page(run: Trained, rows: Sequence[dict[str, Any]]) -> str:
     """HTML of every photograph beside what is seen in it; every picture is inside it."""
-    from pbrs_farm.gallery.gallery_page import page
+    from pbrs_farm.gallery.html_page import page
 
     cards = [row | {"classes": row.get("classes", {})} for row in rows if "tiles" in row]
     failed = [row for row in rows if "error" in row]

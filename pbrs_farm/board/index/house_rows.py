@@ -1,0 +1,116 @@
+"""The houses of an output root and the rows of their views. Effects: reads the store."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any, Final
+
+from pbrs_farm.board.index.stored_houses import view_keys
+from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.layers import LAYERS
+from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+
+LAYER_BIT: Final = {layer.name: 1 << k for k, layer in enumerate(LAYERS)}
+_BIT_OF_FILE: Final = {layer.file: 1 << k for k, layer in enumerate(LAYERS)}
+_MAX_WARNINGS: Final = 8  # of a view that are kept
+
+
+@dataclass(frozen=True, slots=True)
+class ViewRow:
+    """A view as the index keeps it."""
+
+    id: str
+    room: str  # name that can be shown
+    layers: int  # bit k: the file of LAYERS[k] is there
+    classes: int  # bit k: NYU40 class k is in view
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HouseRow:
+    """A house as the index keeps it."""
+
+    id: str
+    name: str
+    credit: str  # the line its pictures must carry, or ""
+    n_rooms: int
+    views: tuple[ViewRow, ...]
+
+
+def read_house(reader: RootReader, house: str) -> HouseRow:
+    """The house and its views; what is damaged is left out, the rest stands."""
+    facts = reader.json_object(keys.house_key(house, "house.json"))
+    source = facts.get("source")
+    credit = source.get("attribution") if isinstance(source, dict) else ""
+    rooms = _room_names(facts.get("rooms"))
+    # Every file of a view is a key below views/<view>/.
+    prefix = keys.house_key(house, "views/")
+    named = (key.removeprefix(prefix).partition("/") for key in view_keys(reader, house))
+    views = [
+        _view_row(reader, house, view, {file for _view, _slash, file in group}, rooms)
+        for view, group in groupby(sorted(p for p in named if p[2]), key=lambda p: p[0])
+    ]
+    name = shown(facts.get("name") or house)
+    return HouseRow(house, name, shown(credit or "", MAX_MESSAGE), len(rooms), tuple(views))
+
+
+def _room_names(rooms: Any) -> dict[str, str]:
+    """Room id -> its name, or its type, or its id."""
+    names: dict[str, str] = {}
+    for room in rooms if isinstance(rooms, list) else ():
+        if isinstance(room, dict) and "id" in room:
+            types = room.get("types")
+            kind = types[0] if isinstance(types, list) and types else ""
+            names[str(room["id"])] = shown(room.get("name") or kind) or f"Room {room['id']}"
+    return names
+
+
+def _view_row(
+    reader: RootReader, house: str, view: str, files: set[str], rooms: Mapping[str, str]
+) -> ViewRow:
+    facts: dict[str, Any] = {}
+    if "view.json" in files:
+        facts = reader.json_object(keys.view_key(house, view, "view.json"))
+    room = str(facts.get("room") or view.rpartition("_")[0])
+    warnings = facts.get("warnings")
+    texts = [shown(w, MAX_MESSAGE) for w in warnings] if isinstance(warnings, list) else []
+    return ViewRow(
+        id=view,
+        room=rooms.get(room) or shown(room) or "?",
+        layers=sum(_BIT_OF_FILE.get(file, 0) for file in files),
+        classes=_class_bits(facts.get("instances")),
+        warnings=tuple(texts[:_MAX_WARNINGS]),
+    )
+
+
+def _class_bits(instances: Any) -> int:
+    bits = 0
+    for row in instances if isinstance(instances, list) else ():
+        nyu40 = row.get("nyu40") if isinstance(row, dict) else None
+        if isinstance(nyu40, int) and 0 <= nyu40 <= 40:
+            bits |= 1 << nyu40
+    return bits
+
+
+def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
+    """(house, view) -> "" where the last selection kept it, else why not; {} without a selection."""
+    run = reader.json_object(keys.SELECTION).get("run")
+    if not run:
+        return {}
+    try:
+        data = reader.get(keys.selection_key(str(run), "jsonl"), 4 * 2**30)
+        rows = [json.loads(line) for line in data.splitlines()]
+        return {(str(r["house"]), str(r["view"])): shown(r["reason"]) for r in rows}
+    except (PbrsError, ValueError, RecursionError, KeyError, TypeError):
+        return {}
+
+
+def selection_fingerprint(reader: RootReader) -> str:
+    """A text that changes when another selection was made."""
+    data = reader.get_or_none(keys.SELECTION)
+    return "" if data is None else keys.sha256(data)

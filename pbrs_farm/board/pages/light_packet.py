@@ -1,0 +1,158 @@
+"""A view's light as half floats that a browser sums and tones, in one packet. Effects: a process.
+
+"PBLT", length of the JSON, the JSON (padded with spaces to a multiple of four), then (H, W, 3)
+little-endian float16 of each plane that the JSON names: albedo, outdoor, and indoor or the
+lamps. Radiance is multiplied by `scale`, a power of two, so that half floats hold its range.
+The layers are made in a process of its own, since the denoiser keeps much memory: `python -m`
+this module reads the view's files from stdin and writes the packet to stdout.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.core.recipe_fields import ToneFields
+from pbrs_farm.core.shown_text import shown
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
+
+MAGIC: Final = b"PBLT"
+_LARGEST: Final = 60_000.0  # of a half float, with some room
+_TIMEOUT_S: Final = 180.0
+_HEAD: Final = struct.Struct("<III?")  # bytes of radiance.exr, view.json, recipe.json; denoise
+
+
+def light_packet_in_process(
+    radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool
+) -> bytes:
+    """The packet of a view, made by a process of its own. Raises BadInput with what it said."""
+    head = _HEAD.pack(len(radiance), len(view_json), len(recipe), denoise)
+    command = [sys.executable, "-m", "pbrs_farm.board.pages.light_packet"]
+    try:
+        done = subprocess.run(
+            command,
+            input=b"".join((head, radiance, view_json, recipe)),
+            capture_output=True,
+            timeout=_TIMEOUT_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        raise BadInput("relight", "", f"took more than {_TIMEOUT_S:.0f} s") from None
+    if done.returncode != 0 or done.stdout[:4] != MAGIC:
+        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        raise BadInput("relight", "", lines[-1] if lines else f"exit code {done.returncode}")
+    return done.stdout
+
+
+def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool) -> bytes:
+    """The packet of a view's light. Raises BadInput, and MachineFailed without a denoiser."""
+    from pbrs_farm.run.relight import relight_layers
+    from pbrs_farm.transport.develop.tone_mapping import exposure_of, with_glare
+
+    tone = _tone_of(view_json, recipe)
+    rows = lamp_rows(view_json)
+    layers = relight_layers(radiance_from_exr(radiance, "radiance.exr"), rows, denoise=denoise)
+    light = {"outdoor": layers.aovs.outdoor}
+    light |= {f"lamp{n}": layer for n, layer in sorted(layers.lamps.items())}
+    if not layers.lamps:
+        light["indoor"] = layers.aovs.indoor
+    # Glare is linear: that of a sum is the sum of the layers', so that a browser need not know of it.
+    light = {name: with_glare(layer, tone.glare) for name, layer in light.items()}
+    # Bring the picture's typical radiance near the middle of a half float's range.
+    total = np.asarray(sum(light.values()), np.float32)
+    scale = scale_of(exposure_of(total, tone), float(total.max(initial=0.0)))
+    planes = {"albedo": layers.aovs.albedo} | {k: v * np.float32(scale) for k, v in light.items()}
+    facts = {"scale": scale, "tone": _tone_facts(tone), "denoised": denoise, "lamps": rows}
+    return packet(planes, facts)
+
+
+def packet(planes: Mapping[str, NDArray[np.float32]], facts: Mapping[str, Any]) -> bytes:
+    """The packet of (H, W, 3) planes, all of one size."""
+    height, width = next(iter(planes.values())).shape[:2]
+    described = {"width": width, "height": height, "planes": list(planes), **facts}
+    text = json.dumps(described, allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    halves = [
+        np.clip(np.nan_to_num(plane, posinf=_LARGEST), 0, _LARGEST).astype("<f2").tobytes()
+        for plane in planes.values()
+    ]
+    return b"".join((MAGIC, struct.pack("<I", len(text)), text, *halves))
+
+
+def scale_of(exposure: float, largest: float) -> float:
+    """The power of two nearest to the exposure that keeps the largest radiance a half float."""
+    power = round(math.log2(exposure))
+    if largest > 0:
+        power = min(power, math.floor(math.log2(_LARGEST / largest)))
+    return float(2.0**power)
+
+
+def lamp_rows(view_json: bytes) -> list[dict[str, Any]]:
+    """What the page shows of each lamp of view.json; [] where light was not stored by lamp."""
+    try:
+        rows = json.loads(view_json)["modes"]["light"]["lamps"]
+        return [
+            {
+                "number": int(r["number"]),
+                "name": shown(r.get("name") or r["item"]),
+                "room": shown(r.get("room") or ""),
+                "lm": float(r["lm"]),
+                "share": float(r["share"]),
+                "layer": str(r["layer"]) if r["layer"] else None,
+            }
+            for r in rows
+        ]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return []
+
+
+def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
+    """The tone that the recipe draws for the view."""
+    try:
+        row = json.loads(view_json)
+        house, view = str(row["house"]), str(row["view"])
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise BadInput("view.json", "", "names no house and view") from None
+    return recipe_from_json(recipe, "recipe.json").tone_of(house, view)
+
+
+def _tone_facts(tone: ToneFields) -> dict[str, Any]:
+    from pbrs_farm.transport.develop.tone_mapping import knee_of
+
+    facts = {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
+    facts |= {"exposure_ev": tone.exposure_ev, "contrast": tone.contrast, "black": tone.black}
+    return facts | {"knee": knee_of(tone.white)}
+
+
+def _files(data: bytes) -> tuple[Sequence[bytes], bool]:
+    n_radiance, n_view, n_recipe, denoise = _HEAD.unpack_from(data)
+    at, parts = _HEAD.size, []
+    for n in (n_radiance, n_view, n_recipe):
+        parts.append(data[at : at + n])
+        at += n
+    return parts, denoise
+
+
+def main() -> int:
+    """Read a view's files from stdin, write its packet to stdout."""
+    (radiance, view_json, recipe), denoise = _files(sys.stdin.buffer.read())
+    try:
+        sys.stdout.buffer.write(light_packet(radiance, view_json, recipe, denoise=denoise))
+    except PbrsError as error:
+        sys.stderr.write(f"{error}\n")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

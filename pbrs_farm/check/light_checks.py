@@ -1,0 +1,291 @@
+"""Pictures in the light modes: radiance.exr through denoiser, white balance and tone again. Effects: reads files.
+
+Formulas are written again here from docs/formats.md and the sources named; the stages' code is not used.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.embree_caster import Floats
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.recipe import Recipe, SensorFields, ToneFields
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
+_MITSUBA_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+_GROUPS = {"mlt_ol": ("outdoor",), "mlt_il_ol": ("outdoor", "indoor")}
+
+# What a picture may differ by from the one developed here, in steps of 255.
+_EXACT_STEPS, _EXACT_SHARE = 1, 0.002  # by one step at most, in so few values
+_DENOISED_STEPS, _DENOISED_SHARE = 2, 0.01  # another processor's denoiser
+_TILE_PX = 16  # over which a sensor's noise is averaged
+_SENSOR_STEPS, _SENSOR_TILES = 14, 0.9  # mean of a tile, share of tiles
+_FACTOR = 0.002  # of exposure and gains that view.json tells
+
+
+def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
+    """Develop radiance.exr again, and compare with the stored pictures of the light modes."""
+    modes = [m for m in _GROUPS if m in arrays]
+    if not modes or view.recipe is None or not view.has("radiance.exr"):
+        return
+    try:
+        light = _light(view, tally)
+    except BadInput as error:
+        tally.expect("light developed", view.place, False, str(error))
+        return
+    if light is None:
+        return
+    told = view.table.get("modes", {}).get("develop", {})
+    for mode in modes:
+        _check_mode(view, mode, arrays[mode], light, told.get(mode, {}), view.recipe, tally)
+    _check_tone(view, view.recipe, told.get("tone"), tally)
+
+
+def _check_tone(view: StoredView, recipe: Recipe, told: Any, tally: Tally) -> None:
+    """What view.json tells of the choices drawn for the view is what the recipe draws."""
+    if recipe.tone.spread == 0 and told is None:
+        return
+    tone = _tone_of(view, recipe)
+    names = ("exposure_ev", "contrast", "black", "white")
+    drawn = {name: getattr(tone, name) for name in names} if recipe.tone.spread > 0 else None
+    what = f"view.json tells of its tone {told}, the recipe draws {drawn}"
+    tally.expect("light developed", view.place, told == drawn, what)
+
+
+def _tone_of(view: StoredView, recipe: Recipe) -> ToneFields:
+    return recipe.tone_of(view.folder.parent.parent.name, view.folder.name)
+
+
+def _check_mode(
+    view: StoredView,
+    mode: str,
+    stored: NDArray[Any],
+    light: Mapping[str, NDArray[np.float32]],
+    told: Mapping[str, Any],
+    recipe: Recipe,
+    tally: Tally,
+) -> None:
+    place = f"{view.place}/{mode}.png"
+    tone, sensor = _tone_of(view, recipe), recipe.sensor
+    total = sum((light[g] for g in _GROUPS[mode]), np.zeros_like(light["outdoor"]))
+    total = _glared(total, tone.glare)
+    gains = _white_balance(total, light["albedo"], tone.white_balance)
+    balanced = np.maximum(np.nan_to_num((total * gains).astype(np.float64), posinf=0.0), 0)
+    exposure = _exposure(balanced, tone)
+    # A sensor's exposure is what its shutter and speed gave.
+    if sensor.is_on:
+        exposure = float(told.get("exposure", exposure))
+    else:
+        off = abs(float(told.get("exposure", exposure)) / exposure - 1)
+        off = max(off, float(np.abs(np.array(told.get("gains", gains)) - gains).max()))
+        what = f"view.json tells other factors, by {off:.4f}"
+        tally.expect("light developed", place, off <= _FACTOR, what)
+    expected = _toned(balanced, exposure, tone, sensor)
+    if sensor.is_on:
+        _compare_tiles(place, stored, expected, tally)
+        return
+    steps, share = _EXACT_STEPS, _EXACT_SHARE
+    if recipe.light.denoise:
+        steps, share = _DENOISED_STEPS, _DENOISED_SHARE
+    difference = np.abs(stored.astype(int) - expected.astype(int))
+    wrong = (difference > steps).any(axis=-1)
+    n_wrong = int(wrong.sum())
+    off_by_one = float((difference > 0).mean()) if not recipe.light.denoise else 0.0
+    # The network's last bits differ between processors; a patch does not hide among so few.
+    allowed = n_wrong <= (share * wrong.size if recipe.light.denoise else 0)
+    is_patch = allowed and bool(ndimage.uniform_filter(wrong.astype(float), 5).max() > 0.5)
+    good = allowed and not is_patch and off_by_one <= share
+    tally.add("light developed", wrong.size, ties=n_wrong if good else 0)
+    if not good:
+        row, column = np.argwhere(difference.any(axis=-1))[0]
+        what = f"differs from radiance.exr at row {row}, column {column}"
+        tally.fail("light developed", place, what, max(n_wrong, 1))
+
+
+def _compare_tiles(place: str, stored: NDArray[Any], expected: NDArray[Any], tally: Tally) -> None:
+    """A sensor's noise goes in the mean of a tile; what is left is its lens, mosaic and JPEG."""
+    difference = np.abs(_tiles(stored) - _tiles(expected)).mean(axis=-1)
+    share = float((difference <= _SENSOR_STEPS).mean())
+    what = f"{1 - share:.0%} of its tiles differ from radiance.exr"
+    tally.expect("light developed", place, share >= _SENSOR_TILES, what)
+
+
+def _tiles(picture: NDArray[Any]) -> Floats:
+    height, width = (max(n // _TILE_PX, 1) * min(_TILE_PX, n) for n in picture.shape[:2])
+    size = min(_TILE_PX, picture.shape[0]), min(_TILE_PX, picture.shape[1])
+    cut = picture[:height, :width].astype(float)
+    parts = cut.reshape(height // size[0], size[0], width // size[1], size[1], 3)
+    return np.asarray(parts.mean(axis=(1, 3)))
+
+
+def _light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | None:
+    """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had."""
+    channels = view.exr("radiance.exr")
+    names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
+    names["normal"] = [f"normal.{c}" for c in "XYZ"]
+    if not all(n in channels for row in names.values() for n in row):
+        return None  # told by the check of radiance
+    planes = {g: np.stack([channels[n] for n in row], axis=-1) for g, row in names.items()}
+    if view.recipe is None or not view.recipe.light.denoise:
+        return planes
+    try:
+        pyoidn = _pyoidn()
+    except ImportError:
+        tally.note(f"{view.place}: light was denoised, and pyoidn is not installed to do it again")
+        return None
+    # A panorama is denoised across its edge.
+    n = min(64, planes["albedo"].shape[1]) if view.recipe.lens.model == "equirect" else 0
+    wide = {g: np.pad(a, ((0, 0), (n, n), (0, 0)), mode="wrap") for g, a in planes.items()}
+    lit = (wide["outdoor"] + wide["indoor"] > 0) | (wide["albedo"] > 0)
+    guides = (np.ascontiguousarray(wide[g], np.float32) for g in ("albedo", "normal"))
+    albedo, normal = guides
+    for group in ("outdoor", "indoor"):
+        noisy = np.ascontiguousarray(wide[group], np.float32)
+        if (noisy > 0).any():
+            clean = pyoidn.denoise(noisy, albedo, normal, hdr=True, clean_aux=True)
+            clean = np.maximum(np.nan_to_num(np.asarray(clean, np.float32), posinf=0.0), 0)
+            noisy = clean * np.asarray(lit).any(axis=-1, keepdims=True)
+        planes[group] = noisy[:, n : noisy.shape[1] - n]
+    return planes
+
+
+def _pyoidn() -> Any:
+    """The denoiser's module, imported as if there were no torch: it would load it for nothing, in 6 s."""
+    is_hidden = "torch" not in sys.modules
+    if is_hidden:
+        sys.modules["torch"] = None  # type: ignore[assignment]  # what import takes for "not there"
+    try:
+        import pyoidn
+    finally:
+        if is_hidden:
+            del sys.modules["torch"]
+    return pyoidn
+
+
+def _glared(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
+    if share == 0:
+        return total
+    finite = np.nan_to_num(total, posinf=0.0)
+    blurred = np.zeros_like(finite)
+    for part in (0.01, 0.04, 0.16):
+        wide = finite
+        for axis in (0, 1):
+            wide = ndimage.gaussian_filter1d(
+                wide, part * total.shape[1], axis, mode="nearest", truncate=3
+            )
+        blurred += wide / 3
+    return np.asarray((1 - share) * finite + share * blurred, np.float32)
+
+
+def _white_balance(total: NDArray[Any], albedo: NDArray[Any], strength: float) -> Floats:
+    """(3,) gains against the median of radiance over albedo, of constant luminance."""
+    level = total @ _LUMINANCE
+    told = (level > 0) & (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
+    if strength == 0 or told.sum() < 16:
+        return np.ones(3)
+    low, high = np.percentile(level[told], [10, 90])
+    told &= (level >= low) & (level <= high)
+    surface = albedo[told].astype(np.float64)
+    logs = np.median(np.log(total[told] / surface), axis=0)
+    # Walls of one hue colour the light they reflect at each other: hold it to lamps and skies.
+    most, least = surface.max(axis=1), surface.min(axis=1)
+    is_colour = most - least > 0.35 * most
+    if is_colour.mean() > 0.5:
+        chroma = surface[is_colour] - surface[is_colour].mean(axis=1, keepdims=True)
+        hue = chroma / np.maximum(np.linalg.norm(chroma, axis=1, keepdims=True), 1e-9)
+        common = np.median(hue, axis=0)
+        length = float(np.linalg.norm(common))
+        alike = int((hue @ common > 0.9 * length).sum()) if length > 0 else 0
+        if alike / len(surface) > 0.5:
+            tint = np.clip(logs[1] - (logs[0] + logs[2]) / 2, -0.1, 0.35)
+            warmth = np.clip(logs[0] - logs[2], -0.7, 1.6)
+            side = logs.mean() - tint / 3
+            logs = np.array([side + warmth / 2, logs.mean() + 2 * tint / 3, side - warmth / 2])
+    light = np.exp(logs)
+    gains = (light / (light @ _LUMINANCE)) ** -strength
+    return np.asarray((gains / (gains @ _LUMINANCE)).astype(np.float32))
+
+
+def _exposure(balanced: Floats, tone: ToneFields) -> float:
+    """The factor that brings the log-average to the key; `photo` leaves the ends out."""
+    if tone.preset == "released":
+        level = balanced @ _MITSUBA_LUMINANCE
+        return tone.key / float(np.exp(np.log(level + 1e-3).mean()))
+    level = balanced @ _LUMINANCE
+    level = level[level > 0]
+    if not level.size:
+        return 1.0
+    bright = float(np.percentile(level, 98))
+    average = float(np.exp(np.log(np.clip(level, bright / 1000, bright)).mean()))
+    return float(tone.key / average * 2**tone.exposure_ev)
+
+
+def _toned(
+    balanced: Floats, exposure: float, tone: ToneFields, sensor: SensorFields
+) -> NDArray[np.uint8]:
+    """8 bits by Reinhard's operator (`released`), else by a line and a logarithm that ends at white."""
+    if tone.preset == "released":
+        level = balanced @ _MITSUBA_LUMINANCE * exposure
+        white = float(level.max()) * 0.64
+        linear = balanced
+        if white > 0:
+            ratio = (1 + level / white**2) / (1 + level) * exposure
+            linear = balanced * ratio[..., None]
+    else:
+        light, white = balanced * exposure, tone.white
+        if sensor.is_on:
+            light, white = (
+                np.minimum(light * _vignette(light, sensor), sensor.headroom),
+                sensor.headroom,
+            )
+        linear = _rolled(light, white)
+    linear = np.clip(linear, 0, 1)
+    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(255 * _curved(srgb, tone)), np.uint8)
+
+
+def _curved(srgb: Floats, tone: ToneFields) -> Floats:
+    """Luma by an S whose odds go to a power, then by the line that begins at the black level."""
+    if tone.preset == "released" or (tone.contrast == 1 and tone.black == 0):
+        return srgb
+    luma = srgb @ [0.299, 0.587, 0.114]
+    with np.errstate(divide="ignore"):
+        s_shaped = 1 / (1 + (np.maximum(1 / luma - 1, 0)) ** tone.contrast)
+    ends = np.maximum((s_shaped - tone.black) / (1 - tone.black), 0)
+    chroma = np.minimum(np.divide(ends, luma, out=np.zeros_like(luma), where=luma > 0), 1)
+    return np.asarray(np.clip(ends[..., None] + (srgb - luma[..., None]) * chroma[..., None], 0, 1))
+
+
+def _vignette(light: Floats, sensor: SensorFields) -> Floats:
+    """(H, W, 1) what a lens lets through, by the squared distance from the middle."""
+    height, width = light.shape[:2]
+    y, x = np.mgrid[0:height, 0:width] + 0.5
+    squared = ((y - height / 2) ** 2 + (x - width / 2) ** 2) / (
+        (height / 2) ** 2 + (width / 2) ** 2
+    )
+    return np.asarray(1 - sensor.vignetting * squared)[..., None]
+
+
+def _rolled(light: Floats, white: float) -> Floats:
+    """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; beyond 2 it pales."""
+    # The sum rises with k, so that halving its logarithm finds it.
+    low, high = -9.3, 9.3
+    for _ in range(100):
+        middle = (low + high) / 2
+        k = float(np.exp(middle))
+        is_short = 0.6 + k * np.log1p((white - 0.6) / k) < 1
+        low, high = (middle, high) if is_short else (low, middle)
+    top = light.max(axis=-1, keepdims=True)
+    over = np.maximum(top - 0.6, 0)
+    target = np.where(top > 0.6, np.minimum(0.6 + k * np.log1p(over / k), 1), top)
+    scaled = light * np.divide(target, top, out=np.ones_like(top), where=top > 0)
+    pale = np.clip(np.log2(np.maximum(top, 1e-9) / 2) / 5, 0, 1)
+    return np.asarray(scaled * (1 - pale) + target * pale)

@@ -1,0 +1,50 @@
+"""Stored files that a stranger may have put there: bytes, digests and JSON of regular ones. Effects: reads files.
+
+Every fault is a BadFile whose text says what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
+
+MAX_BYTES = 2 * 2**30  # of a house's geometry; every other stored file is smaller
+
+
+class BadFile(ValueError):
+    """A stored file cannot be read; the text says why."""
+
+
+def stored_bytes(file: Path) -> bytes:
+    """The file's bytes; raises BadFile."""
+    try:
+        return read_regular(file, MAX_BYTES)
+    except OSError as error:
+        raise BadFile(fault_of(error)) from None
+
+
+def stored_digest(file: Path) -> str:
+    """Hex sha256 of the file, whatever its size; raises BadFile."""
+    try:
+        return digest_of_regular(file)
+    except OSError as error:
+        raise BadFile(fault_of(error)) from None
+
+
+def stored_object(file: Path) -> dict[str, Any]:
+    """The JSON object in the file; raises BadFile."""
+    return object_from_json(stored_bytes(file))
+
+
+def object_from_json(data: bytes | str) -> dict[str, Any]:
+    """The JSON object that data says; raises BadFile."""
+    try:
+        value = json.loads(data)
+    except (ValueError, RecursionError):
+        raise BadFile("is no JSON, or is cut short") from None
+    if not isinstance(value, dict):
+        raise BadFile("is no JSON object")
+    return value

@@ -1,0 +1,68 @@
+"""What the things of a view are called in plain English, counted and listed; no effects."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, Final
+
+from pbrs_farm.export.chosen_view import ChosenView
+
+# Classes of NYU40 whose names are no countable nouns, and what of each is counted.
+_COUNTED: Final = {
+    "shelves": "set of shelves", "blinds": "blind", "books": "row of books", "clothes": "piece of clothing",
+    "floor mat": "rug", "paper": "sheet of paper", "night stand": "nightstand",
+}  # fmt: skip
+
+# Classes of no class in particular, and what is said where the thing's name says nothing.
+_VAGUE: Final = {
+    "otherprop": "object", "otherfurniture": "piece of furniture", "otherstructure": "part of the building",
+    "none": "",
+}  # fmt: skip
+_NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
+_PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")
+_PLURALS: Final = {"person": "people", "bookshelf": "bookshelves", "shelf": "shelves"}
+_NUMBERS: Final = (
+    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
+    "twelve",
+)  # fmt: skip
+
+
+def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
+    """What a thing is called; "" for one without a class."""
+    if view.choice.classes is not None:
+        return str(row["own_class_name"])
+    name = str(row["class"])
+    if name not in _VAGUE:
+        return _COUNTED.get(name, name)
+    if row["kind"] in _NOUNS_OF_KINDS:
+        return _NOUNS_OF_KINDS[row["kind"]]
+    # A thing of no class is what it is called, where that is one word or two.
+    own = str(row["name"]).strip(" 0123456789")
+    return own.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(own) else _VAGUE[name]
+
+
+def plural(noun: str) -> str:
+    """Many of a noun: "chairs", "boxes", "sets of shelves", "people"."""
+    head, of, rest = noun.partition(" of ")
+    first, space, last = head.rpartition(" ")
+    if last in _PLURALS:
+        last = _PLURALS[last]
+    elif re.search(r"(s|x|ch|sh)$", last):
+        last += "es"
+    elif re.search(r"[^aeiou]y$", last):
+        last = f"{last[:-1]}ies"
+    else:
+        last += "s"
+    return f"{first}{space}{last}{of}{rest}"
+
+
+def counted(n: int, noun: str) -> str:
+    """ "a chair", "an armchair", "three chairs"."""
+    if n == 1:
+        return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
+    return f"{_NUMBERS[n] if n < len(_NUMBERS) else n} {plural(noun)}"
+
+
+def listed(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,0 +1,16 @@
+"""illuminance.json: how bright every room's floor is, one a house, written by `illuminance`; no effects.
+
+No step reads the file: `light` repeats a room's row from the step's marker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pbrs_farm.formats.serialise import json_bytes
+
+
+def illuminance_json(record: Mapping[str, Any], sky: Mapping[str, Any]) -> bytes:
+    """The file. record: of transport.illuminance.illuminance_record; sky: the sky's facts."""
+    return json_bytes({**record, "sky": sky})

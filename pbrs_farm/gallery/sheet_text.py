@@ -1,0 +1,128 @@
+"""A line of text in whatever script it is, each letter in the first font that has it. Effects: draws, opens fonts.
+
+Pillow's own font has Latin letters; what it lacks comes from fonts of the machine (`make setup`
+installs two): DejaVu Sans (Latin, Greek, Cyrillic, Hebrew, Arabic, Armenian, Georgian and more)
+and Droid Sans Fallback (Chinese, Japanese, Korean).
+"""
+
+from __future__ import annotations
+
+import os
+import unicodedata
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from PIL import ImageDraw, ImageFont
+
+from pbrs_farm.core.shown_text import shown
+
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
+_FILES: Final = (
+    "DejaVuSans.ttf", "DroidSansFallbackFull.ttf", "DroidSansFallback.ttf",
+    "NotoSans-Regular.ttf", "NotoSansCJK-Regular.ttc", "NotoSansThai-Regular.ttf",
+    "NotoSansDevanagari-Regular.ttf", "NotoSansSymbols2-Regular.ttf", "NotoEmoji-Regular.ttf",
+    "Loma.ttf", "FreeSans.ttf", "wqy-microhei.ttc", "unifont.otf", "unifont.ttf",
+)  # fmt: skip
+"""Fonts that are used where they are installed, the preferred first."""
+_MOST_LETTERS: Final = 1000  # of a line
+_ASCENT: Final = 0.78  # of the size: from the top of Pillow's own letters down to the base line
+_UNKNOWN: Final = "\u0378"  # an unassigned code point: drawn as a font's box for what it lacks
+
+
+def draw_line(
+    draw: ImageDraw.ImageDraw,
+    at: tuple[float, float],
+    text: str,
+    *,
+    fill: tuple[int, int, int],
+    size: int,
+) -> float:
+    """Draw a line whose letters' top left is at; its length in px.
+
+    A letter that no font has is "?"; joiners and variation selectors of pictographs are left out
+    where the font before them lacks them.
+    """
+    x, y = at
+    text = shown(text, _MOST_LETTERS)
+    if text.isascii():
+        draw.text(at, text, fill, _own(size))
+        return float(draw.textlength(text, _own(size)))
+    # Letters of several fonts share a baseline, not a top.
+    base = y + _own_ascent(size)
+    for name, part in _parts(text):
+        font = _font_of_script(name, size)
+        draw.text((x, base), part, fill, font, anchor="ls")
+        x += float(draw.textlength(part, font))
+    return x - at[0]
+
+
+def _parts(text: str) -> Iterator[tuple[str, str]]:
+    """(font file, "" for Pillow's own, and the letters to draw in it), from left to right."""
+    name, part = "", ""
+    for c in text:
+        # Keep marks, joiners and spaces with the letter before, so that shaping sees the whole.
+        follows = part and (c == " " or unicodedata.category(c) in ("Mn", "Mc", "Me", "Cf"))
+        if follows and _has(name, c):
+            part += c
+            continue
+        if follows and c != " ":
+            continue
+        found = next((f for f in ("", *_installed()) if _has(f, c)), None)
+        found, c = (name, "?") if found is None else (found, c)
+        if found != name and part:
+            yield name, part
+            part = ""
+        name, part = found, part + c
+    if part:
+        yield name, part
+
+
+@cache
+def _has(file: str, c: str) -> bool:
+    """Whether a font has a letter of its own for c, and not the box for what it lacks."""
+    if c.isascii():
+        return True
+    font = _font_of_script(file, 16)
+    letter, box = font.getmask(c), font.getmask(_UNKNOWN)
+    return letter.size != box.size or bytes(letter) != bytes(box)
+
+
+@cache
+def _font_of_script(file: str, size: int) -> Font:
+    return ImageFont.truetype(file, size) if file else _own(size)
+
+
+@cache
+def _own(size: int) -> Font:
+    return ImageFont.load_default(size)
+
+
+def _own_ascent(size: int) -> float:
+    font = _own(size)
+    if isinstance(font, ImageFont.FreeTypeFont):
+        return float(font.getmetrics()[0])
+    return _ASCENT * size
+
+
+@cache
+def _installed() -> tuple[str, ...]:
+    """The files of _FILES that the machine has, below the folders that fontconfig looks into."""
+    home = os.environ.get("XDG_DATA_HOME", str(Path.home() / ".local/share"))
+    shared = os.environ.get("XDG_DATA_DIRS", "/usr/local/share:/usr/share").split(":")
+    roots = [*(Path(s) / "fonts" for s in (home, *shared)), Path.home() / ".fonts"]
+    found: dict[str, str] = {}
+    for root in roots:
+        for folder, _folders, names in os.walk(root):
+            for name in set(names).intersection(_FILES):
+                found.setdefault(name, str(Path(folder) / name))
+    return tuple(found[name] for name in _FILES if name in found and _opens(found[name]))
+
+
+def _opens(file: str) -> bool:
+    try:
+        ImageFont.truetype(file, 16)
+    except OSError:
+        return False
+    return True
