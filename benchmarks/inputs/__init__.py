@@ -71,12 +71,12 @@ def class_agreement() -> float:
     from importlib.resources import files
 
     from pbrs_farm.core.classes import NYU40_NAMES
-    from pbrs_farm.read.common.told_items import told_item
+    from pbrs_farm.read.common.box_only_items import box_only_item
 
     text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
     right = []
     for row in csv.DictReader(text.splitlines()):
-        item = told_item("1", row["source"], row["name"], (0, 0.5, 0), (1, 1, 1), 0.0)
+        item = box_only_item("1", row["source"], row["name"], (0, 0.5, 0), (1, 1, 1), 0.0)
         if item is not None and row["nyu40"] in NYU40_NAMES:
             right.append(NYU40_NAMES[item.nyu40] == row["nyu40"])
     return round(sum(right) / len(right), 4)

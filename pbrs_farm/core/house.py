@@ -190,13 +190,13 @@ Light is not scattered by it; labels and pictures have it behind glass.
 LIT: Final = "lit"
 """Begins the name of a material of such an item that shines by itself: windows at night."""
 
-TOLD: Final = "told"
+BOX_ONLY: Final = "told"
 """Tag of an item without surfaces of which the source tells class and box alone.
 
 box: its axes are right, up, front (columns). A piece of furniture stands in for it (prepare/stand_ins.py).
 """
-FRONT_TOLD: Final = "front-told"
-"""Tag beside TOLD: the box's front is the source's own, else it is guessed from what is near."""
+FRONT_GIVEN: Final = "front-told"
+"""Tag beside BOX_ONLY: the box's front is the source's own, else it is guessed from what is near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -69,16 +69,16 @@ def made_of_plan(
 
 
 def made_of_storeys(
-    plans: Sequence[Plan], told: Sequence[Sequence[PlacedPiece]], catalogue: Catalogue, key: str, *,
+    plans: Sequence[Plan], given_pieces: Sequence[Sequence[PlacedPiece]], catalogue: Catalogue, key: str, *,
     seed: int, style: str = "", name: str = "home",
 ) -> Made:  # fmt: skip
-    """Upright storeys from below; rooms where none of the told pieces stands are furnished by a seed.
+    """Upright storeys from below; rooms in which no given piece stands are furnished by a seed.
 
     key: what the plans come from, of which the seed makes a home.
     """
     rng = np.random.default_rng(keys.seed("own plan", VERSION, seed, style, key))
     storeys = []
-    for plan, own in zip(plans, told, strict=True):
+    for plan, own in zip(plans, given_pieces, strict=True):
         grounds = [Polygon(room.polygon).buffer(0.02) for room in plan.rooms]
         taken = {piece.room for piece in own}
         drawn = [
@@ -86,7 +86,7 @@ def made_of_storeys(
             if p.room not in taken and grounds[p.room].contains(Polygon(p.corners))
         ]  # fmt: skip
         storeys.append(Storey(plan, (*own, *drawn)))
-    words = [repr(own) for own in told if own]
+    words = [repr(own) for own in given_pieces if own]
     digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)
     data = home_file(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
     return Made(tuple(storeys), data, f"plan {digest}")

@@ -78,7 +78,7 @@ def solved(
     """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
 
     outline: its width and depth in steps; another one of the leaves' area and of these ratios each
-    time if not told.
+    time if not given.
     """
     w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng, ratios)
     brief = Brief(leaves, contacts, hall, w, d, lit_sides, given_places(leaves))

@@ -138,7 +138,7 @@ def _add_window(
     size: tuple[float, float, float],
     middle: float | None = None,
 ) -> float:
-    """A window (width, height, sill) in a run, in its middle if not told; gives its glass."""
+    """A window (width, height, sill) in a run, in its middle if not given; gives its glass."""
     width, height, sill = size
     low, high = drawing.free(run)
     middle = (low + high) / 2 if middle is None else middle

@@ -1,6 +1,6 @@
-"""A file of a floor plan becomes a House: its walls built, its things told; and a home to be furnished.
+"""A file of a floor plan becomes a House: its walls built, its things as boxes; and a home to be furnished.
 
-Effects: reads the file. Told things are items without surfaces until prepare/stand_ins.py furnishes them.
+Effects: reads the file. Things are items without surfaces until prepare/stand_ins.py furnishes them.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_
 from pbrs_farm.generate.plans.plan_format import part_of
 from pbrs_farm.prepare.formats import PLAN
 from pbrs_farm.prepare.stand_ins import with_stand_ins
+from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.regular_files import digest_of_regular
 
@@ -40,7 +40,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     for line in file.left_out:
         notes.add(LEFT_OUT, "", line)
     house = _walls_of_plan(file, path.stem, fields)
-    items = told_items(house, file.storeys)
+    items = box_only_items(house, file.storeys)
     n_lost = sum(len(s.things) for s in file.storeys) - len(items)
     if n_lost:
         notes.add(
@@ -60,16 +60,16 @@ def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
     return read_home(home_file(storeys, EMPTY, rng, name=name), f"{name}.sh3d", fields=fields)
 
 
-def told_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
-    """An item for each told thing that is drawn, on the levels of the house, which go from below."""
+def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
+    """An item for each thing of a plan that is drawn, on the levels of the house, which go from below."""
     levels = sorted(house.levels, key=lambda level: level.elevation)
     found = []
     for number, (level, storey) in enumerate(zip(levels, storeys, strict=True)):
         for k, t in enumerate(storey.things):
             centre = (t.x, level.elevation + t.low + t.height / 2, t.z)
-            item = told_item(
+            item = box_only_item(
                 f"told_{number}_{k}", t.vocabulary, t.name, centre, (t.width, t.height, t.depth),
-                t.turn_rad, is_front_told=t.is_front_told, level_id=level.id,
+                t.turn_rad, is_front_given=t.is_front_given, level_id=level.id,
             )  # fmt: skip
             if item is not None:
                 found.append(item)
@@ -82,23 +82,29 @@ def told_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
 def made_of_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
 ) -> Made:
-    """A plan as a home's file: told things where they are told, other rooms furnished by a seed."""
+    """A plan as a home's file: its things where the plan has them, other rooms furnished by a seed."""
     plans = [s.plan for s in file.storeys]
     key = repr(plans[0]) if len(plans) == 1 else repr(plans)
     file = upright(file)
-    told = _told_pieces(file, catalogue)
+    pieces_of_storeys = _pieces_of_things(file, catalogue)
     return made_of_storeys(
-        [s.plan for s in file.storeys], told, catalogue, key, seed=seed, style=style, name=name
+        [s.plan for s in file.storeys],
+        pieces_of_storeys,
+        catalogue,
+        key,
+        seed=seed,
+        style=style,
+        name=name,
     )
 
 
-def _told_pieces(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]]:
-    """The pieces that stand in for told things, a list a storey."""
+def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedPiece]]:
+    """The pieces that stand in for a plan's things, a list a storey."""
     found: list[list[PlacedPiece]] = [[] for _ in file.storeys]
     if not catalogue.pieces or not any(s.things for s in file.storeys):
         return found
     house = _walls_of_plan(file, "home", ReadFields())
-    items = told_items(house, file.storeys)
+    items = box_only_items(house, file.storeys)
     stood = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
     pieces = {f"piece:{p.id}": p for p in catalogue.pieces}
     levels = sorted(house.levels, key=lambda level: level.elevation)

@@ -231,7 +231,7 @@ def _parted(word: str) -> tuple[str, str]:
 
 
 def _is_utf8(word: str) -> bool:
-    """Whether a path can be told to others: bytes that are no UTF-8 become lone surrogates."""
+    """Whether a path can be stored and sent: bytes that are no UTF-8 become lone surrogates."""
     try:
         word.encode()
     except UnicodeEncodeError:

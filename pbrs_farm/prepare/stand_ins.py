@@ -1,6 +1,6 @@
 """Furniture for what a source tells by class and box alone: scans, plans, scenes without their models.
 
-No effects but the catalogue's. A told thing (an item tagged TOLD, without surfaces) gets the piece of
+No effects but the catalogue's. A told thing (an item tagged BOX_ONLY, without surfaces) gets the piece of
 the catalogue that fits its box best, scaled, on the floor or where it is told, its front by what is
 near; else a plain box, or nothing.
 """
@@ -22,7 +22,7 @@ from shapely.geometry import Point, Polygon
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, House, Item, Material, Note, Room
+from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, House, Item, Material, Note, Room
 from pbrs_farm.dress.draft import Draft
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.catalogue.piece_groups import group_rule
@@ -65,15 +65,15 @@ class _Fit(NamedTuple):
 
 def has_box_only_items(house: House) -> bool:
     """Whether the source tells things by class and box alone."""
-    return any(TOLD in item.tags for item in house.items)
+    return any(BOX_ONLY in item.tags for item in house.items)
 
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     """The house with a piece, a box or nothing for each told thing; notes say what was left out."""
-    told = [item for item in house.items if TOLD in item.tags]
+    told = [item for item in house.items if BOX_ONLY in item.tags]
     if not told:
         return house
-    left = replace(house, items=tuple(i for i in house.items if TOLD not in i.tags))
+    left = replace(house, items=tuple(i for i in house.items if BOX_ONLY not in i.tags))
     if how == "none":
         text = f"{len(told)} things that are told by their boxes alone are left out"
         return replace(left, notes=(*house.notes, Note("told-left-out", house.source.file, text)))
@@ -118,7 +118,7 @@ class _Scene:
         self._places = [_place(room) for room in house.rooms]
         self._tables = [
             i.box.centre for i in house.items
-            if i.box is not None and TOLD in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
+            if i.box is not None and BOX_ONLY in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
         ]  # fmt: skip
         self.boxes: Counter[str] = Counter()
         self.in_walls: Counter[str] = Counter()
@@ -189,7 +189,7 @@ def _chosen(item: Item, told: Box, place: _Place | None, scene: _Scene) -> tuple
     assert scene.catalogue is not None
     group = _group_of(item)
     best: tuple[float, Box, _Fit] | None = None
-    for turned in _turned(told, is_front_told=FRONT_TOLD in item.tags):
+    for turned in _turned(told, is_front_given=FRONT_GIVEN in item.tags):
         fit = _best(scene.catalogue, group, item, turned)
         if fit is None:
             continue
@@ -286,10 +286,10 @@ def _inside(told: Box, area: Polygon) -> Box | None:
     return told if outside <= 0.3 * ground.area else None
 
 
-def _turned(told: Box, *, is_front_told: bool) -> Iterator[Box]:
+def _turned(told: Box, *, is_front_given: bool) -> Iterator[Box]:
     """The box with its front as told, or in each of the four ways that it may look."""
     yield told
-    if is_front_told:
+    if is_front_given:
         return
     for quarter in (1, 2, 3):
         right, up, front = told.axes.T
@@ -367,7 +367,7 @@ def _level_id(item: Item, place: _Place | None) -> str:
 
 def _kept(item: Item) -> tuple[str, ...]:
     """The tags of a told thing that say more than that it is told."""
-    return tuple(tag for tag in item.tags if tag not in (TOLD, FRONT_TOLD))
+    return tuple(tag for tag in item.tags if tag not in (BOX_ONLY, FRONT_GIVEN))
 
 
 def _plain_box(draft: Draft, item: Item, told: Box, place: _Place | None) -> Item:

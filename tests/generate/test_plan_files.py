@@ -16,9 +16,9 @@ from shapely.geometry import Point, Polygon
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
 from pbrs_farm.generate.plans.closed_rings import closed_rings
+from pbrs_farm.generate.plans.parsed_plan import footprint, footprints
 from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import Part, part_of
-from pbrs_farm.generate.plans.told_plan import footprint, footprints
 from tests.inputs.plan_files import (
     HOLES,
     ROOMS,

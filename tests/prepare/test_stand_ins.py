@@ -15,7 +15,7 @@ from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
 from pbrs_farm.generate.made import made_of_plan
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
-from pbrs_farm.read.common.told_items import told_item
+from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.sweethome3d.home import read_home
 
 BED, CHAIR, TABLE = 4, 5, 7
@@ -63,10 +63,10 @@ def told(
     turn: float = 0.0,
     *,
     number: int = 0,
-    is_front_told: bool = False,
+    is_front_given: bool = False,
 ) -> Item:
-    item = told_item(
-        f"told_{number}", "spatiallm", name, at, size, turn, is_front_told=is_front_told
+    item = box_only_item(
+        f"told_{number}", "spatiallm", name, at, size, turn, is_front_given=is_front_given
     )
     assert item is not None
     return item
@@ -129,7 +129,7 @@ def test_chairs_look_at_the_nearest_table(way: tuple[float, float]) -> None:
 
 
 def test_a_told_front_is_kept() -> None:
-    item = of(stood(told("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_told=True)))
+    item = of(stood(told("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_given=True)))
     assert item.box is not None
     np.testing.assert_allclose(item.box.axes[[0, 2], 2], [0, -1], atol=1e-9)
 
@@ -194,12 +194,12 @@ def test_a_thing_stands_in_the_room_that_holds_it_not_in_the_one_it_is_near() ->
 def test_a_box_that_is_none_is_no_item(
     at: tuple[float, float, float], size: tuple[float, float, float]
 ) -> None:
-    assert told_item("x", "spatiallm", "bed", at, size, 0.0) is None
+    assert box_only_item("x", "spatiallm", "bed", at, size, 0.0) is None
 
 
 def test_names_without_a_drawn_class_are_no_items() -> None:
-    assert told_item("x", "swiss-feature", "ELEVATOR", (0, 0, 0), (1, 1, 1), 0.0) is None
-    assert told_item("x", "ai2thor", "Doorway", (0, 0, 0), (1, 1, 1), 0.0) is None
-    item = told_item("x", "ai2thor", "TVStand", (0, 0, 0), (1, 1, 1), 0.0)
+    assert box_only_item("x", "swiss-feature", "ELEVATOR", (0, 0, 0), (1, 1, 1), 0.0) is None
+    assert box_only_item("x", "ai2thor", "Doorway", (0, 0, 0), (1, 1, 1), 0.0) is None
+    item = box_only_item("x", "ai2thor", "TVStand", (0, 0, 0), (1, 1, 1), 0.0)
     assert item is not None
     assert (item.name, item.source_class) == ("TV Stand", "TVStand")

@@ -96,7 +96,7 @@ def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Gener
         name = _CHILDS_ROOM
     facts, measures = _facts_of_room(plan, space, type_), _measures(space, type_, rng)
 
-    def told(groups: Iterable[_PieceGroup]) -> tuple[PieceGroup, ...]:
+    def groups_of(groups: Iterable[_PieceGroup]) -> tuple[PieceGroup, ...]:
         # Draw only for what the room is large enough for.
         wanted = [
             g
@@ -116,7 +116,9 @@ def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Gener
         )
 
     brief = _BRIEFS[name]  # type: ignore[index]
-    made = RoomBrief(told(brief.groups), told(brief.fillers), brief.density, brief.least_share)
+    made = RoomBrief(
+        groups_of(brief.groups), groups_of(brief.fillers), brief.density, brief.least_share
+    )
     return _with_kitchen(made, space, shelf, rng) if type_ is RoomType.KITCHEN else made
 
 

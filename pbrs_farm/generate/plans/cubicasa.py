@@ -1,4 +1,4 @@
-"""A plan of CubiCasa5k (model.svg) -> a told plan. Effects: reads the file.
+"""A plan of CubiCasa5k (model.svg) -> a ParsedPlan. Effects: reads the file.
 
 Classes of groups say what their polygons are: Floorplan (a floor), Space, Wall, Door, Window, Railing,
 FixedFurniture. A unit is a centimetre, y runs down. Outlines of rooms are drawn to the walls' faces or to
@@ -24,19 +24,19 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.plan_format import PlanFormat
-from pbrs_farm.generate.plans.room_types import LEAST_M2, DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import (
+from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
+    ParsedPlan,
+    ParsedStorey,
     Thing,
-    ToldPlan,
-    ToldStorey,
     footprint,
     footprints,
     largest_part,
     opening,
     value_of,
 )
+from pbrs_farm.generate.plans.plan_format import PlanFormat
+from pbrs_farm.generate.plans.room_types import LEAST_M2, DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.usual_sizes import usual_size
 from pbrs_farm.home.names import parted
 from pbrs_farm.regular_files import read_given
@@ -69,7 +69,7 @@ class _Floor:
         return self.parts.get(kind, [])
 
 
-def plan_of_svg(path: Path) -> ToldPlan:
+def plan_of_svg(path: Path) -> ParsedPlan:
     """What the drawing tells, a storey a floor of it, left edges and upper edges upon each other."""
     floors = _floors(path, _root(path))
     if not floors:
@@ -78,7 +78,9 @@ def plan_of_svg(path: Path) -> ToldPlan:
         )
     left_out = LeftOut()
     scale = _scale(floors, left_out)
-    return ToldPlan(tuple(_storey_of_drawing(f, scale, left_out) for f in floors), left_out.lines())
+    return ParsedPlan(
+        tuple(_storey_of_drawing(f, scale, left_out) for f in floors), left_out.lines()
+    )
 
 
 def _root(path: Path) -> Element:
@@ -179,7 +181,7 @@ def _scale(floors: list[_Floor], left_out: LeftOut) -> float:
     return _UNIT_M * _USUAL_DOOR_M / median
 
 
-def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> ToldStorey:
+def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> ParsedStorey:
     drawn = unary_union([s for _, s in floor.of("Space")])
     x0, y0 = drawn.bounds[:2]
 
@@ -204,7 +206,7 @@ def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> ToldSt
     rooms = typed_rooms(
         "cubicasa", areas, things, [o for o in openings if o["kind"] == "window"], left_out
     )
-    return ToldStorey(value_of(_opened(rooms, left_out), openings, _HEIGHT_M), tuple(things))
+    return ParsedStorey(value_of(_opened(rooms, left_out), openings, _HEIGHT_M), tuple(things))
 
 
 def _things_of_shape(words: Sequence[str], shape: Polygon) -> list[Thing]:

@@ -1,9 +1,9 @@
-"""An apartment of a table of dwellings with WKT polygons -> a told plan. Effects: reads the file.
+"""An apartment of a table of dwellings with WKT polygons -> a ParsedPlan. Effects: reads the file.
 
 The columns are those of geometries.csv of Swiss Dwellings (Archilyse, doi 10.5281/zenodo.7788422):
 entity_type (area, separator, opening, feature), entity_subtype, geometry (WKT in metres, +y north; geom
 in Modified Swiss Dwellings), apartment_id, floor_id, and where they are there elevation and height.
-Walls follow from the areas; railings become parapets, columns stay, features are told things.
+Walls follow from the areas; railings become parapets, columns stay, features are things with a box alone.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from shapely.ops import unary_union
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plan_walls import PARAPET_HEIGHT_M
-from pbrs_farm.generate.plans.plan_format import PlanFormat
-from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import (
+from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
+    ParsedPlan,
+    ParsedStorey,
     Thing,
-    ToldPlan,
-    ToldStorey,
     footprint,
     footprints,
     opening,
     value_of,
 )
+from pbrs_farm.generate.plans.plan_format import PlanFormat
+from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, open_regular
 
 _NEEDED: Final = ("entity_type", "entity_subtype", "geometry", "apartment_id", "floor_id")
@@ -74,7 +74,7 @@ class _Row:
     height: float | None
 
 
-def plan_of_rows(path: Path, apartment: str = "") -> ToldPlan:
+def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
     """What the table tells of one apartment, a storey a floor of it.
 
     Raises BadInput: no such table, no such apartment, several where none is named.
@@ -99,7 +99,7 @@ def plan_of_rows(path: Path, apartment: str = "") -> ToldPlan:
         areas = [r for r in rows[floor] if r.kind == "area:own"]
         if areas:
             storeys.append(_storey_of_rows(path, areas, rows[floor], left_out))
-    return ToldPlan(tuple(storeys), left_out.lines())
+    return ParsedPlan(tuple(storeys), left_out.lines())
 
 
 def _elevation(rows: list[_Row]) -> float:
@@ -201,7 +201,7 @@ def _parse_number(text: str | None) -> float | None:
 
 def _storey_of_rows(
     path: Path, areas: list[_Row], rows: list[_Row], left_out: LeftOut
-) -> ToldStorey:
+) -> ParsedStorey:
     grounds = [shapely.make_valid(a.shape) for a in areas]
     ground = unary_union(grounds)
     near = [
@@ -229,7 +229,7 @@ def _storey_of_rows(
         for r in near
         if r.kind == "separator" and (w := _wall_of_railing(r, balconies, height)) is not None
     ]
-    return ToldStorey(value_of(rooms, openings, height, walls), tuple(things))
+    return ParsedStorey(value_of(rooms, openings, height, walls), tuple(things))
 
 
 def _wall_of_railing(row: _Row, balconies: Any, height: float) -> dict[str, Any] | None:
@@ -247,7 +247,7 @@ def _wall_of_railing(row: _Row, balconies: Any, height: float) -> dict[str, Any]
 
 
 def _opening_of_row(row: _Row, height: float, floor: float | None) -> dict[str, Any]:
-    """Where an opening is and how large: the long side of its polygon, heights where they are told."""
+    """Where an opening is and how large: the long side of its polygon, heights where the row has them."""
     box = footprint(row.shape)
     kind = _OPENINGS[row.subtype]
     found = opening(box._replace(width=round(max(box.width, 0.3), 3)), kind)

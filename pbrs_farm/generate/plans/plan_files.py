@@ -1,4 +1,4 @@
-"""A file of a floor plan, in any format -> storeys of a Plan and told things. Effects: reads the file.
+"""A file of a floor plan, in any format -> storeys of a Plan, and what stands there by name and box. Effects: reads the file.
 
 A plan of one's own:
 
@@ -31,9 +31,9 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate import plans
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan
 from pbrs_farm.generate.made import turned_by, upright_angle
+from pbrs_farm.generate.plans.parsed_plan import MAX_THINGS, ParsedPlan, Thing
 from pbrs_farm.generate.plans.plan_format import Part, PlanFormat
 from pbrs_farm.generate.plans.plan_value import plan_of_value
-from pbrs_farm.generate.plans.told_plan import MAX_THINGS, Thing, ToldPlan
 from pbrs_farm.generate.programme_file import json_from_file
 
 
@@ -102,20 +102,20 @@ def _is_own(value: dict[str, Any]) -> bool:
     )
 
 
-def _of_machine(path: Path, told: ToldPlan, part: Part) -> PlanFile:
-    from pbrs_farm.generate.plans.told_plan import LeftOut
+def _of_machine(path: Path, parsed: ParsedPlan, part: Part) -> PlanFile:
+    from pbrs_farm.generate.plans.parsed_plan import LeftOut
 
     left_out = LeftOut()
     storeys = []
-    x, z = _origin(told)
-    for storey in told.storeys:
+    x, z = _origin(parsed)
+    for storey in parsed.storeys:
         plan = plan_of_value(path, _moved_value(storey.value, -x, -z), left_out)
         things = [t._replace(x=t.x - x, z=t.z - z) for t in storey.things if _is_sound(t)]
         n_lost = len(storey.things) - len(things[:MAX_THINGS])
         for _ in range(min(n_lost, 1)):
             left_out.add(f"{n_lost} things have no sound box, or are beyond {MAX_THINGS}")
         storeys.append(PlanStorey(plan, tuple(things[:MAX_THINGS]), storey.name))
-    return _choose_storeys(path, tuple(storeys), (*told.left_out, *left_out.lines()), part)
+    return _choose_storeys(path, tuple(storeys), (*parsed.left_out, *left_out.lines()), part)
 
 
 def _is_sound(thing: Thing) -> bool:
@@ -125,9 +125,9 @@ def _is_sound(thing: Thing) -> bool:
     )  # fmt: skip
 
 
-def _origin(told: ToldPlan) -> tuple[float, float]:
+def _origin(parsed: ParsedPlan) -> tuple[float, float]:
     """The least corner of all rooms: machines draw far from any origin."""
-    points = [p for s in told.storeys for room in s.value["rooms"] for p in room["polygon"]]
+    points = [p for s in parsed.storeys for room in s.value["rooms"] for p in room["polygon"]]
     finite = [p for p in points if math.isfinite(p[0]) and math.isfinite(p[1])]
     if not finite:
         return 0.0, 0.0

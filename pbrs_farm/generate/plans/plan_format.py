@@ -9,7 +9,7 @@ from typing import Any
 
 from pbrs_farm.core.data_format import DataFormat
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.told_plan import ToldPlan
+from pbrs_farm.generate.plans.parsed_plan import ParsedPlan
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +44,9 @@ def part_of(word: str) -> Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanFormat(DataFormat):
-    """A format whose files become plans. A .json is told by `fits`, any other file by its suffix."""
+    """A format whose files become plans. `fits` recognises a .json, the suffix any other file."""
 
-    read: Callable[[Path, Any, Part], ToldPlan] | None = None
+    read: Callable[[Path, Any, Part], ParsedPlan] | None = None
     """Storeys of a file; of a .json with its value, else None. None: a plan that a person wrote."""
     fits: Callable[[dict[str, Any]], bool] = lambda _value: False
     """Whether the object of a .json is a plan of this format."""

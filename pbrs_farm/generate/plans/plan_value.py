@@ -28,8 +28,8 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.plan_walls import corners
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, largest_part
 from pbrs_farm.generate.plans.plan_format import PlanFormat
-from pbrs_farm.generate.plans.told_plan import LeftOut, largest_part
 from pbrs_farm.generate.plans.walled_rooms import DrawnRoom, walled
 
 MAX_ROOMS: Final = 60
@@ -116,10 +116,10 @@ def plan_of_value(path: Path, value: Any, left_out: LeftOut | None = None) -> Pl
         if len(built.polygon) < 3 and left_out is None:
             raise BadInput(path, f"{room.place} ({room.name})", "has no floor beside its walls")
     rooms = tuple(room for room in rooms if len(room.polygon) >= 3)
-    builder = _Openings(path, walls, rooms, given.height, is_told_by_machine=left_out is not None)
-    told = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(given.doors, 1)]
-    told += [(f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(given.windows, 1)]
-    for place, row, kind in told:
+    builder = _Openings(path, walls, rooms, given.height, is_of_machine=left_out is not None)
+    openings = [(f"door {k}", row, OpeningKind.DOOR) for k, row in enumerate(given.doors, 1)]
+    openings += [(f"window {k}", row, OpeningKind.WINDOW) for k, row in enumerate(given.windows, 1)]
+    for place, row, kind in openings:
         try:
             builder.add(place, row, kind)
         except BadInput as error:
@@ -229,7 +229,7 @@ class _Openings:
     walls: tuple[PlanWall, ...]
     rooms: tuple[PlanRoom, ...]
     height: float
-    is_told_by_machine: bool
+    is_of_machine: bool
 
     def __post_init__(self) -> None:
         self.found: list[PlanOpening] = []
@@ -248,7 +248,7 @@ class _Openings:
         width, tall, sill = (
             usual | given.model_dump(include=set(usual), exclude_unset=True)
         ).values()
-        if self.is_told_by_machine:
+        if self.is_of_machine:
             sill = min(sill, self.height - 0.4)
             tall = min(tall, self.height - 0.03 - sill)
         if sill + tall > self.height - 0.02:
@@ -269,7 +269,7 @@ class _Openings:
         if far[wall] > _REACH_M:
             text = f"is {far[wall]:.1f} m from the nearest wall"
             raise BadInput(self.path, place, text, hint=f"within {_REACH_M} m of one")
-        if self.is_told_by_machine:
+        if self.is_of_machine:
             # Of walls that are about as near, one that is long enough.
             fits = [k for k in far if self.walls[k].length >= width + 0.04 and far[k] <= _REACH_M]
             best = min(fits, key=lambda k: (far[k], k), default=wall)
@@ -284,7 +284,7 @@ class _Openings:
         wall = self.walls[number]
         along = self._lines[number].project(at)
         along = min(max(along, width / 2 + 0.02), wall.length - width / 2 - 0.02)
-        if self.is_told_by_machine:
+        if self.is_of_machine:
             for other in self.found:
                 if other.wall == number and abs(other.along - along) < (other.width + width) / 2:
                     raise BadInput(self.path, place, "overlaps another in its wall")
@@ -296,9 +296,9 @@ class _Openings:
         beside.sort(key=lambda k: (self.rooms[k].type is RoomType.HALL, -self.rooms[k].area))
         other_room = beside[1] if len(beside) > 1 else None
         is_outer = other_room is None and self.rooms[beside[0]].type is not RoomType.BALCONY
-        if self.is_told_by_machine and kind is OpeningKind.DOOR and is_outer:
+        if self.is_of_machine and kind is OpeningKind.DOOR and is_outer:
             kind = OpeningKind.ENTRANCE
-        if self.is_told_by_machine and wall.height is not None and sill + tall > wall.height:
+        if self.is_of_machine and wall.height is not None and sill + tall > wall.height:
             raise BadInput(self.path, place, "stands in a parapet")
         self.found.append(PlanOpening(
             kind, number, round(along, 4), width, tall, sill, beside[0], other_room,

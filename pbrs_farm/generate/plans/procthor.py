@@ -1,4 +1,4 @@
-"""A house of ProcTHOR or Holodeck (JSON) -> a told plan. Effects: reads the table of assets beside it.
+"""A house of ProcTHOR or Holodeck (JSON) -> a ParsedPlan. Effects: reads the table of assets beside it.
 
 Left-handed, y up, metres: x right, z forward. z is mirrored once, for places and for angles. Rooms share
 the lines of their walls. Sizes of objects come from asset-database.json beside the file, else from
@@ -17,9 +17,9 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, Thing, value_of
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 from pbrs_farm.generate.plans.usual_sizes import usual_size
 from pbrs_farm.generate.programme_file import json_from_file
 
@@ -75,7 +75,7 @@ class _House(BaseModel):
     objects: list[_Object] = Field(default_factory=list, max_length=_MOST)
 
 
-def plan_of_procthor(path: Path, value: Any) -> ToldPlan:
+def plan_of_procthor(path: Path, value: Any) -> ParsedPlan:
     """What the house tells. Raises BadInput, naming the place."""
     house = checked(_House, value, path)
     left_out = LeftOut()
@@ -92,7 +92,9 @@ def plan_of_procthor(path: Path, value: Any) -> ToldPlan:
         for r in house.rooms
     ]
     rooms = typed_rooms("ai2thor", areas, things, windows, left_out)
-    return ToldPlan((ToldStorey(value_of(rooms, rows, height), tuple(things)),), left_out.lines())
+    return ParsedPlan(
+        (ParsedStorey(value_of(rooms, rows, height), tuple(things)),), left_out.lines()
+    )
 
 
 def _name(room: _Room) -> str:
@@ -135,7 +137,7 @@ def _opening_of_hole(
 
 
 def _walk_objects(path: Path, objects: list[_Object]) -> Iterator[_Object]:
-    """Each object, those that stand on others too; children are told by their own places."""
+    """Each object, those that stand on others too; children have places of their own."""
     waiting, n = [(o, 0) for o in reversed(objects)], 0
     while waiting:
         thing, depth = waiting.pop()
@@ -168,7 +170,7 @@ def _thing(
     return Thing(
         "ai2thor", name, p.x, -p.z, p.y - height / 2, width, depth, height,
         # Clockwise in a left-handed frame; mirrored, its front (sin, cos) becomes (sin, -cos).
-        math.pi - math.radians(thing.rotation.y), is_front_told=True,
+        math.pi - math.radians(thing.rotation.y), is_front_given=True,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""A home drawn with react-planner (its JSON) -> a told plan; no effects.
+"""A home drawn with react-planner (its JSON) -> a ParsedPlan; no effects.
 
 layers.<id> holds vertices, lines (walls), holes, areas and items; y is up on the page, lengths are in the
 file's unit (cm). A hole lies at `offset`, a share of its line.
@@ -16,16 +16,16 @@ from shapely.geometry import Polygon
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
-from pbrs_farm.generate.plans.plan_format import PlanFormat
-from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import (
+from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
+    ParsedPlan,
+    ParsedStorey,
     Thing,
-    ToldPlan,
-    ToldStorey,
     footprint,
     value_of,
 )
+from pbrs_farm.generate.plans.plan_format import PlanFormat
+from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.usual_sizes import usual_size
 
 _METRES: Final = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "mi": 1609.344}
@@ -48,7 +48,7 @@ class _File(BaseModel):
     layers: dict[str, _Layer] = Field(min_length=1, max_length=50)
 
 
-def plan_of_react_planner(path: Path, value: Any) -> ToldPlan:
+def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
     """What the file tells, a storey a layer. Raises BadInput, naming the place."""
     given = checked(_File, value, path)
     if given.unit not in _METRES:
@@ -61,7 +61,7 @@ def plan_of_react_planner(path: Path, value: Any) -> ToldPlan:
     ]  # fmt: skip
     if not drawn:
         raise BadInput(path, "layers", "has no layer with lines")
-    return ToldPlan(tuple(d.storey(left_out) for d in drawn), left_out.lines())
+    return ParsedPlan(tuple(d.storey(left_out) for d in drawn), left_out.lines())
 
 
 class _Drawing:
@@ -71,7 +71,7 @@ class _Drawing:
         self.path, self.place, self.layer = path, place, layer
         self.metres, self.scale = metres, scale
 
-    def storey(self, left_out: LeftOut) -> ToldStorey:
+    def storey(self, left_out: LeftOut) -> ParsedStorey:
         """The storey of the layer."""
         lines, walls, heights = {}, [], []
         for key, row in self.layer.lines.items():
@@ -99,7 +99,7 @@ class _Drawing:
         windows = [o for o in openings if o["kind"] == "window"]
         rooms = typed_rooms("react-planner", areas, things, windows, left_out)
         value = value_of(rooms, openings, max(heights, default=2.6), walls)
-        return ToldStorey(value, tuple(things), str(self.layer.name)[:60])
+        return ParsedStorey(value, tuple(things), str(self.layer.name)[:60])
 
     def _areas(self, lines: dict[str, Line], left_out: LeftOut) -> list[DrawnArea]:
         found = []

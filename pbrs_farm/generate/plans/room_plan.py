@@ -1,4 +1,4 @@
-"""A scan of Apple's RoomPlan (CapturedRoom or CapturedStructure as JSON) -> a told plan; no effects.
+"""A scan of Apple's RoomPlan (CapturedRoom or CapturedStructure as JSON) -> a ParsedPlan; no effects.
 
 Metres, y up. A surface: dimensions [w, h, 0] and a transform, 16 numbers by column, its x along the
 wall, y up, its origin the middle. Older exports write the category as text and the transform as 4 rows.
@@ -19,9 +19,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, Thing, value_of
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
@@ -54,7 +54,7 @@ class _Scan(BaseModel):
     sections: list[_Section] = Field(default_factory=list, max_length=_MOST)
 
 
-def plan_of_room_plan(path: Path, value: Any) -> ToldPlan:
+def plan_of_room_plan(path: Path, value: Any) -> ParsedPlan:
     """What the scan tells, a storey a `story` of it. Raises BadInput, naming the place."""
     if not value.get("walls") and isinstance(value.get("rooms"), list):
         # A structure of several scans: what each of them holds.
@@ -67,7 +67,7 @@ def plan_of_room_plan(path: Path, value: Any) -> ToldPlan:
     if not scan.walls:
         raise BadInput(path, "walls", "has no wall")
     storeys = [_storey_of_scan(path, _of(scan, story), left_out) for story in stories]
-    return ToldPlan(tuple(storeys), left_out.lines())
+    return ParsedPlan(tuple(storeys), left_out.lines())
 
 
 def _story(value: object) -> int:
@@ -82,7 +82,7 @@ def _of(scan: _Scan, story: int) -> _Scan:
     return scan.model_copy(update=parts)
 
 
-def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ToldStorey:
+def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ParsedStorey:
     walls, lines = [], []
     for k, surface in enumerate(scan.walls, 1):
         pose = _parse_pose(path, f"wall {k}", surface)
@@ -110,7 +110,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ToldStorey:
     areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
     windows = [o for o in openings if o["kind"] == "window"]
     rooms = typed_rooms("roomplan", areas, things, windows, left_out)
-    return ToldStorey(value_of(rooms, openings, height), tuple(things))
+    return ParsedStorey(value_of(rooms, openings, height), tuple(things))
 
 
 def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ring_of
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, Thing, ring_of
 from pbrs_farm.home.names import words_of
 from pbrs_farm.home.room_use import RoomKind, given_room_type, named_kind
 
@@ -39,7 +39,7 @@ class DrawnArea(NamedTuple):
     shape: Polygon
     word: str  # the vocabulary's, "" = none
     name: str = ""
-    is_plain: bool = False  # a room to live in of which no more is told
+    is_plain: bool = False  # a room to live in of which the file says no more
 
 
 def typed_rooms(

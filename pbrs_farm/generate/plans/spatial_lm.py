@@ -1,4 +1,4 @@
-"""A layout as SpatialLM writes it (.txt) -> a told plan. Effects: reads the file.
+"""A layout as SpatialLM writes it (.txt) -> a ParsedPlan. Effects: reads the file.
 
 One line an entity, metres, z up, any origin:
 
@@ -18,9 +18,9 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, Thing, value_of
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import LeftOut, Thing, ToldPlan, ToldStorey, value_of
 from pbrs_farm.regular_files import text_given
 
 _LINE: Final = re.compile(r"\s*(\w{1,40})\s*=\s*(Wall|Door|Window|Bbox)\(([^()]{0,400})\)\s*")
@@ -28,7 +28,7 @@ _MOST_LINES: Final = 50_000
 _NUMBERS: Final = {"Wall": (7, 8), "Door": (5, 5), "Window": (5, 5), "Bbox": (7, 7)}
 
 
-def plan_of_layout(path: Path) -> ToldPlan:
+def plan_of_layout(path: Path) -> ParsedPlan:
     """What the layout tells. Raises BadInput, naming the line, or where the walls close no room."""
     walls: list[list[float]] = []
     holes: list[tuple[str, list[float]]] = []
@@ -61,8 +61,8 @@ def plan_of_layout(path: Path) -> ToldPlan:
     ]
     windows = [o for o in openings if o["kind"] == "window"]
     rows = typed_rooms("spatiallm", [DrawnArea(r, "") for r in rooms], things, windows, left_out)
-    return ToldPlan(
-        (ToldStorey(value_of(rows, openings, height), tuple(things)),), left_out.lines()
+    return ParsedPlan(
+        (ParsedStorey(value_of(rows, openings, height), tuple(things)),), left_out.lines()
     )
 
 

@@ -1,4 +1,4 @@
-"""Floors of ZInD (zind_data.json, its redrawn plans) -> a told plan; no effects.
+"""Floors of ZInD (zind_data.json, its redrawn plans) -> a ParsedPlan; no effects.
 
 redraw.floor_0k.room_nn holds vertices, doors and windows as pairs of ends, and pins with labels; y is up
 on the page, scale_meters_per_coordinate says how long a unit is.
@@ -15,12 +15,12 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, value_of
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.plan_value import MAX_ROOMS
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
-from pbrs_farm.generate.plans.told_plan import LeftOut, ToldPlan, ToldStorey, value_of
 
-_SAME_M: Final = 0.4  # a door is told by both of its rooms
+_SAME_M: Final = 0.4  # both rooms of a door list it
 _Pair = list[Finite]
 
 
@@ -35,7 +35,7 @@ class _Room(BaseModel):
     pins: list[_Pin] = Field(default_factory=list, max_length=500)
 
 
-def plan_of_zind(path: Path, value: Any) -> ToldPlan:
+def plan_of_zind(path: Path, value: Any) -> ParsedPlan:
     """What the file tells, a storey a floor. Raises BadInput, naming the place."""
     redraw = checked(dict[str, dict[str, Any]], value["redraw"], path, "redraw")
     for name, rooms in redraw.items():
@@ -55,12 +55,12 @@ def plan_of_zind(path: Path, value: Any) -> ToldPlan:
         storeys.append(_storey_of_rooms(path, name, floors[name], float(scale), left_out))
     if not storeys:
         raise BadInput(path, "redraw", "has no floor with a room")
-    return ToldPlan(tuple(storeys), left_out.lines())
+    return ParsedPlan(tuple(storeys), left_out.lines())
 
 
 def _storey_of_rooms(
     path: Path, name: str, rooms: dict[str, _Room], scale: float, left_out: LeftOut
-) -> ToldStorey:
+) -> ParsedStorey:
     areas, openings = [], []
     for key, room in rooms.items():
         place = f"redraw.{name}.{key}"[:80]
@@ -78,7 +78,7 @@ def _storey_of_rooms(
         ):
             once.append(row)
     windows = [o for o in once if o["kind"] == "window"]
-    return ToldStorey(
+    return ParsedStorey(
         value_of(typed_rooms("zind", areas, (), windows, left_out), once, 2.6), name=name
     )
 

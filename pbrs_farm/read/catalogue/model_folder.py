@@ -27,7 +27,7 @@ from pbrs_farm.core.house import House, ItemKind, Note
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.catalogue.library_files import LibraryNotes
 from pbrs_farm.read.catalogue.library_shapes import MAX_TRIANGLES, fitted_shape
-from pbrs_farm.read.catalogue.model_tables import ModelTable, Size, Told, model_table
+from pbrs_farm.read.catalogue.model_tables import ModelRow, ModelTable, Size, model_table
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, group_rule
 from pbrs_farm.read.objects.model_folders import ObjectModel, find_models
 from pbrs_farm.read.objects.single_object import read_object
@@ -90,7 +90,7 @@ def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
     found = []
     for model in _models(path, table):
         file = model.path.relative_to(model.root).as_posix()
-        one = _indexed(model, file, table.rows.get(file, Told()), notes)
+        one = _indexed(model, file, table.rows.get(file, ModelRow()), notes)
         if one is not None:
             found.append(one)
     return found
@@ -109,43 +109,43 @@ def _models(path: Path, table: ModelTable) -> list[ObjectModel]:
     return models
 
 
-def _indexed(model: ObjectModel, file: str, told: Told, notes: LibraryNotes) -> _Indexed | None:
+def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: LibraryNotes) -> _Indexed | None:
     place = f"{model.root.name}#{file.rpartition('.')[0]}"
-    name = told.name or model.name.replace("_", " ")
+    name = row.name or model.name.replace("_", " ")
     try:
-        size = told.size or _measure_model(model)
+        size = row.size or _measure_model(model)
     except _FAULTS as error:
         notes.add("unusable-model", place, f"{error}: left out")
         return None
     rule, size = _find_rule_and_size(
-        name, told, model.category, _turn_size(size, told.quarters), place, notes
+        name, row, model.category, _turn_size(size, row.quarters), place, notes
     )
     if rule is None:
         return None
     return _Indexed(
         file, name, rule.group, rule.place.value, rule.nyu40, rule.kind.value, size,
-        told.quarters, told.creator, told.licence,
+        row.quarters, row.creator, row.licence,
     )  # fmt: skip
 
 
 def _find_rule_and_size(
-    name: str, told: Told, category: str, size: Size, place: str, notes: LibraryNotes
+    name: str, row: ModelRow, category: str, size: Size, place: str, notes: LibraryNotes
 ) -> tuple[GroupRule | None, Size]:
     """(the rule, the size in metres) of a piece; None, with a note, where none has that size."""
-    if told.group and told.size is not None:
-        rule = group_rule(name, "", size, group=told.group)
+    if row.group and row.size is not None:
+        rule = group_rule(name, "", size, group=row.group)
         if rule is None:
-            notes.add("unmapped-class", place, f"no group {told.group!r}: left out")
+            notes.add("unmapped-class", place, f"no group {row.group!r}: left out")
         return rule, size
-    rule = _rule_by_words(name, told, category, size)
+    rule = _rule_by_words(name, row, category, size)
     if rule is not None and rule.fits("", size):
         return rule, size
     # A model of another unit is a thing of a usual size in it.
-    if told.size is None:
+    if row.size is None:
         for unit, words in _UNITS.items():
             width, depth, height = size
             smaller = (width * unit, depth * unit, height * unit)
-            other = _rule_by_words(name, told, category, smaller)
+            other = _rule_by_words(name, row, category, smaller)
             if other is not None and other.fits("", smaller):
                 notes.add("other-unit", place, f"is told in {words}")
                 return other, smaller
@@ -160,16 +160,16 @@ def _find_rule_and_size(
     return None, size
 
 
-def _rule_by_words(name: str, told: Told, category: str, size: Size) -> GroupRule | None:
+def _rule_by_words(name: str, row: ModelRow, category: str, size: Size) -> GroupRule | None:
     """By the table's word, then the folder's, then the name's."""
-    if told.group:
-        return group_rule(name, "", size, group=told.group)
-    if told.label:
+    if row.group:
+        return group_rule(name, "", size, group=row.group)
+    if row.label:
         # A data set's category says more than the class that it stands for.
         words = group_rule(name, "", size)
-        if words is not None and (told.label not in NYU40_NAMES or _is_of(words, told.label)):
+        if words is not None and (row.label not in NYU40_NAMES or _is_of(words, row.label)):
             return words
-        return group_rule(name, "", size, group=told.label) or words
+        return group_rule(name, "", size, group=row.label) or words
     return group_rule(name, "", size, group=category) or group_rule(name, "", size)
 
 

@@ -38,7 +38,7 @@ _AXES: Final = {"+z": 0, "z": 0, "+x": 3, "x": 3, "-z": 2, "-x": 1}
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ModelRow:
     """What a table says of a model; "" and None where it says nothing.
 
     quarters: how often the model is turned by 90 degrees about the vertical until its front looks
@@ -58,7 +58,7 @@ class Told:
 class ModelTable:
     """A folder's table: what it says by file; is_whole: models that it does not name are no pieces."""
 
-    rows: Mapping[str, Told]
+    rows: Mapping[str, ModelRow]
     is_whole: bool = False
 
 
@@ -110,13 +110,13 @@ def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     rows = list(csv.DictReader(text.splitlines()))
     if rows and "file" not in rows[0]:
         raise ValueError("has no column `file`")
-    found: dict[str, Told] = {}
+    found: dict[str, ModelRow] = {}
     for row in rows:
         cells = {
             k.strip().lower(): (v or "").strip() for k, v in row.items() if k and isinstance(v, str)
         }
         try:
-            found[cells["file"]] = Told(
+            found[cells["file"]] = ModelRow(
                 name=cells.get("name", ""),
                 group=cells.get("group", "") or cells.get("class", ""),
                 size=_size_cm(cells),
@@ -173,7 +173,7 @@ def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
             seen = given_class("3dfuture", category) or given_class("3dfuture-super", above)
             file = "/".join(filter(None, (folder, str(row["model_id"]), "raw_model.obj")))
             label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
-            found[file] = Told(name=category or above, label=label, creator="3D-FUTURE")
+            found[file] = ModelRow(name=category or above, label=label, creator="3D-FUTURE")
     return ModelTable(found, is_whole=True)
 
 
@@ -191,7 +191,7 @@ def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
         ways = (f"objects/{one[0]}/{one}.glb", f"objects/{one}.glb", f"{one}.glb")
         file = next((w for w in ways if (path / w).is_file()), ways[0])
         quarters = _front_of_config(path / file.replace(".glb", ".object_config.json"))
-        found[file] = Told(name=words, label=words, quarters=quarters, creator="HSSD")
+        found[file] = ModelRow(name=words, label=words, quarters=quarters, creator="HSSD")
     return ModelTable(found, is_whole=True)
 
 
@@ -223,7 +223,7 @@ def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
         words = str(row.get("category") or row.get("ref_category") or "").replace("_", " ")
         seen = given_class("ai2thor", words)
         label = NYU40_NAMES[seen.nyu40] if seen and seen.nyu40 > 0 else ""
-        found[file or ways[0]] = Told(name=words, label=label or words, creator="objathor")
+        found[file or ways[0]] = ModelRow(name=words, label=label or words, creator="objathor")
     if pickles:
         text = f"{pickles} models are pickles, which may hold programs: convert them to GLB"
         notes.add("refused-pickles", name, text)

@@ -44,7 +44,7 @@ from pbrs_farm.read.common.room_limits import check_number, check_unit
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
-from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, told_holes
+from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, holes_with_names
 from pbrs_farm.read.front3d.front_pieces import (
     INFO,
     FrontModels,
@@ -238,16 +238,16 @@ class _Structure:
         """The rooms that have a floor, and their floors and ceilings."""
         rooms: list[Room] = []
         parts: list[Item] = []
-        for told in self._house.rooms:
-            if given_room("3dfront", told.kind) == NO_ROOM:
+        for front_room in self._house.rooms:
+            if given_room("3dfront", front_room.kind) == NO_ROOM:
                 continue
-            own = self._by_room.get(told.id, {})
+            own = self._by_room.get(front_room.id, {})
             floors = [self._level(m, up=True) for m in own.get("Floor", [])]
             surfaces = [s for s in floors if s is not None]
             polygon = floor_polygon(surfaces, []) if surfaces else None
             low = floor_height(surfaces)
             if polygon is None or low is None:
-                self._notes.add("empty-room", f"room {told.id}", "has no floor; left out")
+                self._notes.add("empty-room", f"room {front_room.id}", "has no floor; left out")
                 continue
             ceilings = [self._level(m, up=False) for m in own.get("Ceiling", [])]
             over = [s for s in ceilings if s is not None]
@@ -259,22 +259,26 @@ class _Structure:
                 material = self._paints.index("")
                 over = [horizontal("ceiling", [[polygon]], high, material, up=False)]
             parts.append(
-                _front_structure_item(f"{told.id}_floor", ItemKind.FLOOR, surfaces, told.id)
+                _front_structure_item(
+                    f"{front_room.id}_floor", ItemKind.FLOOR, surfaces, front_room.id
+                )
             )
             parts.append(
-                _front_structure_item(f"{told.id}_ceiling", ItemKind.CEILING, over, told.id)
+                _front_structure_item(
+                    f"{front_room.id}_ceiling", ItemKind.CEILING, over, front_room.id
+                )
             )
-            word = given_room("3dfront", told.kind)
-            name = parted(told.kind) or "Room"
+            word = given_room("3dfront", front_room.kind)
+            name = parted(front_room.kind) or "Room"
             if word and named_kind(f"{word} {name}") is not named_kind(word):
                 name = f"{word} room"  # a LivingDiningRoom is to live in, whatever else it names
             rooms.append(
                 Room(
-                    id=told.id, name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
-                    types=(word or told.kind,) if told.kind else (),
+                    id=front_room.id, name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
+                    types=(word or front_room.kind,) if front_room.kind else (),
                 )
             )  # fmt: skip
-            self._areas[told.id] = shapely.Polygon(polygon)
+            self._areas[front_room.id] = shapely.Polygon(polygon)
         if not rooms:
             raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")
         check_unit(rooms, file, "mesh", "3D-FRONT is in metres")
@@ -309,7 +313,7 @@ class _Structure:
         if not pieces:
             self._notes.add("missing-walls", "mesh", "no mesh of the type WallInner faces a room")
         items = [self._wall(p, pieces, k) for k, p in enumerate(pieces)]
-        return told_holes(self._house, holes_of(pieces)), items
+        return holes_with_names(self._house, holes_of(pieces)), items
 
     def _wall(self, piece: WallPiece, pieces: Sequence[WallPiece], k: int) -> Item:
         sheet = piece.sheet

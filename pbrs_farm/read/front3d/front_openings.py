@@ -18,12 +18,12 @@ HOLE_TYPES: Final = ("Door", "Window", "Hole", "BayWindow")
 _NEAR_M: Final = 0.4  # from a hole to the piece that tells it
 _LEAST_SILL_M: Final = 0.25
 _FLAT_M: Final = 0.1  # a lower hole mesh is a threshold
-_MOST_TOLD: Final = 2_000  # doors and windows of a house; a home has a dozen
+_MAX_NAMED: Final = 2_000  # doors and windows of a house; a home has a dozen
 _WIDE_M: Final = 1.6  # a wider untold hole to the outside is a window
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Told:
+class _NamedOpening:
     at: F64  # (3,) its middle
     kind: Literal["door", "window", "open"]
     title: str
@@ -40,22 +40,22 @@ def is_opening(piece: FrontPiece) -> bool:
     return seen is not None and seen.kind in ("door", "window")
 
 
-def told_holes(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
+def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
     """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too."""
-    told = _openings_by_name(house)[:_MOST_TOLD]
+    named = _openings_by_name(house)[:_MAX_NAMED]
     found = []
     for hole, piece in holes:
-        found.append(_kinded(hole, piece, _best(hole, told)))
+        found.append(_kinded(hole, piece, _best(hole, named)))
     found = merged(sorted(found, key=lambda h: h.kind == "open"))
     # A hole mesh that stands over no gap cuts the wall itself.
     extra = []
-    for one in told:
+    for one in named:
         if one.box is not None and not any(_stands_in(one, hole) for hole in found):
-            extra.append(_of_mesh(one, told))
+            extra.append(_of_mesh(one, named))
     return merged([*found, *extra])
 
 
-def _openings_by_name(house: FrontFile) -> list[_Told]:
+def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
     doors = {ref: door for door in house.doors for ref in door.refs}
     found = []
     for mesh in house.meshes:
@@ -69,10 +69,12 @@ def _openings_by_name(house: FrontFile) -> list[_Told]:
         box = None if mesh.kind == "BayWindow" else np.array([low, high])
         if door is not None:
             found.append(
-                _Told((low + high) / 2, "door", mesh.kind, 0, door.is_entry, door.hinge, box=box)
+                _NamedOpening(
+                    (low + high) / 2, "door", mesh.kind, 0, door.is_entry, door.hinge, box=box
+                )
             )
         else:
-            found.append(_Told((low + high) / 2, kind, mesh.kind, 2, box=box))
+            found.append(_NamedOpening((low + high) / 2, kind, mesh.kind, 2, box=box))
     for piece in house.pieces:
         if not is_opening(piece) and piece.uid not in doors:
             continue
@@ -82,7 +84,7 @@ def _openings_by_name(house: FrontFile) -> list[_Told]:
         door = doors.get(piece.uid)
         is_window = seen is not None and seen.kind == "window"
         found.append(
-            _Told(
+            _NamedOpening(
                 at, "window" if is_window else "door", piece.title, 0 if door else 1,
                 bool(door and door.is_entry) or "entry" in piece.title, door.hinge if door else "",
                 is_mirrored=bool(piece.scale[0] < 0),
@@ -91,9 +93,9 @@ def _openings_by_name(house: FrontFile) -> list[_Told]:
     return found
 
 
-def _best(hole: Hole, told: Sequence[_Told]) -> _Told | None:
+def _best(hole: Hole, named: Sequence[_NamedOpening]) -> _NamedOpening | None:
     """What tells the hole best: the door list, a title, a mesh; the title of the nearest piece with one."""
-    near = [t for t in told if _stands_in(t, hole)]
+    near = [t for t in named if _stands_in(t, hole)]
     best = min(near, key=lambda t: (t.rank, _away(t, hole)), default=None)
     titled = min(
         (t for t in near if "/" in t.title), key=lambda t: (t.rank, _away(t, hole)), default=None
@@ -104,25 +106,25 @@ def _best(hole: Hole, told: Sequence[_Told]) -> _Told | None:
     return replace(best, title=titled.title, is_mirrored=titled.is_mirrored, hinge=hinge)
 
 
-def _local(told: _Told, hole: Hole) -> F64:
-    return np.asarray(np.abs((told.at - hole.centre) @ hole.axes), np.float64)
+def _local(named: _NamedOpening, hole: Hole) -> F64:
+    return np.asarray(np.abs((named.at - hole.centre) @ hole.axes), np.float64)
 
 
-def _stands_in(told: _Told, hole: Hole) -> bool:
-    along, up, across = _local(told, hole)
+def _stands_in(named: _NamedOpening, hole: Hole) -> bool:
+    along, up, across = _local(named, hole)
     half = np.array(hole.size) / 2
     return bool(along < half[0] + 0.1 and up < half[1] + 0.5 and across < half[2] + _NEAR_M)
 
 
-def _away(told: _Told, hole: Hole) -> float:
-    return float(np.linalg.norm(_local(told, hole)[[0, 2]]))
+def _away(named: _NamedOpening, hole: Hole) -> float:
+    return float(np.linalg.norm(_local(named, hole)[[0, 2]]))
 
 
-def _kinded(hole: Hole, piece: WallPiece, told: _Told | None) -> Hole:
+def _kinded(hole: Hole, piece: WallPiece, named: _NamedOpening | None) -> Hole:
     width, _, _ = hole.size
     sill = float(hole.centre[1] - hole.size[1] / 2 - piece.sheet.bounds[1])
-    if told is not None:
-        return _as_told(hole, told)
+    if named is not None:
+        return _with_name_of(hole, named)
     if sill > _LEAST_SILL_M:
         return replace(hole, kind="window", source_class="Window")
     if piece.is_outside:
@@ -130,8 +132,8 @@ def _kinded(hole: Hole, piece: WallPiece, told: _Told | None) -> Hole:
     return replace(hole, source_class="Hole")
 
 
-def _as_told(hole: Hole, told: _Told) -> Hole:
-    title = told.title.lower()
+def _with_name_of(hole: Hole, named: _NamedOpening) -> Hole:
+    title = named.title.lower()
     style: Style = "swing"
     if "sliding" in title:
         style = "sliding"
@@ -139,28 +141,28 @@ def _as_told(hole: Hole, told: _Told) -> Hole:
         style = "folding"
     elif "double" in title:
         style = "double"
-    name = told.kind if told.kind != "door" else "front door" if told.is_entry else "door"
+    name = named.kind if named.kind != "door" else "front door" if named.is_entry else "door"
     return replace(
-        hole, kind=told.kind, name=name, source_class=told.title, style=style,
+        hole, kind=named.kind, name=name, source_class=named.title, style=style,
         is_glazed="sliding" in title or "door window" in title or "glass" in title,
-        is_hinged_right=told.hinge.endswith("Right") != told.is_mirrored,
+        is_hinged_right=named.hinge.endswith("Right") != named.is_mirrored,
     )  # fmt: skip
 
 
-def _of_mesh(told: _Told, every: Sequence[_Told]) -> Hole:
+def _of_mesh(named: _NamedOpening, every: Sequence[_NamedOpening]) -> Hole:
     """The hole that a mesh of jambs shows: its thinner level side lies across the wall."""
-    assert told.box is not None
-    low, high = told.box
+    assert named.box is not None
+    low, high = named.box
     width, height, depth = (float(v) for v in high - low)
     axes = np.eye(3)
     if width < depth:
         axes = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
         width, depth = depth, width
     hole = Hole(
-        f"jambs_{told.at[0]:.2f}_{told.at[2]:.2f}",
+        f"jambs_{named.at[0]:.2f}_{named.at[2]:.2f}",
         "open",
         (low + high) / 2,
         (width, height, depth),
         axes,
     )
-    return _as_told(hole, _best(hole, every) or told)
+    return _with_name_of(hole, _best(hole, every) or named)

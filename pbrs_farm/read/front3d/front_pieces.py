@@ -19,6 +19,7 @@ from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.home.lamps import flux_for_floor
+from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.common.given_classes import GivenClass, class_by_words, given_class
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
@@ -26,7 +27,6 @@ from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.front3d.front_file import FrontLight, FrontPiece
 from pbrs_farm.read.front3d.front_openings import is_opening
 from pbrs_farm.read.mesh.obj import Mesh
@@ -34,9 +34,9 @@ from pbrs_farm.read.mesh.obj import Mesh
 _MAX_INFO_BYTES: Final = 64_000_000
 _BESIDE: Final = ("3D-FUTURE-model", "../3D-FUTURE-model", "../../3D-FUTURE-model", ".")
 INFO: Final = "model_info.json"
-_LUX: Final = 150.0  # what the told lights of a room give its floor together
+_LUX: Final = 150.0  # what the listed lights of a room give its floor together
 _LEAST_LM, _MOST_LM = 50.0, 3_000.0
-_BELOW_M: Final = 0.08  # a light told in the ceiling shines below it
+_BELOW_M: Final = 0.08  # a light listed inside the ceiling shines below it
 _FLAT_M: Final = 0.002
 _STRUCTURE: Final = ("wall", "floor", "ceiling")
 # Linear colour of a black body, by kelvin.
@@ -74,7 +74,7 @@ class FrontModels:
         self.n_missing = 0
 
     def item(self, piece: FrontPiece, item_id: str) -> Item | None:
-        """The piece as an item, told by its box where its model is missing; None for what is not drawn."""
+        """The piece as an item, as a box where its model is missing; None for what is not drawn."""
         if is_opening(piece):
             return None
         vocabulary, name, seen = self._class(piece)
@@ -110,11 +110,11 @@ class FrontModels:
     def _class(self, piece: FrontPiece) -> tuple[str, str, GivenClass]:
         """(vocabulary, name, class) by category, title, super category, the words of the title."""
         info = self._info.get(piece.jid, {})
-        told = [
+        names = [
             ("3dfuture", str(info.get("category") or "")), ("3dfuture", piece.category),
             ("3dfront-title", piece.title), ("3dfuture-super", str(info.get("super-category") or "")),
         ]  # fmt: skip
-        for vocabulary, name in told:
+        for vocabulary, name in names:
             seen = given_class(vocabulary, name) if name else None
             if seen is not None:
                 return vocabulary, name, seen
@@ -144,8 +144,8 @@ class FrontModels:
         at = piece.world_from_model[:3, 3] + np.array([0.0, size[1] / 2, 0.0])
         front = piece.world_from_model[:3, 2] * np.sign(piece.scale[2])
         turn = math.atan2(float(front[0]), float(front[2]))
-        return told_item(
-            item_id, vocabulary, name, triple(at), triple(size), turn, is_front_told=True,
+        return box_only_item(
+            item_id, vocabulary, name, triple(at), triple(size), turn, is_front_given=True,
             room_id=piece.room,
         )  # fmt: skip
 
@@ -184,7 +184,7 @@ def light_items(
     lights: Sequence[FrontLight], items: Sequence[Item], areas: dict[str, float],
     ceilings: dict[str, float],
 ) -> list[Item]:  # fmt: skip
-    """A lamp without a shape for every told light where no lamp stands; a room's share its flux."""
+    """A lamp without a shape for every listed light where no lamp stands; a room's share its flux."""
     lamps = [
         i.oriented_box.centre for i in items if i.kind is ItemKind.LAMP and (i.surfaces or i.box)
     ]

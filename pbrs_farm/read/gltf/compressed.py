@@ -42,8 +42,8 @@ def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh
         hint = f"{install_command('gltf')}, or gltf-transform copy IN.glb OUT.glb"
         raise BadHouse(gltf.file, place, f"{DRACO} needs DracoPy", hint=hint) from None
     # Bound what is decoded by what the file says of it.
-    told = entry(gltf, "accessors", (primitive.get("attributes") or {}).get("POSITION"))
-    n = told.get("count")
+    position = entry(gltf, "accessors", (primitive.get("attributes") or {}).get("POSITION"))
+    n = position.get("count")
     if type(n) is not int or not 0 < n <= _MOST_POINTS:
         raise BadHouse(gltf.file, place, "has an impossible number of vertices")
     try:

@@ -148,7 +148,7 @@ class SceneMaterials:
         return MaterialKind.MIRROR if metallic > 0.9 and roughness < 0.1 else MaterialKind.OPAQUE
 
     def _emission(self, fields_json: dict[str, Any], place: str) -> Emission | None:
-        """Its strength is told by KHR_materials_emissive_strength alone; None = it does not shine."""
+        """KHR_materials_emissive_strength alone gives its strength; None = it does not shine."""
         factor = numbers(
             self._gltf, fields_json.get("emissiveFactor", [0] * 3), 3, f"{place}: emission"
         )

@@ -119,12 +119,12 @@ def house_of_gltf(
 
     rooms: the bytes of its room file. Raises BadHouse as read_gltf does.
     """
-    name, told = source.file, rooms
+    name, room_file = source.file, rooms
     materials = SceneMaterials(gltf, fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
     note_unread(gltf, notes)
-    if told is not None:
-        found = rooms_from_json(told, f"{stem}.rooms.json", items)
+    if room_file is not None:
+        found = rooms_from_json(room_file, f"{stem}.rooms.json", items)
     elif own := _rooms_of_scene(gltf):
         found = rooms_from_value({"rooms": own}, name, items)
     else:

@@ -203,7 +203,7 @@ def _item(
     if not surfaces and not lights:
         return None
     if lights:
-        # Told lights are what its glowing surfaces of unknown strength send out.
+        # Lights of the file are what its glowing surfaces of unknown strength send out.
         unknown = [k for k, emission in shining.items() if emission.luminance == 0]
         lights = _with_surfaces(lights, surfaces, unknown)
         shining = {k: emission for k, emission in shining.items() if k not in unknown}

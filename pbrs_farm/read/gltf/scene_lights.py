@@ -62,10 +62,10 @@ def punctual_light(
 def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[LightPart, ...]:
     """A light for every emissive surface. shining: surface -> its emission.
 
-    Surfaces of unknown strength share ASSUMED_LM by their area. Others send out what they are told
-    to, whatever stands before them: an open one from both its sides.
+    Surfaces of unknown strength share ASSUMED_LM by their area. Others send out what the file
+    says, whatever stands before them: an open one from both its sides.
     """
-    # Share the assumed flux by area where no strength is told.
+    # Share the assumed flux by area where the file gives no strength.
     corners = {k: corners_of_surfaces([surfaces[k]]) for k in shining}
     area = {k: float(face_areas(corners[k]).sum()) for k in shining}
     unknown = sum(area[k] for k, emission in shining.items() if emission.luminance == 0)

@@ -378,8 +378,8 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
         inner = inner.copy()
         inner[:3, 3] -= centre
     name = dataset.class_of(template) or str(settings.get("name") or posixpath.basename(template))
-    told = row.get("user_defined")
-    extras = dict(told) if isinstance(told, dict) else {}
+    user_fields = row.get("user_defined")
+    extras = dict(user_fields) if isinstance(user_fields, dict) else {}
     built.place(roots, matrix @ inner, name, extras)
     return True
 
@@ -416,7 +416,7 @@ def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> N
 
 
 def _centre(gltf: Gltf, inner: F64, settings: dict[str, Any], config: str) -> F64:
-    """What the instance's translation moves: the told centre of mass, else the box's middle."""
+    """What the instance's translation moves: the given centre of mass, else the box's middle."""
     if "COM" in settings:
         return numbers(Gltf({}, (), config), settings["COM"], 3, "COM")
     points = []

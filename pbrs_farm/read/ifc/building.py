@@ -373,9 +373,9 @@ def _given(product: Any) -> GivenClass | None:
         if row is None:
             continue
         entity = row.is_a().removesuffix("Type").removesuffix("Style")
-        told = getattr(row, "PredefinedType", None)
-        if told:
-            names.append(f"{entity} {told}")
+        word_of_type = getattr(row, "PredefinedType", None)
+        if word_of_type:
+            names.append(f"{entity} {word_of_type}")
         names.append(entity)
     for name in sorted(names, key=lambda n: " " not in n):
         if (found := given_class("ifc", name)) is not None:
@@ -419,8 +419,8 @@ def _swing(product: Any) -> tuple[str, ...]:
     if not product.is_a("IfcDoor"):
         return ()
     kind = element.get_type(product)
-    told = getattr(product, "OperationType", None) or getattr(kind, "OperationType", None)
-    word = str(told or "")
+    word_of_type = getattr(product, "OperationType", None) or getattr(kind, "OperationType", None)
+    word = str(word_of_type or "")
     if "ROLLINGUP" in word:
         return ("garage",)
     if "SLIDING" in word or "FOLDING" in word:

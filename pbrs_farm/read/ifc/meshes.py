@@ -27,7 +27,7 @@ class Style:
     """How a part of a product looks."""
 
     name: str
-    rgb: tuple[float, float, float] | None  # sRGB-encoded; None: no colour is told
+    rgb: tuple[float, float, float] | None  # sRGB-encoded; None: the style has no colour
     transparency: float  # 0..1
 
 

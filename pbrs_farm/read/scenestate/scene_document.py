@@ -1,6 +1,6 @@
 """A sceneState's JSON -> its architecture and objects in the world, checked; no effects.
 
-The architecture is that of SUNCG v2's arch.json; axes, units and materials are told in more ways.
+The architecture is that of SUNCG v2's arch.json; axes, units and materials come in more ways.
 """
 
 from __future__ import annotations
@@ -104,8 +104,8 @@ class PlacedModel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ToldElement:
-    """An element in the world (metres, y up), with the rooms that it is told for."""
+class SceneElement:
+    """An element in the world (metres, y up), with the rooms that list it."""
 
     id: str
     element: Element
@@ -117,7 +117,7 @@ class SceneDocument:
     """A sceneState as read."""
 
     id: str
-    elements: tuple[ToldElement, ...]
+    elements: tuple[SceneElement, ...]
     room_types: dict[str, tuple[str, ...]]  # by the room's id, in the file's order
     objects: tuple[PlacedModel, ...]
     pictures: dict[str, str]  # name of a texture -> its data URL, "" where the file has none
@@ -156,7 +156,9 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
             name = f"{name}.{i}"
         taken.add(name)
         elements.append(
-            ToldElement(name, _in_world(found, world_from_arch, arch_scale), _rooms_of_element(raw))
+            SceneElement(
+                name, _in_world(found, world_from_arch, arch_scale), _rooms_of_element(raw)
+            )
         )
     objects = []
     for k, raw in enumerate(scene.objects):
@@ -173,7 +175,7 @@ def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
 
 
 def _scene_axes(scene: _Scene) -> tuple[F64, F64]:
-    """Up and front of the scene: told, else of the architecture, else z up where walls are level in z."""
+    """Up and front of the scene: given, else of the architecture, else z up where walls are level in z."""
     up = next((v for v in (scene.up, scene.arch.up) if v is not None), None)
     front = next((v for v in (scene.front, scene.arch.front) if v is not None), None)
     if up is None:
@@ -205,8 +207,8 @@ def _in_world(e: Element, world_from_arch: F64, scale: float) -> Element:
 
 
 def _rooms_of_element(raw: dict[str, Any]) -> tuple[str, ...]:
-    told = raw.get("roomId")
-    names = told if isinstance(told, list) else [told]
+    room_ids = raw.get("roomId")
+    names = room_ids if isinstance(room_ids, list) else [room_ids]
     return tuple(dict.fromkeys(str(name)[:60] for name in names if name not in (None, "")))
 
 

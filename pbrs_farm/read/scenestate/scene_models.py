@@ -21,13 +21,13 @@ from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.common.given_classes import GivenClass, class_by_words
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.told_items import told_item
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping
@@ -94,7 +94,7 @@ class SceneModels:
         self.missing: Counter[str] = Counter()  # ids without a model whose class is not known
 
     def item(self, one: PlacedModel, item_id: str) -> Item | None:
-        """The object as an item; told by its box where its model is missing; None where nothing is known."""
+        """The object as an item; as a box where its model is missing; None where nothing is known."""
         row = self._rows.get(one.model)
         seen = class_by_words(row.category) if row else None
         surfaces = self._surfaces(one.model, one.place)
@@ -137,9 +137,9 @@ class SceneModels:
         width, height, depth = (float(s * k) for s, k in zip(size, scale, strict=True))
         x, y, z = (float(v) for v in world[:3, 3])
         turn = math.atan2(float(columns[0, 2]), float(columns[2, 2]))
-        return told_item(
+        return box_only_item(
             item_id, "hssd", row.category, (x, y + height / 2, z), (width, height, depth), turn,
-            is_front_told=True,
+            is_front_given=True,
         )  # fmt: skip
 
     def _surfaces(self, model: str, place: str) -> tuple[Surface, ...]:

@@ -41,7 +41,7 @@ from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,
-    ToldElement,
+    SceneElement,
     scene_document,
 )
 from pbrs_farm.read.scenestate.scene_models import (
@@ -175,19 +175,19 @@ class _Shell:
         self._slabs = [e for e in elements if e.element.kind in ("Floor", "Ceiling")]
         self._slabs = [self._sunk(e) for e in self._slabs]
         floors = [e for e in self._slabs if e.element.kind == "Floor"]
-        self._floors: dict[str, list[ToldElement]] = {}
+        self._floors: dict[str, list[SceneElement]] = {}
         for k, e in enumerate(floors):
             names = e.rooms or (f"floor {k}",)
             self._floors.setdefault(names[0], []).append(e)
         areas = {name: _plan_of_floors(some) for name, some in self._floors.items()}
-        told = [e for e in elements if e.element.kind == "Wall"]
-        self._drawn, self._standing = standing_walls(told, areas)
+        walls = [e for e in elements if e.element.kind == "Wall"]
+        self._drawn, self._standing = standing_walls(walls, areas)
 
-    def _sunk(self, told: ToldElement) -> ToldElement:
-        """The slab as it is told, upwards; a floor on whose told height things stand goes down."""
-        e = told.element
+    def _sunk(self, one: SceneElement) -> SceneElement:
+        """The slab upwards from its points; a floor on whose points things stand goes down."""
+        e = one.element
         if e.kind != "Floor" or e.depth_m <= 0:
-            return told
+            return one
         low = float(e.points[0][:, 1].min())
         bases = [
             float(o.world_from_scene[1] @ o.scene_from_model[:, 3]) for o in self._document.objects
@@ -196,9 +196,9 @@ class _Shell:
         at_points = sum(abs(y - low) < _ON_FLOOR_M for y in bases)
         is_down = at_points > at_top or (at_points == at_top and abs(low) < 1e-6)
         if not is_down:
-            return told
+            return one
         points = tuple(ring - [0.0, e.depth_m, 0.0] for ring in e.points)
-        return replace(told, element=replace(e, points=points))
+        return replace(one, element=replace(e, points=points))
 
     def walls(self) -> list[Item]:
         """An item for each wall."""
@@ -241,14 +241,14 @@ class _Shell:
         return wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
 
     def _room(
-        self, name: str, floors: list[ToldElement], ceilings: list[tuple[ToldElement, Any]],
+        self, name: str, floors: list[SceneElement], ceilings: list[tuple[SceneElement, Any]],
         walls: list[tuple[StandingWall, Surface]],
     ) -> tuple[Room, list[Item]] | None:  # fmt: skip
         parts = []
-        for k, told in enumerate(floors):
-            surfaces = slab_surfaces(_AS_IT_STANDS, told.element, self.materials)
+        for k, one in enumerate(floors):
+            surfaces = slab_surfaces(_AS_IT_STANDS, one.element, self.materials)
             if surfaces:
-                item_id = told.id if k == 0 else f"{told.id}.{k}"
+                item_id = one.id if k == 0 else f"{one.id}.{k}"
                 parts.append(_scene_structure_item(item_id, ItemKind.FLOOR, surfaces, name))
         faces = [s for part in parts for s in part.surfaces]
         low = floor_height(faces)
@@ -280,11 +280,11 @@ class _Shell:
                     else []
                 )
         elif not above:
-            for k, told in enumerate(floors):
-                made = _ceiling_over(told.element, max(top, low + 1.0))
+            for k, one in enumerate(floors):
+                made = _ceiling_over(one.element, max(top, low + 1.0))
                 surfaces = slab_surfaces(_AS_IT_STANDS, made, self.materials)
                 parts.append(
-                    _scene_structure_item(f"{told.id}_ceiling{k}", ItemKind.CEILING, surfaces, name)
+                    _scene_structure_item(f"{one.id}_ceiling{k}", ItemKind.CEILING, surfaces, name)
                 )
         else:
             for e in above:
@@ -355,7 +355,7 @@ def _ceiling_over(floor: Element, top: float) -> Element:
     return replace(floor, kind="Ceiling", points=points, overrides=(), depth_m=SLAB_DEPTH_M)
 
 
-def _plan_of_floors(floors: Sequence[ToldElement]) -> Any:
+def _plan_of_floors(floors: Sequence[SceneElement]) -> Any:
     rings = [shapely.Polygon(e.element.points[0][:, [0, 2]]) for e in floors]
     return shapely.union_all([shapely.make_valid(r) for r in rings])
 

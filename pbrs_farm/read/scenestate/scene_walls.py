@@ -17,7 +17,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.read.common.arch_elements import WALL_DEPTH_M, Element, WallFrame
-from pbrs_farm.read.scenestate.scene_document import ToldElement
+from pbrs_farm.read.scenestate.scene_document import SceneElement
 
 _BESIDE_M: Final = 0.06  # from a wall's line to the floor beside it
 _SAME_M: Final = 0.02  # lines and ends nearer than this are one
@@ -37,20 +37,20 @@ class StandingWall:
 
 
 def standing_walls(
-    told: Sequence[ToldElement], floors: Mapping[str, Any]
+    elements: Sequence[SceneElement], floors: Mapping[str, Any]
 ) -> tuple[list[StandingWall], list[StandingWall]]:
-    """(every wall as it is told, with its frame; the walls that stand, each once).
+    """(every wall as it is drawn, with its frame; the walls that stand, each once).
 
     floors: room -> the plan area (shapely) of its floor.
     """
     tree = shapely.STRtree(list(floors.values()))
     names = list(floors)
-    drawn = [w for one in told if (w := _stand_wall(one, tree, names)) is not None]
+    drawn = [w for one in elements if (w := _stand_wall(one, tree, names)) is not None]
     lines: dict[tuple[int, int], list[int]] = defaultdict(list)
     for k, wall in enumerate(drawn):
         if wall.is_between:
             lines[_line_key(wall)].append(k)
-    # Unite what lies on one line; everything else stands as it is told.
+    # Unite what lies on one line; everything else stands as it is drawn.
     united = {k: pieces for ks in lines.values() if len(ks) > 1 for k, pieces in _united(drawn, ks)}
     standing: list[StandingWall] = []
     for k, wall in enumerate(drawn):
@@ -58,8 +58,8 @@ def standing_walls(
     return drawn, standing
 
 
-def _stand_wall(told: ToldElement, tree: Any, names: list[str]) -> StandingWall | None:
-    e = told.element
+def _stand_wall(one: SceneElement, tree: Any, names: list[str]) -> StandingWall | None:
+    e = one.element
     if e.depth_m <= 0:
         e = replace(e, depth_m=WALL_DEPTH_M)
     start, end = e.points[0]
@@ -70,11 +70,11 @@ def _stand_wall(told: ToldElement, tree: Any, names: list[str]) -> StandingWall 
     along /= length
     left = np.array([along[2], 0.0, -along[0]])
     sides = [_rooms_beside(start, end, sign * left, tree, names) for sign in (1, -1)]
-    own = [bool(set(side) & set(told.rooms)) for side in sides]
-    is_between = len(told.rooms) > 1 or all(sides)
+    own = [bool(set(side) & set(one.rooms)) for side in sides]
+    is_between = len(one.rooms) > 1 or all(sides)
     # Out of the first room that tells it, else of the floor that is there.
     is_left_in = own[0] if own[0] != own[1] else bool(sides[0]) and not sides[1]
-    first = told.rooms[:1]
+    first = one.rooms[:1]
     if is_between and first and own == [True, True]:
         is_left_in = first[0] in sides[0]
     outward = -left if is_left_in else left
@@ -82,7 +82,7 @@ def _stand_wall(told: ToldElement, tree: Any, names: list[str]) -> StandingWall 
         start = start - outward * e.depth_m / 2
     up = np.array([0.0, 1.0, 0.0])
     frame = WallFrame(start, np.stack([along, up, outward], 1), length)
-    return StandingWall(told.id, e, frame, told.rooms, is_between)
+    return StandingWall(one.id, e, frame, one.rooms, is_between)
 
 
 def _rooms_beside(start: F64, end: F64, side: F64, tree: Any, names: list[str]) -> list[str]:

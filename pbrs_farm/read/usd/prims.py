@@ -143,12 +143,12 @@ class StageNodes:
         return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
 
     def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:
-        """What the prim is; said in the node's extras where it is told."""
-        told = prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
-        if told:
+        """What the prim is; said in the node's extras where the prim has them."""
+        own_extras = prim.GetAttribute(EXTRAS_ATTRIBUTE).Get()
+        if own_extras:
             from pbrs_farm.core.checked_json import json_from_bytes
 
-            extras = json_from_bytes(str(told).encode(), self._file)
+            extras = json_from_bytes(str(own_extras).encode(), self._file)
             node["extras"] |= extras if isinstance(extras, dict) else {}
             return class_of_node_name(str(node["extras"].get("class", "")))
         label = _own_label(prim)

@@ -75,8 +75,8 @@ class Shaders:
             row = self._mdl(name, shader, str(material.GetPath()))
         else:
             row = {"name": name}
-        told = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
-        return row | ({"extras": {"kind": str(told)}} if told else {})
+        given = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
+        return row | ({"extras": {"kind": str(given)}} if given else {})
 
     # UsdPreviewSurface
 
@@ -149,9 +149,9 @@ class Shaders:
 
     def _mdl(self, name: str, shader: Any, place: str) -> _Row:
         asset = shader.GetPrim().GetAttribute("info:mdl:sourceAsset").Get()
-        told = shader.GetPrim().GetAttribute("info:mdl:sourceAsset:subIdentifier").Get()
+        given = shader.GetPrim().GetAttribute("info:mdl:sourceAsset:subIdentifier").Get()
         path = asset.path if isinstance(asset, Sdf.AssetPath) else ""
-        stem = str(told or path.replace("\\", "/").rsplit("/", 1)[-1].removesuffix(".mdl"))
+        stem = str(given or path.replace("\\", "/").rsplit("/", 1)[-1].removesuffix(".mdl"))
         if stem.startswith("OmniGlass"):
             colour = _triple(self._input(shader, "glass_color", (1, 1, 1))[0], (1.0, 1.0, 1.0))
             return _pbr(name, [*colour, PANE_OPACITY], 0.0, 0.0) | {"alphaMode": "BLEND"}

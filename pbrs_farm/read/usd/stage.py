@@ -53,7 +53,7 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
     nodes = StageNodes(stage, path.name, notes, shaders, fields)
     scale = float(UsdGeom.GetStageMetersPerUnit(stage))
     is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
-    rooms = _told_rooms(stage, folder, path, scale, is_z_up=is_z_up)
+    rooms = _given_rooms(stage, folder, path, scale, is_z_up=is_z_up)
     try:
         gltf = nodes.gltf({"rooms": rooms} if rooms else {})
     except FAULTS as error:
@@ -117,7 +117,7 @@ def _mapping(folder: StageFolder, path: Path) -> Mapping:
     return Mapping() if data is None else mapping_from_json(data, name)
 
 
-def _told_rooms(
+def _given_rooms(
     stage: Any, folder: StageFolder, path: Path, scale: float, *, is_z_up: bool
 ) -> list[dict[str, Any]]:
     """Rooms as the room file of a glTF scene has them; [] where nothing tells any."""

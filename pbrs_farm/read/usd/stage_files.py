@@ -163,7 +163,7 @@ try:
     UsdUtils.ExtractExternalReferences(sys.argv[1])
     Usd.Stage.Open(sys.argv[1])
 except Exception:
-    pass  # told by the process that reads
+    pass  # the process that reads says so
 """
 _TRIAL_S: Final = 8.0
 _BYTES_A_SECOND: Final = 10e6

@@ -13,7 +13,7 @@ import shapely
 
 from pbrs_farm.core.classes import LAMP, NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import FRONT_TOLD, TOLD, House, ItemKind, MaterialKind
+from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
@@ -150,9 +150,9 @@ def test_without_models_every_piece_is_told_by_its_size_and_one_note_says_so(
     tmp_path: Path,
 ) -> None:
     house = read(files.write_house(tmp_path, with_models=False))
-    told = [i for i in house.items if TOLD in i.tags]
+    told = [i for i in house.items if BOX_ONLY in i.tags]
     assert len(told) == files.N_DRAWN
-    assert all(FRONT_TOLD in i.tags for i in told)
+    assert all(FRONT_GIVEN in i.tags for i in told)
     sofa = next(i for i in told if "sofa" in i.source_class)
     assert sofa.box is not None
     np.testing.assert_allclose(2 * sofa.box.half, [2.1, 0.8, 0.9])
@@ -167,7 +167,7 @@ def test_models_may_lie_in_a_folder_that_is_named(tmp_path: Path) -> None:
     for models in (tmp_path / "b", tmp_path / "b" / "3D-FUTURE-model"):
         source = resolve(str(path), models=str(models))
         assert source.companions
-        assert not any(TOLD in i.tags for i in read_house(source, ReadFields()).items)
+        assert not any(BOX_ONLY in i.tags for i in read_house(source, ReadFields()).items)
 
 
 def test_a_told_light_is_a_lamp_where_no_lamp_stands_in_the_colour_it_has(tmp_path: Path) -> None:

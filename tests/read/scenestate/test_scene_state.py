@@ -12,7 +12,7 @@ import pytest
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import TOLD, House, ItemKind, MaterialKind
+from pbrs_farm.core.house import BOX_ONLY, House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
@@ -76,7 +76,7 @@ def test_a_model_stands_where_its_matrix_says_turned_with_the_scene(tmp_path: Pa
 
 def test_without_models_the_category_and_size_of_the_table_stand_in(tmp_path: Path) -> None:
     house = read(files.hssd_like(tmp_path, with_models=False))
-    told = [i for i in house.items if TOLD in i.tags]
+    told = [i for i in house.items if BOX_ONLY in i.tags]
     assert len(told) == 20
     sofa = next(i for i in told if i.name == "couch")
     assert sofa.box is not None

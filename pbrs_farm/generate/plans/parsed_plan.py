@@ -1,6 +1,6 @@
-"""What a file tells of a home before its walls stand: storeys of rooms, openings, things; frozen values.
+"""What a file says of a home before its walls stand: storeys of rooms, openings, things; frozen values.
 
-Plans of machines are told in whatever frame their format has; here x runs to the right, z downwards on
+Plans of machines come in whatever frame their format has; here x runs to the right, z downwards on
 the page, in metres, as in a Plan. Angles are about +y: at 0 a front looks to +z.
 """
 
@@ -25,7 +25,7 @@ _LEAST_BOX_M2: Final = 0.08
 
 
 class Thing(NamedTuple):
-    """Something of which a file tells name and box alone."""
+    """Something of which a file gives name and box alone."""
 
     vocabulary: str  # whose word the name is (read/common/given_classes.csv)
     name: str
@@ -36,11 +36,11 @@ class Thing(NamedTuple):
     depth: float
     height: float
     turn_rad: float
-    is_front_told: bool = False
+    is_front_given: bool = False
 
 
 @dataclass(frozen=True)
-class ToldStorey:
+class ParsedStorey:
     """A storey as the JSON of a plan of one's own would say it, and the things on it."""
 
     value: dict[str, Any]
@@ -49,10 +49,10 @@ class ToldStorey:
 
 
 @dataclass(frozen=True)
-class ToldPlan:
+class ParsedPlan:
     """All storeys from below, and what the file holds that was left out, a line each."""
 
-    storeys: tuple[ToldStorey, ...]
+    storeys: tuple[ParsedStorey, ...]
     left_out: tuple[str, ...] = ()
 
 

@@ -1,4 +1,4 @@
-"""Things that a source tells by class and box alone; no effects. prepare/stand_ins.py furnishes them."""
+"""Things that a source describes by class and box alone; no effects. prepare/stand_ins.py furnishes them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.house import FRONT_TOLD, TOLD, Box, Item, ItemKind
+from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, Item, ItemKind
 from pbrs_farm.home.names import parted
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 
@@ -15,7 +15,7 @@ _FURNITURE: Final = ("object", "lamp", "plant", "stairs", "person")
 LARGEST_M: Final = 15.0
 
 
-def told_item(
+def box_only_item(
     item_id: str,
     vocabulary: str,
     name: str,
@@ -23,11 +23,11 @@ def told_item(
     size: tuple[float, float, float],
     turn_rad: float,
     *,
-    is_front_told: bool = False,
+    is_front_given: bool = False,
     level_id: str = "0",
     room_id: str | None = None,
 ) -> Item | None:
-    """An item without surfaces for a told thing; None where its name means nothing that is drawn, or
+    """An item without surfaces for a thing of known class and box; None where its name means nothing that is drawn, or
     its box is none: not finite, without a size, larger than any furniture.
 
     vocabulary: whose word the name is (given_classes.csv). centre: of the box, metres, world. size:
@@ -46,7 +46,7 @@ def told_item(
         return None
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     axes = np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]])
-    tags = (TOLD, FRONT_TOLD) if is_front_told else (TOLD,)
+    tags = (BOX_ONLY, FRONT_GIVEN) if is_front_given else (BOX_ONLY,)
     return Item(
         id=item_id, name=_spoken(name), kind=seen.item_kind if seen else ItemKind.OBJECT, level_id=level_id, surfaces=(),
         nyu40=seen.nyu40 if seen else 40, source_class=name, room_id=room_id,
