@@ -43,8 +43,8 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
     Storey,
 )
-from pbrs_farm.generate.joinery import JoineryDesign, drawn_design, joinery
 from pbrs_farm.generate.model_file import material_name, model_files
+from pbrs_farm.generate.opening_models import OpeningDesign, drawn_design, opening_model
 from pbrs_farm.generate.plan_families import FLAT, PlanFamily, plan_families
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
@@ -77,13 +77,13 @@ class Paints:
     floor: str
     wet_floor: str
     ceiling: str
-    joinery: JoineryDesign
+    design: OpeningDesign
 
 
 def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
     """Three paints of a family for walls, doors and windows of one paint."""
     chosen = [family.walls[i] for i in rng.permutation(len(family.walls))[:3]]
-    wood = family.joinery[int(rng.integers(len(family.joinery)))]
+    wood = family.opening_paints[int(rng.integers(len(family.opening_paints)))]
     red, green, blue = (int(wood[k : k + 2], 16) / 255 for k in (0, 2, 4))
     design = drawn_design(rng, (red, green, blue), family.leaves, family.sashes)
     return Paints(tuple(chosen), "EEF1F1", family.floor, "C9C6BF", family.ceiling, design)
@@ -250,7 +250,7 @@ def _add_levels(
 def _add_stairs(
     home: ET.Element, stair: Stair, rise: float, contents: _Contents, paints: Paints
 ) -> ET.Element:
-    shape = staircase(stair, rise, paints.joinery.colour)
+    shape = staircase(stair, rise, paints.design.colour)
     (x, z), (low, high) = stair.middle, shape.bounds
     width, height, depth = (high - low).tolist()
     return ET.SubElement(home, "pieceOfFurniture", {
@@ -267,7 +267,7 @@ def _add_opening(
     home: ET.Element, plan: Plan, opening: PlanOpening, contents: _Contents, paints: Paints
 ) -> ET.Element:
     wall = plan.walls[opening.wall]
-    shape = joinery(opening, wall.thickness, paints.joinery)
+    shape = opening_model(opening, wall.thickness, paints.design)
     low, high = shape.bounds
     x, z = wall.at(opening.along)
     angle = _angle_into(plan, opening, wall)

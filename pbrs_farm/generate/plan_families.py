@@ -12,7 +12,7 @@ from pydantic import Field, field_validator
 from pbrs_farm.core.made_home import PLANS
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.joinery import LEAVES, SASHES
+from pbrs_farm.generate.opening_models import LEAVES, SASHES
 
 _Share = Annotated[float, Field(ge=0, le=1)]
 _Colour = Annotated[str, Field(pattern="^[0-9A-F]{6}$")]
@@ -69,7 +69,7 @@ class PlanFamily(Record):
     )  # fmt: skip
     floor: _Colour = "B08A62"
     ceiling: _Colour = "FAFAF8"
-    joinery: tuple[_Colour, ...] = ("EDEBE6", "EDEBE6", "A88054", "737578")
+    opening_paints: tuple[_Colour, ...] = ("EDEBE6", "EDEBE6", "A88054", "737578")
     dry_floor: str = "wood"  # group of the floor's picture where no water runs
 
     @property
@@ -81,7 +81,7 @@ class PlanFamily(Record):
     @classmethod
     def _is_built(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         if unknown := set(names) - {*SASHES, *LEAVES}:
-            raise ValueError(f"joinery.py builds no {unknown}")
+            raise ValueError(f"opening_models.py builds no {unknown}")
         return names
 
 

@@ -91,8 +91,8 @@ _FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), _Home)
 def builtin_home() -> House:
     """The built-in home, unrepaired; the same on every call."""
     library, index = _materials()
-    openings, joinery = _openings(index)
-    items = (*_wall_items(index), *_plane_items(index), *joinery, *_furniture_items(index))
+    openings, fillings = _openings(index)
+    items = (*_wall_items(index), *_plane_items(index), *fillings, *_furniture_items(index))
     sha = keys.sha256(f"builtin home {VERSION}".encode())
     return House(
         id=keys.house_id("builtin", sha),
@@ -203,7 +203,7 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         openings.append(
             Opening(f"opening_{hole.id}", "0", hole.id, hole.is_window, cutter, quad, axes[:, 2])
         )
-        # The joinery stands in the hole, turned with the wall.
+        # The door or window stands in the hole, turned with the wall.
         name, make = ("window", _window_piece) if hole.is_window else ("door", _door_piece)
         turn = 0.0 if hole.along == "x" else 90.0
         piece = make(width, y1 - y0)

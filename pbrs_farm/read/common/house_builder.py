@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Room, Source
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.joinery import Hole, joinery_of, opening_of
+from pbrs_farm.read.common.doors_and_windows import Hole, fill_hole, opening_of
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.room_limits import check_rooms
@@ -72,7 +72,7 @@ class HouseBuilder:
         """
         low = float(hole.centre[1] - hole.size[1] / 2)
         level = self.level_of(low if foot_y is None else foot_y)
-        item = joinery_of(hole, self.library, level, self.room_at(hole.centre))
+        item = fill_hole(hole, self.library, level, self.room_at(hole.centre))
         self.items += [item] if item is not None else []
         self.openings.append(opening_of(hole, self.level_of(low if cut_y is None else cut_y)))
 

@@ -9,8 +9,8 @@ from typing import Final, Literal
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.read.common.doors_and_windows import Hole, Style, merge_holes
 from pbrs_farm.read.common.given_classes import given_class
-from pbrs_farm.read.common.joinery import Hole, Style, merged
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontPiece
 from pbrs_farm.read.front3d.front_walls import WallPiece
 
@@ -46,13 +46,13 @@ def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) 
     found = []
     for hole, piece in holes:
         found.append(_kinded(hole, piece, _best(hole, named)))
-    found = merged(sorted(found, key=lambda h: h.kind == "open"))
+    found = merge_holes(sorted(found, key=lambda h: h.kind == "open"))
     # A hole mesh that stands over no gap cuts the wall itself.
     extra = []
     for one in named:
         if one.box is not None and not any(_stands_in(one, hole) for hole in found):
             extra.append(_of_mesh(one, named))
-    return merged([*found, *extra])
+    return merge_holes([*found, *extra])
 
 
 def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:

@@ -19,7 +19,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.geometry.solids import wall_prism
-from pbrs_farm.read.common.joinery import Hole
+from pbrs_farm.read.common.doors_and_windows import Hole
 from pbrs_farm.read.common.room_shells import plane_of_faces
 from pbrs_farm.read.front3d.front_file import FrontMesh
 

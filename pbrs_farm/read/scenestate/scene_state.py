@@ -28,9 +28,9 @@ from pbrs_farm.read.common.arch_elements import (
     wall_surfaces,
 )
 from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
+from pbrs_farm.read.common.doors_and_windows import Hole, merge_holes
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.house_builder import HouseBuilder
-from pbrs_farm.read.common.joinery import Hole, merged
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import LEAST_HOLE_M
 from pbrs_farm.read.common.room_floors import ceiling_height, floor_height, floor_polygon
@@ -310,7 +310,7 @@ class _Shell:
                 kind = wall.element.hole_types[k] if k < len(wall.element.hole_types) else ""
                 one = self._hole(wall, k, hole, kind, rooms)
                 found += [one] if one is not None else []
-        return merged(found)
+        return merge_holes(found)
 
     def _hole(
         self, wall: StandingWall, k: int, hole: tuple[float, float, float, float], kind: str,

@@ -8,7 +8,7 @@ import shapely
 
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
-from pbrs_farm.generate.joinery import LEAVES, JoineryDesign, joinery
+from pbrs_farm.generate.opening_models import LEAVES, OpeningDesign, opening_model
 
 WIDTH, HEIGHT = 0.9, 2.1
 
@@ -19,7 +19,7 @@ WIDTH, HEIGHT = 0.9, 2.1
 )
 def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: float) -> None:
     door = PlanOpening(kind, 0, 1.0, WIDTH, HEIGHT, 0.0, 0)
-    shape = joinery(door, 0.26, JoineryDesign(leaf=leaf, entrance=leaf))
+    shape = opening_model(door, 0.26, OpeningDesign(leaf=leaf, entrance=leaf))
     corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
     # As seen along the wall's normal: rooms inside have a gap above the floor, nothing else.
     covered = shapely.union_all(shapely.polygons(corners[:, :, :2].astype(np.float64)))

@@ -53,7 +53,7 @@ _Box = tuple[Triple, Triple]  # low and high corner
 
 
 @dataclass(frozen=True, slots=True)
-class JoineryDesign:
+class OpeningDesign:
     """What a home's doors and windows look like."""
 
     leaf: str = LEAVES[0]  # of doors between rooms
@@ -66,15 +66,15 @@ class JoineryDesign:
 def drawn_design(
     rng: np.random.Generator, colour: Triple, leaves: Sequence[str] = LEAVES,
     sashes: Sequence[str] = SASHES,
-) -> JoineryDesign:  # fmt: skip
+) -> OpeningDesign:  # fmt: skip
     """A home's design; all are equally common."""
     leaf, entrance, handle, sash = (
         choices[int(rng.integers(len(choices)))] for choices in (leaves, leaves, HANDLES, sashes)
     )
-    return JoineryDesign(leaf, entrance, handle, sash, colour)
+    return OpeningDesign(leaf, entrance, handle, sash, colour)
 
 
-def joinery(opening: PlanOpening, wall_m: float, design: JoineryDesign) -> Shape:
+def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) -> Shape:
     """The door or window of an opening in a wall of that thickness."""
     paint = Material("joinery", diffuse=design.colour, specular=(0.3, 0.3, 0.3), shininess=40.0)
     metal = Material("handle", diffuse=(0.2, 0.2, 0.2), specular=(0.7, 0.7, 0.7), shininess=60.0)
@@ -191,7 +191,7 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     return boxes
 
 
-def _sashes(w: float, h: float, design: JoineryDesign) -> tuple[list[_Box], list[_Box], list[_Box]]:
+def _sashes(w: float, h: float, design: OpeningDesign) -> tuple[list[_Box], list[_Box], list[_Box]]:
     """(bars, panes, catches): as many sashes side by side as keep each below a metre."""
     n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
     inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M

@@ -1,4 +1,4 @@
-"""Doors and windows of sources that tell holes alone: a leaf or a pane for each hole; no effects.
+"""Doors and windows of sources that have holes alone: a leaf or a pane for each hole; no effects.
 
 What stands in a hole is built to its size, in the middle of the wall: a frame that lines the hole,
 leaves with handles, or a sash with panes.
@@ -75,7 +75,7 @@ def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
     )
 
 
-def joinery_of(
+def fill_hole(
     hole: Hole, library: MaterialLibrary, level_id: str, room_id: str | None
 ) -> Item | None:
     """The door or window of a hole; None for one that stays open."""
@@ -191,7 +191,7 @@ def _window_boxes(hole: Hole) -> _Boxes:
     return {"frame": frame, "pane": panes}
 
 
-def merged(holes: list[Hole]) -> list[Hole]:
+def merge_holes(holes: list[Hole]) -> list[Hole]:
     """Each hole once: two that fill one place across a wall are one, as deep as both."""
     found: list[Hole] = []
     for hole in holes:
