@@ -55,9 +55,8 @@ def coffee_machine(m: Maker) -> None:
         glossy("machine", (0.06, 0.06, 0.065), 0.3),
         glossy("white lacquer", (0.92, 0.92, 0.9), 0.35))  # fmt: skip
     black = plain("machine black", (0.05, 0.05, 0.052), 0.5)
-    # Tank at the back, head over the jug, plate below it.
     match form:
-        case 0:
+        case 0:  # tank at the back, head over the jug, plate below it
             m.name = "filter_coffee"
             m.add(bevelled((-0.09 * s, 0, -0.11), (0.09 * s, 0.022, 0.1), 0.006), of=shell)
             m.add(bevelled((-0.09 * s, 0.0222, -0.11), (0.09 * s, 0.25 * s, -0.035), 0.008),
@@ -69,8 +68,7 @@ def coffee_machine(m: Maker) -> None:
                 of=plain("jug", (0.09, 0.05, 0.03), 0.06))  # fmt: skip
             m.add(tube(bent([(0.04, 0.155, 0.06), (0.085, 0.15, 0.09), (0.09, 0.06, 0.09),
                 (0.065, 0.05, 0.065)], 0.02), 0.006, n=6), at=(0, 0.012, 0), of=black)  # fmt: skip
-        case 1:
-            # Group head with its handle over a drip tray, a steam pipe beside it.
+        case 1:  # group head with its handle over a drip tray, a steam pipe beside it
             m.name, w = "espresso_machine", 0.13 * s
             m.add(bevelled((-w, 0.012, -0.15), (w, 0.045, 0.14), 0.005), of=shell)
             m.add(bevelled((-w, 0.0452, -0.15), (w, 0.33, -0.02), 0.01), of=shell)
@@ -93,8 +91,7 @@ def coffee_machine(m: Maker) -> None:
             m.add(frustum((0.012, 0), (0.016, 0.02), n=12), at=(0, 0.152, 0.06), of=black)
             m.add(tube(bent([(-0.04, 0.262, 0.0), (-0.04, 0.275, 0.09), (0.04, 0.275, 0.09),
                 (0.04, 0.262, 0.0)], 0.02), 0.006, n=6), of=CHROME)  # fmt: skip
-        case 3:
-            # Eight sides, narrow in the middle.
+        case 3:  # eight sides, narrow in the middle
             m.name = "moka_pot"
             m.add(turned([(0, 0), (0.05 * s, 0), (0.042 * s, 0.075), (0.036 * s, 0.08),
                 (0.036 * s, 0.088), (0.05 * s, 0.165), (0.01, 0.178), (0.012, 0.195), (0, 0.197)],
@@ -131,23 +128,23 @@ def toaster(m: Maker) -> None:
 def microwave(m: Maker) -> None:
     """A microwave oven: its window, and keys or knobs on the right."""
     w, d, h = m.uniform(0.44, 0.52), m.uniform(0.33, 0.4), m.uniform(0.255, 0.3)
+    hw = w / 2
     shell = m.pick(glossy("white lacquer", (0.92, 0.92, 0.9), 0.35), STEEL, BLACK_STEEL,
         glossy("microwave", (0.06, 0.06, 0.065), 0.3))  # fmt: skip
     panel, front = m.uniform(0.09, 0.12), d / 2
-    m.add(bevelled((-w / 2, 0.012, -d / 2), (w / 2, h, front - 0.022), 0.004), of=shell)
-    m.add(bevelled((-w / 2, 0.014, front - 0.0218), (w / 2 - panel - 0.0015, h - 0.002, front),
-        0.004), of=shell)  # fmt: skip
-    m.add(bevelled((w / 2 - panel + 0.0015, 0.014, front - 0.0218), (w / 2, h - 0.002, front),
-        0.004), of=m.pick(shell, BLACK_GLASS))  # fmt: skip
-    m.add(slab((-w / 2 + 0.035, 0.05, front), (w / 2 - panel - 0.045, h - 0.045, front + 0.0008)),
+    m.add(bevelled((-hw, 0.012, -d / 2), (hw, h, front - 0.022), 0.004), of=shell)
+    m.add(bevelled((-hw, 0.014, front - 0.0218), (hw - panel - 0.0015, h - 0.002, front), 0.004),
+        of=shell)  # fmt: skip
+    m.add(bevelled((hw - panel + 0.0015, 0.014, front - 0.0218), (hw, h - 0.002, front), 0.004),
+        of=m.pick(shell, BLACK_GLASS))  # fmt: skip
+    m.add(slab((-hw + 0.035, 0.05, front), (hw - panel - 0.045, h - 0.045, front + 0.0008)),
         of=BLACK_GLASS)  # fmt: skip
     if m.chance(0.6):
-        m.add(tube(bent([(w / 2 - panel - 0.022, 0.05, front - 0.002),
-            (w / 2 - panel - 0.022, 0.05, front + 0.03),
-            (w / 2 - panel - 0.022, h - 0.045, front + 0.03),
-            (w / 2 - panel - 0.022, h - 0.045, front - 0.002)], 0.012), 0.006, n=6),
+        m.add(tube(bent([(hw - panel - 0.022, 0.05, front - 0.002),
+            (hw - panel - 0.022, 0.05, front + 0.03), (hw - panel - 0.022, h - 0.045, front + 0.03),
+            (hw - panel - 0.022, h - 0.045, front - 0.002)], 0.012), 0.006, n=6),
             of=m.pick(CHROME, shell))  # fmt: skip
-    x, keys = w / 2 - panel / 2, plain("keys", (0.7, 0.7, 0.7), 0.5)
+    x, keys = hw - panel / 2, plain("keys", (0.7, 0.7, 0.7), 0.5)
     m.add(slab((x - 0.03, h - 0.075, front), (x + 0.03, h - 0.045, front + 0.0008)),
         of=plain("clock", (0.02, 0.06, 0.05), 0.1))  # fmt: skip
     for y in (h * 0.26, h * 0.5):
@@ -158,5 +155,5 @@ def microwave(m: Maker) -> None:
             for i, k in product(range(3), range(4)):
                 m.add(slab((x - 0.03 + 0.022 * i, 0.045 + 0.03 * k, front), (x - 0.014 + 0.022 * i,
                     0.065 + 0.03 * k, front + 0.0012)), of=keys)  # fmt: skip
-    for a, b in product((-w / 2 + 0.05, w / 2 - 0.05), (-d / 2 + 0.04, front - 0.06)):
+    for a, b in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.04, front - 0.06)):
         m.add(cylinder(0.014, 0, 0.0125, n=10), at=(a, 0, b), of=RUBBER)

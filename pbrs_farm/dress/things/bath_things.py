@@ -21,19 +21,16 @@ def toiletries(m: Maker) -> None:
             (0.9, 0.9, 0.88) if m.chance(0.6) else (0.1, 0.1, 0.1), 0.35))  # fmt: skip
         x += r
         with m.moved(at=(x, 0.0, m.uniform(-0.02, 0.02))):
-            # The cap begins just above the bottle, so that no faces coincide.
             match form:
-                case 0 | 1:
+                case 0 | 1:  # the cap begins just above the bottle, so that no faces coincide
                     m.add(turned(scaled(r, tall,
                         [(0, 0), (1, 0), (1, 0.78), (0.5, 0.84), (0, 0.84)]), n=14), of=side)  # fmt: skip
                     m.add(cylinder(r * 0.55, tall * 0.8402, tall, n=12), of=cap)
-                case 2:
-                    # A tube on its cap.
+                case 2:  # a tube on its cap
                     m.add(cylinder(r * 0.8, 0, 0.022, n=14), of=cap)
                     m.add(loft(rings(oval, [(2 * r, 2 * r, 0.0222), (2 * r, 1.6 * r, tall * 0.5),
                         (2 * r, 0.008, tall * 0.8), (2 * r, 0.004, tall * 0.9)], n=16)), of=side)  # fmt: skip
-                case 3:
-                    # With a pump.
+                case 3:  # with a pump
                     m.add(turned(scaled(r, tall,
                         [(0, 0), (1, 0), (1, 0.7), (0.4, 0.78), (0, 0.78)]), n=14), of=side)  # fmt: skip
                     m.add(turned([(0, tall * 0.7802), (r * 0.4, tall * 0.7802),
@@ -41,18 +38,15 @@ def toiletries(m: Maker) -> None:
                         (0, tall * 0.95)], n=12), of=cap)  # fmt: skip
                     m.add(bevelled((-0.007, tall * 0.95, -0.007), (0.007, tall, 0.035), 0.002),
                         of=cap)  # fmt: skip
-                case 4:
-                    # A jar of cream.
+                case 4:  # a jar of cream
                     m.add(cylinder(r, 0, 0.03, n=18), of=side)
                     m.add(cylinder(r * 1.02, 0.0302, 0.046, n=18), of=cap)
-                case 5:
-                    # A can.
+                case 5:  # a can
                     m.add(turned(scaled(r, tall, [(0, 0), (0.8, 0), (0.8, 0.8), (0.5, 0.86),
                         (0, 0.86)]), n=16), of=side)  # fmt: skip
                     m.add(turned(scaled(r, tall, [(0, 0.8602), (0.72, 0.8602), (0.68, 1.04),
                         (0, 1.05)]), n=16), of=cap)  # fmt: skip
-                case 6:
-                    # Scent in square glass.
+                case 6:  # scent in square glass
                     m.add(bevelled((-r * 0.9, 0, -r * 0.6), (r * 0.9, tall * 0.5, r * 0.6), 0.004),
                         of=plain("scent", m.pick((0.85, 0.7, 0.45), (0.75, 0.8, 0.85),
                         (0.85, 0.65, 0.68)), 0.08))  # fmt: skip

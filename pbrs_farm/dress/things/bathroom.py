@@ -45,8 +45,12 @@ from pbrs_farm.dress.things.outlines import bent, d_shape, oval, rect, rings
     size=lambda m: (m.pick(0.36, 0.38, 0.4), m.pick(0.6, 0.64, 0.66, 0.7),
     m.pick(0.76, 0.8, 0.82, 0.86, 1.0)))  # fmt: skip
 def toilet(m: Maker, size: Size) -> None:
-    """A toilet: a cistern on it, one that stands out of the wall, a box behind it, or a high cistern."""
+    """A toilet.
+
+    A cistern on it, one that stands out of the wall, a box behind it, or a high cistern.
+    """
     w, d, h = size
+    hw = w / 2
     back = -d / 2
     form = 3 if h > 0.9 else m.weighted(0.45, 0.3, 0.25)
     tank = 0.17 if form != 1 else 0.14
@@ -87,9 +91,9 @@ def toilet(m: Maker, size: Size) -> None:
                 power=power)))  # fmt: skip
     button = m.pick(CHROME, CHROME, WHITE_STEEL, BLACK_STEEL)
     match form:
-        case 0:
+        case 0:  # a cistern on the bowl
             r = m.pick(0.02, 0.04, 0.07)
-            m.add(rounded((-w / 2, rim - 0.02, back), (w / 2, h - 0.035, back + tank), r, n=2),
+            m.add(rounded((-hw, rim - 0.02, back), (hw, h - 0.035, back + tank), r, n=2),
                 of=CERAMIC)  # fmt: skip
             m.add(loft([(rect(w - 0.005, tank + 0.005, r, z=back + tank / 2), h - 0.045),
                 (rect(w, tank + 0.008, r, z=back + tank / 2 + 0.001), h - 0.03),
@@ -99,56 +103,57 @@ def toilet(m: Maker, size: Size) -> None:
                 m.add(frustum((0.022, h - 0.003), (0.02, h), n=16), at=(0.0, 0.0, back + tank / 2),
                     of=button)  # fmt: skip
             else:
-                m.add(tube([(-w / 2 + 0.06, h - 0.09, back + tank - 0.005),
-                    (-w / 2 + 0.06, h - 0.09, back + tank + 0.02),
-                    (-w / 2 + 0.13, h - 0.1, back + tank + 0.025)], 0.006, n=8), of=button)  # fmt: skip
-        case 1:
-            # A panel of glass or stone with a plate, in front of the pipes.
-            m.add(bevelled((-w / 2, 0.0, back), (w / 2, h, back + tank), 0.004), of=m.pick(WHITE,
+                m.add(tube([(-hw + 0.06, h - 0.09, back + tank - 0.005),
+                    (-hw + 0.06, h - 0.09, back + tank + 0.02),
+                    (-hw + 0.13, h - 0.1, back + tank + 0.025)], 0.006, n=8), of=button)  # fmt: skip
+        case 1:  # a panel of glass or stone with a plate, in front of the pipes
+            m.add(bevelled((-hw, 0.0, back), (hw, h, back + tank), 0.004), of=m.pick(WHITE,
                 m.timber, glossy("panel", (0.15, 0.15, 0.16), 0.3)))  # fmt: skip
             m.add(bevelled((-0.11, h - 0.2, back + tank), (0.11, h - 0.06, back + tank + 0.01),
                 0.002), of=button)  # fmt: skip
             for a, b in ((-0.1, 0.02), (0.028, 0.1)):
                 m.add(bevelled((a, h - 0.19, back + tank + 0.01),
                     (b, h - 0.07, back + tank + 0.014), 0.002), of=button)  # fmt: skip
-        case 2:
-            # A round tank of the bowl's own form.
+        case 2:  # a round tank of the bowl's own form
             m.add(loft(rings(d_shape, [(w * 0.92, tank, 0.2), (w, tank, rim),
                 (w, tank + 0.01, h - 0.03), (w * 0.96, tank, h - 0.005),
                 (w * 0.85, tank * 0.85, h - 0.0005)], back=back, share=0.5)), of=CERAMIC)  # fmt: skip
             m.add(frustum((0.025, h - 0.002), (0.023, h), n=16), at=(0.0, 0.0, back + tank / 2),
                 of=button)  # fmt: skip
-        case 3:
+        case 3:  # a high cistern with a chain
             m.add(tube([(0.0, 0.25, back + 0.05), (0.0, h - 0.2, back + 0.05)], 0.022, n=10),
                 of=CHROME)  # fmt: skip
-            m.add(rounded((-w / 2, h - 0.28, back), (w / 2, h - 0.03, back + 0.17), 0.03, n=2),
+            m.add(rounded((-hw, h - 0.28, back), (hw, h - 0.03, back + 0.17), 0.03, n=2),
                 of=CERAMIC)  # fmt: skip
-            m.add(bevelled((-w / 2, h - 0.03, back), (w / 2, h, back + 0.175), 0.006), of=CERAMIC)
-            m.add(tube([(w / 2 - 0.03, h - 0.26, back + 0.176),
-                (w / 2 - 0.03, h - 0.6, back + 0.176)], 0.002, n=5), of=CHROME)  # fmt: skip
+            m.add(bevelled((-hw, h - 0.03, back), (hw, h, back + 0.175), 0.006), of=CERAMIC)
+            m.add(tube([(hw - 0.03, h - 0.26, back + 0.176), (hw - 0.03, h - 0.6, back + 0.176)],
+                0.002, n=5), of=CHROME)  # fmt: skip
             m.add(frustum((0.012, 0.0), (0.007, 0.06), n=10),
-                at=(w / 2 - 0.03, h - 0.66, back + 0.176), of=m.timber)  # fmt: skip
+                at=(hw - 0.03, h - 0.66, back + 0.176), of=m.timber)  # fmt: skip
 
 
-def basin_tap(m: Maker, y: float, z: float, stuff: Material) -> None:
-    """A mixer on a basin's rim at y, its spout towards +z: a lever, a cube, an arch, or a pillar with two handles."""
+def basin_tap(m: Maker, y: float, z: float, material: Material) -> None:
+    """A mixer on a basin's rim at y, its spout towards +z.
+
+    A lever, a cube, an arch, or a pillar with two handles.
+    """
     form = m.weighted(0.4, 0.2, 0.25, 0.15)
-    with m.of(stuff):
+    with m.of(material):
         m.add(frustum((0.026, y), (0.024, y + 0.008), n=18), at=(0.0, 0.0, z))
         match form:
-            case 0:
+            case 0:  # one lever
                 m.add(tube([(0.0, y, z), (0.0, y + 0.11, z)], 0.02, n=14))
                 m.add(tube([(0.0, y + 0.07, z), (0.0, y + 0.085, z + 0.12)], 0.012, n=10))
                 m.add(tube([(0.0, y + 0.112, z - 0.01), (0.0, y + 0.135, z + 0.07)], 0.007, n=8))
-            case 1:
+            case 1:  # cubes
                 m.add(bevelled((-0.022, y, z - 0.022), (0.022, y + 0.1, z + 0.022), 0.002))
                 m.add(bevelled((-0.018, y + 0.065, z), (0.018, y + 0.09, z + 0.13), 0.002))
                 m.add(bevelled((-0.016, y + 0.105, z - 0.02), (0.016, y + 0.115, z + 0.06), 0.002))
-            case 2:
+            case 2:  # an arch
                 m.add(tube(bent([(0.0, y, z), (0.0, y + 0.15, z), (0.0, y + 0.15, z + 0.12),
                     (0.0, y + 0.1, z + 0.12)], 0.06, n=6), 0.01, n=10))  # fmt: skip
                 m.add(tube([(0.0, y + 0.04, z), (0.07, y + 0.05, z)], 0.006, n=8))
-            case 3:
+            case 3:  # a pillar with two handles
                 m.add(tube(bent([(0.0, y, z), (0.0, y + 0.1, z), (0.0, y + 0.1, z + 0.11),
                     (0.0, y + 0.07, z + 0.11)], 0.03, n=3), 0.012, n=10))  # fmt: skip
                 for x in (-0.08, 0.08):
@@ -158,10 +163,13 @@ def basin_tap(m: Maker, y: float, z: float, stuff: Material) -> None:
 
 
 def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, deep: float) -> None:
-    """A basin from y - deep to y, its back at `back`; form: rectangle, round front, oval, or shell."""
+    """A basin from y - deep to y, its back at `back`; form.
+
+    Rectangle, round front, oval, or shell.
+    """
     z = back + d / 2
     match form:
-        case 0:
+        case 0:  # a rectangle
             m.add(loft([(rect(w * 0.8, d * 0.8, 0.05, z=z), y - deep),
                 (rect(w * 0.97, d * 0.97, 0.04, z=z), y - 0.3 * deep),
                 (rect(w, d, 0.02, z=z), y - 0.02), (rect(w, d, 0.02, z=z), y - 0.004),
@@ -169,7 +177,7 @@ def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, d
                 (rect(w - 0.08, d - 0.15, 0.04, z=z + 0.035), y - 0.002),
                 (rect(w - 0.12, d - 0.19, 0.05, z=z + 0.035), y - 0.7 * deep),
                 (rect(w * 0.4, d * 0.3, 0.05, z=z + 0.03), y - 0.82 * deep)]), of=CERAMIC)  # fmt: skip
-        case 1:
+        case 1:  # straight at the back, round in front
             m.add(loft([(d_shape(w * 0.6, d * 0.6, back=back), y - deep),
                 (d_shape(w * 0.92, d * 0.94, back=back), y - 0.4 * deep),
                 (d_shape(w, d, back=back), y - 0.03), (d_shape(w, d, back=back), y - 0.005),
@@ -177,7 +185,7 @@ def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, d
                 (d_shape(w - 0.09, d - 0.15, back=back + 0.11), y - 0.003),
                 (d_shape(w - 0.14, d - 0.19, back=back + 0.12), y - 0.6 * deep),
                 (d_shape(w * 0.4, d * 0.3, back=back + 0.18), y - 0.8 * deep)]), of=CERAMIC)  # fmt: skip
-        case 2:
+        case 2:  # an oval
             m.add(loft(rings(oval, [(w * 0.55, d * 0.55, y - deep),
                 (w * 0.95, d * 0.95, y - 0.35 * deep), (w, d, y - 0.012), (w - 0.008, d - 0.008, y),
                 (w - 0.03, d - 0.03, y - 0.003), (w * 0.85, d * 0.85, y - 0.5 * deep),
@@ -190,9 +198,13 @@ def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, d
     variants=28, size=lambda m: (m.pick(0.5, 0.6, 0.6, 0.7, 0.8, 0.9), m.pick(0.42, 0.45, 0.48),
     m.pick(0.98, 1.0, 1.02)))  # fmt: skip
 def vanity(m: Maker, size: Size) -> None:
-    """A basin in a cupboard: doors or drawers, on legs, a plinth or the wall, its bowl sunk in or on top."""
+    """A basin in a cupboard.
+
+    Doors or drawers, on legs, a plinth or the wall, its bowl sunk in or on top.
+    """
     w, d, h = size
-    back, y = -d / 2, 0.84
+    hw, hd = w / 2, d / 2
+    back, y = -hd, 0.84
     tap, on_top = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, BRASS), m.chance(0.35)
     look = Look(m.pick("flat", "flat", "shaker", "grooved"),
         m.pick(m.timber, WHITE, glossy("front", m.paint(), 0.35)), WHITE, m.timber,
@@ -201,11 +213,9 @@ def vanity(m: Maker, size: Size) -> None:
     legs = m.weighted(0.4, 0.3, 0.3)
     low = m.pick(0.25, 0.3) if legs == 0 else 0.14 if legs == 1 else 0.0
     if legs == 0:
-        m.add(bevelled((-w / 2 + 0.02, low, back), (w / 2 - 0.02, top, d / 2 - 0.05), 0.002),
-            of=look.front)  # fmt: skip
+        m.add(bevelled((-hw + 0.02, low, back), (hw - 0.02, top, hd - 0.05), 0.002), of=look.front)
     else:
-        m.add(bevelled((-w / 2 + 0.02, low, back), (w / 2 - 0.02, top, d / 2 - 0.05), 0.002),
-            of=look.front)  # fmt: skip
+        m.add(bevelled((-hw + 0.02, low, back), (hw - 0.02, top, hd - 0.05), 0.002), of=look.front)
     # What seems to float is held by a strip at the wall.
     match legs:
         case 0:
@@ -215,15 +225,13 @@ def vanity(m: Maker, size: Size) -> None:
                 four_legs(m, m.pick("square", "tapered", "round"), w - 0.04, d - 0.06, low + 0.001,
                     0.035, 0.03, 0.0, m.pick(m.timber, BLACK_STEEL))  # fmt: skip
         case 2:
-            m.add(slab((-w / 2 + 0.03, -0.0001, back), (w / 2 - 0.03, 0.08, d / 2 - 0.09)),
-                of=look.body)  # fmt: skip
+            m.add(slab((-hw + 0.03, -0.0001, back), (hw - 0.03, 0.08, hd - 0.09)), of=look.body)
     n = 2 if w > 0.62 else 1
-    fronts_of(m, look, (-w / 2 + 0.02, w / 2 - 0.02),
-        (low + (0.08 if legs == 2 else 0.0), top - 0.002), d / 2 - 0.05, m.pick([("door",)] * n,
-        [("drawer", "drawer")],
+    fronts_of(m, look, (-hw + 0.02, hw - 0.02), (low + (0.08 if legs == 2 else 0.0), top - 0.002),
+        hd - 0.05, m.pick([("door",)] * n, [("drawer", "drawer")],
         [("drawer",), ("drawer", "drawer")] if n > 1 else [("low", "drawer")]), False)  # fmt: skip
     if on_top:
-        m.add(bevelled((-w / 2, top, back), (w / 2, top + 0.03, d / 2), 0.003), of=m.pick(m.timber,
+        m.add(bevelled((-hw, top, back), (hw, top + 0.03, hd), 0.003), of=m.pick(m.timber,
             glossy("stone", (0.85, 0.84, 0.81), 0.3), glossy("stone", (0.2, 0.2, 0.21), 0.3)))  # fmt: skip
         basin_bowl(m, m.pick(2, 2, 0), min(0.42, w - 0.08), min(0.36, d - 0.08),
             back + d - min(0.36, d - 0.08) - 0.02, top + 0.15, 0.119)  # fmt: skip
@@ -246,14 +254,14 @@ def pedestal_basin(m: Maker, size: Size) -> None:
     column = m.weighted(0.4, 0.3, 0.3)
     with m.of(CERAMIC), m.moved(at=(0.0, 0.0, back + 0.12)):
         match column:
-            case 0:
+            case 0:  # oval
                 m.add(loft(rings(oval, [(0.2 * s, 0.18, 0.0), (0.19 * s, 0.17, 0.02),
                     (0.13 * s, 0.13, 0.14), (0.13 * s, 0.13, 0.5), (0.2 * s, 0.18, y - 0.14)])))  # fmt: skip
-            case 1:
+            case 1:  # square
                 m.add(loft(rings(rect, [(0.2 * s, 0.18, 0.02, 0.0), (0.2 * s, 0.18, 0.02, 0.04),
                     (0.15 * s, 0.14, 0.02, 0.06), (0.16 * s, 0.14, 0.02, 0.5),
                     (0.2 * s, 0.18, 0.02, y - 0.14)])))  # fmt: skip
-            case 2:
+            case 2:  # turned
                 m.add(turned([(0.0, 0.0), (0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07),
                     (0.06 * s, 0.4), (0.075 * s, 0.6), (0.1 * s, y - 0.15), (0.0, y - 0.15)], n=22))  # fmt: skip
     basin_tap(m, y - 0.003, back + 0.06, tap)
@@ -283,39 +291,40 @@ def wall_basin(m: Maker, size: Size) -> None:
     size=lambda m: (m.pick(1.5, 1.6, 1.7, 1.7, 1.8), m.pick(0.7, 0.75, 0.8),
     m.pick(0.6, 0.62, 0.65)))  # fmt: skip
 def bathtub(m: Maker, size: Size) -> None:
-    """A bath: built in behind a panel, or free on its own, on feet or a plinth; taps at one end or the long side."""
+    """A bath.
+
+    Built in behind a panel, or free on its own, on feet or a plinth; taps at one end or the long side.
+    """
     w, d, h = size
+    hw, hd = w / 2, d / 2
     form = m.weighted(0.55, 0.25, 0.2)
     tap = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, BRASS)
     colour = CERAMIC if m.chance(0.85) else glossy("enamel", m.any_colour(), 0.2)
     side = m.pick(-1.0, 1.0)
     p = m.pick(3.0, 4.0, 6.0, 9.0)
     has_tap = form == 0 or m.chance(0.4)
-    # The told height is that of its taps.
+    # Its height is that of the taps.
     h = h - 0.092 if has_tap else h
-    # Built in: an apron of panels, a rim, the hollow.
     match form:
-        case 0:
+        case 0:  # built in: an apron of panels, a rim, the hollow
             apron = m.pick(WHITE, WHITE, m.timber, glossy("panel", m.paint(), 0.35))
-            m.add(slab((-w / 2 + 0.012, 0.0, -d / 2 + 0.012), (w / 2 - 0.012, 0.12, d / 2 - 0.05)),
-                of=apron)  # fmt: skip
-            for x in (-w / 2 + 0.012, w / 2 - 0.028):
-                m.add(bevelled((x, 0.0, -d / 2 + 0.012), (x + 0.016, h - 0.04, d / 2 - 0.05),
-                    0.003), of=apron)  # fmt: skip
+            m.add(slab((-hw + 0.012, 0.0, -hd + 0.012), (hw - 0.012, 0.12, hd - 0.05)), of=apron)
+            for x in (-hw + 0.012, hw - 0.028):
+                m.add(bevelled((x, 0.0, -hd + 0.012), (x + 0.016, h - 0.04, hd - 0.05), 0.003),
+                    of=apron)  # fmt: skip
             if m.chance(0.5):
-                m.add(bevelled((-w / 2 + 0.01, 0.0, d / 2 - 0.05),
-                    (w / 2 - 0.01, h - 0.04, d / 2 - 0.012), 0.003), of=apron)  # fmt: skip
+                m.add(bevelled((-hw + 0.01, 0.0, hd - 0.05), (hw - 0.01, h - 0.04, hd - 0.012),
+                    0.003), of=apron)  # fmt: skip
             else:
                 for k in range(m.pick(3, 4, 10)):
-                    m.add(bevelled((-w / 2 + 0.01 + k * (w - 0.02) / 10, 0.0, d / 2 - 0.05),
-                        (-w / 2 + 0.01 + (k + 1) * (w - 0.02) / 10, h - 0.04, d / 2 - 0.012),
-                        0.003), of=apron)  # fmt: skip
-                m.add(slab((-w / 2 + 0.01, 0.0, d / 2 - 0.052),
-                    (w / 2 - 0.01, h - 0.04, d / 2 - 0.022)), of=apron)  # fmt: skip
+                    m.add(bevelled((-hw + 0.01 + k * (w - 0.02) / 10, 0.0, hd - 0.05),
+                        (-hw + 0.01 + (k + 1) * (w - 0.02) / 10, h - 0.04, hd - 0.012), 0.003),
+                        of=apron)  # fmt: skip
+                m.add(slab((-hw + 0.01, 0.0, hd - 0.052), (hw - 0.01, h - 0.04, hd - 0.022)),
+                    of=apron)  # fmt: skip
             with m.of(colour):
                 bath_hollow(m, w, d, h, p)
-        case 1:
-            # Free: a shell that swells.
+        case 1:  # free: a shell that swells
             m.add(loft([(oval(w * 0.72, d * 0.6, n=36, power=p), 0.0),
                 (oval(w * 0.84, d * 0.8, n=36, power=p), 0.12),
                 (oval(w * 0.96, d * 0.96, n=36, power=p), h - 0.08),
@@ -324,8 +333,7 @@ def bathtub(m: Maker, size: Size) -> None:
                 (oval(w - 0.06, d - 0.06, n=36, power=p), h - 0.006),
                 (oval(w * 0.84, d * 0.8, n=36, power=p), 0.26),
                 (oval(w * 0.6, d * 0.5, n=36, power=3.0), 0.15)]), of=colour)  # fmt: skip
-        case 2:
-            # On feet.
+        case 2:  # on feet
             m.add(loft(rings(oval, [(w * 0.6, d * 0.5, 0.12), (w * 0.84, d * 0.8, 0.2),
                 (w * 0.95, d * 0.94, h - 0.1), (w * 0.96, d * 0.95, h - 0.03), (w, d, h - 0.015),
                 (w * 0.985, d * 0.97, h), (w * 0.93, d * 0.87, h - 0.01), (w * 0.84, d * 0.78, 0.3),
@@ -340,7 +348,7 @@ def bathtub(m: Maker, size: Size) -> None:
         with (
             m.of(tap),
             m.moved(
-                at=(side * (w / 2 - (0.06 if form == 0 else 0.025)), h - 0.012, 0.0),
+                at=(side * (hw - (0.06 if form == 0 else 0.025)), h - 0.012, 0.0),
                 turn=rotation_y(-side * pi / 2),
             ),
         ):
@@ -368,9 +376,13 @@ def bath_hollow(m: Maker, w: float, d: float, h: float, p: float) -> None:
     size=lambda m: (m.pick(0.8, 0.9, 0.9, 1.0), m.pick(0.8, 0.8, 0.9, 1.0),
     m.pick(1.95, 2.0, 2.05)))  # fmt: skip
 def shower(m: Maker, size: Size) -> None:
-    """A shower in a corner: a tray, panes with or without frames, a door or a curtain, a rail with its head."""
+    """A shower in a corner.
+
+    A tray, panes with or without frames, a door or a curtain, a rail with its head.
+    """
     w, d, h = size
-    metal_of = m.pick(CHROME, CHROME, BLACK_STEEL, WHITE_STEEL, STEEL)
+    hw, hd = w / 2, d / 2
+    fittings = m.pick(CHROME, CHROME, BLACK_STEEL, WHITE_STEEL, STEEL)
     pane = m.pick(CLEAR, CLEAR, FROSTED)
     tray = m.pick(0.04, 0.06, 0.14)
     m.add(loft(rings(rect, [(w, d, 0.02, 0.0), (w, d, 0.02, tray - 0.004),
@@ -382,48 +394,47 @@ def shower(m: Maker, size: Size) -> None:
     top = h - 0.002
     if form < 2:
         # Panes on the left and right, a door in the front.
-        for x in (-w / 2 + 0.012, w / 2 - 0.012):
-            m.add(slab((x - 0.004, tray, -d / 2 + 0.01), (x + 0.004, top, d / 2 - 0.02)), of=pane)
-            for z in (-d / 2 + 0.002, d / 2 - 0.024):
+        for x in (-hw + 0.012, hw - 0.012):
+            m.add(slab((x - 0.004, tray, -hd + 0.01), (x + 0.004, top, hd - 0.02)), of=pane)
+            for z in (-hd + 0.002, hd - 0.024):
                 m.add(bevelled((x - 0.012, tray, z), (x + 0.012, top, z + 0.022), 0.002),
-                    of=metal_of)  # fmt: skip
+                    of=fittings)  # fmt: skip
             if form == 0:
-                m.add(bevelled((x - 0.012, top - 0.022, -d / 2 + 0.02),
-                    (x + 0.012, h, d / 2 - 0.02), 0.002), of=metal_of)  # fmt: skip
+                m.add(bevelled((x - 0.012, top - 0.022, -hd + 0.02), (x + 0.012, h, hd - 0.02),
+                    0.002), of=fittings)  # fmt: skip
         cut = m.pick(0.0, 0.0, 0.15) * w
-        for a, b, z in ((-w / 2 + 0.02, cut + 0.01, d / 2 - 0.008),
-            (cut - 0.01, w / 2 - 0.02, d / 2 - 0.02)):  # fmt: skip
+        for a, b, z in ((-hw + 0.02, cut + 0.01, hd - 0.008), (cut - 0.01, hw - 0.02, hd - 0.02)):
             m.add(slab((a, tray + 0.01, z - 0.004), (b, top, z + 0.003)), of=pane)
             if form == 0:
                 for x in (a, b - 0.018):
                     m.add(bevelled((x, tray + 0.005, z - 0.008), (x + 0.018, top, z + 0.006),
-                        0.002), of=metal_of)  # fmt: skip
-        m.add(bevelled((-w / 2, h - 0.03, d / 2 - 0.03), (w / 2, h, d / 2), 0.002), of=metal_of)
+                        0.002), of=fittings)  # fmt: skip
+        m.add(bevelled((-hw, h - 0.03, hd - 0.03), (hw, h, hd), 0.002), of=fittings)
         if form == 0:
-            m.add(bevelled((-w / 2, tray - 0.002, d / 2 - 0.03), (w / 2, tray + 0.02, d / 2),
-                0.002), of=metal_of)  # fmt: skip
-        m.add(tube(bent([(cut - 0.05, 0.9, d / 2 - 0.004), (cut - 0.05, 0.9, d / 2 + 0.016),
-            (cut - 0.05, 1.25, d / 2 + 0.016), (cut - 0.05, 1.25, d / 2 - 0.004)], 0.01, n=2),
-            0.007, n=8), of=metal_of)  # fmt: skip
+            m.add(bevelled((-hw, tray - 0.002, hd - 0.03), (hw, tray + 0.02, hd), 0.002),
+                of=fittings)  # fmt: skip
+        m.add(tube(bent([(cut - 0.05, 0.9, hd - 0.004), (cut - 0.05, 0.9, hd + 0.016),
+            (cut - 0.05, 1.25, hd + 0.016), (cut - 0.05, 1.25, hd - 0.004)], 0.01, n=2), 0.007,
+            n=8), of=fittings)  # fmt: skip
     else:
         # A curtain that hangs from a rail round two sides.
-        m.add(tube(bent([(-w / 2 + 0.012, h - 0.03, -d / 2),
-            (-w / 2 + 0.012, h - 0.03, d / 2 - 0.012), (w / 2 - 0.012, h - 0.03, d / 2 - 0.012),
-            (w / 2 - 0.012, h - 0.03, -d / 2)], 0.08, n=4), 0.011, n=8), of=metal_of)  # fmt: skip
+        m.add(tube(bent([(-hw + 0.012, h - 0.03, -hd), (-hw + 0.012, h - 0.03, hd - 0.012),
+            (hw - 0.012, h - 0.03, hd - 0.012), (hw - 0.012, h - 0.03, -hd)], 0.08, n=4), 0.011,
+            n=8), of=fittings)  # fmt: skip
         weave = plain("curtain fabric", mix(m.any_colour(), (0.93, 0.93, 0.92),
             m.pick(0.3, 0.8, 0.95)), 0.7)  # fmt: skip
         wide = m.uniform(0.35, 0.7) * w
         m.add(hanging(wide, h - tray - 0.07, 0.05, 0.003, m.pick(5.0, 6.0, 7.0)),
-            at=(-w / 2 + 0.07 + wide / 2, tray + 0.03, d / 2 - 0.03), of=weave)  # fmt: skip
+            at=(-hw + 0.07 + wide / 2, tray + 0.03, hd - 0.03), of=weave)  # fmt: skip
         if m.chance(0.7):
             m.add(hanging(0.55 * d, h - tray - 0.07, 0.045, 0.003, 6.0), turn=rotation_y(pi / 2),
-                at=(w / 2 - 0.03, tray + 0.03, 0.1 * d), of=weave)  # fmt: skip
-        for x in (-w / 2, w / 2):
-            m.add(slab((x - 0.002 if x > 0 else x, h - 0.06, -d / 2),
-                (x if x > 0 else x + 0.002, h, -d / 2 + 0.05)), of=metal_of)  # fmt: skip
+                at=(hw - 0.03, tray + 0.03, 0.1 * d), of=weave)  # fmt: skip
+        for x in (-hw, hw):
+            m.add(slab((x - 0.002 if x > 0 else x, h - 0.06, -hd),
+                (x if x > 0 else x + 0.002, h, -hd + 0.05)), of=fittings)  # fmt: skip
     # The rail on the back wall: head, hose, mixer.
-    with m.of(metal_of):
-        x, z = m.pick(0.0, -0.2, 0.2) * w, -d / 2 + 0.045
+    with m.of(fittings):
+        x, z = m.pick(0.0, -0.2, 0.2) * w, -hd + 0.045
         if m.chance(0.5):
             m.add(tube(bent([(x, 1.0, z), (x, h - 0.12, z), (x, h - 0.12, z + 0.36),
                 (x, h - 0.15, z + 0.36)], 0.05, n=4), 0.011, n=10))  # fmt: skip
@@ -438,4 +449,4 @@ def shower(m: Maker, size: Size) -> None:
                 (x + 0.09, 0.75, z + 0.02), (x + 0.08, 1.05, z)], 0.1, n=5), 0.006, n=6))  # fmt: skip
         m.add(tube([(x - 0.1, 1.05, z), (x + 0.1, 1.05, z)], 0.02, n=12))
         for e in (-0.075, 0.075):
-            m.add(tube([(x + e, 1.05, -d / 2), (x + e, 1.05, z)], 0.014, n=8))
+            m.add(tube([(x + e, 1.05, -hd), (x + e, 1.05, z)], 0.014, n=8))

@@ -17,7 +17,11 @@ from pbrs_farm.dress.things.outlines import bent
 
 
 def bed_of(m: Maker, w: float, d: float, h: float, n: int) -> None:
-    """A bed w by d, its head h high: frame, mattress, duvet, throw, pillows; n: how many sleep in it."""
+    """A bed w by d, its head h high.
+
+    Frame, mattress, duvet, throw, pillows; n: how many sleep in it.
+    """
+    hw, hd = w / 2, d / 2
     frame = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4),
         m.cloth())  # fmt: skip
     head = m.pick("panel", "slats", "soft", "channels", "buttons", "metal", "boards", "low")
@@ -27,78 +31,77 @@ def bed_of(m: Maker, w: float, d: float, h: float, n: int) -> None:
     side, rest = m.uniform(0.26, 0.34), m.uniform(0.16, 0.22)
     low = side - 0.14 if under == "legs" else 0.03
     top = side - 0.04 + rest
-    a, b = -d / 2 + 0.07, d / 2
+    a, b = -hd + 0.07, hd
     # The frame: two sides, a foot, slats' board.
     with m.of(body):
-        for x in (-w / 2, w / 2 - 0.03):
+        for x in (-hw, hw - 0.03):
             m.add(bevelled((x, low, a - 0.01), (x + 0.03, side, b - 0.03), 0.004))
-        m.add(bevelled((-w / 2, low, b - 0.03), (w / 2,
+        m.add(bevelled((-hw, low, b - 0.03), (hw,
             side + (0.12 if head == "metal" and m.chance(0.5) else 0.0), b), 0.004))  # fmt: skip
-        m.add(slab((-w / 2 + 0.03, side - 0.09, a), (w / 2 - 0.03, side - 0.05, b - 0.03)))
+        m.add(slab((-hw + 0.03, side - 0.09, a), (hw - 0.03, side - 0.05, b - 0.03)))
         if under == "legs":
-            for x, z in product((-w / 2 + 0.05, w / 2 - 0.05), (a + 0.03, b - 0.05)):
+            for x, z in product((-hw + 0.05, hw - 0.05), (a + 0.03, b - 0.05)):
                 leg(m, m.pick("square", "square", "tapered") if head != "metal" else "round",
                     (x, z), (x, z), low + 0.001, 0.055 if head != "metal" else 0.035, body)  # fmt: skip
         if under != "legs":
-            m.add(slab((-w / 2 + 0.04, 0.0, a), (w / 2 - 0.04, low + 0.001, b - 0.04)))
+            m.add(slab((-hw + 0.04, 0.0, a), (hw - 0.04, low + 0.001, b - 0.04)))
         if under == "drawers":
             for k in range(2):
-                m.add(bevelled((w / 2 - 0.001, low + 0.03, a + 0.08 + k * (d - 0.2) / 2),
-                    (w / 2 + 0.012, side - 0.03, a + 0.06 + (k + 1) * (d - 0.2) / 2), 0.002))  # fmt: skip
+                m.add(bevelled((hw - 0.001, low + 0.03, a + 0.08 + k * (d - 0.2) / 2), (hw + 0.012,
+                    side - 0.03, a + 0.06 + (k + 1) * (d - 0.2) / 2), 0.002))  # fmt: skip
     # The head.
     match head:
         case "panel" | "low":
-            m.add(bevelled((-w / 2, low, -d / 2 + 0.02), (w / 2, h, a), 0.006), of=frame)
+            m.add(bevelled((-hw, low, -hd + 0.02), (hw, h, a), 0.006), of=frame)
         case "boards":
             with m.of(frame):
                 for k in range(4):
-                    m.add(bevelled((-w / 2, side - 0.1 + k * (h - side + 0.1) / 4, -d / 2 + 0.03),
-                        (w / 2, side - 0.1 + (k + 1) * (h - side + 0.1) / 4 - 0.012, a - 0.005),
-                        0.004))  # fmt: skip
-                for x in (-w / 2, w / 2 - 0.06):
-                    m.add(bevelled((x, 0.0, -d / 2 + 0.005), (x + 0.06, h, -d / 2 + 0.03), 0.003))
+                    m.add(bevelled((-hw, side - 0.1 + k * (h - side + 0.1) / 4, -hd + 0.03), (hw,
+                        side - 0.1 + (k + 1) * (h - side + 0.1) / 4 - 0.012, a - 0.005), 0.004))  # fmt: skip
+                for x in (-hw, hw - 0.06):
+                    m.add(bevelled((x, 0.0, -hd + 0.005), (x + 0.06, h, -hd + 0.03), 0.003))
         case "slats":
             with m.of(frame):
-                for x in (-w / 2, w / 2 - 0.05):
-                    m.add(bevelled((x, 0.0, -d / 2 + 0.02), (x + 0.05, h, a), 0.004))
-                m.add(bevelled((-w / 2 + 0.05, h - 0.08, -d / 2 + 0.025),
-                    (w / 2 - 0.05, h - 0.01, a - 0.005), 0.004))  # fmt: skip
-                m.add(bevelled((-w / 2 + 0.05, side, -d / 2 + 0.025),
-                    (w / 2 - 0.05, side + 0.06, a - 0.005), 0.004))  # fmt: skip
+                for x in (-hw, hw - 0.05):
+                    m.add(bevelled((x, 0.0, -hd + 0.02), (x + 0.05, h, a), 0.004))
+                m.add(bevelled((-hw + 0.05, h - 0.08, -hd + 0.025),
+                    (hw - 0.05, h - 0.01, a - 0.005), 0.004))  # fmt: skip
+                m.add(bevelled((-hw + 0.05, side, -hd + 0.025), (hw - 0.05, side + 0.06, a - 0.005),
+                    0.004))  # fmt: skip
                 n_slats = round(w / 0.13)
                 for k in range(n_slats):
-                    m.add(bevelled((-w / 2 + 0.06 + (w - 0.12) * (k + 0.25) / n_slats, side + 0.06,
-                        -d / 2 + 0.035), (-w / 2 + 0.06 + (w - 0.12) * (k + 0.75) / n_slats, h - 0.08,
+                    m.add(bevelled((-hw + 0.06 + (w - 0.12) * (k + 0.25) / n_slats, side + 0.06,
+                        -hd + 0.035), (-hw + 0.06 + (w - 0.12) * (k + 0.75) / n_slats, h - 0.08,
                         a - 0.012), 0.002))  # fmt: skip
         case "soft" | "channels" | "buttons":
             with m.of(frame if head == "soft" else m.cloth()):
                 if head == "channels":
                     n_slats = round(w / 0.14)
                     for k in range(n_slats):
-                        m.add(rounded((-w / 2 + w * k / n_slats + 0.001, low, -d / 2),
-                            (-w / 2 + w * (k + 1) / n_slats - 0.001, h, a + 0.02), 0.04, n=1))  # fmt: skip
+                        m.add(rounded((-hw + w * k / n_slats + 0.001, low, -hd),
+                            (-hw + w * (k + 1) / n_slats - 0.001, h, a + 0.02), 0.04, n=1))  # fmt: skip
                 else:
-                    m.add(rounded((-w / 2, low, -d / 2), (w / 2, h, a + 0.01), 0.03, n=2))
+                    m.add(rounded((-hw, low, -hd), (hw, h, a + 0.01), 0.03, n=2))
                     for k, j in product(range(round(w / 0.22)), range(2)):
                         if head == "buttons":
-                            m.add(sphere((-w / 2 + w * (k + 0.5) / round(w / 0.22),
-                                h - 0.14 - 0.2 * j, a + 0.008), 0.012, n=6))  # fmt: skip
+                            m.add(sphere((-hw + w * (k + 0.5) / round(w / 0.22), h - 0.14 - 0.2 * j,
+                                a + 0.008), 0.012, n=6))  # fmt: skip
         case "metal":
             with m.of(bar):
                 r = 0.016
-                m.add(tube(bent([(-w / 2 + r, 0.0, -d / 2 + 0.03),
-                    (-w / 2 + r, h - r, -d / 2 + 0.03), (w / 2 - r, h - r, -d / 2 + 0.03),
-                    (w / 2 - r, 0.0, -d / 2 + 0.03)], m.pick(0.05, 0.25), n=6), r, n=10))  # fmt: skip
-                m.add(tube([(-w / 2 + r, side + 0.12, -d / 2 + 0.03),
-                    (w / 2 - r, side + 0.12, -d / 2 + 0.03)], 0.01, n=8))  # fmt: skip
+                m.add(tube(bent([(-hw + r, 0.0, -hd + 0.03), (-hw + r, h - r, -hd + 0.03),
+                    (hw - r, h - r, -hd + 0.03), (hw - r, 0.0, -hd + 0.03)], m.pick(0.05, 0.25),
+                    n=6), r, n=10))  # fmt: skip
+                m.add(tube([(-hw + r, side + 0.12, -hd + 0.03), (hw - r, side + 0.12, -hd + 0.03)],
+                    0.01, n=8))  # fmt: skip
                 n_slats = round(w / 0.16)
                 for k in range(1, n_slats):
-                    m.add(tube([(-w / 2 + w * k / n_slats, side + 0.12, -d / 2 + 0.03),
-                        (-w / 2 + w * k / n_slats, h - 2.5 * r, -d / 2 + 0.03)], 0.006, n=6))  # fmt: skip
+                    m.add(tube([(-hw + w * k / n_slats, side + 0.12, -hd + 0.03),
+                        (-hw + w * k / n_slats, h - 2.5 * r, -hd + 0.03)], 0.006, n=6))  # fmt: skip
     # The mattress, and linen on it.
     linen = mix((0.91, 0.9, 0.88), m.textile(3), m.pick(0.0, 0.3, 0.8))
-    m.add(rounded((-w / 2 + 0.035, side - 0.05, a + 0.012), (w / 2 - 0.035, top, b - 0.035), 0.04,
-        n=1), of=plain("mattress fabric", (0.9, 0.89, 0.86), 0.95))  # fmt: skip
+    m.add(rounded((-hw + 0.035, side - 0.05, a + 0.012), (hw - 0.035, top, b - 0.035), 0.04, n=1),
+        of=plain("mattress fabric", (0.9, 0.89, 0.86), 0.95))  # fmt: skip
     duvet, has_throw, p = plain("fabric duvet", linen, 0.95), m.chance(0.5), m.uniform(0.42, 0.5)
     # From below the pillows to the foot, over both sides.
     long = d - 0.07 - 0.05 - p + 0.06

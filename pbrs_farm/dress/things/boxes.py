@@ -31,81 +31,73 @@ from pbrs_farm.dress.things.outlines import bent, oval, rect, ring_path, rings, 
 
 @thing(group="box", nyu40=BOX)
 def storage_box(m: Maker) -> None:
-    """A box: with a lid, of cloth, a crate, round, a tin, with corners of metal, of slats, two on each other."""
+    """A box.
+
+    With a lid, of cloth, a crate, round, a tin, with corners of metal, of slats, two on each other.
+    """
     form = m.integers(0, 11)
     w, h, d = m.uniform(0.2, 0.36), m.uniform(0.1, 0.2), m.uniform(0.16, 0.28)
+    hw, hd = w / 2, d / 2
     colour = m.any_colour()
     card, grain = plain("box", colour, 0.7), plain("box wood", m.wood, 0.6)
     if form < 2:
         lidded_box(m, w, h, d, card, plain("lid",
             shade(colour, 0.9) if form == 0 else m.any_colour(), 0.7))  # fmt: skip
         if form == 1:
-            m.add(slab((-0.04, 0.35 * h, d / 2), (0.04, 0.35 * h + 0.035, d / 2 + 0.002)),
-                of=m.metal)  # fmt: skip
-            m.add(slab((-0.034, 0.35 * h + 0.005, d / 2 + 0.0021),
-                (0.034, 0.35 * h + 0.03, d / 2 + 0.0026)),
-                of=plain("label", (0.92, 0.91, 0.88), 0.8))  # fmt: skip
-    # Of cloth, open, a loop at its front.
+            m.add(slab((-0.04, 0.35 * h, hd), (0.04, 0.35 * h + 0.035, hd + 0.002)), of=m.metal)
+            m.add(slab((-0.034, 0.35 * h + 0.005, hd + 0.0021),
+                (0.034, 0.35 * h + 0.03, hd + 0.0026)), of=plain("label", (0.92, 0.91, 0.88), 0.8))  # fmt: skip
     match form:
-        case 2:
+        case 2:  # of cloth, open, a loop at its front
             m.add(loft(rings(rect, [(w, d, 0.02, 0), (w + 0.004, d + 0.004, 0.02, h),
                 (w - 0.008, d - 0.008, 0.016, h), (w - 0.012, d - 0.012, 0.016, 0.006)], n=3)),
                 of=plain("cloth", colour, 0.95))  # fmt: skip
-            m.add(tube(bent([(-0.05, h * 0.6, d / 2), (-0.045, h * 0.52, d / 2 + 0.025),
-                (0.045, h * 0.52, d / 2 + 0.025), (0.05, h * 0.6, d / 2)], 0.02, n=3), 0.006, n=6),
+            m.add(tube(bent([(-0.05, h * 0.6, hd), (-0.045, h * 0.52, hd + 0.025),
+                (0.045, h * 0.52, hd + 0.025), (0.05, h * 0.6, hd)], 0.02, n=3), 0.006, n=6),
                 of=plain("strap", (0.35, 0.22, 0.13), 0.7))  # fmt: skip
-        case 3:
-            # A crate of slats.
+        case 3:  # a crate of slats
             with m.of(grain):
-                m.add(slab((-w / 2, 0, -d / 2), (w / 2, 0.01, d / 2)))
+                m.add(slab((-hw, 0, -hd), (hw, 0.01, hd)))
                 for k in range(3):
                     y = 0.012 + k * (h - 0.01) / 3
-                    for z in (-d / 2, d / 2 - 0.01):
-                        m.add(bevelled((-w / 2, y, z),
-                            (w / 2, y + (h - 0.01) / 3 - 0.012, z + 0.01), 0.001))  # fmt: skip
-                    for x in (-w / 2, w / 2 - 0.01):
-                        m.add(bevelled((x, y, -d / 2 + 0.0102), (x + 0.01,
-                            y + (h - 0.01) / 3 - 0.012, d / 2 - 0.0102), 0.001))  # fmt: skip
-                for x, z in product((-w / 2 + 0.0102, w / 2 - 0.0302),
-                    (-d / 2 + 0.0102, d / 2 - 0.0302)):  # fmt: skip
+                    for z in (-hd, hd - 0.01):
+                        m.add(bevelled((-hw, y, z), (hw, y + (h - 0.01) / 3 - 0.012, z + 0.01),
+                            0.001))  # fmt: skip
+                    for x in (-hw, hw - 0.01):
+                        m.add(bevelled((x, y, -hd + 0.0102),
+                            (x + 0.01, y + (h - 0.01) / 3 - 0.012, hd - 0.0102), 0.001))  # fmt: skip
+                for x, z in product((-hw + 0.0102, hw - 0.0302), (-hd + 0.0102, hd - 0.0302)):
                     m.add(slab((x, 0.01, z), (x + 0.02, h, z + 0.02)))
-        case 4:
-            # Round, as for hats.
+        case 4:  # round, as for hats
             r = 0.42 * d + 0.03
             m.add(cylinder(r, 0, h * 0.8, n=28), of=card)
             m.add(cylinder(r + 0.004, h * 0.8 + 0.0002, h, n=28),
                 of=plain("lid", m.any_colour(), 0.6))  # fmt: skip
-        case 5:
-            # A tin with round corners.
+        case 5:  # a tin with round corners
             with m.of(plain("tin", colour, 0.3)):
                 m.add(loft(rings(rect, [(w * 0.8, d * 0.8, 0.03, 0),
                     (w * 0.8, d * 0.8, 0.03, h * 0.8),
                     (w * 0.8 + 0.006, d * 0.8 + 0.006, 0.033, h * 0.8),
                     (w * 0.8 + 0.006, d * 0.8 + 0.006, 0.033, h * 0.95),
                     (w * 0.8 - 0.01, d * 0.8 - 0.01, 0.028, h)])))  # fmt: skip
-        case 6:
-            # Corners of metal.
+        case 6:  # corners of metal
             lidded_box(m, w, h, d, card, card)
             for x, z in product((-1, 1), (-1, 1)):
-                m.add(bevelled((x * w / 2 - 0.02 if x > 0 else -w / 2 - 0.005, h - 0.03,
-                    z * d / 2 - 0.02 if z > 0 else -d / 2 - 0.005),
-                    (w / 2 + 0.005 if x > 0 else -w / 2 + 0.02, h + 0.001,
-                    d / 2 + 0.005 if z > 0 else -d / 2 + 0.02), 0.001), of=m.metal)  # fmt: skip
-        case 7:
-            # A wooden box with a knob or a hasp.
+                m.add(bevelled((x * hw - 0.02 if x > 0 else -hw - 0.005, h - 0.03,
+                    z * hd - 0.02 if z > 0 else -hd - 0.005), (hw + 0.005 if x > 0 else -hw + 0.02,
+                    h + 0.001, hd + 0.005 if z > 0 else -hd + 0.02), 0.001), of=m.metal)  # fmt: skip
+        case 7:  # a wooden box with a knob or a hasp
             m.add(bevelled((-w * 0.4, 0, -d * 0.4), (w * 0.4, h * 0.6, d * 0.4), 0.003), of=grain)
             m.add(bevelled((-w * 0.4, h * 0.6 + 0.001, -d * 0.4), (w * 0.4, h * 0.75, d * 0.4),
                 0.003), of=grain)  # fmt: skip
             m.add(turned([(0, 0), (0.005, 0), (0.01, 0.008), (0.009, 0.016), (0, 0.018)], n=12),
                 turn=LYING_ALONG_Z, at=(0, h * 0.66, d * 0.4), of=m.metal)  # fmt: skip
-        case 8:
-            # Two on each other.
+        case 8:  # two on each other
             lidded_box(m, w, h * 0.8, d, card, card)
             side, lid = plain("box", m.any_colour(), 0.7), plain("lid", m.any_colour(), 0.7)
             with m.moved(at=(0, h * 0.8 + 0.0003, 0), turn=rotation_y(m.uniform(-0.1, 0.1))):
                 lidded_box(m, w * 0.8, h * 0.6, d * 0.8, side, lid)
-        case 9:
-            # Clear plastic with a lid that is not.
+        case 9:  # clear plastic with a lid that is not
             m.add(loft(rings(rect, [(w * 0.92, d * 0.92, 0.02, 0), (w, d, 0.025, h * 0.85)])),
                 of=plain("frosted plastic", (0.82, 0.84, 0.85), 0.3))  # fmt: skip
             m.add(loft(rings(rect, [(w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.0002),
@@ -113,18 +105,17 @@ def storage_box(m: Maker) -> None:
                 (w - 0.02, d - 0.02, 0.02, h * 0.85 + 0.028)])),
                 of=plain("plastic lid", colour, 0.4))  # fmt: skip
             for x in (-1.0, 1.0):
-                m.add(bevelled((x * (w / 2 + 0.004) - 0.006, h * 0.7, -0.03),
-                    (x * (w / 2 + 0.004) + 0.006, h * 0.85 + 0.018, 0.03), 0.002),
+                m.add(bevelled((x * (hw + 0.004) - 0.006, h * 0.7, -0.03),
+                    (x * (hw + 0.004) + 0.006, h * 0.85 + 0.018, 0.03), 0.002),
                     of=plain("plastic lid", colour, 0.4))  # fmt: skip
-        case 10:
-            # A letter box: drawers.
-            m.add(bevelled((-w * 0.45, 0, -d / 2), (w * 0.45, h, d / 2), 0.002), of=card)
+        case 10:  # a letter box: drawers
+            m.add(bevelled((-w * 0.45, 0, -hd), (w * 0.45, h, hd), 0.002), of=card)
             for k in range(2):
-                m.add(bevelled((-w * 0.43, 0.006 + k * 0.5 * h, d / 2 - 0.001),
-                    (w * 0.43, (k + 1) * 0.5 * h - 0.006, d / 2 + 0.006), 0.001),
+                m.add(bevelled((-w * 0.43, 0.006 + k * 0.5 * h, hd - 0.001),
+                    (w * 0.43, (k + 1) * 0.5 * h - 0.006, hd + 0.006), 0.001),
                     of=plain("drawer", shade(colour, 0.92), 0.7))  # fmt: skip
                 m.add(turned([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10),
-                    turn=LYING_ALONG_Z, at=(0, (k + 0.5) * 0.5 * h, d / 2 + 0.0055), of=m.metal)  # fmt: skip
+                    turn=LYING_ALONG_Z, at=(0, (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)  # fmt: skip
 
 
 def lidded_box(m: Maker, w: float, h: float, d: float, side: Material, lid: Material) -> None:
@@ -138,57 +129,52 @@ def lidded_box(m: Maker, w: float, h: float, d: float, side: Material, lid: Mate
 def shelf_basket(m: Maker) -> None:
     """A basket for a shelf: plain, woven in courses, of wire, of felt, with handles or a lid."""
     w, h, d = m.uniform(0.22, 0.34), m.uniform(0.13, 0.2), m.uniform(0.18, 0.24)
+    hw, hd = w / 2, d / 2
     form = m.integers(0, 8)
     weave = plain("wicker", mix((0.66, 0.52, 0.36), m.style.textiles[0], m.pick(0.0, 0.8)), 0.9)
     felt = plain("felt", m.pick((0.35, 0.36, 0.38), (0.6, 0.58, 0.55), m.any_colour()), 0.95)
     match form:
-        case 0:
+        case 0:  # plain
             with m.of(weave):
                 tray(m, w, h, d, 0.008)
-        case 1:
-            # Courses of rope that swell a little.
+        case 1:  # courses of rope that swell a little
             rope_side(m, w, d, 0.04, h, 7, weave)
-        case 2:
+        case 2:  # round, with two grips
             rope_side(m, w * 0.9, w * 0.9, 0.12, h, 7, weave)
             for x in (-1.0, 1.0):
                 m.add(tube(bent([(x * w * 0.44, h * 0.85, -0.05), (x * w * 0.44, h * 1.2, -0.04),
                     (x * w * 0.44, h * 1.2, 0.04), (x * w * 0.44, h * 0.85, 0.05)], 0.03, n=3),
                     0.007, n=6), of=weave)  # fmt: skip
-        case 3:
-            # Wire.
+        case 3:  # wire
             with m.of(m.metal):
                 for y in (0.004, 0.35 * h, 0.68 * h, h - 0.004):
                     m.add(hoop(rect(w, d, 0.02, n=2), y, 0.0028, n=5))
                 for k in range(6):
                     x = (k / 5 - 0.5) * (w - 0.01)
-                    m.add(tube(bent([(x, h, -d / 2), (x, 0.004, -d / 2), (x, 0.004, d / 2),
-                        (x, h, d / 2)], 0.01, n=1), 0.0018, n=5))  # fmt: skip
-        case 4:
+                    m.add(tube(bent([(x, h, -hd), (x, 0.004, -hd), (x, 0.004, hd), (x, h, hd)],
+                        0.01, n=1), 0.0018, n=5))  # fmt: skip
+        case 4:  # of felt, with labels of leather
             m.add(loft(rings(rect, [(w, d, 0.03, 0), (w, d, 0.03, h * 0.8), (w, d, 0.03, h),
                 (w - 0.01, d - 0.01, 0.025, h), (w - 0.01, d - 0.01, 0.025, 0.006)], n=3)), of=felt)  # fmt: skip
             for x in (-1.0, 1.0):
-                m.add(bevelled((x * w / 2 - 0.003, h * 0.72, -0.04),
-                    (x * w / 2 + 0.003, h * 0.86, 0.04), 0.001),
-                    of=plain("leather", (0.35, 0.22, 0.13), 0.6))  # fmt: skip
-        case 5:
+                m.add(bevelled((x * hw - 0.003, h * 0.72, -0.04), (x * hw + 0.003, h * 0.86, 0.04),
+                    0.001), of=plain("leather", (0.35, 0.22, 0.13), 0.6))  # fmt: skip
+        case 5:  # with a lid
             rope_side(m, w, d, 0.03, h * 0.85, 6, weave)
             m.add(loft(rings(rect, [(w + 0.012, d + 0.012, 0.03, h * 0.85 + 0.012),
                 (w + 0.012, d + 0.012, 0.03, h * 0.98), (w * 0.9, d * 0.85, 0.03, h * 1.02)], n=3)),
                 of=weave)  # fmt: skip
-        case 6:
-            # Cloth in a frame of wood.
+        case 6:  # cloth in a frame of wood
             with m.of(plain("wood", m.wood, 0.5)):
-                for x, z in product((-w / 2, w / 2 - 0.014), (-d / 2, d / 2 - 0.014)):
+                for x, z in product((-hw, hw - 0.014), (-hd, hd - 0.014)):
                     m.add(bevelled((x, 0, z), (x + 0.014, h + 0.02, z + 0.014), 0.001))
-                for z in (-d / 2, d / 2 - 0.014):
-                    m.add(bevelled((-w / 2 + 0.014, h - 0.016, z), (w / 2 - 0.014, h, z + 0.014),
-                        0.001))  # fmt: skip
-                for x in (-w / 2, w / 2 - 0.014):
-                    m.add(bevelled((x, h - 0.016, -d / 2 + 0.014), (x + 0.014, h, d / 2 - 0.014),
-                        0.001))  # fmt: skip
+                for z in (-hd, hd - 0.014):
+                    m.add(bevelled((-hw + 0.014, h - 0.016, z), (hw - 0.014, h, z + 0.014), 0.001))
+                for x in (-hw, hw - 0.014):
+                    m.add(bevelled((x, h - 0.016, -hd + 0.014), (x + 0.014, h, hd - 0.014), 0.001))
             with m.moved(at=(0, 0.012, 0)), m.of(plain("cloth", m.any_colour(), 0.95)):
                 tray(m, w - 0.03, h - 0.03, d - 0.03, 0.005)
-        case 7:
+        case 7:  # round, with coloured bands
             m.add(vessel(scaled(d, h, [(0, 0), (0.4, 0), (0.52, 0.3), (0.55, 0.7), (0.5, 1)]),
                 0.008, n=24), of=weave)  # fmt: skip
             for t in (0.25, 0.5, 0.75):
@@ -196,9 +182,14 @@ def shelf_basket(m: Maker) -> None:
                     of=plain("band", m.any_colour(), 0.9))  # fmt: skip
 
 
-def rope_side(m: Maker, w: float, d: float, out: float, h: float, n: int, stuff: Material) -> None:
-    """A bottom and courses of rope one above another; out: by how much of its width it opens upwards."""
-    with m.of(stuff):
+def rope_side(
+    m: Maker, w: float, d: float, out: float, h: float, n: int, material: Material
+) -> None:
+    """A bottom and courses of rope one above another; out.
+
+    By how much of its width it opens upwards.
+    """
+    with m.of(material):
         m.add(loft(rings(oval, [(w * (1 - out), d * (1 - out), 0.001),
             (w * (1 - out), d * (1 - out), 0.009)], n=20, power=4.0)))  # fmt: skip
         for k in range(n):
@@ -210,12 +201,12 @@ def rope_side(m: Maker, w: float, d: float, out: float, h: float, n: int, stuff:
 def bin(m: Maker) -> None:
     """A bin: for paper, of wire, with a pedal, a swing lid, square, of wicker, of felt."""
     form, r, tall = m.integers(0, 10), m.uniform(0.11, 0.15), m.uniform(0.26, 0.36)
-    stuff = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
+    material = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
     match form:
-        case 0 | 1:
+        case 0 | 1:  # for paper
             m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28),
-                of=stuff)  # fmt: skip
-        case 2:
+                of=material)  # fmt: skip
+        case 2:  # of wire
             with m.of(m.metal):
                 m.add(cylinder(r * 0.85, 0, 0.004, n=20))
                 for t in (0.3, 0.65, 1.0):
@@ -224,40 +215,39 @@ def bin(m: Maker) -> None:
                 for k in range(22):
                     m.add(tube([(0.84 * r * cos(0.2856 * k), 0.002, 0.84 * r * sin(0.2856 * k)),
                         (r * cos(0.2856 * k), tall, r * sin(0.2856 * k))], 0.0015, n=4))  # fmt: skip
-        case 3 | 4:
-            # With a pedal.
+        case 3 | 4:  # with a pedal
             h = tall * 1.2
             m.add(turned([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
-                n=26), of=stuff)  # fmt: skip
+                n=26), of=material)  # fmt: skip
             m.add(cylinder(r * 1.02, 0, 0.0118, n=26),
                 of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))  # fmt: skip
             m.add(turned(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
-                (0, 1)]), n=26), of=stuff if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
+                (0, 1)]), n=26), of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
             m.add(bevelled((-0.03, 0.004, r * 0.9), (0.03, 0.018, r + 0.05), 0.003),
                 of=plain("pedal", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
             m.add(bevelled((-0.04, h * 0.82, -r - 0.015), (0.04, h * 0.9, -r * 0.9), 0.003),
                 of=plain("hinge", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-        case 5:
+        case 5:  # a lid that swings
             m.add(loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0),
-                (1.9 * r, 1.6 * r, 0.04, tall * 1.2)])), of=stuff)  # fmt: skip
+                (1.9 * r, 1.6 * r, 0.04, tall * 1.2)])), of=material)  # fmt: skip
             m.add(loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
                 (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)])),
                 of=plain("lid", m.any_colour(), 0.5))  # fmt: skip
-        case 6:
+        case 6:  # square
             m.add(loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
                 (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall),
-                (1.7 * r - 0.006, 1.2 * r - 0.006, 0.018, 0.005)], n=3)), of=stuff)  # fmt: skip
-        case 7:
+                (1.7 * r - 0.006, 1.2 * r - 0.006, 0.018, 0.005)], n=3)), of=material)  # fmt: skip
+        case 7:  # of wicker
             rope_side(m, 2 * r, 2 * r, 0.1, tall, 8, plain("wicker", mix((0.66, 0.52, 0.36),
                 m.any_colour(), m.pick(0.0, 0.3)), 0.9))  # fmt: skip
-        case 8:
+        case 8:  # of felt, with two straps
             m.add(vessel([(0, 0), (r * 0.98, 0), (r, tall)], 0.006, n=24), of=plain("felt",
                 m.pick((0.3, 0.31, 0.33), (0.55, 0.53, 0.5), (0.35, 0.22, 0.13)), 0.95))  # fmt: skip
             for x in (-1.0, 1.0):
                 m.add(tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
                     (x * r, tall * 1.12, 0.03), (x * r * 0.97, tall * 0.9, 0.04)], 0.02, n=3),
                     0.005, n=6), of=plain("strap", (0.35, 0.22, 0.13), 0.6))  # fmt: skip
-        case 9:
+        case 9:  # two for sorting
             for x in (-0.115, 0.115):
                 m.add(bevelled((x - 0.11, 0, -0.14), (x + 0.11, tall * 1.25, 0.14), 0.008),
                     of=plain("bin", m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))  # fmt: skip
@@ -268,22 +258,24 @@ def bin(m: Maker) -> None:
 
 @thing(group="basket")
 def basket(m: Maker) -> None:
-    """A basket on the floor: round, deep, with handles, two tones, of rope, full of wood or wool or rolled blankets."""
+    """A basket on the floor.
+
+    Round, deep, with handles, two tones, of rope, full of wood or wool or rolled blankets.
+    """
     form, tall, r = m.integers(0, 8), m.uniform(0.18, 0.3), m.uniform(0.14, 0.2)
     weave = plain("wicker", mix((0.62, 0.47, 0.3), m.any_colour(), m.pick(0.0, 0.2, 0.7)), 0.9)
     match form:
-        case 0:
+        case 0:  # round
             m.add(vessel(scaled(r, tall, [(0, 0), (0.85, 0), (0.95, 0.3), (1, 0.7), (0.98, 1)]),
                 0.01, n=20), of=weave)  # fmt: skip
-        case 1 | 2 | 3:
+        case 1 | 2 | 3:  # of rope
             rope_side(m, 2 * r, (2 if form != 2 else 1.4) * r, 0.1, tall, 7, weave)
             if form != 3:
                 for x in (-1.0, 1.0):
                     m.add(tube(bent([(x * r * 0.93, tall * 0.85, -0.06),
                         (x * r * 0.97, tall * 1.25, -0.05), (x * r * 0.97, tall * 1.25, 0.05),
                         (x * r * 0.93, tall * 0.85, 0.06)], 0.03, n=3), 0.008, n=6), of=weave)  # fmt: skip
-        case 4:
-            # Firewood.
+        case 4:  # firewood
             m.add(vessel(scaled(r, tall, [(0, 0), (0.9, 0), (1, 0.6), (1.02, 1)]), 0.01, n=20),
                 of=weave)  # fmt: skip
             for k in range(6):
@@ -291,20 +283,19 @@ def basket(m: Maker) -> None:
                     ((k % 3 - 1) * 0.62 * r, tall * m.uniform(1.1, 1.5), (k // 3 - 0.5) * 0.7 * r)],
                     m.uniform(0.02, 0.034), n=7), of=plain("log",
                     shade((0.45, 0.32, 0.2), m.uniform(0.7, 1.3)), 0.9))  # fmt: skip
-        case 5:
-            # Wool and needles, or rolled blankets.
+        case 5:  # wool and needles, or rolled blankets
             m.add(vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1, 0.5), (0.95, 0.8)]), 0.01, n=20),
                 of=weave)  # fmt: skip
             for k in range(3):
                 m.add(sphere((0.45 * r * cos(2.1 * k), tall * 0.62, 0.45 * r * sin(2.1 * k)),
                     0.42 * r, n=12), of=plain("wool", m.any_colour(), 0.95))  # fmt: skip
-        case 6:
+        case 6:  # rolled blankets
             m.add(vessel([(0, 0), (r * 0.95, 0), (r, tall)], 0.01, n=20), of=weave)
             for k in range(3):
                 m.add(tube([(0.45 * r * cos(2.1 * k), 0.014, 0.45 * r * sin(2.1 * k)),
                     (0.5 * r * cos(2.1 * k), tall * m.uniform(1.2, 1.6), 0.5 * r * sin(2.1 * k))],
                     0.36 * r, n=12), of=plain("blanket", m.any_colour(), 0.95))  # fmt: skip
-        case 7:
+        case 7:  # two tones: its lower half painted
             m.add(vessel(scaled(r, tall, [(0, 0), (0.9, 0), (1, 0.45), (0.99, 0.449)]), 0.01, n=22),
                 of=plain("paint", (0.9, 0.89, 0.86), 0.8))  # fmt: skip
             m.add(turned(scaled(r, tall, [(0.99, 0.4495), (1, 0.4495), (1.03, 1), (0.98, 1),
@@ -330,6 +321,7 @@ def cartons(m: Maker) -> None:
 
 
 def cardboard(m: Maker, w: float, h: float, d: float, y: float, slip: float) -> None:
+    """A box of cardboard with its tape, its base at y; slip: how far it may stand aside."""
     board = plain("cardboard", shade((0.66, 0.5, 0.33), m.uniform(0.9, 1.1)), 0.85)
     m.add(slab((-w / 2, 0, -d / 2), (w / 2, h, d / 2)),
         at=(m.uniform(-slip, slip) if slip else 0, y, 0), of=board)  # fmt: skip
@@ -340,11 +332,12 @@ def cardboard(m: Maker, w: float, h: float, d: float, y: float, slip: float) -> 
 
 def tray(m: Maker, w: float, h: float, d: float, t: float) -> None:
     """A bottom and four sides of thickness t; front and back fit between left and right."""
-    m.add(slab((-w / 2, 0, -d / 2), (w / 2, t, d / 2)))
-    m.add(slab((-w / 2, t, -d / 2), (-w / 2 + t, h, d / 2)))
-    m.add(slab((w / 2 - t, t, -d / 2), (w / 2, h, d / 2)))
-    m.add(slab((-w / 2 + t, t, -d / 2), (w / 2 - t, h, -d / 2 + t)))
-    m.add(slab((-w / 2 + t, t, d / 2 - t), (w / 2 - t, h, d / 2)))
+    hw, hd = w / 2, d / 2
+    m.add(slab((-hw, 0, -hd), (hw, t, hd)))
+    m.add(slab((-hw, t, -hd), (-hw + t, h, hd)))
+    m.add(slab((hw - t, t, -hd), (hw, h, hd)))
+    m.add(slab((-hw + t, t, -hd), (hw - t, h, -hd + t)))
+    m.add(slab((-hw + t, t, hd - t), (hw - t, h, hd)))
 
 
 @thing(group="box", nyu40=BOX)

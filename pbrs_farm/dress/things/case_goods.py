@@ -45,25 +45,23 @@ class Boards(NamedTuple):
 def bookcase(m: Maker, boards: Boards, size: Size) -> None:
     """Open shelves between two sides; some have doors below, some no back."""
     w, h, d = size
+    hw, hd = w / 2, d / 2
     sides(m, boards, size)
     has_doors = h > 1.5 and m.chance(0.25)
     plinth = m.uniform(0.05, 0.09)
     with m.of(boards.body):
-        m.add(slab((-w / 2 + 0.018, 0.0, d / 2 - 0.04), (w / 2 - 0.018, plinth, d / 2 - 0.025)))
+        m.add(slab((-hw + 0.018, 0.0, hd - 0.04), (hw - 0.018, plinth, hd - 0.025)))
         if has_doors or m.chance(0.75):
-            m.add(slab((-w / 2 + 0.018, plinth, -d / 2),
-                (w / 2 - 0.018, h - 0.018, -d / 2 + 0.006)))  # fmt: skip
+            m.add(slab((-hw + 0.018, plinth, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
         # Shelves are as far apart as large books need, evenly; longer ones sag and get an upright.
         n = max(2, round((h - plinth) / m.uniform(0.28, 0.37)))
         levels = spaced(plinth, h - 0.018, n + 1)
         for y in levels:
-            m.add(slab((-w / 2 + 0.018, y, -d / 2 + 0.006),
-                (w / 2 - 0.018, y + 0.018, d / 2 - 0.002)))  # fmt: skip
+            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
         for low, high in pairwise(levels) if w > 0.95 else ():
-            m.add(slab((-0.009, low + 0.018, -d / 2 + 0.006), (0.009, high, d / 2 - 0.004)))
+            m.add(slab((-0.009, low + 0.018, -hd + 0.006), (0.009, high, hd - 0.004)))
     if has_doors:
-        doors(m, boards, (-w / 2, w / 2), (levels[0], levels[2] + 0.018), d / 2,
-            2 if w > 0.55 else 1)  # fmt: skip
+        doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1)
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
@@ -72,35 +70,37 @@ def cube_shelf(m: Maker, boards: Boards, size: Size) -> None:
     columns = max(1, int(size[0] / 0.36))
     rows = min(max(1, int(size[1] / 0.36)), 5 if columns > 1 else 4)
     inner, outer, d = 0.34, 0.045, 0.38
+    hd = d / 2
     w, h = (columns * inner + (columns - 1) * 0.018 + 2 * outer,
         rows * inner + (rows - 1) * 0.018 + 2 * outer)  # fmt: skip
+    hw = w / 2
     with m.of(boards.body):
-        m.add(slab((-w / 2, 0.0, -d / 2), (w / 2, outer, d / 2)))
-        m.add(slab((-w / 2, h - outer, -d / 2), (w / 2, h, d / 2)))
-        m.add(slab((-w / 2, outer, -d / 2), (-(w / 2 - outer), h - outer, d / 2)))
-        m.add(slab((w / 2 - outer, outer, -d / 2), (w / 2, h - outer, d / 2)))
+        m.add(slab((-hw, 0.0, -hd), (hw, outer, hd)))
+        m.add(slab((-hw, h - outer, -hd), (hw, h, hd)))
+        m.add(slab((-hw, outer, -hd), (-(hw - outer), h - outer, hd)))
+        m.add(slab((hw - outer, outer, -hd), (hw, h - outer, hd)))
         for k in range(1, columns):
-            x = -w / 2 + outer + k * (inner + 0.018) - 0.018
-            m.add(slab((x, outer, -d / 2 + 0.002), (x + 0.018, h - outer, d / 2 - 0.002)))
+            x = -hw + outer + k * (inner + 0.018) - 0.018
+            m.add(slab((x, outer, -hd + 0.002), (x + 0.018, h - outer, hd - 0.002)))
         # Shelves run from upright to upright.
         for i, k in product(range(1, rows), range(columns)):
-            x, y = -w / 2 + outer + k * (inner + 0.018), outer + i * (inner + 0.018) - 0.018
-            m.add(slab((x, y, -d / 2 + 0.002), (x + inner, y + 0.018, d / 2 - 0.002)))
+            x, y = -hw + outer + k * (inner + 0.018), outer + i * (inner + 0.018) - 0.018
+            m.add(slab((x, y, -hd + 0.002), (x + inner, y + 0.018, hd - 0.002)))
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
 def rack(m: Maker, boards: Boards, size: Size) -> None:
     """Boards between four posts of metal, open on all sides; a rail under each end carries them."""
     w, h, d = size
+    hw, hd = w / 2, d / 2
     post, thick = 0.022, 0.024
-    for x, z in product((-(w / 2 - post / 2), w / 2 - post / 2),
-        (-(d / 2 - post / 2), d / 2 - post / 2)):  # fmt: skip
+    for x, z in product((-(hw - post / 2), hw - post / 2), (-(hd - post / 2), hd - post / 2)):
         m.add(slab((x - post / 2, 0.0, z - post / 2), (x + post / 2, h, z + post / 2)), of=m.metal)
     for y in spaced(0.09, h - thick - 0.004, max(3, round(h / m.uniform(0.34, 0.42)))):
-        m.add(slab((-w / 2 + post, y, -d / 2 + 0.004), (w / 2 - post, y + thick, d / 2 - 0.004)),
+        m.add(slab((-hw + post, y, -hd + 0.004), (hw - post, y + thick, hd - 0.004)),
             of=boards.body)  # fmt: skip
-        for a, b in ((-(w / 2 - 0.004), -(w / 2 - post)), (w / 2 - post, w / 2 - 0.004)):
-            m.add(slab((a, y, -d / 2 + post), (b, y + thick, d / 2 - post)), of=m.metal)
+        for a, b in ((-(hw - 0.004), -(hw - post)), (hw - post, hw - 0.004)):
+            m.add(slab((a, y, -hd + post), (b, y + thick, hd - post)), of=m.metal)
 
 
 @thing(group="dresser", nyu40=DRESSER, place=Place.FLOOR)
@@ -116,6 +116,7 @@ def nightstand(m: Maker, boards: Boards, size: Size) -> None:
 
 
 def chest_of_drawers(m: Maker, boards: Boards, size: Size) -> None:
+    """Drawers of equal height, in two columns where it is wide."""
     w, h, _d = size
     column = ("drawer",) * max(1, round((h - 0.12) / m.uniform(0.17, 0.25)))
     cupboard(m, boards, size, True, [column] * (2 if w > 0.95 else 1))
@@ -140,16 +141,16 @@ def wardrobe(m: Maker, boards: Boards, size: Size) -> None:
 def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
     """A narrow cupboard: shelves that are open in the middle, doors above and below."""
     w, h, d = size
+    hw, hd = w / 2, d / 2
     low, high = 0.4 * h, 0.62 * h
     sides(m, boards, size)
     with m.of(boards.body):
-        m.add(slab((-w / 2 + 0.018, 0.06, -d / 2), (w / 2 - 0.018, h - 0.018, -d / 2 + 0.006)))
-        m.add(slab((-w / 2 + 0.018, 0.0, d / 2 - 0.03), (w / 2 - 0.018, 0.06, d / 2 - 0.015)))
+        m.add(slab((-hw + 0.018, 0.06, -hd), (hw - 0.018, h - 0.018, -hd + 0.006)))
+        m.add(slab((-hw + 0.018, 0.0, hd - 0.03), (hw - 0.018, 0.06, hd - 0.015)))
         for y in (0.06, low, (low + high) / 2, high, h - 0.018):
-            m.add(slab((-w / 2 + 0.018, y, -d / 2 + 0.006),
-                (w / 2 - 0.018, y + 0.018, d / 2 - 0.002)))  # fmt: skip
+            m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
     for span in ((0.06, low + 0.018), (high, h)):
-        doors(m, boards, (-w / 2, w / 2), span, d / 2, 1)
+        doors(m, boards, (-hw, hw), span, hd, 1)
 
 
 @thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
@@ -189,15 +190,16 @@ def desk(m: Maker, boards: Boards, size: Size) -> None:
 def desk_chair(m: Maker, boards: Boards) -> None:
     """A plain chair of wood: four legs, a seat, two bars as its back."""
     w, d, seat, h, leg = 0.43, 0.44, 0.46, m.uniform(0.8, 0.92), 0.034
+    hw, hd = w / 2, d / 2
     with m.of(boards.body):
-        for x, front in product((-(w / 2 - leg / 2), w / 2 - leg / 2), (True, False)):
-            z, high = d / 2 - leg / 2 if front else -d / 2 + leg / 2, seat - 0.022 if front else h
+        for x, front in product((-(hw - leg / 2), hw - leg / 2), (True, False)):
+            z, high = hd - leg / 2 if front else -hd + leg / 2, seat - 0.022 if front else h
             m.add(slab((x - leg / 2, 0.0, z - leg / 2), (x + leg / 2, high, z + leg / 2)))
-        m.add(slab((-w / 2 + leg, seat - 0.022, -d / 2 + 0.003), (w / 2 - leg, seat, d / 2)))
-        for a, b in ((-w / 2, -(w / 2 - leg)), (w / 2 - leg, w / 2)):
-            m.add(slab((a, seat - 0.022, -d / 2 + leg), (b, seat, d / 2)))
+        m.add(slab((-hw + leg, seat - 0.022, -hd + 0.003), (hw - leg, seat, hd)))
+        for a, b in ((-hw, -(hw - leg)), (hw - leg, hw)):
+            m.add(slab((a, seat - 0.022, -hd + leg), (b, seat, hd)))
         for y in (h - 0.09, h - 0.24):
-            m.add(slab((-w / 2 + leg, y, -d / 2 + 0.006), (w / 2 - leg, y + 0.07, -d / 2 + 0.024)))
+            m.add(slab((-hw + leg, y, -hd + 0.006), (hw - leg, y + 0.07, -hd + 0.024)))
 
 
 @thing(group="ottoman", nyu40=CHAIR, place=Place.FLOOR)
@@ -244,19 +246,21 @@ def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
 
 
 def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
-    """The box behind fronts, a top over it, a plinth or legs that taper under it; the box comes first."""
+    """The box behind fronts, a top over it, a plinth or legs that taper under it.
+
+    The box comes first.
+    """
     w, h, d = size
+    hw, hd = w / 2, d / 2
     thick = m.pick(0.018, 0.025)
     has_legs = may_have_legs and m.chance(0.55)
     foot = m.uniform(0.09, 0.16) if has_legs else m.uniform(0.04, 0.07)
-    m.add(slab((-w / 2, foot, -d / 2), (w / 2, h - thick, d / 2 - 0.018)), of=boards.body)
-    m.add(slab((-w / 2 - 0.004, h - thick, -d / 2), (w / 2 + 0.004, h, d / 2 + 0.006)),
-        of=boards.top)  # fmt: skip
+    m.add(slab((-hw, foot, -hd), (hw, h - thick, hd - 0.018)), of=boards.body)
+    m.add(slab((-hw - 0.004, h - thick, -hd), (hw + 0.004, h, hd + 0.006)), of=boards.top)
     if not has_legs:
-        m.add(slab((-w / 2 + 0.01, 0.0, -d / 2), (w / 2 - 0.01, foot, d / 2 - 0.05)),
-            of=boards.body)  # fmt: skip
+        m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, foot, hd - 0.05)), of=boards.body)
     else:
-        for x, z in product((-w / 2 + 0.06, w / 2 - 0.06), (-d / 2 + 0.05, d / 2 - 0.08)):
+        for x, z in product((-hw + 0.06, hw - 0.06), (-hd + 0.05, hd - 0.08)):
             m.add(frustum((0.013, 0.0), (0.022, foot), n=12), at=(x, 0.0, z), of=boards.top)
     return float(np.float32(foot))
 
@@ -284,7 +288,10 @@ def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int) -> None:
 
 def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
     opens_left: bool) -> None:  # fmt: skip
-    """16 mm thick, 2 mm from its neighbours, with what it is opened by: a door's stands at the side that has no hinges, a drawer's lies across."""
+    """A door, drawer or flap 16 mm thick, 2 mm from its neighbours, and what opens it.
+
+    That stands at the side of a door that has no hinges, and lies across a drawer.
+    """
     m.add(slab((x[0] + 0.002, y[0] + 0.002, z + 0.0005), (x[1] - 0.002, y[1] - 0.002, z + 0.0165)),
         of=boards.front)  # fmt: skip
     z, wide, tall, middle = z + 0.0165, x[1] - x[0], y[1] - y[0], (x[0] + x[1]) / 2
@@ -306,6 +313,7 @@ def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_k
 
 
 def knob(m: Maker, x: float, y: float, z: float) -> None:
+    """A round knob on a front at z."""
     m.add(turned([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
         (0.0, 0.028)], n=12), turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)  # fmt: skip
 

@@ -15,62 +15,64 @@ from pbrs_farm.dress.things.outlines import bent, oval, rings, scaled
 
 @thing(group="cup")
 def cup(m: Maker) -> None:
-    """A mug, a tea cup on its saucer, a small one, a tall one, of enamel, with facets, without a handle."""
+    """A mug.
+
+    A tea cup on its saucer, a small one, a tall one, of enamel, with facets, without a handle.
+    """
     form, tall, r, glaze = (m.integers(0, 13), m.uniform(0.078, 0.102), m.uniform(0.036, 0.044),
         m.china())  # fmt: skip
     with m.of(glaze):
         match form:
-            case 0 | 1:
+            case 0 | 1:  # a mug
                 foot = r * m.uniform(0.65, 1.0)
                 m.add(vessel([(0, 0), (foot, 0), (foot + 0.3 * (r - foot), 0.012), (r, 0.4 * tall),
                     (r, tall)], 0.003), of=glaze)  # fmt: skip
                 m.add(handle(r, tall))
-            case 2:
+            case 2:  # a tea cup on its saucer
                 m.add(vessel([(0, 0.0122), (r * 0.6, 0.0122), (r * 0.7, 0.018), (r * 1.05, 0.045),
                     (r * 1.15, 0.068)], 0.0025, n=20))  # fmt: skip
                 m.add(tube(bent([(r * 1.0, 0.058, 0), (r * 1.6, 0.06, 0), (r * 1.5, 0.03, 0),
                     (r * 0.85, 0.028, 0)], 0.015, n=3), 0.003, n=6))  # fmt: skip
                 m.add(turned([(0, 0), (0.04, 0), (0.075, 0.011), (0.074, 0.0125), (0.04, 0.006),
                     (0.03, 0.012), (0, 0.012)], n=24))  # fmt: skip
-            case 3:
+            case 3:  # for espresso, on its saucer
                 m.add(vessel([(0, 0.0082), (0.02, 0.0082), (0.027, 0.02), (0.029, 0.06)], 0.003,
                     n=18))  # fmt: skip
                 m.add(tube(bent([(0.027, 0.052, 0), (0.047, 0.054, 0), (0.045, 0.026, 0),
                     (0.026, 0.026, 0)], 0.012, n=3), 0.003, n=6))  # fmt: skip
                 m.add(turned([(0, 0), (0.03, 0), (0.055, 0.008), (0.054, 0.0095), (0.03, 0.005),
                     (0, 0.008)], n=22))  # fmt: skip
-            case 4:
+            case 4:  # a tall one
                 m.add(vessel([(0, 0), (0.028, 0), (0.034, 0.02), (0.04, 0.13)], 0.003, n=18))
                 m.add(tube(bent([(0.037, 0.11, 0), (0.068, 0.11, 0), (0.066, 0.035, 0),
                     (0.034, 0.035, 0)], 0.02, n=3), 0.004, n=6))  # fmt: skip
-            case 5:
+            case 5:  # a bowl without a handle
                 m.add(vessel([(0, 0), (0.03, 0), (0.035, 0.008), (0.055, 0.04), (0.062, 0.075)],
                     0.0035, n=22))  # fmt: skip
-            case 7:
+            case 7:  # facets
                 k = m.integers(6, 10)
                 m.add(loft(rings(oval, [(1.6 * r, 1.6 * r, 0), (2 * r, 2 * r, 0.03),
                     (2 * r, 2 * r, tall), (2 * r - 0.008, 2 * r - 0.008, tall),
                     (2 * r - 0.01, 2 * r - 0.01, 0.008)], n=k), sharp=20.0))  # fmt: skip
                 m.add(handle(0.92 * r, tall))
-            case 8:
+            case 8:  # round
                 m.add(vessel([(0, 0), (r * 0.7, 0), (r * 1.15, 0.025), (r * 1.2, 0.05),
                     (r * 0.95, 0.082), (r * 1.0, 0.09)], 0.003, n=20))  # fmt: skip
                 m.add(handle(r * 1.12, 0.09))
-            case 9:
+            case 9:  # a groove, an angular handle
                 m.add(vessel([(0, 0), (r, 0), (r, 0.02), (r * 0.97, 0.022), (r * 0.97, 0.03),
                     (r, 0.032), (r, tall)], 0.003, n=18))  # fmt: skip
                 m.add(tube(bent([(r - 0.002, tall * 0.85, 0), (r + 0.03, tall * 0.85, 0),
                     (r + 0.03, tall * 0.3, 0), (r - 0.002, tall * 0.3, 0)], 0.006, n=2), 0.0045,
                     n=6))  # fmt: skip
-            case 10:
+            case 10:  # two on each other
                 for k in range(2):
                     with m.moved(at=(0, 0.05 * k, 0)):
                         m.add(vessel([(0, 0), (0.026, 0), (0.032, 0.03), (0.036, 0.075)], 0.003,
                             n=18))  # fmt: skip
                         m.add(handle(0.033, 0.075), turn=rotation_y(0.4 * k))
-    # Enamel with a dark rim.
     match form:
-        case 6:
+        case 6:  # enamel with a dark rim
             coat = plain("enamel", m.pick((0.92, 0.91, 0.88), (0.2, 0.32, 0.45), (0.5, 0.16, 0.13)),
                 0.2)  # fmt: skip
             m.add(vessel([(0, 0), (r * 0.95, 0), (r, 0.008), (r, tall * 0.9)], 0.002, n=20),
@@ -80,17 +82,15 @@ def cup(m: Maker) -> None:
             m.add(tube(bent([(r - 0.001, tall * 0.78, 0), (r + 0.032, tall * 0.78, 0),
                 (r + 0.028, tall * 0.22, 0), (r - 0.001, tall * 0.22, 0)], 0.015, n=3), 0.003, n=6),
                 of=coat)  # fmt: skip
-        case 11:
-            # For the way: a lid and a sleeve.
+        case 11:  # for the way: a lid and a sleeve
             m.add(frustum((0.029, 0), (0.038, 0.13), n=20), of=plain("cup", m.any_colour(), 0.5))
             m.add(turned([(0.0325, 0.045), (0.0335, 0.045), (0.037, 0.095), (0.0355, 0.095),
                 (0.0325, 0.045)], n=20), of=plain("sleeve", (0.35, 0.24, 0.16), 0.8))  # fmt: skip
             m.add(turned([(0, 0.1302), (0.04, 0.1302), (0.04, 0.138), (0.034, 0.145), (0, 0.145)],
                 n=20), of=plain("cup lid", (0.12, 0.12, 0.12), 0.4))  # fmt: skip
-        case 12:
-            m.add(
-                vessel([(0, 0), (r * 0.9, 0), (r * 0.95, tall)], 0.0025, n=20), of=materials.glass()
-            )
+        case 12:  # of glass, tea in it
+            m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.95, tall)], 0.0025, n=20),
+                of=materials.glass())  # fmt: skip
             m.add(frustum((r * 0.86, 0.004), (r * 0.88, tall * 0.75), n=18), of=plain("tea",
                 m.pick((0.35, 0.16, 0.06), (0.12, 0.07, 0.04), (0.75, 0.6, 0.42)), 0.15))  # fmt: skip
             m.add(handle(r * 0.93, tall), of=materials.glass())
@@ -98,16 +98,19 @@ def cup(m: Maker) -> None:
 
 @thing(group="glass")
 def glass(m: Maker) -> None:
-    """Tumblers, wine glasses, flutes, beer glasses, a whisky glass, a carafe, two that stand together, a drink with a straw."""
+    """Tumblers.
+
+    Wine glasses, flutes, beer glasses, a whisky glass, a carafe, two that stand together, a drink with a straw.
+    """
     form, r, tall = m.integers(0, 13), m.uniform(0.03, 0.04), m.uniform(0.09, 0.14)
     m.name = "wine_glass" if form in (1, 2, 3, 4) else "tumbler"
     drink = plain("drink", m.pick((0.35, 0.03, 0.06), (0.85, 0.75, 0.4), (0.8, 0.45, 0.1),
         (0.45, 0.2, 0.06)), 0.1)  # fmt: skip
     with m.of(materials.glass()):
         match form:
-            case 0:
+            case 0:  # a tumbler
                 m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.0025))
-            case 1 | 2 | 3:
+            case 1 | 2 | 3:  # for wine, red or white; a flute
                 h, q = m.uniform(0.17, 0.22), r if form == 1 else r * 1.25 if form == 2 else 0.026
                 m.add(turned([(0, 0), (0.034, 0), (0.032, 0.003), (0.005, 0.008), (0.004, h * 0.45),
                     (0.02, h * 0.5), (q, h * (0.68 if form < 3 else 0.6)),
@@ -115,35 +118,35 @@ def glass(m: Maker) -> None:
                     (q * (0.85 if form < 3 else 0.95) - 0.0015, h - 0.0005),
                     (q - 0.0015, h * (0.68 if form < 3 else 0.6)), (0.018, h * 0.52),
                     (0, h * 0.49)], n=(16, 16, 20, 14)[form]))  # fmt: skip
-            case 4:
+            case 4:  # for cocktails
                 m.add(turned([(0, 0), (0.035, 0), (0.033, 0.003), (0.005, 0.008), (0.004, 0.1),
                     (0.012, 0.105), (0.05, 0.165), (0.0485, 0.1655), (0.011, 0.109), (0, 0.107)],
                     n=20))  # fmt: skip
-            case 5:
+            case 5:  # for beer, waisted
                 m.add(vessel([(0, 0), (0.032, 0), (0.033, 0.03), (0.028, 0.06), (0.036, 0.15)],
                     0.003, n=18))  # fmt: skip
-            case 6:
+            case 6:  # cut, for whisky
                 m.add(loft(rings(oval, [(0.07, 0.07, 0), (0.078, 0.078, 0.085),
                     (0.072, 0.072, 0.085), (0.062, 0.062, 0.02)], n=10), sharp=20.0))  # fmt: skip
-            case 7:
+            case 7:  # a beer mug
                 m.add(vessel([(0, 0), (0.037, 0), (0.038, 0.12)], 0.004, n=18))
                 m.add(tube(bent([(0.036, 0.105, 0), (0.075, 0.105, 0), (0.073, 0.025, 0),
                     (0.036, 0.025, 0)], 0.02, n=3), 0.005, n=6))  # fmt: skip
-            case 8:
+            case 8:  # a carafe
                 m.add(vessel([(0, 0), (0.045, 0), (0.052, 0.03), (0.045, 0.09), (0.022, 0.15),
                     (0.024, 0.2), (0.032, 0.225)], 0.003, n=20))  # fmt: skip
-            case 9:
+            case 9:  # several tumblers
                 for k in range(m.integers(2, 5)):
                     m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.0025, n=14),
                         at=(0.09 * (k % 2), 0, 0.09 * (k // 2) if k > 1 else 0.0))  # fmt: skip
-            case 10:
+            case 10:  # round, without a foot
                 m.add(vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1.05, 0.35), (1, 0.7),
                     (0.85, 0.9)]), 0.0025, n=18))  # fmt: skip
-            case 11:
+            case 11:  # a drink with a straw
                 m.add(vessel([(0, 0), (r * 0.85, 0), (r, 0.14)], 0.0025))
                 m.add(tube([(-0.01, 0.006, 0), (r * 0.9, 0.2, 0.005)], 0.0035, n=6),
                     of=plain("straw", m.any_colour(), 0.5))  # fmt: skip
-            case 12:
+            case 12:  # with rings
                 m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.9, 0.012), (r, 0.014), (r, 0.05),
                     (r * 0.97, 0.052), (r * 0.97, 0.06), (r, 0.062), (r, tall)], 0.0025, n=16))  # fmt: skip
     if form in (5, 7, 11):

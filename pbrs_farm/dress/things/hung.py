@@ -42,7 +42,10 @@ def wall_shelf(m: Maker, width: float, depth: float, n: int, board: Material) ->
 @thing(group="upper_cabinet", nyu40=CABINET, place=Place.WALL)
 def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height: float, d: float,
     n: int, form: int) -> None:  # fmt: skip
-    """A closed cupboard with its doors: bars, knobs, grip edges, shaker fronts, flaps, an open end."""
+    """A closed cupboard with its doors.
+
+    Bars, knobs, grip edges, shaker fronts, flaps, an open end.
+    """
     w, t = width / 2, 0.018
     # The last form leaves an open end with shelves.
     e = 0.22 if form == 5 and width > 0.75 else 0.0
@@ -78,19 +81,19 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
                         for q in (x + 0.002, x + step - 0.062):
                             m.add(slab((q, 0.002, d + 0.0185),
                                 (q + 0.06, height - 0.002, d + 0.0235)))  # fmt: skip
-                case 0:
+                case 0:  # bars
                     with m.of(m.metal):
                         m.add(slab((a - 0.005, 0.04, d + 0.0345), (a + 0.005, 0.2, d + 0.0425)))
                         for y in (0.05, 0.185):
                             m.add(slab((a - 0.004, y, d + 0.0185),
                                 (a + 0.004, y + 0.008, d + 0.0345)))  # fmt: skip
             match form:
-                case 1 | 3:
+                case 1 | 3:  # knobs
                     with m.of(m.metal):
                         m.add(turned([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
                             (0.013, 0.028), (0.0, 0.03)], n=14), turn=LYING_ALONG_Z,
                             at=(a, 0.07, d + (0.0235 if form == 3 else 0.0185)))  # fmt: skip
-                case 2:
+                case 2:  # a grip edge
                     m.add(slab((x + 0.002, 0.002, d + 0.0005),
                         (x + step - 0.002, 0.012, d + 0.008)), of=m.metal)  # fmt: skip
 
@@ -133,10 +136,12 @@ def tool_rail(m: Maker, width: float) -> None:
 
 
 def stick(m: Maker, x: float, top: float, low: float) -> None:
+    """The handle of a tool from `low` to `top`."""
     m.add(slab((x - 0.006, low, 0.045 - 0.003), (x + 0.006, top, 0.045 + 0.003)))
 
 
 def ladle(m: Maker, x: float, y: float) -> None:
+    """A ladle that hangs from (x, y)."""
     r, low = m.uniform(0.03, 0.042), y - m.uniform(0.24, 0.3)
     with m.of(m.pick(m.metal, plain("handle", (0.08, 0.08, 0.08), 0.5),
         plain("handle " + m.style.wood.name, m.wood, 0.6))):  # fmt: skip
@@ -146,6 +151,7 @@ def ladle(m: Maker, x: float, y: float) -> None:
 
 
 def turner(m: Maker, x: float, y: float) -> None:
+    """A turner that hangs from (x, y)."""
     w, low = m.uniform(0.028, 0.04), y - m.uniform(0.2, 0.24)
     grip = m.pick(m.metal, plain("handle", (0.08, 0.08, 0.08), 0.5),
         plain("handle " + m.style.wood.name, m.wood, 0.6))  # fmt: skip
@@ -156,6 +162,7 @@ def turner(m: Maker, x: float, y: float) -> None:
 
 
 def pan(m: Maker, x: float, y: float) -> None:
+    """A pan that hangs from (x, y), its inside to the front."""
     r, low, black = m.uniform(0.08, 0.1), y - 0.13, plain("pan", (0.07, 0.07, 0.075), 0.4)
     m.add(slab((x - 0.009, low - 0.004, 0.028), (x + 0.009, y - 0.024, 0.046)), of=black)
     m.add(turned([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
@@ -164,7 +171,7 @@ def pan(m: Maker, x: float, y: float) -> None:
 
 
 def hung_cup(m: Maker, x: float, y: float) -> None:
-    """It hangs by its handle, its mouth to the side."""
+    """A cup that hangs by its handle, its mouth to the side."""
     r, h = 0.038, 0.085
     with m.of(plain("hung cup", m.any_colour(), 0.25)):
         m.add(slab((x - 0.018, y - 0.05, 0.045 - 0.005), (x + 0.018, y - 0.026, 0.045 + 0.005)))
@@ -185,28 +192,31 @@ def wall_socket(m: Maker, n: int, colour: Rgb) -> None:
 
 @thing(group="switch", place=Place.WALL)
 def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
-    """Switches of the usual 8 cm beside one another: rockers, halved ones, small ones in a plate, round ones that turn."""
+    """Switches of the usual 8 cm beside one another.
+
+    Rockers, halved ones, small ones in a plate, round ones that turn.
+    """
     with m.of(plain("plate", colour, 0.3)):
         cover(m, n)
         for k in range(n):
             x = (k - (n - 1) / 2) * 0.081
             match form:
-                case 0:
+                case 0:  # a rocker
                     m.add(box((x, 0.0405, 0.0105), (0.029, 0.029, 0.002)), name="rocker")
-                case 1:
+                case 1:  # halved
                     for s in (-1, 1):
                         m.add(box((x + s * 0.0148, 0.0405, 0.0105), (0.0138, 0.029, 0.002)),
                             name="rocker")  # fmt: skip
-                case 2:
+                case 2:  # small, in a screwed plate
                     m.add(box((x, 0.0405, 0.0115), (0.012, 0.022, 0.003)), name="rocker")
-                case 3:
+                case 3:  # round, it turns
                     m.add(facing_disc([(0.024, 0.009), (0.024, 0.013), (0, 0.013)], 0.0405, x),
                         name="rocker")  # fmt: skip
                     m.add(box((x, 0.0405, 0.019), (0.004, 0.018, 0.0065)), name="rocker")
-                case 4:
+                case 4:  # round
                     m.add(facing_disc([(0.03, 0.009), (0.03, 0.0105), (0.024, 0.014), (0, 0.0145)],
                         0.0405, x), name="rocker")  # fmt: skip
-                case 5:
+                case 5:  # flat, nearly the whole plate
                     m.add(box((x, 0.0405, 0.0098), (0.038, 0.038, 0.0012)), name="rocker")
         for y in (0.012, 0.069):
             if form == 2:
@@ -214,6 +224,7 @@ def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
 
 
 def cover(m: Maker, n: int) -> None:
+    """The plate of n switches or sockets side by side."""
     m.add(box((0.0, 0.0405, 0.0045), (0.081 * n / 2, 0.0405, 0.0045)), name="plate")
 
 
@@ -266,7 +277,7 @@ def coat_rack(m: Maker, n: int, is_bath: bool) -> None:
 
 
 def coat(m: Maker, x: float, is_bath: bool) -> None:
-    """It hangs from its collar at (x, 0.04), before the board; sleeves at both sides, a little behind."""
+    """A coat that hangs by its collar at (x, 0.04), before the board; its sleeves a little behind."""
     long, wide = m.uniform(0.95, 1.15) if is_bath else m.uniform(0.65, 1.05), m.uniform(0.2, 0.27)
     if is_bath:
         colour = mix((0.92, 0.91, 0.89), m.any_colour(), 0.3)
@@ -307,11 +318,9 @@ def facing_disc(profile: Profile | F64, up: float, x: float = 0.0) -> Surface:
     upright = lathe("disc", np.asarray(profile), np.zeros(3), 0, n=40)
     normals = upright.normals
     assert normals is not None
-    lying = replace(
-        upright,
+    lying = replace(upright,
         positions=(upright.positions @ _LYING.T.astype(np.float32)).astype(np.float32),
-        normals=(normals @ _LYING.T.astype(np.float32)).astype(np.float32),
-    )
+        normals=(normals @ _LYING.T.astype(np.float32)).astype(np.float32))  # fmt: skip
     return replace(lying, positions=(lying.positions + np.array((x, up, 0.0))).astype(np.float32))
 
 
@@ -332,10 +341,8 @@ def garment(wide: float, long: float, deep: float, phase: float) -> Surface:
     faces = [np.stack([np.full(n, rows * n), after, k], -1)]
     for r in range(rows - 1):
         a, b = r * n, (r + 1) * n
-        faces += [
-            np.stack([a + k, a + after, b + after], -1),
-            np.stack([a + k, b + after, b + k], -1),
-        ]
+        faces += [np.stack([a + k, a + after, b + after], -1),
+            np.stack([a + k, b + after, b + k], -1)]  # fmt: skip
     last = (rows - 1) * n
     faces.append(np.stack([np.full(n, rows * n + 1), last + k, last + after], -1))
     return smooth("coat", points, np.concatenate(faces).astype(np.int32))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from numpy import pi
 
@@ -15,6 +15,8 @@ from pbrs_farm.dress.things.maker import Maker, Pair
 from pbrs_farm.dress.things.materials import FROSTED
 from pbrs_farm.dress.things.outlines import bent, d_shape, ring_path, rings, scaled
 
+_HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
+
 
 class Look(NamedTuple):
     """What the doors and drawers of a piece look like."""
@@ -24,15 +26,18 @@ class Look(NamedTuple):
     body: Material
     top: Material
     pull: str  # what opens them: bar, bow, square, knob, disc, ring, cup, edge, none
-    pull_stuff: Material
+    pull_material: Material
 
 
-def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, stuff: Material) -> None:
-    """A front 19 mm thick before z, 2 mm within its edges: flat, shaker, grooved, raised or glazed."""
+def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -> None:
+    """A front 19 mm thick before z, 2 mm within its edges.
+
+    Flat, shaker, grooved, raised or glazed.
+    """
     a, b, c, d = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
     rail = min(0.065, 0.22 * (b - a), 0.3 * (d - c))
-    with m.of(stuff):
-        if kind == "shaker" or kind == "glazed":
+    with m.of(material):
+        if kind in ("shaker", "glazed"):
             m.add(bevelled((a, c, z), (a + rail, d, z + 0.019), 0.0015))
             m.add(bevelled((b - rail, c, z), (b, d, z + 0.019), 0.0015))
             m.add(bevelled((a + rail, c, z), (b - rail, c + rail, z + 0.019), 0.0015))
@@ -50,16 +55,19 @@ def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, stuff: Material) -> N
                     (a + (b - a) * (k + 1) / n - 0.001, d, z + 0.019), 0.002))  # fmt: skip
         else:
             m.add(bevelled((a, c, z), (b, d, z + 0.019), 0.002))
-            if kind == "raised" and b - a > 0.16 and (d - c > 0.12):
+            if kind == "raised" and b - a > 0.16 and d - c > 0.12:
                 m.add(bevelled((a + rail * 0.8, c + rail * 0.8, z + 0.019),
                     (b - rail * 0.8, d - rail * 0.8, z + 0.025), 0.006))  # fmt: skip
 
 
 def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: float,
-    stuff: Material) -> None:  # fmt: skip
-    """What a front is opened by, its foot at z: bar, bow, knob, cup, edge, ring or none. across: it lies along x."""
+    material: Material) -> None:  # fmt: skip
+    """What a front is opened by, its foot at z.
+
+    Bar, bow, knob, cup, edge, ring or none. across: it lies along x.
+    """
     h = long / 2
-    with m.of(stuff), m.moved(at=(x, y, z)):
+    with m.of(material), m.moved(at=(x, y, z)):
         match kind:
             case "knob":
                 m.add(turned([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
@@ -96,7 +104,10 @@ def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: 
 
 def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bool,
     is_high: bool) -> None:  # fmt: skip
-    """A front with a pull at the side away from its hinges: at its upper end below, its lower end above eyes."""
+    """A front with a pull at the side away from its hinges.
+
+    At its upper end below, its lower end above eyes.
+    """
     panel(m, look.kind, x, y, z, look.front)
     tall = y[1] - y[0]
     a = x[1] - 0.04 if opens_left else x[0] + 0.04
@@ -105,42 +116,43 @@ def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: boo
     b = y[0] + 0.5 * tall if tall > 1.1 else b
     if look.pull == "edge":
         pull(m, "edge", (x[0] + x[1]) / 2, y[0] if is_high else y[1] - 0.004, z + 0.012, True,
-            0.7 * (x[1] - x[0]), look.pull_stuff)  # fmt: skip
+            0.7 * (x[1] - x[0]), look.pull_material)  # fmt: skip
     elif look.pull == "cup":
-        pull(m, "knob", a, b, z + 0.019, False, long, look.pull_stuff)
+        pull(m, "knob", a, b, z + 0.019, False, long, look.pull_material)
     else:
-        pull(m, look.pull, a, b, z + 0.019, False, long, look.pull_stuff)
+        pull(m, look.pull, a, b, z + 0.019, False, long, look.pull_material)
 
 
 def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
+    """The front of a drawer or flap with its pull, or two on wide ones."""
     wide, tall = x[1] - x[0], y[1] - y[0]
     # What has a frame on doors is flat on low drawers.
-    panel(m,
-        "flat" if (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed" else look.kind, x,
-        y, z, look.front)  # fmt: skip
+    is_flat = (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed"
+    panel(m, "flat" if is_flat else look.kind, x, y, z, look.front)
     middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
         min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))  # fmt: skip
     if look.pull == "edge":
-        pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_stuff)
+        pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_material)
     elif look.pull in ("knob", "disc", "ring") and wide > 0.6:
         for s in (-0.25, 0.25):
-            pull(m, look.pull, middle + s * wide, high, z + 0.019, True, long, look.pull_stuff)
+            pull(m, look.pull, middle + s * wide, high, z + 0.019, True, long, look.pull_material)
     else:
-        pull(m, look.pull, middle, high, z + 0.019, True, long, look.pull_stuff)
+        pull(m, look.pull, middle, high, z + 0.019, True, long, look.pull_material)
 
 
 def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
     is_high: bool) -> None:  # fmt: skip
-    """Columns of fronts before z, each column named from the top: 'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'."""
+    """Columns of fronts before z, each column named from the top.
+
+    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'.
+    """
     n = len(columns)
     for k, kinds in enumerate(columns):
         a, b = x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n
-        total, below = 0.0, 0.0
-        for kind in kinds:
-            total += 3.4 if kind == "door" else 0.7 if kind == "low" else 1.0
+        total, below = sum(_HEIGHTS.get(kind, 1.0) for kind in kinds), 0.0
         for kind in kinds:
             above = below
-            below += 3.4 if kind == "door" else 0.7 if kind == "low" else 1.0
+            below += _HEIGHTS.get(kind, 1.0)
             c, d = y[1] - (y[1] - y[0]) * below / total, y[1] - (y[1] - y[0]) * above / total
             match kind:
                 case "door":
@@ -150,10 +162,13 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
 
 
 def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
-    stuff: Material) -> None:  # fmt: skip
-    """One of furniture's legs from foot (x, z) to top (x, z) at a height: square, round, tapered, hairpin or bun."""
+    material: Material) -> None:  # fmt: skip
+    """One of furniture's legs from foot (x, z) to top (x, z) at a height.
+
+    Square, round, tapered, hairpin or bun.
+    """
     a, b = (foot[0], 0.0, foot[1]), (top[0], high, top[1])
-    with m.of(stuff):
+    with m.of(material):
         match kind:
             case "square":
                 m.add(bevelled((top[0] - thick / 2, 0.0, top[1] - thick / 2),
@@ -178,8 +193,8 @@ def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
 
 
 def four_legs(m: Maker, kind: str, w: float, d: float, high: float, thick: float, inset: float,
-    splay: float, stuff: Material) -> None:  # fmt: skip
+    splay: float, material: Material) -> None:  # fmt: skip
     """Under what is w wide and d deep, inset from its edges, leaning outwards by splay."""
     for sx, sz in product((-1.0, 1.0), (-1.0, 1.0)):
         leg(m, kind, (sx * (w / 2 - inset + splay), sz * (d / 2 - inset + splay)),
-            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, stuff)  # fmt: skip
+            (sx * (w / 2 - inset), sz * (d / 2 - inset)), high, thick, material)  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Final
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATOR, SINK
@@ -44,6 +45,8 @@ from pbrs_farm.dress.things.materials import (
 )
 from pbrs_farm.dress.things.outlines import bent, d_shape, oval, rect, rings
 
+_HOB_M: Final = {"gas": 0.044, "ceramic": 0.006, "plates": 0.019}  # that a hob is high
+
 
 @dataclass(frozen=True, slots=True)
 class KitchenSet:
@@ -59,6 +62,7 @@ class KitchenSet:
 
 
 def kitchen_set(m: Maker) -> KitchenSet:
+    """The taste of one kitchen: its fronts, worktop, pulls and plinth."""
     top_h, top_t = m.pick(0.86, 0.88, 0.9, 0.9, 0.92), m.pick(0.02, 0.03, 0.038, 0.04)
     kind = m.pick("flat", "flat", "shaker", "shaker", "grooved", "raised")
     is_wood = m.chance(0.25)
@@ -72,49 +76,47 @@ def kitchen_set(m: Maker) -> KitchenSet:
         glossy("stone", (0.88, 0.87, 0.84), 0.25), glossy("stone", (0.13, 0.13, 0.14), 0.25),
         glossy("stone", (0.55, 0.53, 0.5), 0.3), STEEL)[stone]  # fmt: skip
     pull_kind = m.pick("bar", "bow", "knob", "disc", "square", "cup", "edge", "edge")
-    pull_stuff = m.metal if m.chance(0.6) else m.pick(STEEL, BLACK_STEEL, BRASS)
-    look = Look(kind, front, body, worktop, pull_kind, pull_stuff)
+    pull_material = m.metal if m.chance(0.6) else m.pick(STEEL, BLACK_STEEL, BRASS)
+    look = Look(kind, front, body, worktop, pull_kind, pull_material)
     upper_look = Look(m.pick(kind, kind, kind, "glazed"), upper_front, body, worktop, pull_kind,
-        pull_stuff)  # fmt: skip
+        pull_material)  # fmt: skip
     plinth = front if m.chance(0.5) else m.pick(STEEL, RUBBER)
     plinth_h = m.pick(0.1, 0.12, 0.15)
     return KitchenSet(top_h, top_t, look, upper_look, worktop, plinth, plinth_h)
 
 
-def unit_body(m: Maker, size: Size, top_h: float, top_t: float, look: Look, plinth: Material,
-    plinth_h: float) -> None:  # fmt: skip
-    """A unit's box, plinth and worktop."""
+def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
+    """A unit's box and plinth; its worktop's upper side is to be at top_h."""
     w, d, _h = size
     f = d / 2 - 0.049
-    m.add(slab((-w / 2 + 0.0005, plinth_h, -d / 2), (w / 2 - 0.0005, top_h - top_t, f)),
-        of=look.body)  # fmt: skip
-    m.add(slab((-w / 2, 0.0, -d / 2 + 0.02), (w / 2, plinth_h, f - 0.05)), of=plinth)
+    m.add(slab((-w / 2 + 0.0005, k.plinth_h, -d / 2), (w / 2 - 0.0005, top_h - k.top_t, f)),
+        of=k.look.body)  # fmt: skip
+    m.add(slab((-w / 2, 0.0, -d / 2 + 0.02), (w / 2, k.plinth_h, f - 0.05)), of=k.plinth)
+
+
+def unit(m: Maker, size: Size, k: KitchenSet, columns: Sequence[Sequence[str]]) -> None:
+    """A unit with its worktop and columns of fronts."""
+    unit_body(m, size, k.top_h, k)
+    w, d, h = size
+    m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
+    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
+        False)  # fmt: skip
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
     variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
 def base_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A kitchen's unit with a worktop: doors, drawers, or both."""
-    unit_body(m, size, k.top_h, k.top_t, k.look, k.plinth, k.plinth_h)
-    w, d, h = size
-    m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
-    columns: Sequence[Sequence[str]] = m.pick([("door",)], [("low", "door")], [("drawer", "drawer", "drawer")],
-        [("low", "drawer", "drawer")], [("door",), ("door",)])  # fmt: skip
-    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
-        False)  # fmt: skip
+    unit(m, size, k, m.pick([("door",)], [("low", "door")], [("drawer", "drawer", "drawer")],
+        [("low", "drawer", "drawer")], [("door",), ("door",)]))  # fmt: skip
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
     variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))  # fmt: skip
 def drawer_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """The same with drawers alone, as a second unit of the kitchen."""
-    unit_body(m, size, k.top_h, k.top_t, k.look, k.plinth, k.plinth_h)
-    w, d, h = size
-    m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
-    columns: Sequence[Sequence[str]] = m.pick([("low", "drawer", "drawer")], [("drawer", "drawer")],
-        [("low", "low", "drawer", "drawer")], [("low", "door")])  # fmt: skip
-    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
-        False)  # fmt: skip
+    unit(m, size, k, m.pick([("low", "drawer", "drawer")], [("drawer", "drawer")],
+        [("low", "low", "drawer", "drawer")], [("low", "door")]))  # fmt: skip
 
 
 @family(group="upper_cabinet", nyu40=CABINET, place=Place.WALL, called="kitchen_wall_cabinet",
@@ -122,22 +124,22 @@ def drawer_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
 def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A kitchen's cupboard on the wall: one door or two, a flap, glass, or open shelves."""
     w, d, h = size
+    hw = w / 2
     f, t = d - (0.022 if k.look.pull == "edge" else 0.049), 0.016
     with m.of(k.look.body):
-        m.add(slab((-w / 2, 0.0, 0.0), (w / 2, h, 0.008)))
-        m.add(slab((-w / 2, 0.0, 0.008), (-w / 2 + t, h, f)))
-        m.add(slab((w / 2 - t, 0.0, 0.008), (w / 2, h, f)))
+        m.add(slab((-hw, 0.0, 0.0), (hw, h, 0.008)))
+        m.add(slab((-hw, 0.0, 0.008), (-hw + t, h, f)))
+        m.add(slab((hw - t, 0.0, 0.008), (hw, h, f)))
         for y in (0.0, h * 0.36, h * 0.68, h - t):
-            m.add(slab((-w / 2 + t, y, 0.008), (w / 2 - t, y + t, f - 0.002)))
-    open = m.chance(0.12)
-    if not open:
-        fronts_of(m, k.upper_look, (-w / 2, w / 2), (0.0, h), f, m.pick([("door",), ("door",)],
+            m.add(slab((-hw + t, y, 0.008), (hw - t, y + t, f - 0.002)))
+    if not m.chance(0.12):
+        fronts_of(m, k.upper_look, (-hw, hw), (0.0, h), f, m.pick([("door",), ("door",)],
             [("door",)], [("flap", "flap")]), True)  # fmt: skip
     else:
-        m.add(slab((-w / 2, -0.0001, f), (-w / 2 + t, h, d - 0.002)), of=k.upper_look.front)
-        m.add(slab((w / 2 - t, -0.0001, f), (w / 2, h, d - 0.002)), of=k.upper_look.front)
-        m.add(slab((-w / 2 + t, 0.0, f), (w / 2 - t, t, d)), of=k.upper_look.front)
-        m.add(slab((-w / 2 + t, h - t, f), (w / 2 - t, h, d)), of=k.upper_look.front)
+        m.add(slab((-hw, -0.0001, f), (-hw + t, h, d - 0.002)), of=k.upper_look.front)
+        m.add(slab((hw - t, -0.0001, f), (hw, h, d - 0.002)), of=k.upper_look.front)
+        m.add(slab((-hw + t, 0.0, f), (hw - t, t, d)), of=k.upper_look.front)
+        m.add(slab((-hw + t, h - t, f), (hw - t, h, d)), of=k.upper_look.front)
 
 
 @family(group="sink", nyu40=SINK, place=Place.KITCHEN, variants=32, of_set=kitchen_set,
@@ -145,8 +147,9 @@ def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
 def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     """A unit with a sink in its worktop: one bowl, two, or one with a drainer; many taps."""
     w, d, h = size
-    unit_body(m, size, k.top_h, k.top_t, k.look, k.plinth, k.plinth_h)
-    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, k.top_h - k.top_t - 0.003), d / 2 - 0.049,
+    hd = d / 2
+    unit_body(m, size, k.top_h, k)
+    fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, k.top_h - k.top_t - 0.003), hd - 0.049,
         [("door",), ("door",)] if m.chance(0.7) else [("drawer", "drawer")], False)  # fmt: skip
     # The bowl, and a worktop of four pieces around it.
     basin = m.pick(STEEL, STEEL, CERAMIC, glossy("granite", (0.12, 0.12, 0.13), 0.4))
@@ -155,24 +158,24 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     bd, z0 = 0.4, -0.005
     x0, x1, a, b = -bw / 2, bw / 2, z0 - bd / 2, z0 + bd / 2
     with m.of(k.worktop):
-        m.add(slab((-w / 2, k.top_h - k.top_t, -d / 2), (x0, k.top_h, d / 2 - 0.012)))
-        m.add(slab((x1, k.top_h - k.top_t, -d / 2), (w / 2, k.top_h, d / 2 - 0.012)))
-        m.add(slab((x0, k.top_h - k.top_t, -d / 2), (x1, k.top_h, a)))
-        m.add(slab((x0, k.top_h - k.top_t, b), (x1, k.top_h, d / 2 - 0.012)))
+        m.add(slab((-w / 2, k.top_h - k.top_t, -hd), (x0, k.top_h, hd - 0.012)))
+        m.add(slab((x1, k.top_h - k.top_t, -hd), (w / 2, k.top_h, hd - 0.012)))
+        m.add(slab((x0, k.top_h - k.top_t, -hd), (x1, k.top_h, a)))
+        m.add(slab((x0, k.top_h - k.top_t, b), (x1, k.top_h, hd - 0.012)))
     with m.of(basin):
         match form:
-            case 0:
+            case 0:  # one bowl
                 sink_bowl(m, 0.0, z0, 0.5, bd, k.top_h, 0.06)
-            case 1:
+            case 1:  # two
                 sink_bowl(m, -0.18, z0, 0.36, bd, k.top_h, 0.05)
                 sink_bowl(m, 0.18, z0, 0.36, bd, k.top_h, 0.05)
-            case 2:
+            case 2:  # one and a drainer
                 sink_bowl(m, -0.15, z0, 0.42, bd, k.top_h, 0.06)
                 m.add(bevelled((0.06, k.top_h - 0.01, a), (x1, k.top_h + 0.003, b), 0.002))
                 for i in range(6):
                     m.add(bevelled((0.09, k.top_h + 0.002, a + 0.05 + i * 0.05),
                         (x1 - 0.03, k.top_h + 0.007, a + 0.06 + i * 0.05), 0.002))  # fmt: skip
-            case 3:
+            case 3:  # round
                 m.add(loft([(oval(0.36, 0.36, z=z0), k.top_h - 0.17),
                     (oval(0.43, 0.39, z=z0), k.top_h - 0.02),
                     (rect(0.44, bd, 0.02, z=z0, n=5), k.top_h - 0.001),
@@ -181,10 +184,11 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
                     (oval(0.36, 0.35, z=z0), k.top_h - 0.1),
                     (oval(0.25, 0.25, z=z0), k.top_h - 0.15)]))  # fmt: skip
     with m.moved(at=(0.0 if form != 2 else -0.15, 0.0, 0.0)):
-        kitchen_tap(m, k.top_h, -d / 2 + 0.06, h)
+        kitchen_tap(m, k.top_h, -hd + 0.06, h)
 
 
 def sink_bowl(m: Maker, x: float, z: float, w: float, d: float, y: float, r: float) -> None:
+    """A bowl w by d about (x, z), its rim at y, with its drain; r: of its corners."""
     m.add(loft(rings(rect, [(w - 0.04, d - 0.04, r, y - 0.19), (w - 0.014, d - 0.014, r, y - 0.16),
         (w - 0.002, d - 0.002, r, y - 0.001), (w, d, r, y + 0.002),
         (w - 0.02, d - 0.02, r, y + 0.003), (w - 0.03, d - 0.03, r, y - 0.14),
@@ -194,19 +198,19 @@ def sink_bowl(m: Maker, x: float, z: float, w: float, d: float, y: float, r: flo
 
 def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
     """From the worktop at y up to top: an arch, a bend, an angle or a pull-out."""
-    stuff = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, m.metal)
-    form, r, t = m.weighted(0.4, 0.3, 0.3), m.uniform(0.01, 0.014), top - 0.0
-    with m.of(stuff):
+    material = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, m.metal)
+    form, r, t = m.weighted(0.4, 0.3, 0.3), m.uniform(0.01, 0.014), top
+    with m.of(material):
         m.add(turned([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012),
             (0.022, y + 0.05), (0.0, y + 0.05)], n=20), at=(0.0, 0.0, z))  # fmt: skip
         match form:
-            case 0:
+            case 0:  # an arch
                 m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
                     (0.0, t - 0.12, z + 0.2)], 0.09, n=6), r, n=10))  # fmt: skip
-            case 1:
+            case 1:  # a bend
                 m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r, z), (0.0, t - r, z + 0.2),
                     (0.0, t - 0.05, z + 0.2)], 0.03, n=3), r, n=10))  # fmt: skip
-            case 2:
+            case 2:  # an angle, its head pulls out
                 m.add(tube(bent([(0.0, y + 0.04, z), (0.0, t - r - 0.06, z),
                     (0.0, t - r, z + 0.22)], 0.05, n=4), r * 1.1, n=10))  # fmt: skip
                 m.add(tube([(0.0, t - r - 0.004, z + 0.2), (0.0, t - r - 0.05, z + 0.215)], r,
@@ -219,7 +223,9 @@ def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
                 m.add(tube([(s * 0.015, y + 0.03, z), (s * 0.055, y + 0.03, z)], 0.012, n=8))
 
 
-def hob_top(m: Maker, w: float, d: float, y: float, z: float, kind: str, stuff: Material) -> None:
+def hob_top(
+    m: Maker, w: float, d: float, y: float, z: float, kind: str, material: Material
+) -> None:
     """What one cooks on, over y: gas, ceramic, or solid plates, in w by d about z."""
     match kind:
         case "ceramic":
@@ -231,14 +237,14 @@ def hob_top(m: Maker, w: float, d: float, y: float, z: float, kind: str, stuff: 
                     (r * 0.97, y + 0.0065), (r * 0.97, y + 0.0055)], n=28),
                     at=(x * w, 0.0, z + c * d), of=ring)  # fmt: skip
         case "plates":
-            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=stuff)
+            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.073), (-0.24, 0.22, 0.073),
                 (0.24, 0.22, 0.09)):  # fmt: skip
                 m.add(turned([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
                     (r, y + 0.012), (r, y + 0.019), (r * 0.3, y + 0.019), (r * 0.28, y + 0.016),
                     (0.0, y + 0.016)], n=26), at=(x * w, 0.0, z + c * d), of=CAST_IRON)  # fmt: skip
         case "gas":
-            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=stuff)
+            m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
             for x, c, r in ((-0.24, -0.22, 0.05), (0.24, -0.22, 0.038), (-0.24, 0.22, 0.03),
                 (0.24, 0.22, 0.042)):  # fmt: skip
                 m.add(turned([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014),
@@ -266,14 +272,17 @@ def hob_top(m: Maker, w: float, d: float, y: float, z: float, kind: str, stuff: 
                             (x + 0.005, y + 0.035, z + q + 0.005)))  # fmt: skip
 
 
-def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, stuff: Material, grip: str,
+def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: Material, grip: str,
     has_knobs: bool, n: int) -> None:  # fmt: skip
-    """An oven's door with its window and handle, in x and y before z; its knobs or its display above."""
+    """An oven's door with its window and handle, in x and y before z.
+
+    Its knobs or its display above.
+    """
     a, b, c, d = x[0] + 0.002, x[1] - 0.002, y[0] + 0.002, y[1]
     w = b - a
-    m.add(bevelled((a, d - panel_h, z), (b, d - 0.001, z + 0.02), 0.002), of=stuff)
+    m.add(bevelled((a, d - panel_h, z), (b, d - 0.001, z + 0.02), 0.002), of=material)
     m.add(bevelled((a, c, z), (b, d - panel_h - 0.004, z + 0.02), 0.003),
-        of=m.pick(BLACK_GLASS, stuff))  # fmt: skip
+        of=m.pick(BLACK_GLASS, material))  # fmt: skip
     e = d - panel_h - 0.004
     m.add(bevelled((a + 0.06, c + 0.07, z + 0.0195), (b - 0.06, e - 0.1, z + 0.022), 0.001),
         of=BLACK_GLASS)  # fmt: skip
@@ -296,23 +305,26 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, stuff: Mate
 @family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, variants=32,
     size=lambda m: (m.pick(0.5, 0.6, 0.6), 0.6, m.uniform(0.88, 0.92)))  # fmt: skip
 def cooker(m: Maker, size: Size) -> None:
-    """A cooker that stands between the units: hob, knobs, oven door, a drawer below; some have a lid or a splash back."""
+    """A cooker that stands between the units.
+
+    Hob, knobs, oven door, a drawer below; some have a lid or a splash back.
+    """
     w, d, h = size
-    stuff = m.pick(ENAMEL, STEEL, STEEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.25),
+    hw = w / 2
+    material = m.pick(ENAMEL, STEEL, STEEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.25),
         glossy("cream enamel", (0.9, 0.86, 0.74), 0.2))  # fmt: skip
     kind = m.pick("gas", "gas", "ceramic", "plates")
-    over = 0.044 if kind == "gas" else 0.006 if kind == "ceramic" else 0.019
-    y, f = h - over, d / 2 - 0.049
-    m.add(slab((-w / 2, 0.06, -d / 2), (w / 2, y - 0.012, f)), of=stuff)
-    m.add(board(w, d - 0.02, y - 0.012, y + 0.0005, 0.008, 0.003, z=-0.01), of=stuff)
-    hob_top(m, w - 0.02, d - 0.09, y, -0.02, kind, stuff)
-    for x, z in product((-w / 2 + 0.05, w / 2 - 0.05), (-d / 2 + 0.06, f - 0.06)):
+    y, f = h - _HOB_M[kind], d / 2 - 0.049
+    m.add(slab((-hw, 0.06, -d / 2), (hw, y - 0.012, f)), of=material)
+    m.add(board(w, d - 0.02, y - 0.012, y + 0.0005, 0.008, 0.003, z=-0.01), of=material)
+    hob_top(m, w - 0.02, d - 0.09, y, -0.02, kind, material)
+    for x, z in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.06, f - 0.06)):
         m.add(frustum((0.02, 0.0), (0.016, 0.06), n=10), at=(x, 0.0, z), of=RUBBER)
     drawer = m.uniform(0.14, 0.2) if m.chance(0.7) else 0.0
     if drawer > 0:
-        m.add(bevelled((-w / 2 + 0.002, 0.065, f), (w / 2 - 0.002, 0.06 + drawer, f + 0.02), 0.003),
-            of=stuff)  # fmt: skip
-    oven_front(m, (-w / 2, w / 2), (0.064 + drawer, y - 0.016), f, m.pick(0.09, 0.1, 0.11), stuff,
+        m.add(bevelled((-hw + 0.002, 0.065, f), (hw - 0.002, 0.06 + drawer, f + 0.02), 0.003),
+            of=material)  # fmt: skip
+    oven_front(m, (-hw, hw), (0.064 + drawer, y - 0.016), f, m.pick(0.09, 0.1, 0.11), material,
         m.pick("bar", "bow", "square"), m.chance(0.8), m.pick(5, 6))  # fmt: skip
 
 
@@ -321,20 +333,20 @@ def cooker(m: Maker, size: Size) -> None:
 def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     """An oven in a unit of the kitchen, a hob in the worktop over it."""
     w, d, h = size
+    hw = w / 2
     kind = m.pick("ceramic", "ceramic", "ceramic", "gas", "plates")
-    over = 0.044 if kind == "gas" else 0.006 if kind == "ceramic" else 0.019
     f = d / 2 - 0.049
-    # It is drawn with its worktop at its told height less what stands on it.
-    y = h - over
-    unit_body(m, (w, d, y), y, k.top_t, k.look, k.plinth, k.plinth_h)
-    m.add(slab((-w / 2, y - k.top_t, -d / 2), (w / 2, y, d / 2 - 0.012)), of=k.worktop)
+    # The worktop lies below its height by what stands on it.
+    y = h - _HOB_M[kind]
+    unit_body(m, (w, d, y), y, k)
+    m.add(slab((-hw, y - k.top_t, -d / 2), (hw, y, d / 2 - 0.012)), of=k.worktop)
     hob_top(m, w - 0.02, 0.51, y - 0.001, -0.02, kind, m.pick(STEEL, ENAMEL, BLACK_GLASS))
-    stuff = m.pick(STEEL, STEEL, BLACK_GLASS, ENAMEL)
+    material = m.pick(STEEL, STEEL, BLACK_GLASS, ENAMEL)
     low = y - k.top_t - 0.003 - 0.595
-    oven_front(m, (-w / 2, w / 2), (low, y - k.top_t - 0.003), f, m.pick(0.09, 0.12), stuff,
+    oven_front(m, (-hw, hw), (low, y - k.top_t - 0.003), f, m.pick(0.09, 0.12), material,
         m.pick("bar", "square", "bow"), m.chance(0.6), m.pick(2, 4))  # fmt: skip
     if low - k.plinth_h > 0.06:
-        drawer_front(m, k.look, (-w / 2, w / 2), (k.plinth_h, low), f)
+        drawer_front(m, k.look, (-hw, hw), (k.plinth_h, low), f)
 
 
 @family(group="dishwasher", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=32,
@@ -342,17 +354,17 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
 def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
     """A dishwasher under the kitchen's worktop: a front of the kitchen, or its own with a panel."""
     w, d, h = size
+    hw = w / 2
     f, y = d / 2 - 0.049, h - k.top_t - 0.003
-    unit_body(m, size, k.top_h, k.top_t, k.look, k.plinth, k.plinth_h)
-    m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
+    unit_body(m, size, k.top_h, k)
+    m.add(slab((-hw, h - k.top_t, -d / 2), (hw, h, d / 2 - 0.012)), of=k.worktop)
     if m.chance(0.45):
-        drawer_front(m, k.look, (-w / 2, w / 2), (k.plinth_h, y), f)
+        drawer_front(m, k.look, (-hw, hw), (k.plinth_h, y), f)
     else:
-        stuff = m.pick(ENAMEL, STEEL, STEEL, BLACK_GLASS)
-        m.add(bevelled((-w / 2 + 0.002, k.plinth_h, f), (w / 2 - 0.002, y - 0.12, f + 0.02), 0.003),
-            of=stuff)  # fmt: skip
-        m.add(bevelled((-w / 2 + 0.002, y - 0.117, f), (w / 2 - 0.002, y, f + 0.02), 0.002),
-            of=stuff)  # fmt: skip
+        material = m.pick(ENAMEL, STEEL, STEEL, BLACK_GLASS)
+        m.add(bevelled((-hw + 0.002, k.plinth_h, f), (hw - 0.002, y - 0.12, f + 0.02), 0.003),
+            of=material)  # fmt: skip
+        m.add(bevelled((-hw + 0.002, y - 0.117, f), (hw - 0.002, y, f + 0.02), 0.002), of=material)
         m.add(slab((-0.06, y - 0.07, f + 0.0199), (0.06, y - 0.035, f + 0.0207)), of=BLACK_GLASS)
         for i in range(m.pick(3, 4, 5)):
             m.add(cylinder(0.008, 0.0, 0.003, n=10), turn=LYING_ALONG_Z,
@@ -366,85 +378,89 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
 def hood(m: Maker, size: Size) -> None:
     """An extractor over the cooker: a chimney, a pyramid, a dome, a glass plate, or a flat one."""
     w, d, h = size
-    stuff = m.pick(STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3), m.metal)
+    hw, hd = w / 2, d / 2
+    material = m.pick(STEEL, STEEL, ENAMEL, glossy("black enamel", (0.06, 0.06, 0.065), 0.3),
+        m.metal)  # fmt: skip
     form = m.weighted(0.3, 0.3, 0.2, 0.2) if h > 0.5 else 4
     # Everything is drawn from the wall, z = -d / 2.
     c, cd = 0.24, 0.26
-    cz = -d / 2 + cd / 2
-    with m.of(stuff):
+    cz = -hd + cd / 2
+    with m.of(material):
         if form < 4:
-            m.add(bevelled((-c / 2, 0.1, -d / 2), (c / 2, h, -d / 2 + cd), 0.002))
+            m.add(bevelled((-c / 2, 0.1, -hd), (c / 2, h, -hd + cd), 0.002))
         match form:
-            case 0:
-                m.add(bevelled((-w / 2, 0.0, -d / 2), (w / 2, 0.07, d / 2), 0.002))
-            case 1:
-                m.add(bevelled((-w / 2, 0.0, -d / 2), (w / 2, 0.045, d / 2), 0.002))
+            case 0:  # a beam
+                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.07, hd), 0.002))
+            case 1:  # a pyramid
+                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.045, hd), 0.002))
                 m.add(loft([(rect(w, d, 0.004), 0.044),
                     (rect(c + 0.01, cd + 0.01, 0.004, z=cz), 0.26)]))  # fmt: skip
-            case 2:
-                m.add(loft([(d_shape(w, d, back=-d / 2, share=0.5), 0.0),
-                    (d_shape(w, d, back=-d / 2, share=0.5), 0.02),
-                    (d_shape(w * 0.9, d * 0.9, back=-d / 2, share=0.5), 0.09),
-                    (d_shape(c + 0.02, cd + 0.02, back=-d / 2, share=0.3), 0.2)]))  # fmt: skip
-            case 3:
-                m.add(bevelled((-c / 2 - 0.05, 0.03, -d / 2),
-                    (c / 2 + 0.05, 0.09, -d / 2 + cd + 0.08), 0.003))  # fmt: skip
-                m.add(board(w, d, 0.02, 0.03, 0.05, 0.002), of=glass((0.8, 0.9, 0.9), 0.3))
-                m.add(bevelled((-c / 2 - 0.03, 0.0, -d / 2), (c / 2 + 0.03, 0.02, -d / 2 + cd),
-                    0.002))  # fmt: skip
-            case 4:
-                m.add(bevelled((-w / 2, 0.0, -d / 2), (w / 2, 0.035, d / 2), 0.002))
-                m.add(bevelled((-w / 2 + 0.02, 0.035, -d / 2), (w / 2 - 0.02, h, d / 2 - 0.14),
+            case 2:  # a dome
+                m.add(loft([(d_shape(w, d, back=-hd, share=0.5), 0.0),
+                    (d_shape(w, d, back=-hd, share=0.5), 0.02),
+                    (d_shape(w * 0.9, d * 0.9, back=-hd, share=0.5), 0.09),
+                    (d_shape(c + 0.02, cd + 0.02, back=-hd, share=0.3), 0.2)]))  # fmt: skip
+            case 3:  # a glass plate
+                m.add(bevelled((-c / 2 - 0.05, 0.03, -hd), (c / 2 + 0.05, 0.09, -hd + cd + 0.08),
                     0.003))  # fmt: skip
-    m.add(slab((-0.2, -0.002, -d / 2 + 0.1), (0.2, 0.001, d / 2 - 0.1)),
+                m.add(board(w, d, 0.02, 0.03, 0.05, 0.002), of=glass((0.8, 0.9, 0.9), 0.3))
+                m.add(bevelled((-c / 2 - 0.03, 0.0, -hd), (c / 2 + 0.03, 0.02, -hd + cd), 0.002))
+            case 4:  # flat
+                m.add(bevelled((-hw, 0.0, -hd), (hw, 0.035, hd), 0.002))
+                m.add(bevelled((-hw + 0.02, 0.035, -hd), (hw - 0.02, h, hd - 0.14), 0.003))
+    m.add(slab((-0.2, -0.002, -hd + 0.1), (0.2, 0.001, hd - 0.1)),
         of=glossy("filter", (0.35, 0.35, 0.36), 0.4))  # fmt: skip
     for k in range(4):
-        m.add(slab((-0.06 + k * 0.035, 0.012, d / 2 - 0.001),
-            (-0.04 + k * 0.035, 0.024, d / 2 + 0.001)), of=RUBBER)  # fmt: skip
+        m.add(slab((-0.06 + k * 0.035, 0.012, hd - 0.001), (-0.04 + k * 0.035, 0.024, hd + 0.001)),
+            of=RUBBER)  # fmt: skip
 
 
 @family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32,
     size=lambda m: (m.pick(0.55, 0.6, 0.6, 0.7, 0.9), m.uniform(0.6, 0.68),
     m.pick(1.45, 1.75, 1.8, 1.86, 2.0)))  # fmt: skip
 def fridge(m: Maker, size: Size) -> None:
-    """A fridge: one door, a freezer below or above, two doors side by side, drawers below two doors, or a round one on feet."""
+    """A fridge.
+
+    One door, a freezer below or above, two doors side by side, drawers below two doors, or a round one on feet.
+    """
     w, d, h = size
-    stuff = m.pick(ENAMEL, ENAMEL, STEEL, STEEL, glossy("black", (0.07, 0.07, 0.075), 0.25),
+    hw = w / 2
+    material = m.pick(ENAMEL, ENAMEL, STEEL, STEEL, glossy("black", (0.07, 0.07, 0.075), 0.25),
         glossy("enamel", m.pick((0.62, 0.75, 0.72), (0.75, 0.2, 0.16), (0.9, 0.86, 0.72),
         (0.35, 0.48, 0.58)), 0.2))  # fmt: skip
     retro = m.chance(0.25) and w < 0.8
     grip = m.pick("bar", "square", "bow", "none") if w < 0.8 else m.pick("bar", "square", "bow")
     f, foot = d / 2 - (0.07 if grip == "none" else 0.1), 0.05
-    grip_stuff = m.pick(STEEL, CHROME, CHROME, stuff)
+    grip_material = m.pick(STEEL, CHROME, CHROME, material)
     cut = m.pick(0.38, 0.36, 0.68, 0.72, 1.0) * h
     left = m.chance(0.5)
-    with m.of(stuff):
+    with m.of(material):
         if retro:
-            m.add(rounded((-w / 2, foot, -d / 2), (w / 2, h, f + 0.01), 0.06, n=3))
+            m.add(rounded((-hw, foot, -d / 2), (hw, h, f + 0.01), 0.06, n=3))
         else:
-            m.add(bevelled((-w / 2, foot, -d / 2), (w / 2, h, f), 0.004))
+            m.add(bevelled((-hw, foot, -d / 2), (hw, h, f), 0.004))
         if w > 0.8:
             low = h * 0.4 if m.chance(0.5) else foot
-            for a, b, s in ((-w / 2, -0.002, -1.0), (0.002, w / 2, 1.0)):
+            for a, b, s in ((-hw, -0.002, -1.0), (0.002, hw, 1.0)):
                 m.add(rounded((a + 0.002, low + 0.003, f + 0.004), (b - 0.002, h, f + 0.07), 0.01,
                     n=1))  # fmt: skip
                 pull(m, grip, s * 0.045, (low + h) / 2, f + 0.069, False, 0.5 * (h - low),
-                    grip_stuff)  # fmt: skip
+                    grip_material)  # fmt: skip
             if low > 0.1:
-                m.add(rounded((-w / 2 + 0.002, foot, f + 0.004),
-                    (w / 2 - 0.002, low - 0.002, f + 0.07), 0.01, n=1))  # fmt: skip
-                pull(m, grip, 0.0, low - 0.06, f + 0.069, True, 0.5 * w, grip_stuff)
+                m.add(rounded((-hw + 0.002, foot, f + 0.004), (hw - 0.002, low - 0.002, f + 0.07),
+                    0.01, n=1))  # fmt: skip
+                pull(m, grip, 0.0, low - 0.06, f + 0.069, True, 0.5 * w, grip_material)
         else:
             for c, e in ((foot, cut), (cut, h)) if cut < h else ((foot, h),):
-                m.add(rounded((-w / 2 + 0.001, c + 0.002, f + 0.006),
-                    (w / 2 - 0.001, e - 0.002, f + 0.07), 0.05 if retro else 0.008,
+                m.add(rounded((-hw + 0.001, c + 0.002, f + 0.006),
+                    (hw - 0.001, e - 0.002, f + 0.07), 0.05 if retro else 0.008,
                     n=3 if retro else 1))  # fmt: skip
                 is_low = e < 0.6 * h
                 if grip != "none":
-                    pull(m, grip, (w / 2 - 0.05) * (1 if left else -1),
+                    pull(m, grip, (hw - 0.05) * (1 if left else -1),
                         e - 0.2 if is_low else c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28,
-                        0.5 * (e - c)), f + 0.069, False, min(0.34, 0.6 * (e - c)), grip_stuff)  # fmt: skip
-    for x, z in product((-w / 2 + 0.06, w / 2 - 0.06), (-d / 2 + 0.06, f - 0.06)):
+                        0.5 * (e - c)), f + 0.069, False, min(0.34, 0.6 * (e - c)), grip_material)  # fmt: skip
+    for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
         m.add(frustum((0.022, 0.0), (0.018, foot + 0.01), n=10), at=(x, 0.0, z), of=RUBBER)
     if grip == "none" or m.chance(0.2):
         m.add(slab((-0.05, h - 0.3, f + 0.0695), (0.05, h - 0.2, f + 0.0708)), of=BLACK_GLASS)
@@ -455,17 +471,18 @@ def fridge(m: Maker, size: Size) -> None:
 def washing_machine(m: Maker, size: Size) -> None:
     """A machine with a round door in its front: drawer, dial and display above it."""
     w, d, h = size
-    stuff = m.pick(ENAMEL, ENAMEL, ENAMEL, glossy("grey", (0.55, 0.56, 0.58), 0.3), STEEL,
+    hw = w / 2
+    material = m.pick(ENAMEL, ENAMEL, ENAMEL, glossy("grey", (0.55, 0.56, 0.58), 0.3), STEEL,
         glossy("black", (0.1, 0.1, 0.105), 0.3))  # fmt: skip
     f, foot, strip = d / 2 - 0.045, 0.02, m.uniform(0.09, 0.13)
-    with m.of(stuff):
-        m.add(bevelled((-w / 2, foot, -d / 2), (w / 2, h - 0.03, f), 0.004))
+    with m.of(material):
+        m.add(bevelled((-hw, foot, -d / 2), (hw, h - 0.03, f), 0.004))
         m.add(board(w, d - 0.045, h - 0.028, h, 0.02, 0.006, z=-0.0225))
-        m.add(bevelled((-w / 2 + 0.003, h - 0.03 - strip, f), (w / 2 - 0.003, h - 0.032, f + 0.012),
+        m.add(bevelled((-hw + 0.003, h - 0.03 - strip, f), (hw - 0.003, h - 0.032, f + 0.012),
             0.003))  # fmt: skip
     y, r, x = (foot + (h - strip - foot) * m.uniform(0.5, 0.55), m.uniform(0.16, 0.2),
         m.pick(0.0, 0.0, 0.0, -0.02))  # fmt: skip
-    frame = m.pick(CHROME, STEEL, stuff, glossy("dark hoop", (0.15, 0.15, 0.16), 0.3))
+    frame = m.pick(CHROME, STEEL, material, glossy("dark hoop", (0.15, 0.15, 0.16), 0.3))
     with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
         m.add(turned([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),
             (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36), of=frame)  # fmt: skip
@@ -475,19 +492,18 @@ def washing_machine(m: Maker, size: Size) -> None:
         m.add(bevelled((x + r - 0.03, y - 0.04, f + 0.01), (x + r - 0.008, y + 0.04, f + 0.036),
             0.004), of=frame)  # fmt: skip
     # The drawer at the left, the dial in the middle or at the right, a display.
-    m.add(bevelled((-w / 2 + 0.02, h - 0.03 - strip + 0.015, f + 0.0115),
-        (-w / 2 + 0.18, h - 0.045, f + 0.016), 0.003), of=stuff)  # fmt: skip
+    m.add(bevelled((-hw + 0.02, h - 0.03 - strip + 0.015, f + 0.0115),
+        (-hw + 0.18, h - 0.045, f + 0.016), 0.003), of=material)  # fmt: skip
     m.add(turned([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20),
         turn=LYING_ALONG_Z, at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
-        of=m.pick(CHROME, stuff, RUBBER))  # fmt: skip
-    m.add(slab((w / 2 - 0.2, h - 0.03 - strip / 2 - 0.018, f + 0.0119), (w / 2 - 0.1,
-        h - 0.03 - strip / 2 + 0.018, f + 0.0128)), of=BLACK_GLASS)  # fmt: skip
+        of=m.pick(CHROME, material, RUBBER))  # fmt: skip
+    m.add(slab((hw - 0.2, h - 0.03 - strip / 2 - 0.018, f + 0.0119),
+        (hw - 0.1, h - 0.03 - strip / 2 + 0.018, f + 0.0128)), of=BLACK_GLASS)  # fmt: skip
     for k in range(m.pick(2, 3, 4)):
-        m.add(slab((w / 2 - 0.085 + k * 0.02, h - 0.03 - strip / 2 - 0.005, f + 0.0119),
-            (w / 2 - 0.073 + k * 0.02, h - 0.03 - strip / 2 + 0.005, f + 0.015)),
+        m.add(slab((hw - 0.085 + k * 0.02, h - 0.03 - strip / 2 - 0.005, f + 0.0119),
+            (hw - 0.073 + k * 0.02, h - 0.03 - strip / 2 + 0.005, f + 0.015)),
             of=m.pick(CHROME, RUBBER))  # fmt: skip
     if m.chance(0.5):
-        m.add(slab((-w / 2 + 0.05, foot + 0.03, f), (-w / 2 + 0.17, foot + 0.09, f + 0.003)),
-            of=stuff)  # fmt: skip
-    for x, z in product((-w / 2 + 0.05, w / 2 - 0.05), (-d / 2 + 0.05, f - 0.05)):
+        m.add(slab((-hw + 0.05, foot + 0.03, f), (-hw + 0.17, foot + 0.09, f + 0.003)), of=material)
+    for x, z in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.05, f - 0.05)):
         m.add(cylinder(0.022, 0.0, foot + 0.005, n=10), at=(x, 0.0, z), of=RUBBER)

@@ -30,15 +30,18 @@ from pbrs_farm.dress.things.outlines import bent, oval, rect, ring_path, rings, 
 
 @thing(group="ornament")
 def ornament(m: Maker) -> None:
-    """A small thing for its looks: an animal, a house, a globe, a boat, a camera, a stack of pebbles and many more."""
+    """A small thing for its looks.
+
+    An animal, a house, a globe, a boat, a camera, a stack of pebbles and many more.
+    """
     form = m.integers(0, 24)
-    stuff = m.metal if m.chance(0.25) else plain("ornament", m.any_colour(), m.uniform(0.2, 0.8))
+    material = m.metal if m.chance(0.25) else plain("ornament", m.any_colour(), m.uniform(0.2, 0.8))
     grain = plain("ornament wood", m.wood, 0.5)
-    own = grain if m.chance(0.4) else stuff
+    own = grain if m.chance(0.4) else material
     s = m.uniform(0.85, 1.2)
     match form:
         case 0:
-            m.add(sculpture(m), of=stuff)
+            m.add(sculpture(m), of=material)
         case 1:
             m.name = "bird"
             with m.of(own):
@@ -79,7 +82,7 @@ def ornament(m: Maker) -> None:
         case 4:
             m.name = "little_house"
             w, h, d = m.uniform(0.045, 0.065), m.uniform(0.07, 0.12), m.uniform(0.04, 0.06)
-            m.add(bevelled((-w / 2, 0, -d / 2), (w / 2, h, d / 2), 0.002), of=stuff)
+            m.add(bevelled((-w / 2, 0, -d / 2), (w / 2, h, d / 2), 0.002), of=material)
             m.add(loft(rings(rect, [(w + 0.012, d + 0.01, 0.0005, h), (0.004, d + 0.01, 0.0005,
                 h + w * m.uniform(0.6, 1.0))], n=1), sharp=20.0), of=own)  # fmt: skip
             for x, y in product((-0.22, 0.22), (0.62, 0.8)):
@@ -126,10 +129,10 @@ def ornament(m: Maker) -> None:
             r = m.uniform(0.06, 0.1)
             m.add(bevelled((-0.05, 0, -0.03), (0.05, 0.02, 0.03), 0.002), of=grain)
             m.add(tube(ring_path(r, n=24), m.uniform(0.008, 0.018), n=8), turn=rotation_x(pi / 2),
-                at=(0, r + 0.028, 0), of=stuff)  # fmt: skip
+                at=(0, r + 0.028, 0), of=material)  # fmt: skip
             if m.chance(0.5):
                 m.add(tube(ring_path(r * 0.6, n=20), 0.008, n=8), turn=rotation_x(pi / 2),
-                    at=(0.01, r * 0.75 + 0.028, 0.012), of=stuff)  # fmt: skip
+                    at=(0.01, r * 0.75 + 0.028, 0.012), of=material)  # fmt: skip
         case 9:
             m.name = "arch"
             w = m.uniform(0.1, 0.15)
@@ -194,7 +197,7 @@ def ornament(m: Maker) -> None:
         case 15:
             m.name = "bust"
             m.add(bevelled((-0.04, 0, -0.035), (0.04, 0.025, 0.035), 0.003), of=grain)
-            with m.of(stuff):
+            with m.of(material):
                 m.add(loft([(oval(0.05, 0.045), 0.0255), (oval(0.12, 0.07), 0.06),
                     (oval(0.1, 0.06), 0.085), (oval(0.045, 0.045), 0.105),
                     (oval(0.042, 0.045, z=0.004), 0.13)]))  # fmt: skip
@@ -248,9 +251,9 @@ def ornament(m: Maker) -> None:
             m.add(bevelled((-0.009, 0.12, 0.036), (0.009, 0.14, 0.044), 0.001), of=m.metal)
         case 21:
             m.name = "toy_car_model"
-            m.add(bevelled((-0.03, 0.012, -0.07), (0.03, 0.036, 0.07), 0.008), of=stuff)
+            m.add(bevelled((-0.03, 0.012, -0.07), (0.03, 0.036, 0.07), 0.008), of=material)
             m.add(loft([(rect(0.056, 0.085, 0.008, z=-0.005), 0.0361),
-                (rect(0.046, 0.055, 0.008, z=-0.008), 0.06)]), of=stuff)  # fmt: skip
+                (rect(0.046, 0.055, 0.008, z=-0.008), 0.06)]), of=material)  # fmt: skip
             for x, z in product((-0.029, 0.029), (-0.045, 0.045)):
                 m.add(tube([(x - 0.006, 0.014, z), (x + 0.006, 0.014, z)], 0.014, n=14),
                     of=plain("tyre", (0.06, 0.06, 0.06), 0.8))  # fmt: skip
@@ -277,7 +280,7 @@ def ornament(m: Maker) -> None:
             for _ in range(m.integers(2, 5)):
                 w, h, d = m.uniform(0.04, 0.09), m.uniform(0.02, 0.06), m.uniform(0.03, 0.06)
                 m.add(bevelled((-w / 2, y, -d / 2), (w / 2, y + h, d / 2), 0.003),
-                    turn=rotation_y(m.uniform(-0.3, 0.3)), of=m.pick(grain, stuff,
+                    turn=rotation_y(m.uniform(-0.3, 0.3)), of=m.pick(grain, material,
                     plain("ornament", m.any_colour(), 0.5)))  # fmt: skip
                 y += h + 0.0002
 

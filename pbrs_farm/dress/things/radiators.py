@@ -63,46 +63,49 @@ def wall_radiator(m: Maker, width: float, height: float, paint: Material) -> Non
     size=lambda m: (m.pick(0.6, 0.8, 1.0, 1.2, 1.4), m.pick(0.07, 0.09, 0.11, 0.13),
     m.pick(0.45, 0.5, 0.6, 0.6)))  # fmt: skip
 def panel_radiator(m: Maker, size: Size) -> None:
-    """A radiator: a panel with grooves, a flat one, columns of tubes, a low convector, an upright one."""
+    """A radiator.
+
+    A panel with grooves, a flat one, columns of tubes, a low convector, an upright one.
+    """
     w, d, h = size
-    stuff, form = (m.pick(WHITE_STEEL, WHITE_STEEL, glossy("grey", (0.35, 0.36, 0.37), 0.4)),
+    hw = w / 2
+    material, form = (m.pick(WHITE_STEEL, WHITE_STEEL, glossy("grey", (0.35, 0.36, 0.37), 0.4)),
         m.weighted(0.35, 0.2, 0.3, 0.15))  # fmt: skip
     z0 = 0.025
-    with m.of(stuff):
+    with m.of(material):
         match form:
-            case 0:
-                m.add(bevelled((-w / 2 + 0.004, 0.01, z0), (w / 2 - 0.004, h - 0.02, d - 0.006),
-                    0.004))  # fmt: skip
+            case 0:  # with grooves
+                m.add(bevelled((-hw + 0.004, 0.01, z0), (hw - 0.004, h - 0.02, d - 0.006), 0.004))
                 n = max(6, round(w / 0.05))
                 for k in range(n):
-                    m.add(bevelled((-w / 2 + 0.02 + (w - 0.04) * (k + 0.2) / n, 0.03, d - 0.008),
-                        (-w / 2 + 0.02 + (w - 0.04) * (k + 0.8) / n, h - 0.05, d), 0.003))  # fmt: skip
-                m.add(bevelled((-w / 2, h - 0.022, z0 - 0.003), (w / 2, h, d - 0.004), 0.002))
-                for x in (-w / 2, w / 2 - 0.006):
+                    m.add(bevelled((-hw + 0.02 + (w - 0.04) * (k + 0.2) / n, 0.03, d - 0.008),
+                        (-hw + 0.02 + (w - 0.04) * (k + 0.8) / n, h - 0.05, d), 0.003))  # fmt: skip
+                m.add(bevelled((-hw, h - 0.022, z0 - 0.003), (hw, h, d - 0.004), 0.002))
+                for x in (-hw, hw - 0.006):
                     m.add(slab((x, 0.02, z0), (x + 0.006, h - 0.022, d - 0.01)))
-            case 1:
-                m.add(bevelled((-w / 2, 0.0, z0), (w / 2, h, d), 0.006))
+            case 1:  # flat
+                m.add(bevelled((-hw, 0.0, z0), (hw, h, d), 0.006))
                 for k in range(round(w / 0.03)):
-                    m.add(slab((-w / 2 + 0.02 + k * (w - 0.04) / round(w / 0.03), h - 0.001,
-                        z0 + 0.012), (-w / 2 + 0.03 + k * (w - 0.04) / round(w / 0.03), h + 0.0005,
+                    m.add(slab((-hw + 0.02 + k * (w - 0.04) / round(w / 0.03), h - 0.001,
+                        z0 + 0.012), (-hw + 0.03 + k * (w - 0.04) / round(w / 0.03), h + 0.0005,
                         d - 0.012)), of=RUBBER)  # fmt: skip
-            case 2:
+            case 2:  # columns of tubes
                 n, r = max(6, round(w / 0.075)), 0.016
                 for k in range(n):
-                    x = -w / 2 + w * (k + 0.5) / n
+                    x = -hw + w * (k + 0.5) / n
                     for z in (z0 + r, d - r):
                         m.add(tube([(x, 0.03, z), (x, h - 0.03, z)], r, n=6))
                 for y in (0.0, h - 0.05):
-                    m.add(rounded((-w / 2, y, z0), (w / 2, y + 0.05, d), 0.02, n=1))
-            case 3:
-                m.add(bevelled((-w / 2, 0.0, z0), (w / 2, h, d), 0.004))
+                    m.add(rounded((-hw, y, z0), (hw, y + 0.05, d), 0.02, n=1))
+            case 3:  # flat, with level grooves
+                m.add(bevelled((-hw, 0.0, z0), (hw, h, d), 0.004))
                 for k in range(7):
-                    m.add(bevelled((-w / 2 + 0.01, 0.03 + (h - 0.06) * k / 7, d - 0.001),
-                        (w / 2 - 0.01, 0.03 + (h - 0.06) * (k + 0.7) / 7, d + 0.006), 0.002))  # fmt: skip
+                    m.add(bevelled((-hw + 0.01, 0.03 + (h - 0.06) * k / 7, d - 0.001), (hw - 0.01,
+                        0.03 + (h - 0.06) * (k + 0.7) / 7, d + 0.006), 0.002))  # fmt: skip
         for x in (-0.3 * w, 0.3 * w):
             m.add(slab((x - 0.015, 0.25 * h, 0.0), (x + 0.015, 0.7 * h, z0 + 0.001)))
-    m.add(tube(bent([(w / 2 - 0.04, 0.06, z0 + 0.02), (w / 2 - 0.012, 0.06, z0 + 0.02),
-        (w / 2 - 0.012, 0.06, 0.002)], 0.01, n=2), 0.008, n=7), of=CHROME)  # fmt: skip
+    m.add(tube(bent([(hw - 0.04, 0.06, z0 + 0.02), (hw - 0.012, 0.06, z0 + 0.02),
+        (hw - 0.012, 0.06, 0.002)], 0.01, n=2), 0.008, n=7), of=CHROME)  # fmt: skip
     m.add(turned([(0.0, 0.0), (0.02, 0.0), (0.022, 0.03), (0.016, 0.05), (0.0, 0.05)], n=12),
-        turn=rotation_z(-pi / 2), at=(w / 2 - 0.05, 0.09 if form < 2 else h - 0.09, d - 0.022),
+        turn=rotation_z(-pi / 2), at=(hw - 0.05, 0.09 if form < 2 else h - 0.09, d - 0.022),
         of=WHITE_STEEL)  # fmt: skip

@@ -16,32 +16,35 @@ from pbrs_farm.dress.things.outlines import rect, scaled
 
 @thing(group="pillow", nyu40=PILLOW)
 def cushion(m: Maker) -> None:
-    """A cushion for a sofa or a bed, lying flat: square, long, round, a roll, with piping, with a button."""
+    """A cushion for a sofa or a bed, lying flat.
+
+    Square, long, round, a roll, with piping, with a button.
+    """
     form, edge, colour = m.integers(0, 8), m.pick(0.38, 0.42, 0.46), m.textile()
     colour, thick = m.style.accent if m.chance(0.3) else colour, m.uniform(0.11, 0.15)
-    stuff, trim = (plain("cushion", colour, 0.95), plain("piping", m.pick(m.style.accent,
+    material, trim = (plain("cushion", colour, 0.95), plain("piping", m.pick(m.style.accent,
         shade(colour, 0.7), (0.9, 0.88, 0.84)), 0.95))  # fmt: skip
-    with m.of(stuff):
+    with m.of(material):
         match form:
-            case 0 | 1:
+            case 0 | 1:  # square
                 m.add(bulged((edge, thick, edge), n=12 if form == 0 else 11))
-            case 2:
+            case 2:  # long
                 m.add(bulged((edge * 1.25, thick, edge * 0.8), n=12))
-            case 3:
+            case 3:  # with piping
                 m.add(bulged((edge, thick, edge), n=9))
                 m.add(hoop(rect(edge * 0.94, edge * 0.94, 0.03, n=2), 0.0, 0.006, n=5), of=trim)
-            case 4:
+            case 4:  # round, with a button
                 m.add(turned([(0, -0.06), (0.13, -0.055), (0.19, -0.03), (0.2, 0), (0.19, 0.03),
                     (0.13, 0.055), (0.02, 0.05), (0, 0.045)], n=26))  # fmt: skip
                 m.add(turned([(0, 0.044), (0.018, 0.05), (0.014, 0.058), (0, 0.06)], n=12), of=trim)
-            case 5:
+            case 5:  # a roll
                 m.add(tube([(-edge / 2, 0, 0), (-edge / 2 + 0.01, 0, 0), (edge / 2 - 0.01, 0, 0),
                     (edge / 2, 0, 0)], 0.08, n=18))  # fmt: skip
-            case 6:
+            case 6:  # with tassels
                 m.add(bulged((edge, thick, edge), n=8))
                 for x, z in product((-1.0, 1.0), (-1.0, 1.0)):
                     m.add(sphere((x * edge * 0.48, 0, z * edge * 0.48), 0.014, n=8), of=trim)
-            case 7:
+            case 7:  # with three bands
                 m.add(bulged((edge, thick * 0.9, edge), n=10, edge=0.3, bulge=3.2))
                 for x in (-0.22, 0.0, 0.22):
                     m.add(slab((x * edge - 0.008, 0.445 * thick - 0.004, -0.28 * edge),

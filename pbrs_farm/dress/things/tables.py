@@ -36,57 +36,60 @@ from pbrs_farm.dress.things.materials import (
 from pbrs_farm.dress.things.outlines import bent, oval, rect, rings
 
 
-def under_top(m: Maker, kind: str, w: float, d: float, high: float, stuff: Material,
+def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Material,
     leg_kind: str) -> None:  # fmt: skip
-    """What carries a top w by d at `high`: four legs with or without rails, frames, trestles, one foot, crossed legs, panels."""
+    """What carries a top w by d at `high`.
+
+    Four legs with or without rails, frames, trestles, one foot, crossed legs, panels.
+    """
+    hw, hd = w / 2, d / 2
     match kind:
         case "legs" | "rails":
             four_legs(m, leg_kind, w, d, high, 0.055,
                 0.07 if leg_kind in ("tapered", "hairpin") else 0.035,
-                0.03 if leg_kind == "tapered" else 0.0, stuff)  # fmt: skip
+                0.03 if leg_kind == "tapered" else 0.0, material)  # fmt: skip
             if kind == "rails":
-                with m.of(stuff):
-                    for z in (-d / 2 + 0.045, d / 2 - 0.065):
-                        m.add(bevelled((-w / 2 + 0.04, high - 0.085, z),
-                            (w / 2 - 0.04, high, z + 0.02), 0.002))  # fmt: skip
-                    for x in (-w / 2 + 0.045, w / 2 - 0.065):
-                        m.add(bevelled((x, high - 0.085, -d / 2 + 0.065),
-                            (x + 0.02, high, d / 2 - 0.065), 0.002))  # fmt: skip
+                with m.of(material):
+                    for z in (-hd + 0.045, hd - 0.065):
+                        m.add(bevelled((-hw + 0.04, high - 0.085, z), (hw - 0.04, high, z + 0.02),
+                            0.002))  # fmt: skip
+                    for x in (-hw + 0.045, hw - 0.065):
+                        m.add(bevelled((x, high - 0.085, -hd + 0.065), (x + 0.02, high, hd - 0.065),
+                            0.002))  # fmt: skip
         case "frames":
-            with m.of(stuff):
+            with m.of(material):
                 for s in (-1.0, 1.0):
-                    x = s * (w / 2 - 0.16)
-                    for z in (-d / 2 + 0.05, d / 2 - 0.05):
+                    x = s * (hw - 0.16)
+                    for z in (-hd + 0.05, hd - 0.05):
                         m.add(bevelled((x - 0.03, 0.0, z - 0.02), (x + 0.03, high, z + 0.02),
                             0.002))  # fmt: skip
-                    m.add(bevelled((x - 0.03, 0.0, -d / 2 + 0.07), (x + 0.03, 0.03, d / 2 - 0.07),
+                    m.add(bevelled((x - 0.03, 0.0, -hd + 0.07), (x + 0.03, 0.03, hd - 0.07), 0.002))
+                    m.add(bevelled((x - 0.03, high - 0.03, -hd + 0.07), (x + 0.03, high, hd - 0.07),
                         0.002))  # fmt: skip
-                    m.add(bevelled((x - 0.03, high - 0.03, -d / 2 + 0.07),
-                        (x + 0.03, high, d / 2 - 0.07), 0.002))  # fmt: skip
         case "crossed":
-            with m.of(stuff):
+            with m.of(material):
                 for s in (-1.0, 1.0):
-                    x = s * (w / 2 - 0.2)
-                    m.add(square_tube((x, 0.012, -d / 2 + 0.06), (x, high - 0.012, d / 2 - 0.06),
-                        0.07, 0.035))  # fmt: skip
-                    m.add(square_tube((x + s * 0.036, 0.012, d / 2 - 0.06),
-                        (x + s * 0.036, high - 0.012, -d / 2 + 0.06), 0.07, 0.035))  # fmt: skip
-                m.add(bevelled((-w / 2 + 0.2, high / 2 - 0.03, -0.02),
-                    (w / 2 - 0.2, high / 2 + 0.03, 0.02), 0.003))  # fmt: skip
+                    x = s * (hw - 0.2)
+                    m.add(square_tube((x, 0.012, -hd + 0.06), (x, high - 0.012, hd - 0.06), 0.07,
+                        0.035))  # fmt: skip
+                    m.add(square_tube((x + s * 0.036, 0.012, hd - 0.06),
+                        (x + s * 0.036, high - 0.012, -hd + 0.06), 0.07, 0.035))  # fmt: skip
+                m.add(bevelled((-hw + 0.2, high / 2 - 0.03, -0.02),
+                    (hw - 0.2, high / 2 + 0.03, 0.02), 0.003))  # fmt: skip
         case "trestles":
-            with m.of(stuff):
+            with m.of(material):
                 for s in (-1.0, 1.0):
-                    x = s * (w / 2 - 0.22)
-                    for e, z in product((-1.0, 1.0), (-d / 2 + 0.06, d / 2 - 0.06)):
+                    x = s * (hw - 0.22)
+                    for e, z in product((-1.0, 1.0), (-hd + 0.06, hd - 0.06)):
                         m.add(square_tube((x + e * 0.14, 0.008, z), (x + e * 0.03, high - 0.02, z),
                             0.03, 0.04))  # fmt: skip
-                    m.add(bevelled((x - 0.05, high - 0.05, -d / 2 + 0.03),
-                        (x + 0.05, high, d / 2 - 0.03), 0.003))  # fmt: skip
-                    for z in (-d / 2 + 0.06, d / 2 - 0.06):
+                    m.add(bevelled((x - 0.05, high - 0.05, -hd + 0.03), (x + 0.05, high, hd - 0.03),
+                        0.003))  # fmt: skip
+                    for z in (-hd + 0.06, hd - 0.06):
                         m.add(bevelled((x - 0.11, 0.2, z - 0.01), (x + 0.11, 0.235, z + 0.01),
                             0.002))  # fmt: skip
         case "foot":
-            with m.of(stuff):
+            with m.of(material):
                 r = 0.34 * min(w, d)
                 if m.chance(0.5):
                     m.add(turned([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
@@ -101,17 +104,16 @@ def under_top(m: Maker, kind: str, w: float, d: float, high: float, stuff: Mater
                             (1.2 * r * cos(k * pi / 2 + pi / 4), 0.02,
                             1.2 * r * sin(k * pi / 2 + pi / 4))], 0.1, n=3), 0.028, n=8, end=0.018))  # fmt: skip
         case "panels":
-            with m.of(stuff):
-                for x in (-w / 2 + 0.02, w / 2 - 0.05):
-                    m.add(bevelled((x, 0.0, -d / 2 + 0.02), (x + 0.03, high, d / 2 - 0.02), 0.002))
-                m.add(bevelled((-w / 2 + 0.05, high - 0.3, -0.012), (w / 2 - 0.05, high, 0.012),
-                    0.002))  # fmt: skip
+            with m.of(material):
+                for x in (-hw + 0.02, hw - 0.05):
+                    m.add(bevelled((x, 0.0, -hd + 0.02), (x + 0.03, high, hd - 0.02), 0.002))
+                m.add(bevelled((-hw + 0.05, high - 0.3, -0.012), (hw - 0.05, high, 0.012), 0.002))
 
 
 def top_of(m: Maker, kind: str, w: float, d: float, low: float, high: float,
-    stuff: Material) -> None:  # fmt: skip
+    material: Material) -> None:  # fmt: skip
     """A top w by d between low and high: rectangle, round corners, oval, or boards side by side."""
-    with m.of(stuff):
+    with m.of(material):
         match kind:
             case "rect":
                 m.add(board(w, d, low, high, 0.004, 0.003, n=1))
@@ -152,15 +154,19 @@ def dining_table(m: Maker, size: Size) -> None:
 @family(group="coffee_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
     size=lambda m: (*m.pick((0.8, 0.8), (0.85, 0.5), (0.9, 0.55), (1.0, 0.6), (1.1, 0.6), (1.2, 0.65), (0.9, 0.8)), m.uniform(0.38, 0.46)))  # fmt: skip
 def coffee_table(m: Maker, size: Size) -> None:
-    """A low table before a sofa: on legs, a shelf below, drawers, a drum, two that nest, a top of glass."""
+    """A low table before a sofa.
+
+    On legs, a shelf below, drawers, a drum, two that nest, a top of glass.
+    """
     w, d, h = size
+    hw, hd = w / 2, d / 2
     form = m.weighted(0.4, 0.2, 0.14, 0.12, 0.14)
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
     top = m.pick("rect", "round_rect",
         "boards") if abs(w - d) > 0.05 and m.chance(0.7) else m.pick("oval", "oval", "round_rect")  # fmt: skip
     t = m.pick(0.018, 0.025, 0.035)
     match form:
-        case 0:
+        case 0:  # a top on legs
             glassy = m.chance(0.2)
             top_of(m, top, w, d, h - t, h,
                 glass((0.85, 0.93, 0.92), 0.3) if glassy else m.pick(body, body, body,
@@ -171,28 +177,25 @@ def coffee_table(m: Maker, size: Size) -> None:
                 m.pick(body, BLACK_STEEL, m.metal), m.pick("tapered", "hairpin", "round", "square"))  # fmt: skip
             if kind == "legs" and top != "oval" and m.chance(0.4):
                 m.add(board(w - 0.16, d - 0.16, 0.14, 0.158, 0.01, 0.003), of=body)
-        case 1:
-            # Drawers or niches below the top.
+        case 1:  # drawers or niches below the top
             look = Look("flat", m.pick(body, WHITE), body, body,
                 m.pick("knob", "bar", "edge", "disc"), m.metal)  # fmt: skip
             top_of(m, "rect", w, d, h - t, h, body)
             if m.chance(0.6):
-                m.add(slab((-w / 2 + 0.02, h - t - 0.16, -d / 2 + 0.02),
-                    (w / 2 - 0.02, h - t, d / 2 - 0.045)), of=body)  # fmt: skip
-                fronts_of(m, look, (-w / 2 + 0.02, w / 2 - 0.02), (h - t - 0.16, h - t - 0.002),
-                    d / 2 - 0.045, [("flap",)] * m.pick(1, 2), False)  # fmt: skip
+                m.add(slab((-hw + 0.02, h - t - 0.16, -hd + 0.02), (hw - 0.02, h - t, hd - 0.045)),
+                    of=body)  # fmt: skip
+                fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t - 0.002),
+                    hd - 0.045, [("flap",)] * m.pick(1, 2), False)  # fmt: skip
                 four_legs(m, m.pick("tapered", "square", "round"), w, d, h - t - 0.158, 0.05, 0.06,
                     0.0, body)  # fmt: skip
             else:
-                for x in (-w / 2 + 0.01, w / 2 - 0.035):
-                    m.add(bevelled((x, 0.0, -d / 2 + 0.01), (x + 0.025, h - t, d / 2 - 0.01),
-                        0.002), of=body)  # fmt: skip
-                m.add(slab((-w / 2 + 0.035, 0.08, -d / 2 + 0.02),
-                    (w / 2 - 0.035, 0.1, d / 2 - 0.02)), of=body)  # fmt: skip
+                for x in (-hw + 0.01, hw - 0.035):
+                    m.add(bevelled((x, 0.0, -hd + 0.01), (x + 0.025, h - t, hd - 0.01), 0.002),
+                        of=body)  # fmt: skip
+                m.add(slab((-hw + 0.035, 0.08, -hd + 0.02), (hw - 0.035, 0.1, hd - 0.02)), of=body)
                 if m.chance(0.5):
-                    m.add(slab((-0.01, 0.1, -d / 2 + 0.03), (0.01, h - t, d / 2 - 0.03)), of=body)
-        case 2:
-            # A drum, ribbed or plain.
+                    m.add(slab((-0.01, 0.1, -hd + 0.03), (0.01, h - t, hd - 0.03)), of=body)
+        case 2:  # a drum, ribbed or plain
             m.add(loft(rings(oval, [(w * 0.9, d * 0.9, 0.0), (w * 0.94, d * 0.94, h * 0.5),
                 (w * 0.9, d * 0.9, h - t)], n=36)), of=body)  # fmt: skip
             m.add(disc(w, d, h - t, h, 0.006, n=40), of=m.pick(body, m.timber,
@@ -201,8 +204,7 @@ def coffee_table(m: Maker, size: Size) -> None:
                 m.add(tube([(0.47 * w * cos(k * pi / 12), 0.0, 0.47 * d * sin(k * pi / 12)),
                     (0.47 * w * cos(k * pi / 12), h - t, 0.47 * d * sin(k * pi / 12))], 0.018, n=6),
                     of=body)  # fmt: skip
-        case 3:
-            # Two that nest.
+        case 3:  # two that nest
             with m.moved(at=(-0.12 * w, 0.0, -0.08 * d)):
                 m.add(disc(w * 0.76, d * 0.84, h - t, h, 0.005, n=36), of=body)
                 four_legs(m, "round", w * 0.6, d * 0.62, h - t + 0.001, 0.024, 0.0, 0.0,
@@ -212,24 +214,26 @@ def coffee_table(m: Maker, size: Size) -> None:
                     of=m.pick(body, WHITE, m.timber))  # fmt: skip
                 four_legs(m, "round", w * 0.34, d * 0.44, h * 0.72 - t + 0.001, 0.024, 0.0, 0.0,
                     m.pick(BLACK_STEEL, m.metal, body))  # fmt: skip
-        case 4:
-            # A tray on crossed legs, a block.
+        case 4:  # a tray on crossed legs, a block
             if m.chance(0.5):
                 under_top(m, "crossed", w, d, h - 0.02, body, "square")
                 m.add(board(w, d, h - 0.04, h - 0.02, 0.03, 0.004), of=body)
                 m.add(hoop(rect(w - 0.02, d - 0.02, 0.03, n=3), h - 0.01, 0.01, n=6), of=body)
             else:
-                m.add(bevelled((-w / 2, 0.05, -d / 2), (w / 2, h, d / 2), 0.006), of=body)
-                m.add(slab((-w / 2 + 0.06, 0.0, -d / 2 + 0.06), (w / 2 - 0.06, 0.05, d / 2 - 0.06)),
-                    of=RUBBER)  # fmt: skip
+                m.add(bevelled((-hw, 0.05, -hd), (hw, h, hd), 0.006), of=body)
+                m.add(slab((-hw + 0.06, 0.0, -hd + 0.06), (hw - 0.06, 0.05, hd - 0.06)), of=RUBBER)
 
 
 @family(group="desk", nyu40=DESK, place=Place.FLOOR, variants=36,
     size=lambda m: (m.pick(0.95, 1.1, 1.2, 1.3, 1.4, 1.6), m.pick(0.55, 0.6, 0.65, 0.7),
     m.uniform(0.73, 0.77)))  # fmt: skip
 def desk(m: Maker, size: Size) -> None:
-    """A desk: on legs, with drawers at one side or both, a shelf over it, trestles, a frame, a secretaire's niches."""
+    """A desk.
+
+    On legs, with drawers at one side or both, a shelf over it, trestles, a frame, a secretaire's niches.
+    """
     w, d, h = size
+    hw, hd = w / 2, d / 2
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "raised", "shaker"), m.pick(body, body, WHITE), body, body,
         m.pick("knob", "bar", "edge", "disc", "square", "bow"), m.metal)  # fmt: skip
@@ -238,46 +242,47 @@ def desk(m: Maker, size: Size) -> None:
         m.pick(body, m.timber))  # fmt: skip
     y = h - t + 0.001
     match form:
-        case 0:
+        case 0:  # on legs
             under_top(m, m.pick("legs", "rails", "frames", "trestles", "crossed"), w, d, y,
                 m.pick(body, BLACK_STEEL, WHITE_STEEL, m.metal),
                 m.pick("square", "tapered", "hairpin", "round"))  # fmt: skip
-        case 1 | 2:
-            # Drawers at one side.
+        case 1 | 2:  # drawers at one side
             for s in (m.pick(-1.0, 1.0),) if form == 1 else (-1.0, 1.0):
-                a, b = (min(s * (w / 2 - 0.01), s * (w / 2 - 0.01 - (0.4 if form == 1 else 0.32))),
-                    max(s * (w / 2 - 0.01), s * (w / 2 - 0.01 - (0.4 if form == 1 else 0.32))))  # fmt: skip
-                m.add(slab((a, 0.05, -d / 2 + 0.02), (b, y, d / 2 - 0.05)), of=body)
-                m.add(slab((a + 0.02, 0.0, -d / 2 + 0.04), (b - 0.02, 0.05, d / 2 - 0.09)), of=body)
-                fronts_of(m, look, (a, b), (0.06, h - t - 0.003), d / 2 - 0.05,
+                a, b = (min(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))),
+                    max(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))))  # fmt: skip
+                m.add(slab((a, 0.05, -hd + 0.02), (b, y, hd - 0.05)), of=body)
+                m.add(slab((a + 0.02, 0.0, -hd + 0.04), (b - 0.02, 0.05, hd - 0.09)), of=body)
+                fronts_of(m, look, (a, b), (0.06, h - t - 0.003), hd - 0.05,
                     [m.pick(("low", "drawer", "drawer"), ("drawer", "drawer", "drawer"),
                     ("low", "door"), ("door",))], False)  # fmt: skip
                 if form == 1:
-                    for z in (-d / 2 + 0.05, d / 2 - 0.05):
-                        leg(m, m.pick("square", "square", "round"), (-s * (w / 2 - 0.05), z),
-                            (-s * (w / 2 - 0.05), z), y, 0.045, m.pick(body, BLACK_STEEL))  # fmt: skip
+                    for z in (-hd + 0.05, hd - 0.05):
+                        leg(m, m.pick("square", "square", "round"), (-s * (hw - 0.05), z),
+                            (-s * (hw - 0.05), z), y, 0.045, m.pick(body, BLACK_STEEL))  # fmt: skip
             if m.chance(0.6):
-                m.add(slab((-w / 2 + 0.06, h - t - 0.3, -d / 2 + 0.03),
-                    (w / 2 - 0.06, y, -d / 2 + 0.045)), of=body)  # fmt: skip
-        case 3:
-            # A drawer or two under the whole top.
-            m.add(slab((-w / 2 + 0.02, h - t - 0.11, -d / 2 + 0.02),
-                (w / 2 - 0.02, y, d / 2 - 0.05)), of=body)  # fmt: skip
-            fronts_of(m, look, (-w / 2 + 0.02, w / 2 - 0.02), (h - t - 0.11, h - t - 0.002),
-                d / 2 - 0.05, [("flap",)] * m.pick(1, 2, 3), False)  # fmt: skip
+                m.add(slab((-hw + 0.06, h - t - 0.3, -hd + 0.03), (hw - 0.06, y, -hd + 0.045)),
+                    of=body)  # fmt: skip
+        case 3:  # a drawer or two under the whole top
+            m.add(slab((-hw + 0.02, h - t - 0.11, -hd + 0.02), (hw - 0.02, y, hd - 0.05)), of=body)
+            fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.11, h - t - 0.002), hd - 0.05,
+                [("flap",)] * m.pick(1, 2, 3), False)  # fmt: skip
             four_legs(m, m.pick("tapered", "square", "turned", "round", "hairpin"), w, d,
                 h - t - 0.108, 0.05, 0.06, 0.0, m.pick(body, body, BLACK_STEEL))  # fmt: skip
-        case 4:
+        case 4:  # with a shelf below
             under_top(m, "panels", w, d, y, body, "square")
-            m.add(slab((-w / 2 + 0.05, h - t - 0.14, -d / 2 + 0.04),
-                (w / 2 - 0.05, h - t - 0.125, d / 2 - 0.04)), of=body)  # fmt: skip
+            m.add(slab((-hw + 0.05, h - t - 0.14, -hd + 0.04),
+                (hw - 0.05, h - t - 0.125, hd - 0.04)), of=body)  # fmt: skip
 
 
 @family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
     size=lambda m: (m.uniform(0.36, 0.52), m.uniform(0.34, 0.42), m.uniform(0.42, 0.6)))  # fmt: skip
 def nightstand(m: Maker, size: Size) -> None:
-    """What stands beside a bed: drawers, a niche, a door, on legs or a plinth, a round one, a stool, of wire."""
+    """What stands beside a bed.
+
+    Drawers, a niche, a door, on legs or a plinth, a round one, a stool, of wire.
+    """
     w, d, h = size
+    hw, hd = w / 2, d / 2
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "shaker", "raised", "grooved"), m.pick(body, body, WHITE),
         body, body, m.pick("knob", "bar", "edge", "disc", "ring", "cup", "bow"), m.metal)  # fmt: skip
@@ -288,32 +293,29 @@ def nightstand(m: Maker, size: Size) -> None:
         low = 0.04 if legs == "plinth" else 0.06 if legs == "bun" else min(m.uniform(0.1, 0.22),
             0.4 * h)  # fmt: skip
         if legs == "plinth":
-            m.add(slab((-w / 2 + 0.01, 0.0, -d / 2), (w / 2 - 0.01, low, d / 2 - 0.06)), of=body)
+            m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, low, hd - 0.06)), of=body)
         else:
             four_legs(m, legs, w, d - 0.03, low + 0.001, 0.045, 0.045,
                 0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL, m.metal))  # fmt: skip
         m.add(board(w, d - 0.012, h - t, h, 0.006, 0.004, z=-0.006, n=2), of=body)
         if form == 0:
-            m.add(slab((-w / 2 + 0.005, low, -d / 2), (w / 2 - 0.005, h - t, d / 2 - 0.05)),
-                of=body)  # fmt: skip
-            fronts_of(m, look, (-w / 2 + 0.005, w / 2 - 0.005), (low, h - t - 0.002), d / 2 - 0.05,
+            m.add(slab((-hw + 0.005, low, -hd), (hw - 0.005, h - t, hd - 0.05)), of=body)
+            fronts_of(m, look, (-hw + 0.005, hw - 0.005), (low, h - t - 0.002), hd - 0.05,
                 [m.pick(("drawer",), ("drawer", "drawer"), ("drawer", "drawer", "drawer"),
                 ("door",), ("low", "door"))], False)  # fmt: skip
         else:
             # A niche over a drawer, or under it.
             mid, is_low = low + (h - low) * m.uniform(0.4, 0.55), m.chance(0.5)
             with m.of(body):
-                m.add(slab((-w / 2 + 0.005, low, -d / 2), (w / 2 - 0.005, h - t, -d / 2 + 0.008)))
-                for x in (-w / 2 + 0.005, w / 2 - 0.021):
-                    m.add(slab((x, low, -d / 2 + 0.008), (x + 0.016, h - t, d / 2 - 0.045)))
+                m.add(slab((-hw + 0.005, low, -hd), (hw - 0.005, h - t, -hd + 0.008)))
+                for x in (-hw + 0.005, hw - 0.021):
+                    m.add(slab((x, low, -hd + 0.008), (x + 0.016, h - t, hd - 0.045)))
                 for y in (low, mid):
-                    m.add(slab((-w / 2 + 0.021, y, -d / 2 + 0.008),
-                        (w / 2 - 0.021, y + 0.016, d / 2 - 0.05)))  # fmt: skip
-            drawer_front(m, look, (-w / 2 + 0.006, w / 2 - 0.006),
-                (low, mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), d / 2 - 0.045)  # fmt: skip
+                    m.add(slab((-hw + 0.021, y, -hd + 0.008), (hw - 0.021, y + 0.016, hd - 0.05)))
+            drawer_front(m, look, (-hw + 0.006, hw - 0.006),
+                (low, mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), hd - 0.045)  # fmt: skip
     match form:
-        case 2:
-            # Round, with a rim.
+        case 2:  # round, with a rim
             m.add(disc(w, d, h - t, h, 0.004, n=32), of=body)
             if m.chance(0.5):
                 under_top(m, "foot", w, d, h - t + 0.001, m.pick(body, BLACK_STEEL, m.metal),
@@ -321,41 +323,41 @@ def nightstand(m: Maker, size: Size) -> None:
             else:
                 four_legs(m, "tapered", w * 0.8, d * 0.8, h - t + 0.001, 0.03, 0.06, 0.04, body)
                 m.add(disc(w * 0.7, d * 0.7, h * 0.4, h * 0.4 + 0.014, 0.003, n=28), of=body)
-        case 3:
-            # A cube of boards, open to the front.
+        case 3:  # a cube of boards, open to the front
             with m.of(body):
                 for y in (0.0, h - 0.02):
-                    m.add(bevelled((-w / 2, y, -d / 2), (w / 2, y + 0.02, d / 2), 0.002))
-                for x in (-w / 2, w / 2 - 0.02):
-                    m.add(bevelled((x, 0.0201, -d / 2), (x + 0.02, h - 0.0201, d / 2), 0.002))
+                    m.add(bevelled((-hw, y, -hd), (hw, y + 0.02, hd), 0.002))
+                for x in (-hw, hw - 0.02):
+                    m.add(bevelled((x, 0.0201, -hd), (x + 0.02, h - 0.0201, hd), 0.002))
                 for k in range(m.pick(1, 2)):
-                    m.add(slab((-w / 2 + 0.02, 0.0 + h * (k + 1) / 3, -d / 2 + 0.01),
-                        (w / 2 - 0.02, 0.016 + h * (k + 1) / 3, d / 2 - 0.01)))  # fmt: skip
+                    m.add(slab((-hw + 0.02, 0.0 + h * (k + 1) / 3, -hd + 0.01),
+                        (hw - 0.02, 0.016 + h * (k + 1) / 3, hd - 0.01)))  # fmt: skip
                 if m.chance(0.6):
-                    m.add(slab((-w / 2 + 0.02, 0.02, -d / 2),
-                        (w / 2 - 0.02, h - 0.02, -d / 2 + 0.008)))  # fmt: skip
-        case 4:
-            # A frame of metal with two boards.
+                    m.add(slab((-hw + 0.02, 0.02, -hd), (hw - 0.02, h - 0.02, -hd + 0.008)))
+        case 4:  # a frame of metal with two boards
             bar = m.pick(BLACK_STEEL, m.metal, WHITE_STEEL, BRASS)
             with m.of(bar):
-                for x, z in product((-w / 2 + 0.008, w / 2 - 0.008),
-                    (-d / 2 + 0.008, d / 2 - 0.008)):  # fmt: skip
+                for x, z in product((-hw + 0.008, hw - 0.008), (-hd + 0.008, hd - 0.008)):
                     m.add(bevelled((x - 0.008, 0.0, z - 0.008), (x + 0.008, h - 0.016, z + 0.008),
                         0.001))  # fmt: skip
                 for y in (0.12, h - 0.032):
                     m.add(hoop(rect(w - 0.016, d - 0.016, 0.005, n=1), y, 0.007, n=4))
             m.add(board(w, d, h - 0.016, h, 0.004, 0.003, n=1), of=m.pick(m.timber, body,
                 glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
-            m.add(slab((-w / 2 + 0.017, 0.127, -d / 2 + 0.01),
-                (w / 2 - 0.017, 0.139, d / 2 - 0.01)), of=m.pick(m.timber, body))  # fmt: skip
+            m.add(slab((-hw + 0.017, 0.127, -hd + 0.01), (hw - 0.017, 0.139, hd - 0.01)),
+                of=m.pick(m.timber, body))  # fmt: skip
 
 
 @family(group="tv_stand", nyu40=OTHERFURNITURE, place=Place.FLOOR, called="tv_stand", variants=32,
     size=lambda m: (m.pick(1.2, 1.4, 1.5, 1.6, 1.8), m.pick(0.38, 0.4, 0.42, 0.45),
     m.uniform(0.4, 0.58)))  # fmt: skip
 def tv_bench(m: Maker, size: Size) -> None:
-    """A low bench for a television: doors, flaps, drawers and niches in a row, on legs, a plinth, or open."""
+    """A low bench for a television.
+
+    Doors, flaps, drawers and niches in a row, on legs, a plinth, or open.
+    """
     w, d, h = size
+    hw, hd = w / 2, d / 2
     body = m.pick(m.timber, m.timber, m.dark_timber, WHITE, WHITE, glossy("paint", m.paint(), 0.4))
     look = Look(m.pick("flat", "flat", "shaker", "grooved", "glazed"),
         m.pick(body, body, WHITE, m.timber), body, body, m.pick("knob", "bar", "edge", "disc",
@@ -363,24 +365,24 @@ def tv_bench(m: Maker, size: Size) -> None:
     legs = m.pick("tapered", "square", "round", "hairpin", "plinth", "plinth")
     low, t = 0.05 if legs == "plinth" else m.uniform(0.1, 0.18), m.pick(0.018, 0.025, 0.03)
     if legs == "plinth":
-        m.add(slab((-w / 2 + 0.02, 0.0, -d / 2 + 0.02), (w / 2 - 0.02, low, d / 2 - 0.07)), of=body)
+        m.add(slab((-hw + 0.02, 0.0, -hd + 0.02), (hw - 0.02, low, hd - 0.07)), of=body)
     else:
         four_legs(m, legs, w, d - 0.03, low + 0.001, 0.05, 0.08, 0.03 if legs == "tapered" else 0.0,
             m.pick(body, BLACK_STEEL, m.metal))  # fmt: skip
     n = m.pick(2, 3, 3, 4)
     open = m.pick((), (0,), (1,), (n - 1,), (0, 1))
-    f = d / 2 - 0.05
+    f = hd - 0.05
     with m.of(body):
         m.add(board(w, d - 0.02, h - t, h, 0.004, 0.003, z=-0.01, n=1))
-        m.add(slab((-w / 2 + 0.003, low, -d / 2), (w / 2 - 0.003, h - t, -d / 2 + 0.008)))
-        m.add(slab((-w / 2 + 0.003, low, -d / 2 + 0.008), (w / 2 - 0.003, low + 0.018, f)))
+        m.add(slab((-hw + 0.003, low, -hd), (hw - 0.003, h - t, -hd + 0.008)))
+        m.add(slab((-hw + 0.003, low, -hd + 0.008), (hw - 0.003, low + 0.018, f)))
         for k in range(n + 1):
-            x = -w / 2 + 0.003 + k * (w - 0.024) / n
-            m.add(slab((x, low + 0.018, -d / 2 + 0.008), (x + 0.018, h - t, f)))
+            x = -hw + 0.003 + k * (w - 0.024) / n
+            m.add(slab((x, low + 0.018, -hd + 0.008), (x + 0.018, h - t, f)))
     for k in range(n):
-        a, b = -w / 2 + 0.003 + k * (w - 0.006) / n, -w / 2 + 0.003 + (k + 1) * (w - 0.006) / n
+        a, b = -hw + 0.003 + k * (w - 0.006) / n, -hw + 0.003 + (k + 1) * (w - 0.006) / n
         if k in open:
-            m.add(slab((a + 0.012, (low + h) / 2 - 0.008, -d / 2 + 0.01),
+            m.add(slab((a + 0.012, (low + h) / 2 - 0.008, -hd + 0.01),
                 (b - 0.012, (low + h) / 2 + 0.008, f - 0.01)), of=body)  # fmt: skip
         else:
             fronts_of(m, look, (a, b), (low, h - t - 0.002), f, [m.pick(("door",),
@@ -391,8 +393,12 @@ def tv_bench(m: Maker, size: Size) -> None:
     size=lambda m: m.pick((0.73, 0.2, 0.48), (0.97, 0.22, 0.63), (1.08, 0.24, 0.69),
     (1.22, 0.26, 0.77)))  # fmt: skip
 def screen(m: Maker, size: Size) -> None:
-    """A television: a thin screen on two feet, one foot, a bar or a plate; an old deep one is rare."""
+    """A television.
+
+    A thin screen on two feet, one foot, a bar or a plate; an old deep one is rare.
+    """
     w, d, h = size
+    hd = d / 2
     black = glossy("screen case", m.pick((0.05, 0.05, 0.055), (0.05, 0.05, 0.055),
         (0.35, 0.35, 0.36)), 0.35)  # fmt: skip
     low, form, edge = (h - (w - 0.02) * 0.5625 - 0.025, m.weighted(0.35, 0.25, 0.2, 0.2),
@@ -402,19 +408,19 @@ def screen(m: Maker, size: Size) -> None:
     m.add(slab((-w / 2 + edge, low + edge + 0.008, 0.012), (w / 2 - edge, h - edge, 0.0128)),
         of=BLACK_GLASS)  # fmt: skip
     match form:
-        case 0:
+        case 0:  # two feet
             for x, s in product((-0.36 * w, 0.36 * w), (-1.0, 1.0)):
-                m.add(tube([(x, low + 0.03, 0.0), (x, 0.006, s * (d / 2 - 0.006))], 0.006, n=8),
+                m.add(tube([(x, low + 0.03, 0.0), (x, 0.006, s * (hd - 0.006))], 0.006, n=8),
                     of=m.pick(black, STEEL))  # fmt: skip
-        case 1:
+        case 1:  # one foot
             m.add(board(0.42 * w, d, 0.0, 0.012, 0.03, 0.003), of=m.pick(black, STEEL, BLACK_GLASS))
             m.add(bevelled((-0.05, 0.011, -0.045), (0.05, low + 0.1, -0.02), 0.003), of=black)
-        case 2:
-            m.add(tube(bent([(-0.22 * w, 0.008, d / 2 - 0.008), (-0.22 * w, 0.008, -d / 2 + 0.008),
-                (0.22 * w, 0.008, -d / 2 + 0.008), (0.22 * w, 0.008, d / 2 - 0.008)], 0.04, n=4),
-                0.008, n=8), of=m.pick(STEEL, BLACK_STEEL))  # fmt: skip
-            m.add(tube([(0.0, 0.008, -d / 2 + 0.008), (0.0, low + 0.12, -0.03)], 0.014, n=10),
+        case 2:  # a bar
+            m.add(tube(bent([(-0.22 * w, 0.008, hd - 0.008), (-0.22 * w, 0.008, -hd + 0.008),
+                (0.22 * w, 0.008, -hd + 0.008), (0.22 * w, 0.008, hd - 0.008)], 0.04, n=4), 0.008,
+                n=8), of=m.pick(STEEL, BLACK_STEEL))  # fmt: skip
+            m.add(tube([(0.0, 0.008, -hd + 0.008), (0.0, low + 0.12, -0.03)], 0.014, n=10),
                 of=m.pick(STEEL, BLACK_STEEL))  # fmt: skip
-        case 3:
+        case 3:  # a round plate
             m.add(disc(0.4 * w, d, 0.0, 0.014, 0.004), of=BLACK_GLASS)
             m.add(tube([(0.0, 0.01, -0.02), (0.0, low + 0.08, -0.02)], 0.022, n=12), of=STEEL)

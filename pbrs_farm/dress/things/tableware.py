@@ -36,6 +36,7 @@ def one_plate(m: Maker) -> None:
 
 
 def pile(m: Maker, n: int) -> None:
+    """Plates of one form on top of each other."""
     r, glaze, form = m.uniform(0.1, 0.14), m.china(), m.integers(0, 6)
     # A deep one stands alone.
     form = 0 if form == 4 and n > 1 else form
@@ -44,27 +45,27 @@ def pile(m: Maker, n: int) -> None:
     for k in range(n):
         with m.moved(at=(0, 0.0066 * k, 0)), m.of(glaze):
             match form:
-                case 0:
+                case 0:  # flat
                     m.add(turned([(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02),
                         (r - 0.002, 0.0225), (r * 0.7, 0.0095), (r * 0.6, 0.005), (0, 0.005)],
                         n=sides))  # fmt: skip
-                case 1:
+                case 1:  # deep
                     m.add(turned([(0, 0), (r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028),
                         (r * 0.55, 0.005), (0, 0.005)], n=sides))  # fmt: skip
-                case 2:
+                case 2:  # square
                     m.add(loft(rings(rect, [(1.2 * r, 1.2 * r, 0.01, 0),
                         (1.9 * r, 1.9 * r, 0.02, 0.016),
                         (1.9 * r - 0.003, 1.9 * r - 0.003, 0.019, 0.018),
                         (1.2 * r, 1.2 * r, 0.01, 0.005)], n=2)))  # fmt: skip
-                case 3:
+                case 3:  # oval
                     m.add(loft(rings(oval, [(1.6 * r, 1.0 * r, 0), (2.4 * r, 1.6 * r, 0.018),
                         (2.4 * r - 0.004, 1.6 * r - 0.004, 0.02), (1.6 * r, 1.0 * r, 0.005)],
                         n=18)))  # fmt: skip
-                case 4:
+                case 4:  # with a well
                     m.add(turned([(0, 0), (r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
                         (r * 0.95 - 0.002, 0.036), (r * 0.58, 0.03), (r * 0.47, 0.005), (0, 0.005)],
                         n=sides))  # fmt: skip
-                case 5:
+                case 5:  # fluted
                     m.add(loft(rings(fluted, [(1.3 * r, 10, 0.03, 0), (2 * r, 10, 0.06, 0.019),
                         (2 * r - 0.004, 10, 0.06, 0.021), (1.3 * r, 10, 0.03, 0.005)]), sharp=70.0))  # fmt: skip
     # Some have a spoon, a fork or crumbs on them.
@@ -119,24 +120,26 @@ def kitchen_roll(m: Maker) -> None:
 
 @thing(group="cutlery")
 def cutlery(m: Maker) -> None:
-    """Spoons and knives: in a pot, in a block of wood, on a board with a knife, or a fork and a knife that lie side by side."""
+    """Spoons and knives.
+
+    In a pot, in a block of wood, on a board with a knife, or a fork and a knife that lie side by side.
+    """
     form = m.integers(0, 4)
     grip = m.pick(STEEL, plain("grip", (0.08, 0.08, 0.08), 0.4), plain("grip wood", m.wood, 0.5))
-    # Wooden spoons and ladles lean in a pot.
     match form:
-        case 0:
+        case 0:  # wooden spoons and ladles lean in a pot
             m.name, r, tall = "utensil_pot", m.uniform(0.045, 0.06), m.uniform(0.13, 0.17)
             m.add(vessel([(0, 0), (r * 0.92, 0), (r, tall)], 0.004, n=18),
                 of=m.pick(m.china(), STEEL, plain("pot", m.any_colour(), 0.4)))  # fmt: skip
             for k in range(m.integers(3, 6)):
                 with m.moved(turn=rotation_y(1.7 * k + m.uniform(0, 0.6))):
-                    stuff, high = (m.pick(STEEL, plain("spoon wood", m.wood, 0.6),
+                    material, high = (m.pick(STEEL, plain("spoon wood", m.wood, 0.6),
                         plain("nylon", (0.05, 0.05, 0.05), 0.5)), tall + m.uniform(0.06, 0.13))  # fmt: skip
-                    m.add(tube([(-r * 0.5, 0.012, 0), (r * 0.62, high, 0)], 0.005, n=6), of=stuff)
+                    m.add(tube([(-r * 0.5, 0.012, 0), (r * 0.62, high, 0)], 0.005, n=6),
+                        of=material)  # fmt: skip
                     m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.008, 0.036, 0.024)),
-                        turn=rotation_z(-0.3), at=(r * 0.62 + 0.008, high + 0.028, 0), of=stuff)  # fmt: skip
-        case 1:
-            # The block leans back; handles stand out of its top.
+                        turn=rotation_z(-0.3), at=(r * 0.62 + 0.008, high + 0.028, 0), of=material)  # fmt: skip
+        case 1:  # the block leans back; handles stand out of its top
             m.name = "knife_block"
             m.add(loft([(rect(0.1, 0.12, 0.006, n=1), 0),
                 (rect(0.1, 0.1, 0.006, n=1, z=-0.04), 0.2)], sharp=20.0),

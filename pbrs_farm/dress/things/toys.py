@@ -27,7 +27,10 @@ from pbrs_farm.dress.things.outlines import bent, oval, rect, rings, scaled
 
 @thing(group="toy")
 def toy(m: Maker) -> None:
-    """A toy: a bear, blocks, a train, a car, stacked rings, a robot, a top, a plane, a rocket, a house, a drum, an animal on wheels."""
+    """A toy.
+
+    A bear, blocks, a train, a car, stacked rings, a robot, a top, a plane, a rocket, a house, a drum, an animal on wheels.
+    """
     form, s = m.integers(0, 13), m.uniform(0.85, 1.2)
     own, other, third = (plain("toy", m.any_colour(), 0.5), plain("toy", m.any_colour(), 0.5),
         plain("toy", m.any_colour(), 0.5))  # fmt: skip
@@ -205,7 +208,7 @@ def ball(m: Maker) -> None:
     own, other = (plain("ball", m.any_colour(), 0.45), plain("ball", m.pick((0.9, 0.9, 0.88),
         (0.08, 0.08, 0.09), m.any_colour()), 0.45))  # fmt: skip
     match form:
-        case 0:
+        case 0:  # plain
             m.add(sphere((0, r, 0), r, n=18), of=own)
         case 1:
             m.name = "ball_of_two_colours"
