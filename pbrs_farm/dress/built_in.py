@@ -1,6 +1,6 @@
 """Doors, windows, stairs, railings, radiators, appliances and steps of one home in its scheme.
 
-What has a picture of its own, and glass, stay. Effects: on the draft.
+What has a picture of its own, and glass, stay. Effects: changes the house.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from pbrs_farm.core.classes import DOOR, MIRROR, OTHERFURNITURE, OTHERSTRUCTURE,
 from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import connected_parts
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import (
     Finish,
@@ -41,14 +41,16 @@ _APPLIANCES: Final = frozenset(
 _TO_STREET: Final = ("front", "garage", "entrance")
 
 
-def finish_built_in_parts(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def finish_built_in_parts(
+    house: MutableHouse, catalogue: Catalogue, style: Style, share: float
+) -> None:
     """Give doors, windows, stairs, railings and fitted appliances the finishes of the home's scheme.
 
     share: of the kinds of things (all doors, all windows, ...) that are changed.
     """
-    scheme = finish_scheme(draft, style)
+    scheme = finish_scheme(house, style)
     kinds = {
-        kind: float(draft.rng(PART, kind).random()) < share
+        kind: float(house.rng(PART, kind).random()) < share
         for kind in (
             "door",
             "window",
@@ -60,16 +62,16 @@ def finish_built_in_parts(draft: Draft, catalogue: Catalogue, style: Style, shar
             "mirror",
         )
     }
-    for index, item in enumerate(draft.items):
+    for index, item in enumerate(house.items):
         if item.kind.is_structure or not item.n_faces:
             continue
         kind = _kind_in_scheme(item)
         if not kinds.get(kind, False):
             continue
-        made = _finish_by_scheme(draft, item, kind, scheme)
+        made = _finish_by_scheme(house, item, kind, scheme)
         if made is not item:
-            draft.change(index, made, PART)
-            draft.done[f"{PART}: {kind}"] += 1
+            house.change(index, made, PART)
+            house.done[f"{PART}: {kind}"] += 1
 
 
 def _kind_in_scheme(item: Item) -> str:
@@ -93,27 +95,27 @@ def _kind_in_scheme(item: Item) -> str:
     return "appliance" if is_appliance and words & _APPLIANCES else ""
 
 
-def _finish_by_scheme(draft: Draft, item: Item, kind: str, scheme: FinishScheme) -> Item:
+def _finish_by_scheme(house: MutableHouse, item: Item, kind: str, scheme: FinishScheme) -> Item:
     if kind == "door":
         said = f"{item.name} {item.source_class}".casefold()
         is_front = any(word in said for word in _TO_STREET)
         return _finish_opening(
-            draft, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim
+            house, item, scheme, scheme.front if is_front else scheme.leaf, scheme.trim
         )
     if kind == "window":
-        return _finish_opening(draft, item, scheme, scheme.window, scheme.window)
+        return _finish_opening(house, item, scheme, scheme.window, scheme.window)
     if kind == "stairs":
         finish = scheme.stone if item.room_id is None and len(item.surfaces) > 1 else scheme.stair
-        return item_with_finish(draft, item, finish)
+        return item_with_finish(house, item, finish)
     if kind == "railing":
-        return item_with_finish(draft, item, _finish_of_railing(item, scheme))
+        return item_with_finish(house, item, _finish_of_railing(item, scheme))
     if kind == "radiator":
-        return item_with_finish(draft, item, scheme.radiator)
+        return item_with_finish(house, item, scheme.radiator)
     if kind == "mirror":
-        return _finish_mirror_frame(draft, item, scheme)
+        return _finish_mirror_frame(house, item, scheme)
     if kind == "spotlight":
-        return _finish_spotlight(draft, item, scheme)
-    return _finish_appliance(draft, item, scheme)
+        return _finish_spotlight(house, item, scheme)
+    return _finish_appliance(house, item, scheme)
 
 
 def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
@@ -124,23 +126,23 @@ def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
 
 
 def _finish_opening(
-    draft: Draft, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
+    house: MutableHouse, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
 ) -> Item:
     """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
     # What lights is named by the number of its surface, which parting would change.
-    if any(light.emitting for light in item.lights) or not has_plain(draft, item):
+    if any(light.emitting for light in item.lights) or not has_plain(house, item):
         return item
     box = item.oriented_box
     wide = float(box.half[0] * 2)
     found: list[Surface] = []
     for surface in item.surfaces:
-        if not is_plain(draft.materials[surface.material]):
+        if not is_plain(house.materials[surface.material]):
             found.append(surface)
             continue
         for part, size in _connected_surfaces(surface, box.axes):
             is_frame = size[0] > _FRAME * wide and frame != leaf
             finish = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
-            found.append(with_finish(draft, part, finish, box.axes))
+            found.append(with_finish(house, part, finish, box.axes))
     return replace(item, surfaces=tuple(_merge_surfaces(found)))
 
 
@@ -176,36 +178,36 @@ def _join_surfaces(some: list[Surface]) -> Surface:
     )  # fmt: skip
 
 
-def _finish_appliance(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
+def _finish_appliance(house: MutableHouse, item: Item, scheme: FinishScheme) -> Item:
     # The body alone: plates, doors and panels keep their glass and black.
     areas = [float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in item.surfaces]
     return _finish_some(
-        draft, item, scheme.appliance,
-        [a >= _FRONT_SHARE * sum(areas) and _is_bright(draft, s)
+        house, item, scheme.appliance,
+        [a >= _FRONT_SHARE * sum(areas) and _is_bright(house, s)
          for a, s in zip(areas, item.surfaces, strict=True)],
     )  # fmt: skip
 
 
-def _finish_mirror_frame(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
+def _finish_mirror_frame(house: MutableHouse, item: Item, scheme: FinishScheme) -> Item:
     # Where no surface is known to be glass, all of it may be.
-    materials = [draft.materials[s.material] for s in item.surfaces]
+    materials = [house.materials[s.material] for s in item.surfaces]
     if not any(m.kind is MaterialKind.MIRROR for m in materials):
         return item
-    return item_with_finish(draft, item, scheme.trim)
+    return item_with_finish(house, item, scheme.trim)
 
 
-def _finish_spotlight(draft: Draft, item: Item, scheme: FinishScheme) -> Item:
+def _finish_spotlight(house: MutableHouse, item: Item, scheme: FinishScheme) -> Item:
     emitting = {k for light in item.lights for k in light.emitting}
     return _finish_some(
-        draft, item, scheme.spotlight, [k not in emitting for k in range(len(item.surfaces))]
+        house, item, scheme.spotlight, [k not in emitting for k in range(len(item.surfaces))]
     )
 
 
-def _finish_some(draft: Draft, item: Item, finish: Finish, covers: list[bool]) -> Item:
+def _finish_some(house: MutableHouse, item: Item, finish: Finish, covers: list[bool]) -> Item:
     axes = item.oriented_box.axes
     surfaces = tuple(
-        with_finish(draft, s, finish, axes)
-        if is_mine and is_plain(draft.materials[s.material])
+        with_finish(house, s, finish, axes)
+        if is_mine and is_plain(house.materials[s.material])
         else s
         for s, is_mine in zip(item.surfaces, covers, strict=True)
     )
@@ -214,5 +216,5 @@ def _finish_some(draft: Draft, item: Item, finish: Finish, covers: list[bool]) -
     return replace(item, surfaces=surfaces)
 
 
-def _is_bright(draft: Draft, surface: Surface) -> bool:
-    return max(draft.materials[surface.material].diffuse) > 0.25
+def _is_bright(house: MutableHouse, surface: Surface) -> bool:
+    return max(house.materials[surface.material].diffuse) > 0.25

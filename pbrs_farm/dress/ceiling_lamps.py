@@ -1,4 +1,4 @@
-"""Hangs a lamp from a room's ceiling: over the dining table, else in the middle of what is free. Effects: on the draft."""
+"""Hangs a lamp from a room's ceiling: over the dining table, else in the middle of what is free. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import TABLE
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.made_lamps import ceiling_dome, globe_pendant, shade_pendant, with_flux
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import next_id
@@ -29,14 +29,14 @@ _GAP_M = 0.0005
 
 
 def hang_from_ceiling(
-    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, flux_lm: float,
+    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, flux_lm: float,
     rng: np.random.Generator,
 ) -> bool:  # fmt: skip
     """Hang one lamp of that flux; False, and a reason counted, where there is no place for it."""
-    space = house_space(draft)
+    space = house_space(house)
     room = space.room(room_id)
     choices = _choices(catalogue, style, room, rng)
-    for place, top_y, low_y in _hanging_places(draft, space, room):
+    for place, top_y, low_y in _hanging_places(house, space, room):
         for piece, ready in choices:
             # Load a model when it is its turn: most rooms take the first.
             shape = ready or catalogue.shape(piece)
@@ -51,13 +51,13 @@ def hang_from_ceiling(
             at = np.array([place[0], top_y - height - _GAP_M, place[1]])
             lit = with_flux(shape, flux_lm)
             turn = float(rng.choice([0.0, np.pi / 2]))
-            item = draft.placed(
-                piece, lit, at, turn, item_id=next_id(draft, PART), room_id=room_id,
+            item = house.placed(
+                piece, lit, at, turn, item_id=next_id(house, PART), room_id=room_id,
                 level_id=room.room.level_id, scale=factor,
             )  # fmt: skip
-            draft.add(item, PART, piece)
+            house.add(item, PART, piece)
             return True
-    draft.refused[f"{PART}: no place under the ceiling"] += 1
+    house.refused[f"{PART}: no place under the ceiling"] += 1
     return False
 
 
@@ -107,13 +107,13 @@ def _factor(shape: Shape, height_m: float) -> float | None:
 
 
 def _hanging_places(
-    draft: Draft, space: HouseSpace, room: RoomSpace
+    house: MutableHouse, space: HouseSpace, room: RoomSpace
 ) -> list[tuple[F64, float, float]]:
     """Plan places, the ceiling's y and the lowest y of a lamp there; best first."""
     floor = room.room.floor_y
     places, lows = [], []
     for number in room.items:
-        item, (low, high) = draft.items[number], space.bounds[number]
+        item, (low, high) = house.items[number], space.bounds[number]
         size = high - low
         if item.nyu40 == TABLE and size[1] > 0.6 and min(size[0], size[2]) > 0.7:
             places.append(((low + high) / 2)[[0, 2]])

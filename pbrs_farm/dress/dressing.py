@@ -1,6 +1,6 @@
 """The stage: a House that looks lived in, from a House, a Catalogue and a seed; no effects.
 
-The parts follow one another as people furnish: surfaces, furniture and what it is made of, lamps,
+The passes follow one another as people furnish: surfaces, furniture and what it is made of, lamps,
 large textiles, what hangs on walls, and last what lies about. The gates take out what stands wrong.
 """
 
@@ -19,12 +19,12 @@ from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.built_in import finish_built_in_parts
 from pbrs_farm.dress.clutter import add_clutter
-from pbrs_farm.dress.draft import CHANGED_TAG, Draft
 from pbrs_farm.dress.finishes import finish_furniture
 from pbrs_farm.dress.furniture import add_furniture
-from pbrs_farm.dress.gates import group_of, keep_gates, kept_as_rendered, pass_that_added, piece_id
+from pbrs_farm.dress.gates import group_of, keep_gates, pass_that_added, piece_id, refit_to_walls
 from pbrs_farm.dress.lamps import add_lamps
 from pbrs_farm.dress.mess import move_chairs, tilt_pictures
+from pbrs_farm.dress.mutable_house import CHANGED_TAG, MutableHouse
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import dress_surfaces
@@ -33,18 +33,18 @@ from pbrs_farm.dress.textiles import add_textiles
 from pbrs_farm.dress.walls import furnish_walls
 from pbrs_farm.dress.wear import add_wear
 
-Part = Callable[[Draft, Catalogue, Style, float], None]
+DressingPass = Callable[[MutableHouse, Catalogue, Style, float], None]
 
 
-_FURNITURE: Final[tuple[tuple[str, Part], ...]] = (
+_FURNITURE: Final[tuple[tuple[str, DressingPass], ...]] = (
     ("surfaces", dress_surfaces),
     ("swap", swap_furniture),
     ("furniture", add_furniture),
     ("mess", move_chairs),
 )
-"""Field of the recipe that holds the part's share, and the part, in the order they are done."""
+"""Field of the recipe that holds the pass's share, and the pass, in the order they are done."""
 
-_THINGS: Final[tuple[tuple[str, Part], ...]] = (
+_THINGS: Final[tuple[tuple[str, DressingPass], ...]] = (
     ("surfaces", finish_built_in_parts),
     ("parts", finish_furniture),
     ("parts", add_wear),
@@ -62,8 +62,14 @@ def dress(
 ) -> tuple[House, DressReport]:
     """The house dressed by a seed, and what was added, changed, refused and measured.
 
-    house: as read, not repaired. Equal arguments give equal bits. Raises BadRecipe for an unknown
-    style.
+    house: as read, not repaired: its walls are still as they were drawn. catalogue: where models come
+    from; what it lacks is generated, so EMPTY serves. fields: shares 0..1 of each pass, 0 leaves it
+    out. Equal arguments give equal bits. Raises BadRecipe for an unknown style.
+
+        dressed, report = dress(house, EMPTY, DressFields(), seed=1)
+
+    A house that is repaired afterwards needs dressed_house and refit_after_repair: repair may take
+    away the wall that a picture hangs on.
     """
     made = dressed_house(house, catalogue, fields, seed)
     return made.house, made.report
@@ -82,54 +88,55 @@ def dressed_house(
     house: House, catalogue: Catalogue, fields: DressFields, seed: int,
     tell: Callable[[float], None] = lambda _share: None,
 ) -> Dressed:  # fmt: skip
-    """As dress, with what kept_in needs. tell: called with the share of the parts that are done."""
-    with closing(Draft(house, seed, fields.mess)) as draft:
-        return Dressed(*_dressed(draft, catalogue, fields, tell), draft.used, len(house.items))
+    """As dress, with what refit_after_repair needs. tell: called with the share of the passes that are done."""
+    with closing(MutableHouse(house, seed, fields.mess)) as mutable:
+        return Dressed(*_dressed(mutable, catalogue, fields, tell), mutable.used, len(house.items))
 
 
-def kept_in(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
-    """The dressed house with what repair parted from its wall hung anew or taken out.
+def refit_after_repair(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
+    """The dressed house with what repair parted from its wall moved to the wall that is left, or taken out.
 
-    The same object where everything that was added is held in the repaired house as well.
+    repaired: `dressed.house` after repair. Returns `dressed` itself where everything that was added is
+    held in the repaired house as well; else repair the returned house again.
     """
-    house, report = kept_as_rendered(
+    house, report = refit_to_walls(
         dressed.house, dressed.n_source, repaired, dressed.report, dressed.pieces
     )
     if house is dressed.house:
         return dressed
-    added = _added(house.items[dressed.n_source :], dressed.pieces)
+    added = _count_added(house.items[dressed.n_source :], dressed.pieces)
     update = {"added": added, "credits": _credits_of_house(house, catalogue)}
     return dressed._replace(house=house, report=report.model_copy(update=update))
 
 
 def _dressed(
-    draft: Draft, catalogue: Catalogue, fields: DressFields, tell: Callable[[float], None]
+    house: MutableHouse, catalogue: Catalogue, fields: DressFields, tell: Callable[[float], None]
 ) -> tuple[House, DressReport]:
-    style = style_for(draft.rng("style"), fields.style)
+    style = style_for(house.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
     gates: tuple[Gate, ...] = ()
     # Put back what stands wrong before things are laid on it, then look at everything.
     n_done = 0
     for several in (_FURNITURE, _THINGS):
-        for field, part in several:
+        for field, dressing_pass in several:
             share = float(getattr(fields, field))
             if share > 0:
-                part(draft, catalogue, style, share)
+                dressing_pass(house, catalogue, style, share)
             n_done += 1
             tell(n_done / len(_FURNITURE + _THINGS))
-        gates = _merge_gates(gates, keep_gates(draft, pieces | draft.used))
+        gates = _merge_gates(gates, keep_gates(house, pieces | house.used))
     if fields.passes:
         for name in fields.passes.split(":"):
-            plugin("passes", name).load()(draft, catalogue, style, 1.0)
-        gates = _merge_gates(gates, keep_gates(draft, pieces | draft.used))
-    dressed = draft.house()
+            plugin("passes", name).load()(house, catalogue, style, 1.0)
+        gates = _merge_gates(gates, keep_gates(house, pieces | house.used))
+    dressed = house.frozen()
     credits = _credits_of_house(dressed, catalogue)
     dressed = replace(
         dressed,
-        id=keys.dressed_id(draft.source.id, draft.seed),
-        source=_credited(draft.source.source, credits),
+        id=keys.dressed_id(house.source.id, house.seed),
+        source=_credited(house.source.source, credits),
     )
-    return dressed, _report_of_dressing(dressed, draft, style, gates, credits)
+    return dressed, _report_of_dressing(dressed, house, style, gates, credits)
 
 
 def _merge_gates(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
@@ -142,7 +149,11 @@ def _merge_gates(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gat
 
 
 def _report_of_dressing(
-    house: House, draft: Draft, style: Style, gates: tuple[Gate, ...], credits: tuple[Credit, ...]
+    house: House,
+    mutable: MutableHouse,
+    style: Style,
+    gates: tuple[Gate, ...],
+    credits: tuple[Credit, ...],
 ) -> DressReport:
     changed = Counter(
         tag.removeprefix(CHANGED_TAG)
@@ -152,18 +163,18 @@ def _report_of_dressing(
     )
     return DressReport(
         house_id=house.id,
-        seed=draft.seed,
+        seed=mutable.seed,
         style=style.name,
-        added=_added(house.items[len(draft.source.items) :], draft.used),
+        added=_count_added(house.items[len(mutable.source.items) :], mutable.used),
         changed=dict(sorted(changed.items())),
-        refused=dict(sorted(draft.refused.items())),
+        refused=dict(sorted(mutable.refused.items())),
         gates=gates,
         credits=credits,
-        notes=tuple(f"{n.kind}: {n.place}: {n.text}" for n in draft.notes),
+        notes=tuple(f"{n.kind}: {n.place}: {n.text}" for n in mutable.notes),
     )
 
 
-def _added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
+def _count_added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
     """What was added and stands there now, whatever was tried, by part and group."""
     found = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
     return dict(sorted(found.items()))

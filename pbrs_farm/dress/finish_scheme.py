@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import COLOURS, METALS, WOODS, WOODS_FOR, Rgb, Style, mix, rgb, shade
 from pbrs_farm.dress.surface_finishes import Finish
 
@@ -39,9 +39,9 @@ class FinishScheme:
     plaster: Finish  # the tops of walls, the sides of openings
 
 
-def finish_scheme(draft: Draft, style: Style) -> FinishScheme:
+def finish_scheme(house: MutableHouse, style: Style) -> FinishScheme:
     """The home's scheme, from streams of its own: equal for every part that asks."""
-    rng = draft.rng("joinery")
+    rng = house.rng("joinery")
     trim = _trim_finish(rng, style)
     leaf = _leaf_finish(rng, style, trim)
     return FinishScheme(

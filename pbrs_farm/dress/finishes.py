@@ -20,7 +20,7 @@ from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import box_mapped
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import (
     PartKind,
     has_taps,
@@ -60,32 +60,32 @@ class _LaidMaterial:
     is_grained: bool = False
 
 
-def finish_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def finish_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the furniture's plain parts the look of what they are made of.
 
     Parts of one colour in one room get one look, so that sets stay sets.
     """
     groups = {p.id: p.group for p in catalogue.pieces}
-    n_source = len(draft.source.items)
-    for index, item in enumerate(draft.items):
+    n_source = len(house.source.items)
+    for index, item in enumerate(house.items):
         # Of what was added only models of the catalogue have plain parts.
         is_finished = index >= n_source and item.source_class not in groups
         if item.kind.is_structure or not item.n_faces or is_finished:
             continue
         group = groups.get(item.source_class, "")
-        kinds = _kinds_of_surfaces(draft, item, group)
+        kinds = _kinds_of_surfaces(house, item, group)
         surfaces = tuple(
-            _finish_surface(draft, catalogue, style, share, item, group, surface, kind)
+            _finish_surface(house, catalogue, style, share, item, group, surface, kind)
             for surface, kind in zip(item.surfaces, kinds, strict=True)
         )
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
-            draft.change(index, replace(item, surfaces=surfaces), PART)
-            draft.done[f"{PART}: {item.kind.value}"] += 1
+            house.change(index, replace(item, surfaces=surfaces), PART)
+            house.done[f"{PART}: {item.kind.value}"] += 1
 
 
-def _kinds_of_surfaces(draft: Draft, item: Item, group: str) -> list[PartKind]:
-    kinds = [kind_of_part(draft.materials[s.material], item, group) for s in item.surfaces]
-    materials = [draft.materials[s.material] for s in item.surfaces]
+def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[PartKind]:
+    kinds = [kind_of_part(house.materials[s.material], item, group) for s in item.surfaces]
+    materials = [house.materials[s.material] for s in item.surfaces]
     # One sits or lies on the soft part, whatever it is called.
     if is_upholstered(item, group):
         areas = [
@@ -128,14 +128,14 @@ def _may_be_board(surface: Surface, material: Material, item: Item, group: str) 
 
 
 def _finish_surface(
-    draft: Draft, catalogue: Catalogue, style: Style, share: float, item: Item, group: str,
+    house: MutableHouse, catalogue: Catalogue, style: Style, share: float, item: Item, group: str,
     surface: Surface, kind: PartKind,
 ) -> Surface:  # fmt: skip
-    material = draft.materials[surface.material]
+    material = house.materials[surface.material]
     if kind is PartKind.OTHER:
         return surface
     shade = "".join(f"{round(31 * c):02x}" for c in material.diffuse)
-    rng = draft.rng(
+    rng = house.rng(
         PART, item.level_id, item.room_id or "", kind.value, group * (kind is PartKind.SOFT), shade
     )
     if rng.random() >= share:
@@ -145,7 +145,7 @@ def _finish_surface(
         PartKind.SOFT: _finish_soft,
         PartKind.METAL: _finish_metal,
     }.get(kind, _finish_lacquer)
-    finish = make(draft, catalogue, style, item, material, rng)
+    finish = make(house, catalogue, style, item, material, rng)
     if finish is None:
         return surface
     if finish.size_m is None:
@@ -156,14 +156,14 @@ def _finish_surface(
 
 
 def _finish_wood(
-    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
 ) -> _LaidMaterial | None:  # fmt: skip
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
     is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
     if (is_vivid(own) and stays < _PAINT_STAYS) or (is_other and stays < _GREY_STAYS):
-        return _finish_lacquer(draft, catalogue, style, item, material, rng)
+        return _finish_lacquer(house, catalogue, style, item, material, rng)
     mean = linear_from_srgb(np.array(style.wood.mean))
     mine = np.maximum(linear_from_srgb(np.array(own)), _DARKEST)
     # The stronger a brown, the less of it is of wood.
@@ -175,18 +175,18 @@ def _finish_wood(
         wanted = mean * float(mine @ LUMINANCE + 0.02) / float(mean @ LUMINANCE)
     is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
     wood = WOODS[_PALE] if is_pale else style.wood
-    pattern = photographed(draft, catalogue, grain_pattern(draft, wood))
-    return _tinted(draft, pattern, wanted, is_grained=True)
+    pattern = photographed(house, catalogue, grain_pattern(house, wood))
+    return _tinted(house, pattern, wanted, is_grained=True)
 
 
-def grain_pattern(draft: Draft, wood: Wood) -> Pattern:
+def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
     """The one veneer that a home's furniture of that wood shows."""
-    seed = int(draft.rng(PART, "grain", wood.name).integers(2**31))
+    seed = int(house.rng(PART, "grain", wood.name).integers(2**31))
     return Pattern("grain", seed, wood=wood)
 
 
 def _finish_soft(
-    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
 ) -> _LaidMaterial | None:  # fmt: skip
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
@@ -204,13 +204,13 @@ def _finish_soft(
     if family == "leather":
         hides = COLOURS["hides"]
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
-    seed = int(draft.rng(PART, family).integers(2**31))
-    pattern = photographed(draft, catalogue, Pattern(family, seed))
-    return _tinted(draft, pattern, wanted, is_grained=False)
+    seed = int(house.rng(PART, family).integers(2**31))
+    pattern = photographed(house, catalogue, Pattern(family, seed))
+    return _tinted(house, pattern, wanted, is_grained=False)
 
 
 def _finish_lacquer(
-    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
 ) -> _LaidMaterial | None:  # fmt: skip
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
@@ -228,11 +228,11 @@ def _finish_lacquer(
         material, diffuse=(r, g, b), specular=_SHEEN, roughness=roughness,
         shininess=round(2 / roughness**4 - 2, 1),
     )  # fmt: skip
-    return _LaidMaterial(draft.material(painted))
+    return _LaidMaterial(house.material(painted))
 
 
 def _finish_metal(
-    draft: Draft, catalogue: Catalogue, style: Style, item: Item, material: Material,
+    house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
 ) -> _LaidMaterial | None:  # fmt: skip
     if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
@@ -244,17 +244,19 @@ def _finish_metal(
         material, diffuse=(r, g, b), specular=metal.colour, roughness=metal.roughness,
         shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
     )  # fmt: skip
-    return _LaidMaterial(draft.material(polished))
+    return _LaidMaterial(house.material(polished))
 
 
-def _tinted(draft: Draft, pattern: Pattern, wanted: F64, *, is_grained: bool) -> _LaidMaterial:
+def _tinted(
+    house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bool
+) -> _LaidMaterial:
     # The pattern's material in another colour: its picture times a diffuse of at most 1.
-    made = pattern_material(draft, pattern)
+    made = pattern_material(house, pattern)
     ratio = wanted / np.maximum(np.array(made.mean_rgb), 1e-3)
     ratio = ratio / max(1.0, float(ratio.max()))
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
-    tinted = replace(draft.materials[made.number], diffuse=(r, g, b))
-    return _LaidMaterial(draft.material(tinted), made.size_m, is_grained)
+    tinted = replace(house.materials[made.number], diffuse=(r, g, b))
+    return _LaidMaterial(house.material(tinted), made.size_m, is_grained)
 
 
 def _area_of_surface(surface: Surface) -> float:

@@ -18,8 +18,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.record import Nyu40, Record, read_toml
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.furniture_look import Look, grained, look_of
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
 from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
@@ -77,29 +77,29 @@ KINDS: Final[Mapping[str, WantedKind]] = _FILE.kinds
 WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = _FILE.wanted
 
 
-def add_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Add furniture to the rooms of the draft. share: 0..1 of what a room would get."""
-    space = house_space(draft)
+def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Add furniture to the rooms of the house. share: 0..1 of what a room would get."""
+    space = house_space(house)
     for room in space.rooms:
         wanted = WANTED.get(room.kind, ())
         if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
             continue
-        rng = draft.rng(PART, room.room.id)
-        names = _draw_wanted(draft, room, wanted, rng, share)
-        floor = RoomFloor.of(draft, space, room) if names else None
+        rng = house.rng(PART, room.room.id)
+        names = _draw_wanted(house, room, wanted, rng, share)
+        floor = RoomFloor.of(house, space, room) if names else None
         if floor is None:
             continue
-        own = room_style(style, draft.rng("style", room.room.id))
-        look = look_of(draft, catalogue, own, draft.rng(PART, "look", int(rng.integers(_LOOKS))))
+        own = room_style(style, house.rng("style", room.room.id))
+        look = look_of(house, catalogue, own, house.rng(PART, "look", int(rng.integers(_LOOKS))))
         for name in names:
-            _stand_at_wall(draft, catalogue, floor, name, look, rng)
+            _stand_at_wall(house, catalogue, floor, name, look, rng)
 
 
 def _draw_wanted(
-    draft: Draft, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
+    house: MutableHouse, room: RoomSpace, wanted: Sequence[tuple[str, float]], rng: np.random.Generator,
     share: float,
 ) -> list[str]:  # fmt: skip
-    has = {draft.items[n].nyu40 for n in room.items}
+    has = {house.items[n].nyu40 for n in room.items}
     found = []
     for name, chance in wanted:
         kind = KINDS[name]
@@ -112,7 +112,7 @@ def _draw_wanted(
 
 
 def _stand_at_wall(
-    draft: Draft, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
+    house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """Put a thing of that kind where it fits; narrower ones are tried."""
@@ -127,14 +127,14 @@ def _stand_at_wall(
             continue
         made = _from_catalogue(catalogue, kind, w, own) if from_catalogue else None
         made = made or _generated(kind, look, (w, height, depth), own)
-        spot = _find_spot(draft, floor, kind, made, rng)
+        spot = _find_spot(house, floor, kind, made, rng)
         if spot is None:
             continue
-        _put_at_spot(draft, floor, made, spot)
+        _put_at_spot(house, floor, made, spot)
         if name == "desk":
-            _chair_before(draft, floor, spot, look, rng)
+            _chair_before(house, floor, spot, look, rng)
         return
-    draft.refused[f"{PART}: no free wall for a {name}"] += 1
+    house.refused[f"{PART}: no free wall for a {name}"] += 1
 
 
 def _generated(kind: WantedKind, look: Look, size: tuple[float, float, float], own: int) -> Made:
@@ -163,7 +163,7 @@ def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: i
 
 
 def _find_spot(
-    draft: Draft, floor: RoomFloor, kind: WantedKind, made: Made, rng: np.random.Generator
+    house: MutableHouse, floor: RoomFloor, kind: WantedKind, made: Made, rng: np.random.Generator
 ) -> FloorSpot | None:
     """A place for the thing, drawn from those that are free; None where there is none."""
     low, high = made[1].bounds
@@ -178,9 +178,9 @@ def _find_spot(
         places += [(k, s + _SIDE_M + w / 2, liked) for s, liked in _liked(starts)]
     weights = np.array([liked for _, _, liked in places])
     if kind.beside is not None:
-        weights *= [_is_beside(draft, floor, kind.beside, k, s, w) for k, s, _ in places]
+        weights *= [_is_beside(house, floor, kind.beside, k, s, w) for k, s, _ in places]
     if BOOKSHELF in kind.alike:
-        weights *= [not _is_cooked_at(draft, floor, k, s, w) for k, s, _ in places]
+        weights *= [not _is_cooked_at(house, floor, k, s, w) for k, s, _ in places]
     if not weights.any():
         return None
     n = min(_TRIES, int(np.count_nonzero(weights)))
@@ -203,12 +203,12 @@ def _liked(starts: F64) -> list[tuple[float, float]]:
 
 
 def _is_beside(
-    draft: Draft, floor: RoomFloor, nyu40: int, face_number: int, s: float, width: float
+    house: MutableHouse, floor: RoomFloor, nyu40: int, face_number: int, s: float, width: float
 ) -> bool:
     """Whether a place at a wall is right beside a thing of the class that stands at that wall."""
     face = floor.faces[face_number]
     for number in floor.room.items:
-        if draft.items[number].nyu40 != nyu40:
+        if house.items[number].nyu40 != nyu40:
             continue
         low, high = floor.space.bounds[number]
         corners = np.array([[x, 0.0, z] for x in (low[0], high[0]) for z in (low[2], high[2])])
@@ -219,7 +219,9 @@ def _is_beside(
     return False
 
 
-def _is_cooked_at(draft: Draft, floor: RoomFloor, face_number: int, s: float, width: float) -> bool:
+def _is_cooked_at(
+    house: MutableHouse, floor: RoomFloor, face_number: int, s: float, width: float
+) -> bool:
     """Whether a place at a wall is among what a kitchen is made of: nobody keeps books there."""
     face = floor.faces[face_number]
     ends = [face.point(x, 0.0, 0.0) for x in (s - width / 2, s + width / 2)]
@@ -228,7 +230,7 @@ def _is_cooked_at(draft: Draft, floor: RoomFloor, face_number: int, s: float, wi
         return True
     plan = [0, 2]
     for number in floor.room.items:
-        item, bounds = draft.items[number], floor.space.bounds[number]
+        item, bounds = house.items[number], floor.space.bounds[number]
         is_kitchen = item.nyu40 in (COUNTER, SINK) or is_cooked_in([item])
         if (
             is_kitchen
@@ -239,20 +241,20 @@ def _is_cooked_at(draft: Draft, floor: RoomFloor, face_number: int, s: float, wi
     return False
 
 
-def _put_at_spot(draft: Draft, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
+def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
     _piece, shape = made
     low, high = shape.bounds
     # Its back comes to the wall, the middle of its width to the spot.
     y = floor.room.room.floor_y + _LIFT_M - float(low[1])
     at = spot.face.point(spot.s, y, OUT_M - float(low[2]))
     at = at - spot.face.along * float(low[0] + high[0]) / 2
-    _add_to_floor(draft, floor, made, at, spot.face.turn_rad)
+    _add_to_floor(house, floor, made, at, spot.face.turn_rad)
     floor.take(spot.body, spot.front)
     floor.wall_m -= float(high[0] - low[0])
 
 
 def _chair_before(
-    draft: Draft, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
+    house: MutableHouse, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
     made = grained(case_goods.desk_chair.make(rng, look.style, look.boards), look)
@@ -270,14 +272,16 @@ def _chair_before(
     floor.fronts.append(own)
     if is_free:
         _add_to_floor(
-            draft, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25))
+            house, floor, made, at, spot.face.turn_rad + np.pi + float(rng.normal(0, 0.25))
         )
         floor.take(body, shapely.Polygon())
 
 
-def _add_to_floor(draft: Draft, floor: RoomFloor, made: Made, at: F64, turn_rad: float) -> None:
+def _add_to_floor(
+    house: MutableHouse, floor: RoomFloor, made: Made, at: F64, turn_rad: float
+) -> None:
     room = floor.room.room
-    item = draft.placed(
-        *made, at, turn_rad, item_id=next_id(draft, PART), room_id=room.id, level_id=room.level_id
+    item = house.placed(
+        *made, at, turn_rad, item_id=next_id(house, PART), room_id=room.id, level_id=room.level_id
     )
-    draft.add(item, PART, made[0])
+    house.add(item, PART, made[0])

@@ -1,4 +1,4 @@
-"""What added furniture is made of: wood of the home, white or painted boards. Effects: materials of the draft."""
+"""What added furniture is made of: wood of the home, white or painted boards. Effects: adds materials to the house."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.box_mapping import box_mapped
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import grain_pattern
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix
 from pbrs_farm.dress.textures.families import pattern_material, photographed
 from pbrs_farm.dress.things.assembly import Made
@@ -30,11 +30,13 @@ class Look:
     size_m: Mapping[Material, tuple[float, float]]
 
 
-def look_of(draft: Draft, catalogue: Catalogue, style: Style, rng: np.random.Generator) -> Look:
+def look_of(
+    house: MutableHouse, catalogue: Catalogue, style: Style, rng: np.random.Generator
+) -> Look:
     """What the added furniture of a room is made of."""
-    pattern = photographed(draft, catalogue, grain_pattern(draft, style.wood))
-    grain = pattern_material(draft, pattern)
-    wood = draft.materials[grain.number]
+    pattern = photographed(house, catalogue, grain_pattern(house, style.wood))
+    grain = pattern_material(house, pattern)
+    wood = house.materials[grain.number]
     kind, tone = rng.random(), float(rng.uniform(0.3, 0.45))
     white = plain("board white", _WHITE, tone)
     colour = COLOURS["boards"][int(rng.integers(len(COLOURS["boards"])))]

@@ -10,8 +10,8 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import NIGHT_STAND, SOFA
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.ceiling_lamps import PART, hang_from_ceiling
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.made_lamps import floor_lamp, table_lamp, with_flux
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import WANTS, next_id
@@ -31,16 +31,16 @@ _FLUX_LM = (500.0, 9000.0)  # of one lamp
 
 
 def stand_by_sofas(
-    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
+    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
 ) -> None:
     """A floor lamp at one end of a sofa, where the floor is free and every way stays open."""
-    space = house_space(draft)
+    space = house_space(house)
     room = space.room(room_id)
     has_one = any(
-        draft.items[n].kind is ItemKind.LAMP and _stands_on_floor(space, room, n)
+        house.items[n].kind is ItemKind.LAMP and _stands_on_floor(space, room, n)
         for n in room.items
     )
-    sofas = [n for n in room.items if draft.items[n].nyu40 == SOFA]
+    sofas = [n for n in room.items if house.items[n].nyu40 == SOFA]
     if has_one or not sofas or rng.random() >= _BY_SOFA:
         return
     piece, shape = _draw_lamp(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
@@ -50,34 +50,34 @@ def stand_by_sofas(
         for place in _ends(space, room, number, radius):
             if _floor_is_free(space, room, place, radius, float(shape.bounds[1, 1])):
                 at = np.array([place[0], room.room.floor_y, place[1]])
-                _stand_lamp(draft, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
-                if _ways_are_open(draft, room_id):
+                _stand_lamp(house, room, piece, with_flux(shape, _FLOOR_LM), at, 0.0)
+                if _ways_are_open(house, room_id):
                     return
-                draft.items.pop()
-                draft.done[f"{PART}: {piece.group}"] -= 1
-    draft.refused[f"{PART}: no floor beside a sofa"] += 1
+                house.items.pop()
+                house.done[f"{PART}: {piece.group}"] -= 1
+    house.refused[f"{PART}: no floor beside a sofa"] += 1
 
 
 def stand_by_beds(
-    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
+    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator
 ) -> None:
     """The same lamp on every nightstand of the room that is free."""
-    space = house_space(draft)
+    space = house_space(house)
     room = space.room(room_id)
-    stands = [n for n in room.items if draft.items[n].nyu40 == NIGHT_STAND]
+    stands = [n for n in room.items if house.items[n].nyu40 == NIGHT_STAND]
     if not stands or rng.random() >= _BY_BED:
         return
     piece, shape = _draw_lamp(catalogue, "table_lamp", rng) or table_lamp(rng, style)
     for number in stands:
         low, high = space.bounds[number]
         middle = ((low + high) / 2)[[0, 2]]
-        at = _spot_on_top(draft, space, number, middle, shape)
+        at = _spot_on_top(house, space, number, middle, shape)
         if at is None:
-            draft.refused[f"{PART}: no free nightstand"] += 1
+            house.refused[f"{PART}: no free nightstand"] += 1
             continue
-        turn = draft.items[number].oriented_box.axes[:, 2]
+        turn = house.items[number].oriented_box.axes[:, 2]
         _stand_lamp(
-            draft, room, piece, with_flux(shape, _TABLE_LM), at, float(np.arctan2(turn[0], turn[2]))
+            house, room, piece, with_flux(shape, _TABLE_LM), at, float(np.arctan2(turn[0], turn[2]))
         )
 
 
@@ -94,13 +94,13 @@ def _draw_lamp(
 
 
 def _stand_lamp(
-    draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
+    house: MutableHouse, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
 ) -> None:
-    item = draft.placed(
-        piece, shape, at, turn_rad, item_id=next_id(draft, PART), room_id=room.room.id,
+    item = house.placed(
+        piece, shape, at, turn_rad, item_id=next_id(house, PART), room_id=room.room.id,
         level_id=room.room.level_id,
     )  # fmt: skip
-    draft.add(item, PART, piece)
+    house.add(item, PART, piece)
 
 
 def _stands_on_floor(space: HouseSpace, room: RoomSpace, number: int) -> bool:
@@ -144,16 +144,16 @@ def _floor_is_free(
     return space.is_free(low, low + np.array([2 * around, height + 0.03, 2 * around]))
 
 
-def _ways_are_open(draft: Draft, room_id: str) -> bool:
-    space = house_space(draft)
+def _ways_are_open(house: MutableHouse, room_id: str) -> bool:
+    space = house_space(house)
     room = space.room(room_id)
-    last = len(draft.items) - 1
+    last = len(house.items) - 1
     before = doors_are_joined(floor_bitmap(space, room, without=(last,)), room)
     return not before or doors_are_joined(floor_bitmap(space, room), room)
 
 
 def _spot_on_top(
-    draft: Draft, space: HouseSpace, number: int, place: F64, shape: Shape
+    house: MutableHouse, space: HouseSpace, number: int, place: F64, shape: Shape
 ) -> F64 | None:
     """(3,) where the shape stands on the thing's flat and free top; None where it cannot."""
     low, high = shape.bounds
@@ -165,7 +165,7 @@ def _spot_on_top(
     ring = [
         place + reach * 0.95 * np.array([np.cos(a), np.sin(a)]) for a in np.arange(8) * np.pi / 4
     ]
-    triangles = item_triangles(draft.items[number])
+    triangles = item_triangles(house.items[number])
     heights = highest_below(np.array([place, *ring]), triangles)
     if not np.isfinite(heights).all() or np.ptp(heights) > 0.001:
         return None
@@ -176,22 +176,22 @@ def _spot_on_top(
     return np.array([place[0], y, place[1]]) if space.is_free(a, b) else None
 
 
-def add_lamps(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_lamps(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang a lamp in rooms without one or with too little light; stand some by sofas and beds.
 
     share: of such rooms, 0..1.
     """
-    for room_id in [room.room.id for room in house_space(draft).rooms]:
-        rng = draft.rng("lamps", room_id)
-        room = house_space(draft).room(room_id)
+    for room_id in [room.room.id for room in house_space(house).rooms]:
+        rng = house.rng("lamps", room_id)
+        room = house_space(house).room(room_id)
         if room.area.area < _LEAST_M2 or room.kind is RoomKind.OUTDOOR or not room.room.has_floor:
             continue
         if rng.random() < share:
-            area, has = float(room.area.area), flux_of_lamps(draft.items[k] for k in room.items)
+            area, has = float(room.area.area), flux_of_lamps(house.items[k] for k in room.items)
             wanted = flux_for_floor(area, WANTS[room.kind].lux)
             if has < flux_for_floor(area, _WEAK_LX):
                 flux = min(max(wanted - has, _FLUX_LM[0]), _FLUX_LM[1])
-                hang_from_ceiling(draft, catalogue, style, room_id, flux, rng)
+                hang_from_ceiling(house, catalogue, style, room_id, flux, rng)
         if rng.random() < share:
-            stand_by_beds(draft, catalogue, style, room_id, rng)
-            stand_by_sofas(draft, catalogue, style, room_id, rng)
+            stand_by_beds(house, catalogue, style, room_id, rng)
+            stand_by_sofas(house, catalogue, style, room_id, rng)

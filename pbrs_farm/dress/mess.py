@@ -16,7 +16,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import CHAIR, DESK, PICTURE, TABLE
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.draft import Draft, moved_item
+from pbrs_farm.dress.mutable_house import MutableHouse, moved_item
 from pbrs_farm.dress.neighbours import Neighbours, things_on
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space, item_footprint
 from pbrs_farm.dress.style import Style
@@ -34,32 +34,32 @@ _ASKEW: Final = np.radians(1.6)
 _HUNG_M: Final = 0.2  # a picture that hangs is larger
 
 
-def move_chairs(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Move chairs at tables and desks as people do who get up: most a little, some far.
 
     share: 0..1, of chairs that somebody has just left. No chair goes before a door or into a thing.
     """
-    space = house_space(draft)
-    around = Neighbours(draft.items)
+    space = house_space(house)
+    around = Neighbours(house.items)
     for room in space.rooms:
-        rng = draft.rng(PART, "chairs", room.room.id)
-        tables = [k for k in room.items if draft.items[k].nyu40 in (TABLE, DESK)]
+        rng = house.rng(PART, "chairs", room.room.id)
+        tables = [k for k in room.items if house.items[k].nyu40 in (TABLE, DESK)]
         free = shapely.difference(room.area, room.walls)
         zone = _door_zone(room)
         for index in room.items:
-            table = _table_of(draft, space, index, tables)
+            table = _table_of(house, space, index, tables)
             if table is not None and not any(things_on(around, index)):
-                _pull_out(draft, space, around, (index, table), (free, zone), rng, share)
+                _pull_out(house, space, around, (index, table), (free, zone), rng, share)
 
 
-def tilt_pictures(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def tilt_pictures(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Turn pictures that were hung by a degree or so about their middle."""
-    for index in range(len(draft.source.items), len(draft.items)):
-        item = draft.items[index]
+    for index in range(len(house.source.items), len(house.items)):
+        item = house.items[index]
         if item.nyu40 != PICTURE or item.box is None or item.box.half[:2].min() < _HUNG_M / 2:
             continue
-        angle = float(draft.rng(PART, item.id).normal(0, _ASKEW)) * min(2 * share, 1.0)
-        draft.items[index] = moved_item(
+        angle = float(house.rng(PART, item.id).normal(0, _ASKEW)) * min(2 * share, 1.0)
+        house.items[index] = moved_item(
             item, np.zeros(3), _about(item.box.axes[:, 2], angle), item.box.centre
         )
 
@@ -77,9 +77,9 @@ def _door_zone(room: RoomSpace) -> BaseGeometry:
     return shapely.union_all(zones)
 
 
-def _table_of(draft: Draft, space: HouseSpace, index: int, tables: list[int]) -> int | None:
+def _table_of(house: MutableHouse, space: HouseSpace, index: int, tables: list[int]) -> int | None:
     """The table that a chair stands at; None for what is no chair or stands alone."""
-    item, (low, high) = draft.items[index], space.bounds[index]
+    item, (low, high) = house.items[index], space.bounds[index]
     size = high - low
     if item.nyu40 != CHAIR or max(size[0], size[2]) > _WIDEST_M or size[1] > _TALLEST_M:
         return None
@@ -93,11 +93,11 @@ def _table_of(draft: Draft, space: HouseSpace, index: int, tables: list[int]) ->
 
 
 def _pull_out(
-    draft: Draft, space: HouseSpace, around: Neighbours, pair: tuple[int, int],
+    house: MutableHouse, space: HouseSpace, around: Neighbours, pair: tuple[int, int],
     areas: tuple[BaseGeometry, BaseGeometry], rng: np.random.Generator, share: float,
 ) -> None:  # fmt: skip
     index, table = pair
-    item = draft.items[index]
+    item = house.items[index]
     out = _outwards(space, index, table)
     is_left = rng.random() < share
     before = around.n_shared(item, {index})
@@ -112,13 +112,13 @@ def _pull_out(
         middle = (space.bounds[index][0] + space.bounds[index][1]) / 2
         moved = moved_item(item, step, rotation_y(float(turn) * factor), middle)
         if _chair_is_free(around, moved, index, before, areas):
-            if index < len(draft.source.items):
-                draft.change(index, moved, PART)
+            if index < len(house.source.items):
+                house.change(index, moved, PART)
             else:
-                draft.items[index] = moved
-            draft.done[f"{PART}: chair"] += 1
+                house.items[index] = moved
+            house.done[f"{PART}: chair"] += 1
             return
-    draft.refused[f"{PART}: no room behind a chair"] += 1
+    house.refused[f"{PART}: no room behind a chair"] += 1
 
 
 def _outwards(space: HouseSpace, index: int, table: int) -> F64:

@@ -15,7 +15,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.mesh import boxes_meeting, triangle_bounds
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.old_place import HELD, HeldBy
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
@@ -27,7 +27,7 @@ Cubes = NDArray[np.int64]
 
 
 class Neighbours:
-    """The items of a draft, as they are when they are asked for."""
+    """The items of a house, as they are when they are asked for."""
 
     def __init__(self, items: Sequence[Item]) -> None:
         self.items = items
@@ -123,12 +123,12 @@ ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
 """By what holds a thing, the places of the models that may be held so."""
 
 
-def held_by(draft: Draft, around: Neighbours, index: int, group: str) -> Place:
+def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> Place:
     """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling."""
     if HELD.get(group) is HeldBy.TOP:
         return Place.CEILING
     item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
-    if height_above_floor(draft, item, low_y) <= _STANDS_M:
+    if height_above_floor(house, item, low_y) <= _STANDS_M:
         return Place.FLOOR
     # What stands on a piece, a step or a platform does not hang.
     (low, high), all_bounds = around.bounds()[index], around.bounds()
@@ -143,10 +143,10 @@ def held_by(draft: Draft, around: Neighbours, index: int, group: str) -> Place:
     return Place.SURFACE if stands else Place.WALL
 
 
-def height_above_floor(draft: Draft, item: Item, low_y: float) -> float:
+def height_above_floor(house: MutableHouse, item: Item, low_y: float) -> float:
     """How far a height lies above the floor of the item's room, or of its storey."""
-    floors = [room.floor_y for room in draft.source.rooms if room.id == item.room_id]
-    floors += [lv.elevation for lv in draft.source.levels if lv.id == item.level_id]
+    floors = [room.floor_y for room in house.source.rooms if room.id == item.room_id]
+    floors += [lv.elevation for lv in house.source.levels if lv.id == item.level_id]
     return low_y - floors[0] if floors else 0.0
 
 

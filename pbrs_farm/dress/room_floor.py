@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import Bools
 from pbrs_farm.core.walkable import CELL_M, FloorGrid
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import FloorBitmap, HouseSpace, RoomSpace, WallFace
 from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import doors_are_joined, floor_bitmap, with_body
@@ -67,7 +67,7 @@ class RoomFloor:
     fronts: list[BaseGeometry] = field(default_factory=list)  # the floor before it
 
     @classmethod
-    def of(cls, draft: Draft, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
+    def of(cls, house: MutableHouse, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
         """The room as it is; None where it has no floor or no walls."""
         bitmap = floor_bitmap(space, room)
         if not bitmap.inside.any() or not room.faces:
@@ -79,10 +79,10 @@ class RoomFloor:
             if side is not None and is_walked:
                 zones.append(passage.before(side))
                 zones += [] if passage.is_window else [passage.swing(side)]
-        flights = flights_of(draft, room.room, room.area)
+        flights = flights_of(house, room.room, room.area)
         zones += [flights.under, flights.before]
         # Count the wall before which one could stand something.
-        faces = Hanging(draft, room, "furniture").faces
+        faces = Hanging(house, room, "furniture").faces
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9
         free_m = sum(len(face.starts(WALL_CELL_M, low, high, 0.5)) for face in faces) * WALL_CELL_M
         return cls(

@@ -1,4 +1,4 @@
-"""Gives surfaces a finish of paint, wood or metal; effects: materials and textures of the draft."""
+"""Gives surfaces a finish of paint, wood or metal; effects: adds materials and textures to the house."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
 from pbrs_farm.dress.box_mapping import box_mapped
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import grain_pattern
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Metal, Rgb, Wood
 from pbrs_farm.dress.textures.families import pattern_material
 
@@ -32,35 +32,35 @@ FINISHED = "coated"
 _SHEEN = (0.4, 0.4, 0.4)
 
 
-def with_finish(draft: Draft, surface: Surface, finish: Finish, axes: F64) -> Surface:
+def with_finish(house: MutableHouse, surface: Surface, finish: Finish, axes: F64) -> Surface:
     """The surface with a finish; texture coordinates are made anew for wood.
 
     axes: (3, 3), columns are the thing's own axes, along which the grain of wood runs.
     """
     if finish.wood is None:
-        return replace(surface, material=number_of_finish(draft, finish))
-    veneer = pattern_material(draft, grain_pattern(draft, finish.wood))
+        return replace(surface, material=number_of_finish(house, finish))
+    veneer = pattern_material(house, grain_pattern(house, finish.wood))
     mapped = box_mapped(surface, axes, veneer.size_m)
     return replace(mapped, material=veneer.number)
 
 
-def item_with_finish(draft: Draft, item: Item, finish: Finish) -> Item:
+def item_with_finish(house: MutableHouse, item: Item, finish: Finish) -> Item:
     """The item with the finish on every plain opaque surface; itself where it has none."""
-    if not has_plain(draft, item):
+    if not has_plain(house, item):
         return item
     axes = np.eye(3) if item.box is None else item.box.axes
     return replace(
         item,
         surfaces=tuple(
-            with_finish(draft, s, finish, axes) if is_plain(draft.materials[s.material]) else s
+            with_finish(house, s, finish, axes) if is_plain(house.materials[s.material]) else s
             for s in item.surfaces
         ),
     )
 
 
-def has_plain(draft: Draft, item: Item) -> bool:
+def has_plain(house: MutableHouse, item: Item) -> bool:
     """Whether a finish would cover any of its surfaces."""
-    return any(is_plain(draft.materials[s.material]) for s in item.surfaces)
+    return any(is_plain(house.materials[s.material]) for s in item.surfaces)
 
 
 def is_plain(material: Material) -> bool:
@@ -82,9 +82,9 @@ def part_of_surface(surface: Surface, faces: Bools) -> Surface:
     )
 
 
-def number_of_finish(draft: Draft, finish: Finish) -> int:
+def number_of_finish(house: MutableHouse, finish: Finish) -> int:
     """The number of the material of a finish without a picture; wood counts as its mean colour."""
-    return draft.material(material_of_finish(finish))
+    return house.material(material_of_finish(finish))
 
 
 def material_of_finish(finish: Finish) -> Material:

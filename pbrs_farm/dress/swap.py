@@ -16,8 +16,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Item, ItemKind, LightPart
-from pbrs_farm.dress.draft import Draft, moved_item
 from pbrs_farm.dress.fitting_pieces import Scale, common_scale, is_lit_alike
+from pbrs_farm.dress.mutable_house import MutableHouse, moved_item
 from pbrs_farm.dress.neighbours import (
     ALIKE_HELD,
     Neighbours,
@@ -62,7 +62,7 @@ class _Member:
     held_by: Place
 
 
-def swap_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def swap_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the source's furniture another model of the catalogue.
 
     Each side of the new one is 75 to 100 % of the old one's, its height within 15 %; its back and
@@ -70,25 +70,25 @@ def swap_furniture(draft: Draft, catalogue: Catalogue, style: Style, share: floa
     the new one would reach into its neighbours, or where things stand in it, the old one stays.
     What stands on a balcony or a terrace stays, too.
     """
-    around = Neighbours(draft.items)
-    for key, indices in _sets_of_models(draft, catalogue).items():
+    around = Neighbours(house.items)
+    for key, indices in _sets_of_models(house, catalogue).items():
         group = key[0]
-        rng = draft.rng(PART, *key)
+        rng = house.rng(PART, *key)
         if rng.random() >= share:
             continue
-        members = _members_of_set(draft, indices, group, around)
+        members = _members_of_set(house, indices, group, around)
         if members is None:
             continue
-        _swap_set(draft, catalogue, group, members, around, rng)
+        _swap_set(house, catalogue, group, members, around, rng)
 
 
-def _sets_of_models(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
+def _sets_of_models(house: MutableHouse, catalogue: Catalogue) -> dict[tuple[str, ...], list[int]]:
     # Items of one model in one room, by group, room, level and model.
     by_id = pieces_by_plain_id(catalogue)
     # Catalogues furnish rooms: an upholstered armchair would stand in the rain.
-    outdoors = {r.id for r in draft.source.rooms if is_outdoors(r)}
+    outdoors = {r.id for r in house.source.rooms if is_outdoors(r)}
     found: dict[tuple[str, ...], list[int]] = {}
-    for index, item in enumerate(draft.items[: len(draft.source.items)]):
+    for index, item in enumerate(house.items[: len(house.source.items)]):
         group = "" if item.kind.is_structure else group_of_item(item, by_id)
         if group in HELD and item.room_id not in outdoors:
             key = (group, item.level_id, item.room_id or "", item.source_class or item.name)
@@ -97,37 +97,37 @@ def _sets_of_models(draft: Draft, catalogue: Catalogue) -> dict[tuple[str, ...],
 
 
 def _members_of_set(
-    draft: Draft, indices: Sequence[int], group: str, around: Neighbours
+    house: MutableHouse, indices: Sequence[int], group: str, around: Neighbours
 ) -> list[_Member] | None:
     found = []
     for index in indices:
-        item = draft.items[index]
+        item = house.items[index]
         place = old_place(item, group)
         if place is None:
-            draft.refused[f"{PART}: which way it faces is not known"] += 1
+            house.refused[f"{PART}: which way it faces is not known"] += 1
             return None
         on, inside = things_on(around, index)
         if group in _UNDER_TABLES:
-            inside = [k for k in inside if draft.items[k].nyu40 != CHAIR]
+            inside = [k for k in inside if house.items[k].nyu40 != CHAIR]
         if inside:
-            draft.refused[f"{PART}: things stand in it or under it"] += 1
+            house.refused[f"{PART}: things stand in it or under it"] += 1
             return None
         if HELD[group] is HeldBy.BACK:
-            place = before_boards(place, _boards_near(draft, item))
+            place = before_boards(place, _boards_near(house, item))
         if group in _ON_WALLS:
-            place = at_wall(place, _walls_near(draft, item))
-        by = held_by(draft, around, index, group)
+            place = at_wall(place, _walls_near(house, item))
+        by = held_by(house, around, index, group)
         found.append(
             _Member(index, item, place, tuple(on), Place.WALL if group in _ON_WALLS else by)
         )
     return found
 
 
-def _boards_near(draft: Draft, item: Item) -> list[F64]:
+def _boards_near(house: MutableHouse, item: Item) -> list[F64]:
     """(N, 3) points of each skirting board that the item's bounds meet."""
     low, high = item.bounds
     boards = []
-    for board in draft.items:
+    for board in house.items:
         if BASEBOARD not in board.tags or not board.n_faces:
             continue
         least, most = board.bounds
@@ -137,11 +137,11 @@ def _boards_near(draft: Draft, item: Item) -> list[F64]:
     return boards
 
 
-def _walls_near(draft: Draft, item: Item) -> list[F64]:
+def _walls_near(house: MutableHouse, item: Item) -> list[F64]:
     """(F, 3, 3) triangles of each wall whose bounds come near the item's."""
     low, high = item.bounds + np.array([[-_NEAR_WALL_M], [_NEAR_WALL_M]])
     found = []
-    for wall in draft.items:
+    for wall in house.items:
         if wall.kind is ItemKind.WALL and BASEBOARD not in wall.tags and wall.n_faces:
             least, most = wall.bounds
             if (least < high).all() and (most > low).all():
@@ -150,7 +150,7 @@ def _walls_near(draft: Draft, item: Item) -> list[F64]:
 
 
 def _swap_set(
-    draft: Draft, catalogue: Catalogue, group: str, members: list[_Member],
+    house: MutableHouse, catalogue: Catalogue, group: str, members: list[_Member],
     around: Neighbours, rng: np.random.Generator,
 ) -> None:  # fmt: skip
     places, items = [m.place for m in members], [m.item for m in members]
@@ -161,7 +161,7 @@ def _swap_set(
         if plain_id(piece.id) != old and (scale := common_scale(piece, places)) is not None
     ]
     if not candidates:
-        draft.refused[f"{PART}: no other model fits"] += 1
+        house.refused[f"{PART}: no other model fits"] += 1
         return
     # What hangs stays hung, what stands keeps standing.
     candidates = [
@@ -170,7 +170,7 @@ def _swap_set(
         if all(piece.held_by in ALIKE_HELD[m.held_by] for m in members)
     ]
     if not candidates:
-        draft.refused[f"{PART}: no other model is held as the old one is"] += 1
+        house.refused[f"{PART}: no other model is held as the old one is"] += 1
         return
     why = "no other model can be used"
     for k in rng.permutation(len(candidates))[:_TRIES]:
@@ -178,20 +178,20 @@ def _swap_set(
         shape = catalogue.shape(piece)
         if shape is None or not is_lit_alike(bool(shape.lights), items):
             continue
-        new = [_item_at_old_place(draft, piece, shape, scale, group, m) for m in members]
+        new = [_item_at_old_place(house, piece, shape, scale, group, m) for m in members]
         lifts = _lifts(around, members, new)
         if lifts is None:
             why = "a thing on it would find no place"
         elif not _fits_between_neighbours(around, members, new):
             why = "it would reach into its neighbours"
         else:
-            _put_set(draft, group, piece, members, new, lifts)
+            _put_set(house, group, piece, members, new, lifts)
             return
-    draft.refused[f"{PART}: {why}"] += 1
+    house.refused[f"{PART}: {why}"] += 1
 
 
 def _item_at_old_place(
-    draft: Draft, piece: Piece, shape: Shape, scale: Scale, group: str, member: _Member
+    house: MutableHouse, piece: Piece, shape: Shape, scale: Scale, group: str, member: _Member
 ) -> Item:
     """The piece as the member's item: same id, room, kind and tags of its source."""
     held, place, item = HELD[group], member.place, member.item
@@ -205,8 +205,8 @@ def _item_at_old_place(
     ])  # fmt: skip
     at = place.turn @ (place.held_at(held) - own)
     if held is not HeldBy.TOP:
-        at[1] -= _above_floor_m(draft, item, float(place.low[1]))
-    new = draft.placed(
+        at[1] -= _above_floor_m(house, item, float(place.low[1]))
+    new = house.placed(
         piece, shape, at, place.turn_rad, item_id=item.id, room_id=item.room_id,
         level_id=item.level_id, scale=np.array(scale),
     )  # fmt: skip
@@ -214,9 +214,9 @@ def _item_at_old_place(
     return replace(new, lights=_lights_like(item.lights, new.lights))
 
 
-def _above_floor_m(draft: Draft, item: Item, low_y: float) -> float:
+def _above_floor_m(house: MutableHouse, item: Item, low_y: float) -> float:
     """How much a piece stands above its room's floor where that is a few millimetres; else 0."""
-    above = height_above_floor(draft, item, low_y)
+    above = height_above_floor(house, item, low_y)
     return above if 0 < above <= _ON_FLOOR_M else 0.0
 
 
@@ -260,13 +260,13 @@ def _lifts(around: Neighbours, members: list[_Member], new: list[Item]) -> dict[
 
 
 def _put_set(
-    draft: Draft, group: str, piece: Piece, members: list[_Member], new: list[Item],
+    house: MutableHouse, group: str, piece: Piece, members: list[_Member], new: list[Item],
     lifts: dict[int, float],
 ) -> None:  # fmt: skip
     for member, item in zip(members, new, strict=True):
-        draft.change(member.index, item, PART)
-        draft.done[f"{PART}: {group}"] += 1
+        house.change(member.index, item, PART)
+        house.done[f"{PART}: {group}"] += 1
     for index, up in lifts.items():
         step = np.array([0.0, up, 0.0])
-        draft.change(index, moved_item(draft.items[index], step), PART)
-    draft.used[piece.id] = piece
+        house.change(index, moved_item(house.items[index], step), PART)
+    house.used[piece.id] = piece

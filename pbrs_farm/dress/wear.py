@@ -16,7 +16,7 @@ from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface, Texture
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import box_mapped
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textures.maps import normals_from_height, roughness_bytes, texture_from_pixels
 from pbrs_farm.dress.textures.noise import blurred, noise, smoothstep
@@ -32,34 +32,34 @@ _COATED: Final = 0.55  # Ks: more is metal
 _CLEAN: Final = 0.66  # roughness of a smudge map where nobody has touched it
 
 
-def add_wear(draft: Draft, _catalogue: Catalogue, _style: Style, share: float) -> None:
+def add_wear(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
     """Give smooth parts of furniture a roughness map, in share of the homes' pieces."""
     smudges = brushed = None
-    for index, item in enumerate(draft.items):
-        if not _is_handled(item) or draft.rng(PART, "wear", item.id).random() >= share:
+    for index, item in enumerate(house.items):
+        if not _is_handled(item) or house.rng(PART, "wear", item.id).random() >= share:
             continue
         surfaces = []
         for surface in item.surfaces:
-            material = draft.materials[surface.material]
+            material = house.materials[surface.material]
             if not _is_smooth(material) or _area_of_surface(surface) < _LEAST_M2:
                 surfaces.append(surface)
                 continue
             axes = np.eye(3) if item.box is None else item.box.axes
             if max(material.specular) <= _COATED:
-                smudges = smudges or _smudges(draft)
-                number = draft.material(_smudged(material, smudges), [smudges])
+                smudges = smudges or _smudges(house)
+                number = house.material(_smudged(material, smudges), [smudges])
             elif "brushed" in material.name:
-                brushed = brushed or _brushed(draft)
+                brushed = brushed or _brushed(house)
                 normal, rough = brushed
-                number = draft.material(_grained(material, normal, rough), brushed)
+                number = house.material(_grained(material, normal, rough), brushed)
             else:
                 surfaces.append(surface)
                 continue
             mapped = box_mapped(surface, axes, SIZE_M, is_grained=True)
             surfaces.append(replace(mapped, material=number))
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
-            draft.change(index, replace(item, surfaces=tuple(surfaces)), PART)
-            draft.done[f"{PART}: worn"] += 1
+            house.change(index, replace(item, surfaces=tuple(surfaces)), PART)
+            house.done[f"{PART}: worn"] += 1
 
 
 def smudge_map(rng: np.random.Generator) -> F32:
@@ -94,14 +94,14 @@ def _stamp_oval(
     np.maximum(field, ((r < 1) & (r >= hollow)).astype(np.float32), out=field)
 
 
-def _smudges(draft: Draft) -> Texture:
-    pixels = roughness_bytes(smudge_map(draft.rng(PART, "smudges")))
+def _smudges(house: MutableHouse) -> Texture:
+    pixels = roughness_bytes(smudge_map(house.rng(PART, "smudges")))
     return texture_from_pixels("smudges-roughness.jpg", pixels, _QUALITY)
 
 
-def _brushed(draft: Draft) -> tuple[Texture, Texture]:
+def _brushed(house: MutableHouse) -> tuple[Texture, Texture]:
     """(normals, roughness) of steel that was brushed along u."""
-    rng = draft.rng(PART, "brushed")
+    rng = house.rng(PART, "brushed")
     lines = noise(rng, _SHAPE, slope=0.4, stretch=(1.0, 60.0), band=(20.0, 1e9))
     rough = np.asarray(0.72 + 0.06 * lines, np.float32) * (smudge_map(rng) / np.float32(_CLEAN))
     normal = normals_from_height(np.asarray(4e-5 * lines, np.float32), SIZE_M)

@@ -20,7 +20,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.house import House, ItemKind, Note
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space
 from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.generate.floor_plan import (
@@ -63,27 +63,27 @@ def furnish_rooms(house: House, catalogue: Catalogue, seed: int, style: str = ""
 
     Raises BadInput for a style that there is none of.
     """
-    with closing(Draft(house, seed)) as draft:
-        return _furnished(draft, catalogue, style)
+    with closing(MutableHouse(house, seed)) as mutable:
+        return _furnished(mutable, catalogue, style)
 
 
-def _furnished(draft: Draft, catalogue: Catalogue, style: str) -> House:
-    house = draft.source
-    space = floor_space(draft)
-    rng = np.random.default_rng(keys.seed(house.id, "furnish", draft.seed))
+def _furnished(mutable: MutableHouse, catalogue: Catalogue, style: str) -> House:
+    house = mutable.source
+    space = floor_space(mutable)
+    rng = np.random.default_rng(keys.seed(house.id, "furnish", mutable.seed))
     for level in house.levels:
-        storey = _storey(house, space, level.id, draft)
+        storey = _storey(house, space, level.id, mutable)
         if storey.empty:
-            standing = {k: _standing(storey, k, draft) for k in storey.empty}
+            standing = {k: _standing(storey, k, mutable) for k in storey.empty}
             pieces = furnished(
                 storey.plan, catalogue, rng, style, rooms=storey.empty, standing=standing
             )
-            _add(draft, storey, pieces, catalogue)
+            _add(mutable, storey, pieces, catalogue)
     # Attribution licences (CC-BY) oblige whoever shows the pictures: name their authors.
     owed = sorted(
-        {(p.creator or p.library, p.licence) for p in draft.used.values() if "BY" in p.licence}
+        {(p.creator or p.library, p.licence) for p in mutable.used.values() if "BY" in p.licence}
     )
-    made = draft.house()
+    made = mutable.frozen()
     if not owed:
         return made
     credit = "; ".join(f"{creator}, {licence}" for creator, licence in owed)
@@ -91,7 +91,7 @@ def _furnished(draft: Draft, catalogue: Catalogue, style: str) -> House:
     return replace(made, source=replace(made.source, attribution=line))
 
 
-def _storey(house: House, space: HouseSpace, level_id: str, draft: Draft) -> _Storey:
+def _storey(house: House, space: HouseSpace, level_id: str, mutable: MutableHouse) -> _Storey:
     """The rooms of a level as a plan, and which of them are to be furnished."""
     rooms, shapes = [], []
     for room in space.rooms:
@@ -111,7 +111,7 @@ def _storey(house: House, space: HouseSpace, level_id: str, draft: Draft) -> _St
             walls.append(wall)
     height = min((r.room.ceiling_y - r.room.floor_y for r in rooms), default=2.5)
     plan = Plan(tuple(shapes), tuple(walls), tuple(openings), max(height, 2.0))
-    empty = [k for k, room in enumerate(rooms) if _is_empty(room, shapes[k], draft)]
+    empty = [k for k, room in enumerate(rooms) if _is_empty(room, shapes[k], mutable)]
     angle = upright_angle(plan.rooms) if plan.rooms else 0.0
     return _Storey(turned_by(plan, angle), angle, tuple(rooms), tuple(empty))
 
@@ -122,28 +122,28 @@ def _type_of(room: RoomSpace) -> RoomType:
     return _TYPES.get(room.kind, RoomType.STORE)
 
 
-def _is_empty(room: RoomSpace, shape: PlanRoom, draft: Draft) -> bool:
+def _is_empty(room: RoomSpace, shape: PlanRoom, mutable: MutableHouse) -> bool:
     if room.kind is RoomKind.OUTDOOR or shape.area < _LEAST_M2 or not room.room.has_floor:
         return False
-    covered = sum(_ground(draft.items[n].bounds).area for n in _on_floor(room, draft))
+    covered = sum(_ground(mutable.items[n].bounds).area for n in _on_floor(room, mutable))
     if covered > _EMPTY_SHARE * shape.area:
         return False
     if room.kind not in _TYPES:
         what = f"{room.room.name or 'a room without a name'} is empty and its use is not known"
-        draft.notes.append(Note("not-furnished", f"room {room.room.id}", what))
+        mutable.notes.append(Note("not-furnished", f"room {room.room.id}", what))
         return False
     return True
 
 
-def _on_floor(room: RoomSpace, draft: Draft) -> list[int]:
+def _on_floor(room: RoomSpace, mutable: MutableHouse) -> list[int]:
     """Numbers of what stands in the way of a man in the room."""
     floor = room.room.floor_y
     return [
         n
         for n in room.items
-        if not draft.items[n].kind.is_structure
-        and draft.items[n].bounds[0, 1] < floor + _STANDS_M
-        and draft.items[n].bounds[1, 1] > floor + _FLAT_M
+        if not mutable.items[n].kind.is_structure
+        and mutable.items[n].bounds[0, 1] < floor + _STANDS_M
+        and mutable.items[n].bounds[1, 1] > floor + _FLAT_M
     ]
 
 
@@ -152,12 +152,12 @@ def _ground(bounds: F64) -> Polygon:
     return Polygon([(x0, z0), (x1, z0), (x1, z1), (x0, z1)])
 
 
-def _standing(storey: _Storey, number: int, draft: Draft) -> list[Rect]:
+def _standing(storey: _Storey, number: int, mutable: MutableHouse) -> list[Rect]:
     """Rectangles of the upright plan around what stands in a room already."""
     found = []
-    for n in _on_floor(storey.rooms[number], draft):
+    for n in _on_floor(storey.rooms[number], mutable):
         ground = shapely.affinity.rotate(
-            _ground(draft.items[n].bounds), storey.angle_rad, (0, 0), use_radians=True
+            _ground(mutable.items[n].bounds), storey.angle_rad, (0, 0), use_radians=True
         )
         x0, z0, x1, z1 = ground.bounds
         found.append((x0, z0, x1, z1))
@@ -184,11 +184,11 @@ def _opening(
 
 
 def _add(
-    draft: Draft, storey: _Storey, pieces: Sequence[PlacedPiece], catalogue: Catalogue
+    mutable: MutableHouse, storey: _Storey, pieces: Sequence[PlacedPiece], catalogue: Catalogue
 ) -> None:
     """Put the pieces into the house, turned back to where its walls stand."""
     cos, sin = math.cos(-storey.angle_rad), math.sin(-storey.angle_rad)
-    lit = {k for k, room in enumerate(storey.rooms) if _has_lamp(room, draft)}
+    lit = {k for k, room in enumerate(storey.rooms) if _has_lamp(room, mutable)}
     grounds = [Polygon(room.polygon).buffer(0.02) for room in storey.plan.rooms]
     for piece in pieces:
         shape = catalogue.shape(piece.piece)
@@ -207,17 +207,17 @@ def _add(
         x -= mx * math.cos(turn) + mz * math.sin(turn)
         z -= mz * math.cos(turn) - mx * math.sin(turn)
         at = np.array([x, room.floor_y + piece.elevation - low[1], z])
-        item = draft.placed(
-            piece.piece, shape, at, turn, item_id=f"furnished_{len(draft.items)}",
+        item = mutable.placed(
+            piece.piece, shape, at, turn, item_id=f"furnished_{len(mutable.items)}",
             room_id=room.id, level_id=room.level_id, scale=scale,
         )  # fmt: skip
-        draft.add(item, "furnish", piece.piece)
+        mutable.add(item, "furnish", piece.piece)
 
 
-def _has_lamp(room: RoomSpace, draft: Draft) -> bool:
+def _has_lamp(room: RoomSpace, mutable: MutableHouse) -> bool:
     ground = room.area
     return any(
         item.kind is ItemKind.LAMP and ground.contains(Point(*item.bounds.mean(0)[[0, 2]]))
-        for item in draft.items
+        for item in mutable.items
         if item.n_faces and item.level_id == room.room.level_id
     )

@@ -196,7 +196,7 @@ def _repair(work: Preparation) -> Preparation:
     The gates of dressing hold for the house as it is rendered: what loses its wall to repair is
     hung on the wall that is left or taken out, and the house is repaired again without it.
     """
-    from pbrs_farm.dress.dressing import kept_in
+    from pbrs_farm.dress.dressing import refit_after_repair
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import repair
 
@@ -211,7 +211,7 @@ def _repair(work: Preparation) -> Preparation:
     for k in range(_MAX_ROUNDS):
         work.tell_share(_DRESS_SHARE + (1 - _DRESS_SHARE) * k / _MAX_ROUNDS)
         house, report = repaired(dressed.house)
-        kept = kept_in(house, dressed, catalogue_of(work.recipe.dress))
+        kept = refit_after_repair(house, dressed, catalogue_of(work.recipe.dress))
         if kept is dressed:
             break
         dressed = kept

@@ -23,7 +23,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, House, Item, Material, Note, Room
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.catalogue.piece_groups import group_rule
 
@@ -77,14 +77,14 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
     if how == "none":
         text = f"{len(told)} things that are told by their boxes alone are left out"
         return replace(left, notes=(*house.notes, Note("told-left-out", house.source.file, text)))
-    with closing(Draft(left, 0)) as draft:
+    with closing(MutableHouse(left, 0)) as mutable:
         scene = _Scene(house, catalogue if how == "pieces" else None)
         for item in told:
-            _stand_in(draft, item, scene)
-        draft.notes += scene.notes()
-        made = draft.house()
+            _stand_in(mutable, item, scene)
+        mutable.notes += scene.notes()
+        made = mutable.frozen()
     owed = sorted(
-        {(p.creator or p.library, p.licence) for p in draft.used.values() if "BY" in p.licence}
+        {(p.creator or p.library, p.licence) for p in mutable.used.values() if "BY" in p.licence}
     )
     if not owed:
         return made
@@ -165,7 +165,7 @@ class _Scene:
         return tables[nearest] if nearest >= 0 and far[nearest] < _AT_TABLE_M else None
 
 
-def _stand_in(draft: Draft, item: Item, scene: _Scene) -> None:
+def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
     assert item.box is not None
     place = scene.place_of(item)
     told = _inside(_between(item.box, place.room), place.area) if place else item.box
@@ -177,11 +177,11 @@ def _stand_in(draft: Draft, item: Item, scene: _Scene) -> None:
         turned, fit = found
         shape = scene.catalogue.shape(fit.piece)
         if shape is not None:
-            draft.add(_placed(draft, item, turned, fit, shape, place), "stand_ins", fit.piece)
+            mutable.add(_placed(mutable, item, turned, fit, shape, place), "stand_ins", fit.piece)
             return
     if scene.catalogue is not None:
         scene.boxes[item.name] += 1
-    draft.add(_plain_box(draft, item, told, place), "stand_ins")
+    mutable.add(_plain_box(mutable, item, told, place), "stand_ins")
 
 
 def _chosen(item: Item, told: Box, place: _Place | None, scene: _Scene) -> tuple[Box, _Fit] | None:
@@ -323,7 +323,7 @@ def _front_cost(told: Box, group: str, place: _Place | None, scene: _Scene) -> f
 
 
 def _placed(
-    draft: Draft, item: Item, told: Box, fit: _Fit, shape: Shape, place: _Place | None
+    mutable: MutableHouse, item: Item, told: Box, fit: _Fit, shape: Shape, place: _Place | None
 ) -> Item:
     size = np.ptp(shape.bounds, axis=0)
     wanted = fit.scale * np.array([fit.piece.size[0], fit.piece.size[2], fit.piece.size[1]])
@@ -343,7 +343,7 @@ def _placed(
     deeper = max(float(high[2] - low[2]) / 2 - float(told.half[2]), 0.0)
     at = told.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
     at[1] = base - low[1]
-    placed = draft.placed(
+    placed = mutable.placed(
         fit.piece, shape, at, turn_rad, item_id=item.id, room_id=_room_id(item, place),
         level_id=_level_id(item, place), scale=scale,
     )  # fmt: skip
@@ -370,10 +370,10 @@ def _kept(item: Item) -> tuple[str, ...]:
     return tuple(tag for tag in item.tags if tag not in (BOX_ONLY, FRONT_GIVEN))
 
 
-def _plain_box(draft: Draft, item: Item, told: Box, place: _Place | None) -> Item:
+def _plain_box(mutable: MutableHouse, item: Item, told: Box, place: _Place | None) -> Item:
     name = NYU40_NAMES[item.nyu40] if item.nyu40 else ""
     r, g, b = _COLOURS.get(name, _PLAIN)
-    material = draft.material(Material(f"stand-in {name}".strip(), diffuse=(r, g, b)))
+    material = mutable.material(Material(f"stand-in {name}".strip(), diffuse=(r, g, b)))
     half = np.maximum(told.half, 0.005)
     # Off the floor by a hair, so that no face of it coincides with the floor's.
     centre = told.centre + np.array([0.0, 0.001, 0.0])

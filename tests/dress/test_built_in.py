@@ -10,10 +10,10 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import DressFields
 from pbrs_farm.dress.built_in import finish_built_in_parts
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.dressing import dress
 from pbrs_farm.dress.finish_scheme import finish_scheme
 from pbrs_farm.dress.gates.bodies import bodies_of, has_same_mesh
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import boards, house, solid
@@ -39,9 +39,9 @@ def door() -> Item:
 
 
 def joined(source: House, seed: int, share: float = 1.0) -> House:
-    draft = Draft(source, seed)
-    finish_built_in_parts(draft, EMPTY, style_for(draft.rng("style")), share)
-    return draft.house()
+    mutable = MutableHouse(source, seed)
+    finish_built_in_parts(mutable, EMPTY, style_for(mutable.rng("style")), share)
+    return mutable.frozen()
 
 
 def materials_of(home: House, index: int = 0) -> list[Material]:
@@ -108,9 +108,9 @@ def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
     assert len(parted.surfaces) > 1
     assert has_same_mesh(parted, door())
     # Nothing that the home had is measured as if dressing had put it there.
-    draft = Draft(house(door(), replace(door(), id="moved")), 1)
-    draft.items = [parted, replace(moved, id="moved")]
-    assert [body.is_new for body in bodies_of(draft, {})] == [False, True]
+    mutable = MutableHouse(house(door(), replace(door(), id="moved")), 1)
+    mutable.items = [parted, replace(moved, id="moved")]
+    assert [body.is_new for body in bodies_of(mutable, {})] == [False, True]
 
 
 def test_a_share_of_nothing_changes_no_door() -> None:
@@ -119,11 +119,11 @@ def test_a_share_of_nothing_changes_no_door() -> None:
 
 
 def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
-    draft = Draft(house(door()), 3)
-    style = style_for(draft.rng("style"))
-    first = finish_scheme(draft, style)
-    draft.rng("surfaces").random(100)
-    assert finish_scheme(draft, style) == first
+    mutable = MutableHouse(house(door()), 3)
+    style = style_for(mutable.rng("style"))
+    first = finish_scheme(mutable, style)
+    mutable.rng("surfaces").random(100)
+    assert finish_scheme(mutable, style) == first
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.house import House, Item, Material, MaterialKind
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finishes import finish_furniture
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import is_brown, is_dark, is_white, kind_by_name
 from pbrs_farm.dress.style import Rgb, style_for
 from pbrs_farm.dress.textures.families import PatternMaterial
@@ -27,26 +27,26 @@ def _thing(class_name: str, item_id: str = "t") -> Item:
 
 def _dressed(
     *items: Item, materials: tuple[Material, ...], share: float = 1.0, seed: int = 5
-) -> Draft:
+) -> MutableHouse:
     whole: House = replace(house(*items), materials=materials)
-    draft = Draft(whole, seed)
-    finish_furniture(draft, EMPTY, style_for(draft.rng("style"), ""), share)
-    return draft
+    mutable = MutableHouse(whole, seed)
+    finish_furniture(mutable, EMPTY, style_for(mutable.rng("style"), ""), share)
+    return mutable
 
 
-def _material(draft: Draft, index: int = 0, surface: int = 0) -> Material:
-    return draft.materials[draft.items[index].surfaces[surface].material]
+def _material(mutable: MutableHouse, index: int = 0, surface: int = 0) -> Material:
+    return mutable.materials[mutable.items[index].surfaces[surface].material]
 
 
 def test_a_brown_table_becomes_wood_near_its_own_colour() -> None:
-    draft = _dressed(_thing("table"), materials=(Material("amber", diffuse=BROWN),))
-    wood, surface = _material(draft), draft.items[0].surfaces[0]
+    mutable = _dressed(_thing("table"), materials=(Material("amber", diffuse=BROWN),))
+    wood, surface = _material(mutable), mutable.items[0].surfaces[0]
     assert wood.name.startswith("grain")
     assert wood.roughness_texture_id
     assert surface.uvs is not None
     own = linear_from_srgb(np.array(BROWN)) @ LUMINANCE
     # Its mean is that of the picture times its colour.
-    (kept,) = (v for v in draft.kept.values() if isinstance(v, PatternMaterial))
+    (kept,) = (v for v in mutable.kept.values() if isinstance(v, PatternMaterial))
     mean = np.array(kept.mean_rgb) * linear_from_srgb(np.array(wood.diffuse))
     assert 0.4 * own < mean @ LUMINANCE < 5 * own
     assert mean[0] > mean[1] > mean[2]
@@ -56,8 +56,8 @@ def test_a_brown_table_becomes_wood_near_its_own_colour() -> None:
     "class_name", ["refrigerator", "television", "toilet", "sink", "lamp", "window", "clothes"]
 )
 def test_what_is_never_made_of_wood_stays(class_name: str) -> None:
-    draft = _dressed(_thing(class_name), materials=(Material("amber", diffuse=BROWN),))
-    assert draft.items[0] is draft.source.items[0]
+    mutable = _dressed(_thing(class_name), materials=(Material("amber", diffuse=BROWN),))
+    assert mutable.items[0] is mutable.source.items[0]
 
 
 @pytest.mark.parametrize(
@@ -73,8 +73,8 @@ def test_what_is_never_made_of_wood_stays(class_name: str) -> None:
     ],
 )
 def test_glass_mirrors_bulbs_and_pictures_stay(material: Material) -> None:
-    draft = _dressed(_thing("table"), materials=(material,))
-    assert draft.items[0] is draft.source.items[0]
+    mutable = _dressed(_thing("table"), materials=(material,))
+    assert mutable.items[0] is mutable.source.items[0]
 
 
 def test_white_lacquer_keeps_its_colour_and_gets_a_sheen() -> None:
@@ -106,8 +106,8 @@ def test_a_bed_has_linen_on_a_wooden_frame() -> None:
     mattress = replace(solid("b", [0.1, 0.3, 0.1], [1.9, 0.5, 1.5], 4).surfaces[0], material=1)
     bed = replace(_thing("bed"), surfaces=(head, mattress))
     materials = (Material("a", diffuse=BROWN), Material("b", diffuse=WHITE))
-    draft = _dressed(bed, materials=materials)
-    names = [_material(draft, 0, k).name.split("-")[0] for k in (0, 1)]
+    mutable = _dressed(bed, materials=materials)
+    names = [_material(mutable, 0, k).name.split("-")[0] for k in (0, 1)]
     assert names[0] == "grain"
     assert names[1] in ("weave", "twill")
 
@@ -116,13 +116,13 @@ def test_linen_of_a_bed_never_shines_as_paint_does() -> None:
     bed = _thing("bed")
     blanket = replace(bed.surfaces[0], material=1, faces=bed.surfaces[0].faces[:2])
     materials = (Material("a", diffuse=(0.5, 0.5, 0.5)), Material("b", diffuse=(0.4, 0.42, 0.45)))
-    draft = _dressed(replace(bed, surfaces=(*bed.surfaces, blanket)), materials=materials)
-    assert all(m.specular != (0.5, 0.5, 0.5) for m in (_material(draft, 0, k) for k in (0, 1)))
+    mutable = _dressed(replace(bed, surfaces=(*bed.surfaces, blanket)), materials=materials)
+    assert all(m.specular != (0.5, 0.5, 0.5) for m in (_material(mutable, 0, k) for k in (0, 1)))
 
 
 def test_metals_have_measured_colours_and_no_colour_beneath() -> None:
-    draft = _dressed(_thing("sink"), materials=(Material("Chrome_01", diffuse=(0.7, 0.7, 0.7)),))
-    metal = _material(draft)
+    mutable = _dressed(_thing("sink"), materials=(Material("Chrome_01", diffuse=(0.7, 0.7, 0.7)),))
+    metal = _material(mutable)
     kd, ks = (linear_from_srgb(np.array(c)) @ LUMINANCE for c in (metal.diffuse, metal.specular))
     assert metal.roughness is not None
     assert ks > 4 * kd
@@ -133,9 +133,9 @@ def test_metals_have_measured_colours_and_no_colour_beneath() -> None:
 
 def test_parts_of_one_colour_in_one_room_get_one_look() -> None:
     chairs = [_thing("chair", f"c{k}") for k in range(5)]
-    draft = _dressed(*chairs, materials=(Material("amber", diffuse=BROWN),))
-    assert len({i.surfaces[0].material for i in draft.items}) == 1
-    assert draft.done["parts: object"] == 5
+    mutable = _dressed(*chairs, materials=(Material("amber", diffuse=BROWN),))
+    assert len({i.surfaces[0].material for i in mutable.items}) == 1
+    assert mutable.done["parts: object"] == 5
 
 
 def test_the_share_and_the_seed_decide() -> None:
@@ -153,10 +153,10 @@ def test_small_knobs_of_other_colours_stay() -> None:
     knob = replace(desk.surfaces[1], material=1)
     desk = replace(desk, surfaces=(desk.surfaces[0], knob))
     materials = (Material("amber", diffuse=BROWN), Material("x", diffuse=(0.5, 0.5, 0.5)))
-    draft = _dressed(desk, materials=materials)
-    assert draft.items[0].surfaces[1].uvs is knob.uvs
-    assert _material(draft, 0, 1).texture_id is None
-    assert _material(draft).name.startswith("grain")
+    mutable = _dressed(desk, materials=materials)
+    assert mutable.items[0].surfaces[1].uvs is knob.uvs
+    assert _material(mutable, 0, 1).texture_id is None
+    assert _material(mutable).name.startswith("grain")
 
 
 def test_words_of_a_name_say_the_kind() -> None:

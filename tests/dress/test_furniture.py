@@ -12,8 +12,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.furniture import KINDS, add_furniture
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
@@ -29,14 +29,14 @@ _WOOD = plain("wood", (0.6, 0.5, 0.4), 0.4)
 BOARDS = Boards(_WOOD, plain("white", (0.9, 0.9, 0.9), 0.4), _WOOD)
 
 
-def _draft(seed: int, share: float = 1.0) -> Draft:
-    draft = Draft(builtin_home(), seed)
-    add_furniture(draft, EMPTY, STYLE, share)
-    return draft
+def _draft(seed: int, share: float = 1.0) -> MutableHouse:
+    mutable = MutableHouse(builtin_home(), seed)
+    add_furniture(mutable, EMPTY, STYLE, share)
+    return mutable
 
 
-def _added(draft: Draft) -> list[Item]:
-    return draft.items[len(draft.source.items) :]
+def _added(mutable: MutableHouse) -> list[Item]:
+    return mutable.items[len(mutable.source.items) :]
 
 
 def _pieces() -> list[Made]:
@@ -80,21 +80,21 @@ def test_the_boards_of_a_shelf_are_found_as_supports(
     name: str, size: tuple[float, float, float], least: int
 ) -> None:
     made = CASE_GOODS[name].make(np.random.default_rng(2), STYLE, BOARDS, size)
-    draft = Draft(builtin_home(), 1)
-    room = draft.source.rooms[0]
+    mutable = MutableHouse(builtin_home(), 1)
+    room = mutable.source.rooms[0]
     middle = room.polygon.mean(0)
     at = np.array([middle[0], room.floor_y, middle[1]])
-    item = draft.placed(*made, at, 0.0, item_id="shelf", room_id=room.id, level_id=room.level_id)
-    draft.items = [item]
-    found = supports_of_item(SceneTriangles(draft.items), 0, room)
+    item = mutable.placed(*made, at, 0.0, item_id="shelf", room_id=room.id, level_id=room.level_id)
+    mutable.items = [item]
+    found = supports_of_item(SceneTriangles(mutable.items), 0, room)
     assert len(found) >= least
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_furniture_stands_on_the_floor_with_its_back_at_a_wall_of_its_room(seed: int) -> None:
-    draft = _draft(seed)
-    space = house_space(draft)
-    stood = [i for i in _added(draft) if "chair" not in i.name]
+    mutable = _draft(seed)
+    space = house_space(mutable)
+    stood = [i for i in _added(mutable) if "chair" not in i.name]
     assert stood
     for item in stood:
         room = space.room(str(item.room_id))
@@ -108,9 +108,9 @@ def test_furniture_stands_on_the_floor_with_its_back_at_a_wall_of_its_room(seed:
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
-    draft = _draft(seed)
-    space = house_space(draft)
-    for item in _added(draft):
+    mutable = _draft(seed)
+    space = house_space(mutable)
+    for item in _added(mutable):
         room = space.room(str(item.room_id))
         low, high = item.bounds
         body = shapely.box(low[0], low[2], high[0], high[2])
@@ -131,9 +131,9 @@ def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:
     bare = [i for i in home.items if not i.id.startswith("piece_")]
     n = 0
     for seed in range(3):
-        draft = Draft(replace(home, items=(*bare, worktop)), seed)
-        add_furniture(draft, EMPTY, STYLE, 1.0)
-        for item in _added(draft):
+        mutable = MutableHouse(replace(home, items=(*bare, worktop)), seed)
+        add_furniture(mutable, EMPTY, STYLE, 1.0)
+        for item in _added(mutable):
             if item.nyu40 == BOOKSHELF and item.room_id == "0_0":
                 apart = np.maximum(
                     item.bounds[0] - worktop.bounds[1], worktop.bounds[0] - item.bounds[1]

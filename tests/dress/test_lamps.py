@@ -11,8 +11,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.dress import made_lamps as made
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.lamps import add_lamps
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.geometry.solids import box
@@ -26,21 +26,21 @@ def _dark() -> House:
     return replace(home, items=tuple(i for i in home.items if i.kind is not ItemKind.LAMP))
 
 
-def _dressed(house: House, seed: int, share: float = 1.0) -> Draft:
-    draft = Draft(house, seed)
-    add_lamps(draft, EMPTY, STYLE, share)
-    return draft
+def _dressed(house: House, seed: int, share: float = 1.0) -> MutableHouse:
+    mutable = MutableHouse(house, seed)
+    add_lamps(mutable, EMPTY, STYLE, share)
+    return mutable
 
 
-def _hanging(draft: Draft) -> list[Item]:
-    added = draft.items[len(draft.source.items) :]
+def _hanging(mutable: MutableHouse) -> list[Item]:
+    added = mutable.items[len(mutable.source.items) :]
     return [i for i in added if i.bounds[1, 1] > 2.0]
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_every_dark_room_gets_a_lamp_that_touches_the_ceiling(seed: int) -> None:
-    draft = _dressed(_dark(), seed)
-    hanging = _hanging(draft)
+    mutable = _dressed(_dark(), seed)
+    hanging = _hanging(mutable)
     assert sorted(str(i.room_id) for i in hanging) == ["0_0", "0_1"]
     for item in hanging:
         assert item.bounds[1, 1] == pytest.approx(2.5, abs=0.001)
@@ -51,14 +51,14 @@ def test_every_dark_room_gets_a_lamp_that_touches_the_ceiling(seed: int) -> None
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_one_can_walk_under_a_lamp_unless_a_table_is_below(seed: int) -> None:
-    draft = _dressed(_dark(), seed)
-    space = house_space(draft)
-    for item in _hanging(draft):
+    mutable = _dressed(_dark(), seed)
+    space = house_space(mutable)
+    for item in _hanging(mutable):
         low, high = item.bounds
         if low[1] > 1.9:
             continue
         middle = (low + high) / 2
-        below = [i for i in space.room(str(item.room_id)).items if draft.items[i].nyu40 == 7]
+        below = [i for i in space.room(str(item.room_id)).items if mutable.items[i].nyu40 == 7]
         assert any(
             (space.bounds[n][0] < middle).all() or abs(space.bounds[n].mean(0) - middle)[[0, 2]].max() < 0.3
             for n in below
@@ -79,9 +79,9 @@ def test_a_room_with_lamps_enough_gets_none_at_its_ceiling() -> None:
 def test_a_room_open_to_the_sky_gets_none() -> None:
     home = _dark()
     bare = replace(home, items=tuple(i for i in home.items if i.kind is not ItemKind.CEILING))
-    draft = _dressed(bare, 1)
-    assert not _hanging(draft)
-    assert draft.refused["lamps: no place under the ceiling"] == 2
+    mutable = _dressed(bare, 1)
+    assert not _hanging(mutable)
+    assert mutable.refused["lamps: no place under the ceiling"] == 2
 
 
 def test_a_lamp_keeps_clear_of_what_reaches_the_ceiling() -> None:
@@ -95,10 +95,10 @@ def test_a_lamp_keeps_clear_of_what_reaches_the_ceiling() -> None:
 
 def test_a_lamp_stands_on_the_nightstand_exactly() -> None:
     for seed in range(1, 9):
-        draft = _dressed(_dark(), seed)
-        for item in draft.items[len(draft.source.items) :]:
+        mutable = _dressed(_dark(), seed)
+        for item in mutable.items[len(mutable.source.items) :]:
             if "table_lamp" in item.source_class:
-                stand = next(i for i in draft.items if i.nyu40 == 32)
+                stand = next(i for i in mutable.items if i.nyu40 == 32)
                 assert item.bounds[0, 1] == pytest.approx(stand.bounds[1, 1], abs=0.0005)
                 return
     pytest.fail("no seed of eight gave the nightstand a lamp")

@@ -18,9 +18,9 @@ from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
 from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import Stock
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.mess import move_chairs, tilt_pictures
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.things.books import book_covers
 from pbrs_farm.geometry.heights import highest_below
@@ -45,9 +45,9 @@ def _dining() -> House:
 
 
 def _moves(seed: int, share: float) -> list[float]:
-    draft = Draft(_dining(), seed, share)
-    move_chairs(draft, EMPTY, STYLE, share)
-    pairs = zip(draft.items[1:], draft.source.items[1:], strict=True)
+    mutable = MutableHouse(_dining(), seed, share)
+    move_chairs(mutable, EMPTY, STYLE, share)
+    pairs = zip(mutable.items[1:], mutable.source.items[1:], strict=True)
     return [float(np.linalg.norm(a.bounds.mean(0) - b.bounds.mean(0))) for a, b in pairs]
 
 
@@ -62,12 +62,12 @@ def test_chairs_stand_apart_by_a_few_centimetres_and_some_are_pulled_out() -> No
 def test_a_chair_is_not_pulled_into_what_stands_behind_it_or_through_a_wall() -> None:
     cupboard = solid("cupboard", [1.0, 0.0, 0.35], [3.0, 1.0, 0.66])
     for seed in range(8):
-        draft = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.7), cupboard), seed, 1.0)
-        move_chairs(draft, EMPTY, STYLE, 1.0)
-        assert draft.items[1].bounds[0, 2] > 0.64
-        keep_gates(draft, {})
-        assert not draft.refused["swap: stood in another thing"]
-        at_wall = Draft(house(TABLE_ITEM, _chair("a", 1.4, 0.02)), seed, 1.0)
+        mutable = MutableHouse(house(TABLE_ITEM, _chair("a", 1.4, 0.7), cupboard), seed, 1.0)
+        move_chairs(mutable, EMPTY, STYLE, 1.0)
+        assert mutable.items[1].bounds[0, 2] > 0.64
+        keep_gates(mutable, {})
+        assert not mutable.refused["swap: stood in another thing"]
+        at_wall = MutableHouse(house(TABLE_ITEM, _chair("a", 1.4, 0.02)), seed, 1.0)
         move_chairs(at_wall, EMPTY, STYLE, 1.0)
         assert at_wall.items[1].bounds[0, 2] > -0.001
 
@@ -81,14 +81,14 @@ def test_a_picture_hangs_a_degree_askew_in_its_own_plane() -> None:
     )
     angles = []
     for seed in range(12):
-        draft = Draft(house(), seed, 0.5)
+        mutable = MutableHouse(house(), seed, 0.5)
         at = np.array([2.0, 1.4, 0.001])
-        item = draft.placed(
+        item = mutable.placed(
             piece, shape, at, 0.0, item_id="dress-walls-0", room_id="0_0", level_id="0"
         )
-        draft.add(item, "walls", piece)
-        tilt_pictures(draft, EMPTY, STYLE, 0.5)
-        moved = draft.items[-1]
+        mutable.add(item, "walls", piece)
+        tilt_pictures(mutable, EMPTY, STYLE, 0.5)
+        moved = mutable.items[-1]
         assert moved.bounds[:, 2] == pytest.approx(item.bounds[:, 2], abs=1e-6)
         assert moved.box is not None
         angles.append(float(np.degrees(np.arctan2(moved.box.axes[1, 0], moved.box.axes[0, 0]))))
@@ -107,10 +107,10 @@ def _bedroom(width: float) -> House:
 @pytest.mark.parametrize(("width", "n"), [(1.6, 2), (1.12, 2), (0.9, 1)])
 def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: float, n: int) -> None:
     for seed in range(3):
-        draft = Draft(_bedroom(width), seed, 0.3)
-        add_clutter(draft, EMPTY, STYLE, 1.0)
-        keep_gates(draft, draft.used)
-        added = draft.items[1:]
+        mutable = MutableHouse(_bedroom(width), seed, 0.3)
+        add_clutter(mutable, EMPTY, STYLE, 1.0)
+        keep_gates(mutable, mutable.used)
+        added = mutable.items[1:]
         pillows = [i for i in added if i.source_class == "generated#pillow"]
         duvets = [i for i in added if i.source_class == "generated#duvet"]
         assert (len(pillows), len(duvets)) == (n, 1)
@@ -124,12 +124,12 @@ def test_clothes_on_a_seat_hang_on_no_post_behind_it() -> None:
     chair = boards("Chair", [([0.0, 0.0, 0.0], [0.4, 0.45, 0.4]), *posts], CHAIR)
     found = []
     for seed in range(6):
-        draft = Draft(house(chair, name="Bedroom"), seed, 1.0)
-        rng = draft.rng("test")
+        mutable = MutableHouse(house(chair, name="Bedroom"), seed, 1.0)
+        rng = mutable.rng("test")
         stock = Stock(EMPTY, book_covers(rng, STYLE), 1)
-        placing = Placing(draft, stock, draft.source.rooms[0], STYLE, rng, 1.0)
-        drop_clothes(placing, SceneTriangles(draft.items), np.array([0.2, 0.2]), 0.45)
-        found += draft.items[1:]
+        placing = Placing(mutable, stock, mutable.source.rooms[0], STYLE, rng, 1.0)
+        drop_clothes(placing, SceneTriangles(mutable.items), np.array([0.2, 0.2]), 0.45)
+        found += mutable.items[1:]
     # What finds no place on the seat stays in the wardrobe.
     assert len(found) >= 3
     assert max(float(item.bounds[1, 1]) for item in found) < 0.65

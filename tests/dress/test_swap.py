@@ -11,7 +11,7 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.dress.old_place import OldPlace, before_boards
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.swap import swap_furniture
@@ -67,10 +67,10 @@ def _item(
     )  # fmt: skip
 
 
-def _swapped(catalogue: Catalogue, *items: Item, share: float = 1.0, seed: int = 3) -> Draft:
-    draft = Draft(house(*items), seed)
-    swap_furniture(draft, catalogue, style_for(draft.rng("style"), ""), share)
-    return draft
+def _swapped(catalogue: Catalogue, *items: Item, share: float = 1.0, seed: int = 3) -> MutableHouse:
+    mutable = MutableHouse(house(*items), seed)
+    swap_furniture(mutable, catalogue, style_for(mutable.rng("style"), ""), share)
+    return mutable
 
 
 def _corners(item: Item) -> F64:
@@ -83,10 +83,10 @@ DRESSER: Size = (1.2, 0.5, 0.8)
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0, 180.0, 33.0])
 def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg: float) -> None:
     old = _item("d", DRESSER, [2.0, 0.02, 1.5], 17, turn_deg=turn_deg)
-    draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
+    mutable = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
     turn = rotation_y(np.radians(turn_deg))
-    own, was = (_corners(i) @ turn for i in (draft.items[0], old))
-    assert draft.items[0].source_class == "T#new"
+    own, was = (_corners(i) @ turn for i in (mutable.items[0], old))
+    assert mutable.items[0].source_class == "T#new"
     assert_allclose(own[:, 2].min(), was[:, 2].min(), atol=1e-5)
     assert_allclose(own[:, 1].min(), was[:, 1].min(), atol=1e-5)
     assert_allclose((own.min(0) + own.max(0))[0], (was.min(0) + was.max(0))[0], atol=1e-5)
@@ -96,9 +96,9 @@ def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg
 
 def test_a_thing_drawn_two_millimetres_above_the_floor_gives_way_to_one_that_stands_on_it() -> None:
     old = _item("d", DRESSER, [2.0, 0.002, 1.5], 17)
-    draft = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
-    assert draft.items[0].source_class == "T#new"
-    assert_allclose(_corners(draft.items[0])[:, 1].min(), 0.0, atol=1e-6)
+    mutable = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
+    assert mutable.items[0].source_class == "T#new"
+    assert_allclose(_corners(mutable.items[0])[:, 1].min(), 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -117,32 +117,32 @@ def test_what_hangs_stays_hung_and_what_stands_keeps_standing(
     catalogue = _catalogue(("dresser", "new", DRESSER))
     (piece,) = catalogue.pieces
     catalogue = replace(catalogue, pieces=(replace(piece, place=place, low_m=low_m),))
-    draft = _swapped(catalogue, _item("d", DRESSER, [2.0, above_m, 1.5], 17))
-    assert (draft.items[0].source_class == "T#new") is is_swapped
-    assert draft.items[0].bounds[0, 1] == pytest.approx(above_m, abs=1e-5)
-    assert ("swap: no other model is held as the old one is" in draft.refused) is not is_swapped
+    mutable = _swapped(catalogue, _item("d", DRESSER, [2.0, above_m, 1.5], 17))
+    assert (mutable.items[0].source_class == "T#new") is is_swapped
+    assert mutable.items[0].bounds[0, 1] == pytest.approx(above_m, abs=1e-5)
+    assert ("swap: no other model is held as the old one is" in mutable.refused) is not is_swapped
 
 
 def test_a_thing_on_a_platform_stands_and_does_not_hang() -> None:
     platform = solid("platform", [1.0, 0.0, 1.0], [3.0, 0.3, 2.0])
     catalogue = _catalogue(("dresser", "new", DRESSER))
-    draft = _swapped(catalogue, _item("d", DRESSER, [2.0, 0.3, 1.5], 17), platform)
-    assert draft.items[0].source_class == "T#new"
+    mutable = _swapped(catalogue, _item("d", DRESSER, [2.0, 0.3, 1.5], 17), platform)
+    assert mutable.items[0].source_class == "T#new"
 
 
 def test_it_keeps_its_id_and_says_what_it_was_made_from() -> None:
-    draft = _swapped(_catalogue(("dresser", "new", DRESSER)), _item("d", DRESSER, [2, 0, 1], 17))
-    item = draft.items[0]
-    assert (item.id, item.nyu40, item.room_id, len(draft.items)) == ("d", 17, "0_0", 1)
+    mutable = _swapped(_catalogue(("dresser", "new", DRESSER)), _item("d", DRESSER, [2, 0, 1], 17))
+    item = mutable.items[0]
+    assert (item.id, item.nyu40, item.room_id, len(mutable.items)) == ("d", 17, "0_0", 1)
     assert f"{ADDED_TAG}T#new" in item.tags
-    assert draft.done["swap: dresser"] == 1
+    assert mutable.done["swap: dresser"] == 1
 
 
 @pytest.mark.parametrize("size", [(2.0, 0.5, 0.8), (0.5, 0.5, 0.8), (1.2, 0.5, 1.6), (0, 0.5, 0.8)])
 def test_a_model_of_another_size_does_not_fit(size: Size) -> None:
-    draft = _swapped(_catalogue(("dresser", "new", size)), _item("d", DRESSER, [2, 0, 1], 17))
-    assert draft.items[0].source_class == "T#old"
-    assert draft.refused["swap: no other model fits"] == 1
+    mutable = _swapped(_catalogue(("dresser", "new", size)), _item("d", DRESSER, [2, 0, 1], 17))
+    assert mutable.items[0].source_class == "T#old"
+    assert mutable.refused["swap: no other model fits"] == 1
 
 
 def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind() -> None:
@@ -160,11 +160,11 @@ def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind()
 def test_a_chair_on_a_balcony_stays_and_one_in_a_room_is_swapped(name: str, is_kept: bool) -> None:
     size = (0.5, 0.5, 0.9)
     home = house(_item("chair", size, [1, 0, 1], 5, is_seat=True), name=name)
-    draft = Draft(home, 3)
+    mutable = MutableHouse(home, 3)
     swap_furniture(
-        draft, _catalogue(("chair", "new", size)), style_for(draft.rng("style"), ""), 1.0
+        mutable, _catalogue(("chair", "new", size)), style_for(mutable.rng("style"), ""), 1.0
     )
-    assert (draft.items[0] is home.items[0]) == is_kept
+    assert (mutable.items[0] is home.items[0]) == is_kept
 
 
 def test_chairs_of_one_room_get_one_model() -> None:
@@ -180,26 +180,26 @@ def test_chairs_of_one_room_get_one_model() -> None:
 def test_a_thing_on_it_comes_to_stand_on_the_new_one() -> None:
     thing = solid("vase", [1.9, 0.8, 1.0], [2.1, 1.1, 1.2], 40)
     catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))
-    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
-    top = _corners(draft.items[0])[:, 1].max()
+    mutable = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
+    top = _corners(mutable.items[0])[:, 1].max()
     assert top == pytest.approx(0.9)
-    assert draft.items[1].bounds[0, 1] == pytest.approx(top, abs=1e-4)
+    assert mutable.items[1].bounds[0, 1] == pytest.approx(top, abs=1e-4)
 
 
 def test_a_thing_inside_or_under_it_keeps_it() -> None:
     thing = solid("box", [1.9, 0.3, 1.0], [2.1, 0.5, 1.2], 29)
     catalogue = _catalogue(("dresser", "new", DRESSER))
-    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
-    assert draft.items[0].source_class == "T#old"
-    assert draft.refused["swap: things stand in it or under it"] == 1
+    mutable = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
+    assert mutable.items[0].source_class == "T#old"
+    assert mutable.refused["swap: things stand in it or under it"] == 1
 
 
 def test_it_never_reaches_farther_into_its_neighbours() -> None:
     shelf = solid("shelf", [1.4, 0.83, 0.9], [2.6, 0.85, 1.3], 15)
     catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))
-    draft = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), shelf)
-    assert draft.items[0].source_class == "T#old"
-    assert draft.refused["swap: it would reach into its neighbours"] == 1
+    mutable = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), shelf)
+    assert mutable.items[0].source_class == "T#old"
+    assert mutable.refused["swap: it would reach into its neighbours"] == 1
 
 
 def _light(power: float) -> LightPart:
@@ -214,9 +214,9 @@ def test_a_lamp_keeps_its_power_and_its_colour() -> None:
     new = replace(_light(0.5), rgb_linear=(1.0, 1.0, 1.0), share=1.0)
     table = solid("table", [1.5, 0.0, 0.5], [2.5, 0.7, 1.5])
     catalogue = _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size), lights=(new,))
-    draft = _swapped(catalogue, lamp, table)
-    (light,) = draft.items[0].lights
-    assert draft.items[0].source_class == "T#new"
+    mutable = _swapped(catalogue, lamp, table)
+    (light,) = mutable.items[0].lights
+    assert mutable.items[0].source_class == "T#new"
     assert (light.power, light.rgb_linear) == (0.8, (1.0, 0.5, 0.2))
     assert_allclose(light.position, [2, 1.0, 1], atol=1e-6)
 
@@ -225,9 +225,9 @@ def test_a_lamp_that_is_lit_gets_no_model_without_a_light_source() -> None:
     size = (0.3, 0.3, 0.5)
     lamp = _item("l", size, [2, 0, 1], 35, kind=ItemKind.LAMP, lights=(_light(0.8),))
     catalogue = _catalogue(("table_lamp", "old", size), ("table_lamp", "new", size))
-    draft = _swapped(catalogue, lamp)
-    assert draft.items[0] is lamp
-    assert draft.refused["swap: no other model can be used"] == 1
+    mutable = _swapped(catalogue, lamp)
+    assert mutable.items[0] is lamp
+    assert mutable.refused["swap: no other model can be used"] == 1
 
 
 def test_the_share_says_how_many_and_the_seed_which() -> None:
@@ -244,9 +244,9 @@ def test_the_share_says_how_many_and_the_seed_which() -> None:
 
 def test_a_model_that_cannot_be_used_leaves_the_old_one() -> None:
     broken = replace(_catalogue(("dresser", "new", DRESSER)), load=lambda _piece: None)
-    draft = _swapped(broken, _item("d", DRESSER, [2, 0, 1], 17))
-    assert draft.items[0].source_class == "T#old"
-    assert draft.refused["swap: no other model can be used"] == 1
+    mutable = _swapped(broken, _item("d", DRESSER, [2, 0, 1], 17))
+    assert mutable.items[0].source_class == "T#old"
+    assert mutable.refused["swap: no other model can be used"] == 1
 
 
 def test_a_swapped_cabinet_stands_before_the_skirting_board_that_the_old_one_stood_in() -> None:

@@ -12,7 +12,7 @@ from PIL import Image
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.wear import SIZE_M, add_wear
 from tests.dress.furniture import house, solid
@@ -21,25 +21,25 @@ FRONT = Material("coated front", specular=(0.4, 0.4, 0.4), roughness=0.3)
 STEEL = Material("brushed steel", specular=(0.78, 0.77, 0.75), roughness=0.38)
 
 
-def _worn(material: Material, size: float = 1.0, share: float = 1.0) -> Draft:
+def _worn(material: Material, size: float = 1.0, share: float = 1.0) -> MutableHouse:
     thing = solid("t", [1, 0, 1], [1 + size, size, 1 + size], NYU40_NAMES.index("cabinet"))
-    draft = Draft(replace(house(thing), materials=(material,)), 5)
-    add_wear(draft, EMPTY, style_for(draft.rng("style"), ""), share)
-    return draft
+    mutable = MutableHouse(replace(house(thing), materials=(material,)), 5)
+    add_wear(mutable, EMPTY, style_for(mutable.rng("style"), ""), share)
+    return mutable
 
 
-def _mean(draft: Draft, texture_id: str | None) -> float:
-    data = draft.textures[str(texture_id)].data
+def _mean(mutable: MutableHouse, texture_id: str | None) -> float:
+    data = mutable.textures[str(texture_id)].data
     return float(np.asarray(Image.open(io.BytesIO(data))).mean()) / 255
 
 
 @pytest.mark.parametrize("material", [FRONT, STEEL])
 def test_a_smooth_front_is_as_rough_as_before_in_the_mean(material: Material) -> None:
-    draft = _worn(material)
-    surface = draft.items[0].surfaces[0]
-    worn = draft.materials[surface.material]
+    mutable = _worn(material)
+    surface = mutable.items[0].surfaces[0]
+    worn = mutable.materials[surface.material]
     assert (worn.normal_texture_id is not None) == (material is STEEL)
-    mean = (worn.roughness or 0) * _mean(draft, worn.roughness_texture_id)
+    mean = (worn.roughness or 0) * _mean(mutable, worn.roughness_texture_id)
     assert mean == pytest.approx(material.roughness, rel=0.15)
     assert surface.uvs is not None
     assert np.ptp(surface.uvs[:, 0]) == pytest.approx(1.0 / SIZE_M[0], rel=0.7)
@@ -53,10 +53,10 @@ def test_a_smooth_front_is_as_rough_as_before_in_the_mean(material: Material) ->
     ],
 )  # fmt: skip
 def test_what_is_matt_a_mirror_or_chrome_stays(kept: Material) -> None:
-    draft = _worn(kept)
-    assert draft.items[0] is draft.source.items[0]
+    mutable = _worn(kept)
+    assert mutable.items[0] is mutable.source.items[0]
 
 
 def test_small_things_stay_and_a_share_of_none_touches_nothing() -> None:
-    for draft in (_worn(FRONT, size=0.2), _worn(FRONT, share=0.0)):
-        assert draft.items[0] is draft.source.items[0]
+    for mutable in (_worn(FRONT, size=0.2), _worn(FRONT, share=0.0)):
+        assert mutable.items[0] is mutable.source.items[0]

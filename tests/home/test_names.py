@@ -6,7 +6,7 @@ import pytest
 
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.walls.radiators import wants_radiators
 from pbrs_farm.home.names import words_of
 from pbrs_farm.home.room_use import is_cooked_in
@@ -47,7 +47,7 @@ def test_a_cooker_makes_a_kitchen(name: str) -> None:
 def test_a_home_theater_heats_no_home() -> None:
     seeds = range(1, 9)
     bare, theater, heater = (
-        [wants_radiators(Draft(house(*items), seed)) for seed in seeds]
+        [wants_radiators(MutableHouse(house(*items), seed)) for seed in seeds]
         for items in ((), (named("Home theater"),), (named("GasHeater"),))
     )
     assert theater == bare

@@ -1,4 +1,4 @@
-"""Lays pillows, cushions and a folded blanket on beds; they take the shape of what they lie on. Effects: on the draft."""
+"""Lays pillows, cushions and a folded blanket on beds; they take the shape of what they lie on. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
         rows = first, bed.rows[1] * bed.grid.cell_m
         duvet = lay_duvet(placing, scene, index, bed.grid, sides, rows, bed.level)
-        if rng.random() < placing.draft.mess:
+        if rng.random() < placing.house.mess:
             _drop_on(placing, scene, duvet)
         return n + 1
     if rng.random() < 0.45 * placing.share:

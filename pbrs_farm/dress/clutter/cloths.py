@@ -1,4 +1,4 @@
-"""Duvets on beds, throws over seats, clothes where they were dropped; effects: on the draft."""
+"""Duvets on beds, throws over seats, clothes where they were dropped; effects: changes the house."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def lay_duvet(
     foot = rows[1] + (float(rng.uniform(0.0, 0.12)) if rng.random() < 0.5 else -0.03)
     size = (high - low, foot - rows[0])
     middle = ((low + high) / 2 + shift[0], level + _DUVET_M, (rows[0] + foot) / 2 + shift[1])
-    mess = placing.draft.mess
+    mess = placing.house.mess
     net, threads = flat_net(
         size, _THREADS_M["duvet"], middle, float(rng.normal(0, 0.015 + 0.05 * mess))
     )

@@ -21,7 +21,7 @@ from pbrs_farm.dress.clutter.receptacles import can_hold, receptacle_of
 from pbrs_farm.dress.clutter.shelves import fill_shelf, plan_shelves
 from pbrs_farm.dress.clutter.stock import Stock
 from pbrs_farm.dress.clutter.table_tops import fill_top, set_table
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.supports import supports_of_item
@@ -42,18 +42,18 @@ _SCREENS = ("laptop", "monitor")
 _SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook", "pc", "imac"})
 
 
-def add_clutter(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Put small things where they belong, touching what they stand on and nothing else."""
-    space = house_space(draft)
-    scene = SceneTriangles(draft.items)
-    covers = book_covers(draft.rng("clutter", "covers"), style)
-    stock = Stock(catalogue, covers, int(draft.rng("clutter", "stock").integers(1 << 31)))
-    bias = house_bias(draft.rng("clutter", "bias"))
+    space = house_space(house)
+    scene = SceneTriangles(house.items)
+    covers = book_covers(house.rng("clutter", "covers"), style)
+    stock = Stock(catalogue, covers, int(house.rng("clutter", "stock").integers(1 << 31)))
+    bias = house_bias(house.rng("clutter", "bias"))
     owners = _owners(scene, space)
     for room in space.rooms:
-        rng = draft.rng("clutter", room.room.id)
-        own = room_style(style, draft.rng("style", room.room.id))
-        placing = Placing(draft, stock, room.room, own, rng, share, bias, room.kind)
+        rng = house.rng("clutter", room.room.id)
+        own = room_style(style, house.rng("style", room.room.id))
+        placing = Placing(house, stock, room.room, own, rng, share, bias, room.kind)
         _fill_room(placing, scene, room, owners)
         fill_floor(placing, scene, space, room)
 
@@ -139,7 +139,7 @@ def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item)
     low, high = item.bounds
     width = float(max(high[0] - low[0], high[2] - low[2]))
     # Chairs at tables carry none, armchairs one now and then.
-    mess, kind = placing.draft.mess, placing.kind
+    mess, kind = placing.house.mess, placing.kind
     if item.nyu40 == SOFA:
         # A throw first: cushions need its place, and find it taken.
         if width > 1.2 and placing.rng.random() < _THROWN * mess * placing.share:

@@ -1,4 +1,4 @@
-"""Puts things on floors near walls: bins, bags, shoes, baskets, boxes, never in anybody's way. Effects: on the draft."""
+"""Puts things on floors near walls: bins, bags, shoes, baskets, boxes, never in anybody's way. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
         if rng.random() < chance * placing.share
     ]
     floor = _floor_of_room(scene, space, room) if wanted else None
-    flights = flights_of(placing.draft, room.room, room.area)
+    flights = flights_of(placing.house, room.room, room.area)
     if floor is not None and not flights.before.is_empty:
         plan = floor.grid.centres()
         floor.free &= ~shapely.contains_xy(flights.before, plan[..., 0], plan[..., 1])
@@ -73,7 +73,7 @@ def fill_floor(placing: Placing, scene: SceneTriangles, space: HouseSpace, room:
     for kind in wanted:
         made = placing.stock.take(rng, kind, placing.style)
         if made is not None and kind == "shoes":
-            made = separate_pair(made, rng, placing.draft.mess)
+            made = separate_pair(made, rng, placing.house.mess)
         if made is not None:
             n += _put_on_floor(placing, floor, made, at_wall=kind in CLUTTER.at_walls)
     return n

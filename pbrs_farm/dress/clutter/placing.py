@@ -1,4 +1,4 @@
-"""What small things stand on and come from, and how they get there; effects: on the draft."""
+"""What small things stand on and come from, and how they get there; effects: changes the house."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.stock import CLUTTER, Stock
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.worktop import TopSpot, Worktop, turned_size
@@ -64,7 +64,7 @@ def _connected_part_of_vertices(surface: Surface) -> NDArray[np.int64]:
 class Placing:
     """What is needed to put things into one room."""
 
-    draft: Draft
+    house: MutableHouse
     stock: Stock
     room: Room
     style: Style
@@ -82,13 +82,13 @@ class Placing:
         piece, shape = made
         low, high = shape.bounds
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-        number = sum(self.draft.done.values())
-        item = self.draft.placed(
+        number = sum(self.house.done.values())
+        item = self.house.placed(
             piece, shape, at - rotation_y(turn_rad) @ base, turn_rad,
-            item_id=f"dress-{PART}-{len(self.draft.items)}-{number}",
+            item_id=f"dress-{PART}-{len(self.house.items)}-{number}",
             room_id=self.room.id, level_id=self.room.level_id,
         )  # fmt: skip
-        self.draft.add(item, PART, piece)
+        self.house.add(item, PART, piece)
 
     def laid_near(self, low: F64, high: F64) -> list[F64]:
         """The triangles of cloth in the room that may meet the box low..high (3,)."""
@@ -99,7 +99,7 @@ class Placing:
 
     def refuse(self, reason: str) -> None:
         """Count a thing that was not put down."""
-        self.draft.refused[f"{PART}: {reason}"] += 1
+        self.house.refused[f"{PART}: {reason}"] += 1
 
     def drop(self, top: Worktop, made: Made, *, faces_anywhere: bool, depth_pull: float) -> bool:
         """Put the thing where it fits on the worktop; False where it fits nowhere.
@@ -109,7 +109,7 @@ class Placing:
         size = np.asarray(made[0].size)[[0, 2, 1]]
         low, high = made[1].bounds
         size = high - low
-        sd = 0.06 + 0.3 * self.draft.mess
+        sd = 0.06 + 0.3 * self.house.mess
         turn = self.rng.uniform(-np.pi, np.pi) if faces_anywhere else self.rng.normal(0, sd)
         for turn_rad, inset in ((turn, 0.02), (0.0, 0.01), (0.0, 0.0)):
             needed = turned_size(size, turn_rad)

@@ -1,4 +1,4 @@
-"""Fills shelves from left to right: runs of books with their spines out, piles, boxes, ornaments. Effects: on the draft."""
+"""Fills shelves from left to right: runs of books with their spines out, piles, boxes, ornaments. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _put_books(
     if depth < 0.1 or tall < 0.11:
         return None
     # Now and then they lie; a pile may carry nothing.
-    mess = placing.draft.mess
+    mess = placing.house.mess
     if rng.random() < 0.08 + 0.14 * mess:
         return _leftmost(placing, top, column, [_lying(rng, placing, depth, tall)], plan.inset_m)
     most = min(float(rng.uniform(0.14, 0.6)), (top.columns[1] - column) * top.grid.cell_m - 0.012)

@@ -1,4 +1,4 @@
-"""Puts things on tables, desks, counters and chests, as the table of shares says, the largest first. Effects: on the draft."""
+"""Puts things on tables, desks, counters and chests, as the table of shares says, the largest first. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
 
     After a meal things stand where hands left them, and a napkin lies beside a plate.
     """
-    rng, is_eaten = placing.rng, placing.rng.random() < placing.draft.mess
+    rng, is_eaten = placing.rng, placing.rng.random() < placing.house.mess
     plate = placing.stock.take(placing.rng, "one_plate", placing.style)
     glass = placing.stock.take(placing.rng, "glass", placing.style)
     if plate is None or glass is None:

@@ -1,7 +1,7 @@
 """What a dressed house must keep, measured on its meshes; what breaks it is taken out again."""
 
-from pbrs_farm.dress.gates.as_rendered import kept_as_rendered
+from pbrs_farm.dress.gates.as_rendered import refit_to_walls
 from pbrs_farm.dress.gates.bodies import piece_id
 from pbrs_farm.dress.gates.keep_gates import group_of, keep_gates, pass_that_added
 
-__all__ = ["group_of", "keep_gates", "kept_as_rendered", "pass_that_added", "piece_id"]
+__all__ = ["group_of", "keep_gates", "pass_that_added", "piece_id", "refit_to_walls"]

@@ -17,13 +17,13 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import boxes_meeting
-from pbrs_farm.dress.draft import Draft, moved_item
 from pbrs_farm.dress.gates.bodies import Body, bodies_of, boxes_of
 from pbrs_farm.dress.gates.keep_gates import CONTACT, keep_gates
 from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
 from pbrs_farm.dress.gates.plumb import Plumb
 from pbrs_farm.dress.gates.shells import Solids
 from pbrs_farm.dress.gates.support import held
+from pbrs_farm.dress.mutable_house import MutableHouse, moved_item
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.walls.hanging import GAP_M
 from pbrs_farm.geometry.heights import highest_below
@@ -35,7 +35,7 @@ _FLAT_M: Final = 0.0015  # that a back's distances to a wall may differ
 _SEES_WALL: Final = 0.95  # of the back
 
 
-def kept_as_rendered(
+def refit_to_walls(
     dressed: House, n_source: int, repaired: House, report: DressReport, pieces: Mapping[str, Piece]
 ) -> tuple[House, DressReport]:
     """The dressed house without what nothing holds in the repaired one, and its report.
@@ -47,15 +47,15 @@ def kept_as_rendered(
     own = {i.id for i in dressed.items[n_source:] if not i.kind.is_structure}
     added = [item for item in repaired.items if item.id in own]
     base = repaired.with_items(item for item in repaired.items if item.id not in own)
-    with closing(Draft(base, report.seed)) as draft:
-        draft.items += added
-        bodies = bodies_of(draft, pieces)
+    with closing(MutableHouse(base, report.seed)) as house:
+        house.items += added
+        bodies = bodies_of(house, pieces)
         if _is_held(bodies):
             return dressed, report
-        moved = _hung_anew(draft, bodies)
-        gates = {gate.name: gate for gate in keep_gates(draft, pieces, CONTACT)}
-        left = {item.id for item in draft.items[len(base.items) :]}
-        out, why = {item.id for item in added} - left, draft.refused
+        moved = _hung_anew(house, bodies)
+        gates = {gate.name: gate for gate in keep_gates(house, pieces, CONTACT)}
+        left = {item.id for item in house.items[len(base.items) :]}
+        out, why = {item.id for item in added} - left, house.refused
     if not out and not moved:
         return dressed, report
     items = [
@@ -101,8 +101,8 @@ def _hangs(body: Body) -> bool:
     return body.piece is not None and body.piece.place in (Place.WALL, Place.CEILING)
 
 
-def _hung_anew(draft: Draft, bodies: Sequence[Body]) -> dict[str, F64]:
-    """By id, how things that hang and are not held were moved to a wall; they are moved in the draft."""
+def _hung_anew(house: MutableHouse, bodies: Sequence[Body]) -> dict[str, F64]:
+    """By id, how things that hang and are not held were moved to a wall; they are moved in the house."""
     walls = [b for b in bodies if b.item.kind is ItemKind.WALL]
     asked = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
     moved: dict[str, F64] = {}
@@ -113,7 +113,7 @@ def _hung_anew(draft: Draft, bodies: Sequence[Body]) -> dict[str, F64]:
         step = _to_wall(item, walls)
         if step is not None:
             moved[item.id] = step
-            draft.items[bodies[k].index] = moved_item(item, step)
+            house.items[bodies[k].index] = moved_item(item, step)
     return moved
 
 

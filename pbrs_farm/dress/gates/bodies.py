@@ -1,4 +1,4 @@
-"""The things of a draft as the gates see them: triangles, bounds, connected shells; no effects."""
+"""The things of a house as the gates see them: triangles, bounds, connected shells; no effects."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
-from pbrs_farm.dress.draft import ADDED_TAG, Draft
+from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.geometry.surface_points import item_triangles
 
 Faces = NDArray[np.int64]
@@ -40,7 +40,7 @@ class Shell:
 class Body:
     """An item: what it is made of, and whether dressing put it there."""
 
-    index: int  # in Draft.items
+    index: int  # in MutableHouse.items
     item: Item
     corners: F64  # (F, 3, 3) finite triangles, metres
     low: F64  # (3,)
@@ -64,16 +64,16 @@ class Body:
 
 
 def bodies_of(
-    draft: Draft, pieces: Mapping[str, Piece], known: Mapping[int, Body] | None = None
+    house: MutableHouse, pieces: Mapping[str, Piece], known: Mapping[int, Body] | None = None
 ) -> list[Body]:
-    """A body for each item of the draft that has triangles, in order.
+    """A body for each item of the house that has triangles, in order.
 
     pieces: by id. known: bodies by the id of their item, which are taken as they are.
     """
     found = []
-    n_source = len(draft.source.items)
-    for index, item in enumerate(draft.items):
-        was = draft.source.items[index] if index < n_source else None
+    n_source = len(house.source.items)
+    for index, item in enumerate(house.items):
+        was = house.source.items[index] if index < n_source else None
         held = (known or {}).get(id(item))
         if held is not None:
             held.index = index

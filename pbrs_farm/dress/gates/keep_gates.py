@@ -1,4 +1,4 @@
-"""Measure a draft by its gates, take out what breaks one, and measure again; state: the draft's.
+"""Measure a house by its gates, take out what breaks one, and measure again; state: the house is changed.
 
 What was added is taken out; what replaced a thing of the source goes, and that thing comes back.
 """
@@ -15,7 +15,6 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates.bodies import Body, bodies_of, piece_id
 from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
 from pbrs_farm.dress.gates.plumb import Plumb
@@ -23,6 +22,7 @@ from pbrs_farm.dress.gates.shells import Solids
 from pbrs_farm.dress.gates.support import MOST_M as SUPPORT_M
 from pbrs_farm.dress.gates.support import held, held_as_drawn
 from pbrs_farm.dress.gates.ways import blocked_doors, closed_ways, covered_windows
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import Gate
 from pbrs_farm.dress.space import HouseSpace, floor_space
 
@@ -55,19 +55,19 @@ class _Memory:
 
 
 def keep_gates(
-    draft: Draft, pieces: Mapping[str, Piece], names: Sequence[str] = _NAMES
+    house: MutableHouse, pieces: Mapping[str, Piece], names: Sequence[str] = _NAMES
 ) -> tuple[Gate, ...]:
-    """Take out of the draft what breaks a gate, until nothing does. pieces: by id; names: of gates.
+    """Take out of the house what breaks a gate, until nothing does. pieces: by id; names: of gates.
 
     What an earlier call measured of items that are still the same is not measured again.
     """
-    memory = draft.kept.get("gates")
+    memory = house.kept.get("gates")
     if not isinstance(memory, _Memory):
-        memory = draft.kept["gates"] = _Memory()
+        memory = house.kept["gates"] = _Memory()
     memory.free.clear()
     taken: Counter[str] = Counter()
     for _round in range(_ROUNDS):
-        checked, broken = _measure_gates(draft, pieces, memory, names)
+        checked, broken = _measure_gates(house, pieces, memory, names)
         out: dict[int, str] = {}
         for name in names:
             for index in broken[name]:
@@ -75,9 +75,9 @@ def keep_gates(
         if not out:
             break
         taken.update(out.values())
-        _take_out(draft, out)
+        _take_out(house, out)
     else:
-        checked, broken = _measure_gates(draft, pieces, memory, names)
+        checked, broken = _measure_gates(house, pieces, memory, names)
     return tuple(
         Gate(name=n, n_checked=checked[n], n_taken_out=taken[n], n_left=len(broken[n]))
         for n in names
@@ -85,12 +85,12 @@ def keep_gates(
 
 
 def _measure_gates(
-    draft: Draft, pieces: Mapping[str, Piece], memory: _Memory, names: Sequence[str]
+    house: MutableHouse, pieces: Mapping[str, Piece], memory: _Memory, names: Sequence[str]
 ) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Gate -> how much was measured, and gate -> indices of the items that break it."""
-    bodies = _bodies(draft, pieces, memory)
+    bodies = _bodies(house, pieces, memory)
     checked, broken = dict.fromkeys(_NAMES, 0), {name: list[int]() for name in _NAMES}
-    checked["must_haves"], broken["must_haves"] = _changed_class(draft)
+    checked["must_haves"], broken["must_haves"] = _changed_class(house)
     if not any(body.is_new for body in bodies):
         return checked, broken
     # Of two things that share space the one that came later goes.
@@ -102,7 +102,7 @@ def _measure_gates(
     # What is free stays free when things are taken out.
     ways = {name: gate for name, gate in _WAYS.items() if name in names}
     if any(name not in memory.free for name in ways):
-        space, large = _space(draft, bodies)
+        space, large = _space(house, bodies)
         for name, gate in ways.items():
             n, found = gate(space, large)
             checked[name], broken[name] = n, sorted({b.index for b in found})
@@ -111,12 +111,12 @@ def _measure_gates(
     return checked | memory.free, broken
 
 
-def _space(draft: Draft, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
-    """The space of the draft without small things, and the bodies in it, as numbered there.
+def _space(house: MutableHouse, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
+    """The space of the house without small things, and the bodies in it, as numbered there.
 
     What is small and stands on other things is in nobody's way, and there are hundreds.
     """
-    floors = np.array([room.floor_y for room in draft.source.rooms] or [0.0])
+    floors = np.array([room.floor_y for room in house.source.rooms] or [0.0])
     large = [
         b
         for b in bodies
@@ -124,14 +124,14 @@ def _space(draft: Draft, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
         or float((b.high - b.low).max()) > _LARGE_M
         or float(np.abs(floors - b.low[1]).min()) < _ON_FLOOR_M
     ]
-    some = copy(draft)
+    some = copy(house)
     some.items = [b.item for b in large]
     return floor_space(some), large
 
 
-def _bodies(draft: Draft, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:
-    """The draft's bodies, with the shells that were found before."""
-    fresh = bodies_of(draft, pieces, memory.bodies)
+def _bodies(house: MutableHouse, pieces: Mapping[str, Piece], memory: _Memory) -> list[Body]:
+    """The house's bodies, with the shells that were found before."""
+    fresh = bodies_of(house, pieces, memory.bodies)
     memory.bodies |= {id(b.item): b for b in fresh}
     return fresh
 
@@ -167,25 +167,25 @@ def _unsupported(bodies: list[Body], memory: _Memory) -> tuple[int, list[int]]:
     ]
 
 
-def _changed_class(draft: Draft) -> tuple[int, list[int]]:
+def _changed_class(house: MutableHouse) -> tuple[int, list[int]]:
     """How many things of the source there are, and which are no longer of their class."""
-    was = draft.source.items
+    was = house.source.items
     return len(was), [
-        k for k, (a, b) in enumerate(zip(was, draft.items, strict=False)) if a.nyu40 != b.nyu40
+        k for k, (a, b) in enumerate(zip(was, house.items, strict=False)) if a.nyu40 != b.nyu40
     ]
 
 
-def _take_out(draft: Draft, out: Mapping[int, str]) -> None:
-    """Take items out of the draft, or put those of the source back; count why."""
-    n_source = len(draft.source.items)
+def _take_out(house: MutableHouse, out: Mapping[int, str]) -> None:
+    """Take items out of the house, or put those of the source back; count why."""
+    n_source = len(house.source.items)
     for index, name in out.items():
-        item = draft.items[index]
-        draft.refused[
+        item = house.items[index]
+        house.refused[
             f"{pass_that_added(item) if index >= n_source else 'swap'}: {_REASONS[name]}"
         ] += 1
         if index < n_source:
-            draft.items[index] = draft.source.items[index]
-    draft.items = [x for k, x in enumerate(draft.items) if k < n_source or k not in out]
+            house.items[index] = house.source.items[index]
+    house.items = [x for k, x in enumerate(house.items) if k < n_source or k not in out]
 
 
 def pass_that_added(item: Item) -> str:

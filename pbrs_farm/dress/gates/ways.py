@@ -33,7 +33,7 @@ class Blocked:
     """A door, window or way that a body keeps from being used."""
 
     what: str  # the passage or room
-    index: int  # of the body's item in the draft
+    index: int  # of the body's item in the house
 
 
 def _is_in_the_way(body: Body) -> bool:

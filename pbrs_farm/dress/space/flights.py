@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind, Room
 from pbrs_farm.core.mesh import unit_normals
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.footprints import plan_area
 from pbrs_farm.geometry.surface_points import item_triangles
 
@@ -31,11 +31,11 @@ class Flights:
     before: BaseGeometry  # where one steps on and off
 
 
-def flights_of(draft: Draft, room: Room, area: BaseGeometry) -> Flights:
-    """The draft's stairs that stand in a room or arrive in it. area: the room's plan."""
+def flights_of(house: MutableHouse, room: Room, area: BaseGeometry) -> Flights:
+    """The stairs of the house that stand in a room or arrive in it. area: the room's plan."""
     under, before = [], []
     near = area.buffer(_REACH_M)
-    for treads, plan in _stairs(draft):
+    for treads, plan in _stairs(house):
         low, high = float(treads[..., 1].min()), float(treads[..., 1].max())
         if high < room.floor_y - _STEP_M or low > room.ceiling_y or not plan.intersects(near):
             continue
@@ -47,17 +47,17 @@ def flights_of(draft: Draft, room: Room, area: BaseGeometry) -> Flights:
     return Flights(shapely.union_all(under), shapely.union_all(before))
 
 
-def _stairs(draft: Draft) -> list[tuple[F64, BaseGeometry]]:
-    """Level triangles (F, 3, 3) of each stairs of the source, and their plan; found once a draft."""
-    kept = draft.kept.get("stairs")
+def _stairs(house: MutableHouse) -> list[tuple[F64, BaseGeometry]]:
+    """Level triangles (F, 3, 3) of each stairs of the source, and their plan; found once a house."""
+    kept = house.kept.get("stairs")
     if isinstance(kept, list):
         return kept
     found: list[tuple[F64, BaseGeometry]] = []
-    for item in draft.source.items:
+    for item in house.source.items:
         if item.kind is ItemKind.STAIRS and item.n_faces:
             corners = item_triangles(item)
             treads = corners[np.abs(unit_normals(corners)[:, 1]) > _FLAT]
             if len(treads):
                 found.append((treads, plan_area(treads, upright=False).simplify(_COARSE_M)))
-    draft.kept["stairs"] = found
+    house.kept["stairs"] = found
     return found

@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.house import Item, ItemKind, Room
 from pbrs_farm.core.mesh import area_vectors, points_bounds, triangle_bounds
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.footprints import areal, plan_area
 from pbrs_farm.dress.space.passages import Passage, passages_of
 from pbrs_farm.dress.space.room_faces import (
@@ -45,7 +45,7 @@ class RoomSpace:
     faces: tuple[WallFace, ...]
     doors: tuple[Passage, ...]  # and archways
     windows: tuple[Passage, ...]
-    items: tuple[int, ...]  # numbers in Draft.items of what stands or hangs in it
+    items: tuple[int, ...]  # numbers in MutableHouse.items of what stands or hangs in it
     walls: BaseGeometry  # plan area of the walls at the height of a man's chest
     above: F64  # (F, 3, 3) triangles of ceilings and of what else is over it
 
@@ -60,7 +60,7 @@ class HouseSpace:
 
     rooms: tuple[RoomSpace, ...]
     passages: tuple[Passage, ...]
-    points: tuple[F64, ...]  # (N, 3) by number of Draft.items; empty for structure
+    points: tuple[F64, ...]  # (N, 3) by number of MutableHouse.items; empty for structure
     bounds: F64  # (I, 2, 3) of those points; NaN where there are none
 
     def room(self, room_id: str) -> RoomSpace:
@@ -108,29 +108,29 @@ class _KeptSpaces:
     inside: dict[tuple[str, int], bool] = field(default_factory=dict)  # by room and item
 
 
-def house_space(draft: Draft) -> HouseSpace:
-    """The space of the draft as it is now; what did not change since the last call is kept."""
-    kept = draft.kept.get("space")
+def house_space(house: MutableHouse) -> HouseSpace:
+    """The space of the house as it is now; what did not change since the last call is kept."""
+    kept = house.kept.get("space")
     if not isinstance(kept, _KeptSpaces):
-        kept = draft.kept["space"] = _empty_house(draft)
-    key = tuple(id(item) for item in draft.items)
+        kept = house.kept["space"] = _empty_house(house)
+    key = tuple(id(item) for item in house.items)
     if kept.space is None or kept.space[0] != key:
         # Spread points over new items; keep those of the others.
-        for item in draft.items:
+        for item in house.items:
             if id(item) not in kept.items:
                 kept.items[id(item)] = _with_points(item)
-        kept.space = key, _house_space(draft.items, kept)
+        kept.space = key, _house_space(house.items, kept)
     return kept.space[1]
 
 
-def floor_space(draft: Draft) -> HouseSpace:
+def floor_space(house: MutableHouse) -> HouseSpace:
     """As house_space, without the faces of walls: doors, windows, floors and points cost less."""
-    kept = draft.kept.get("space")
+    kept = house.kept.get("space")
     if not isinstance(kept, _KeptSpaces):
-        kept = draft.kept["space"] = _empty_house(draft)
-    kept.items |= {id(i): _with_points(i) for i in draft.items if id(i) not in kept.items}
+        kept = house.kept["space"] = _empty_house(house)
+    kept.items |= {id(i): _with_points(i) for i in house.items if id(i) not in kept.items}
     bare = replace(kept, rooms=tuple(replace(room, faces=()) for room in kept.rooms))
-    return _house_space(draft.items, bare)
+    return _house_space(house.items, bare)
 
 
 def _with_points(item: Item) -> tuple[Item, F64, F64]:
@@ -141,8 +141,8 @@ def _with_points(item: Item) -> tuple[Item, F64, F64]:
     return item, points, bounds
 
 
-def _empty_house(draft: Draft) -> _KeptSpaces:
-    house = draft.source
+def _empty_house(mutable: MutableHouse) -> _KeptSpaces:
+    house = mutable.source
     areas = [room_area(room) for room in house.rooms]
     wall_items = [i for i in house.items if i.kind is ItemKind.WALL and i.n_faces]
     bounds = np.array([i.bounds for i in wall_items]).reshape(-1, 2, 3)

@@ -1,6 +1,6 @@
 """The part of dressing that gives every room its floor, walls, ceiling and skirting boards.
 
-Effects: on the draft.
+Effects: changes the house.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import Item, ItemKind, Surface
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.surface_finishes import (
@@ -93,55 +93,55 @@ class _RoomFinish:
     walls: WallFinish | None
 
 
-def dress_surfaces(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def dress_surfaces(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the rooms floors, walls and ceilings of the style, and skirting boards."""
-    rooms = house_space(draft).rooms
-    home = home_finish(draft.rng(PART, "home"), style)
-    finishes = [_room_finish(draft, catalogue, style, home, room, share) for room in rooms]
-    _lay_floors(draft, home, finishes)
-    scheme = finish_scheme(draft, style)
-    _paint_walls(draft, scheme, finishes)
-    _set_boards(draft, home, scheme, finishes)
+    rooms = house_space(house).rooms
+    home = home_finish(house.rng(PART, "home"), style)
+    finishes = [_room_finish(house, catalogue, style, home, room, share) for room in rooms]
+    _lay_floors(house, home, finishes)
+    scheme = finish_scheme(house, style)
+    _paint_walls(house, scheme, finishes)
+    _set_boards(house, home, scheme, finishes)
 
 
 def _room_finish(
-    draft: Draft, catalogue: Catalogue, style: Style, home: HomeFinish, room: RoomSpace,
+    house: MutableHouse, catalogue: Catalogue, style: Style, home: HomeFinish, room: RoomSpace,
     share: float,
 ) -> _RoomFinish:  # fmt: skip
     # Streams of their own: what one room draws changes nothing in another.
-    rng = draft.rng(PART, room.room.id)
+    rng = house.rng(PART, room.room.id)
     taste = room_style(style, rng)
-    floor = floor_of(draft.rng(PART, room.room.id, "floor"), taste, home, room.kind)
-    walls = walls_of(draft.rng(PART, room.room.id, "walls"), taste, home, room.kind)
+    floor = floor_of(house.rng(PART, room.room.id, "floor"), taste, home, room.kind)
+    walls = walls_of(house.rng(PART, room.room.id, "walls"), taste, home, room.kind)
     if rng.random() >= share:
         return _RoomFinish(room, None, None)
     # Now and then a photographed floor stays.
-    if rng.random() < _KEPT_SHARE and _is_photographed(draft, f"floor_{room.room.id}"):
+    if rng.random() < _KEPT_SHARE and _is_photographed(house, f"floor_{room.room.id}"):
         floor = None
     # Libraries may hold pictures of what was drawn.
     if floor is not None:
-        floor = replace(floor, pattern=photographed(draft, catalogue, floor.pattern))
+        floor = replace(floor, pattern=photographed(house, catalogue, floor.pattern))
     if walls is not None:
         main, accent, low = (
-            None if p is None else photographed(draft, catalogue, p)
+            None if p is None else photographed(house, catalogue, p)
             for p in (walls.main, walls.accent, walls.low)
         )
         walls = replace(walls, main=main or walls.main, accent=accent, low=low)
     return _RoomFinish(room, floor, walls)
 
 
-def _is_photographed(draft: Draft, item_id: str) -> bool:
+def _is_photographed(house: MutableHouse, item_id: str) -> bool:
     return any(
-        draft.materials[s.material].texture_id is not None
-        for item in draft.items
+        house.materials[s.material].texture_id is not None
+        for item in house.items
         if item.id == item_id
         for s in item.surfaces
     )
 
 
-def _lay_floors(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
+def _lay_floors(house: MutableHouse, home: HomeFinish, finishes: list[_RoomFinish]) -> None:
     of_room = {f.space.room.id: f for f in finishes}
-    for index, item in enumerate(draft.items):
+    for index, item in enumerate(house.items):
         finish = of_room.get(item.room_id or "")
         if finish is None or item.kind not in (ItemKind.FLOOR, ItemKind.CEILING):
             continue
@@ -154,37 +154,37 @@ def _lay_floors(draft: Draft, home: HomeFinish, finishes: list[_RoomFinish]) -> 
             pattern, turn = finish.floor.pattern, finish.floor.turn_rad
         else:
             continue
-        material = pattern_material(draft, pattern)
-        draft.change(index, laid(item, material, finish.space.area, turn), PART)
-        draft.done[f"{PART}: {pattern.family} {item.kind}"] += 1
+        material = pattern_material(house, pattern)
+        house.change(index, laid(item, material, finish.space.area, turn), PART)
+        house.done[f"{PART}: {pattern.family} {item.kind}"] += 1
 
 
-def _paint_walls(draft: Draft, scheme: FinishScheme, finishes: list[_RoomFinish]) -> None:
-    house = draft.source
+def _paint_walls(mutable: MutableHouse, scheme: FinishScheme, finishes: list[_RoomFinish]) -> None:
+    house = mutable.source
     finder = RoomFinder(house.rooms, [f.space.area for f in finishes])
     walls = {
         index: sided_wall(item, finder)
-        for index, item in enumerate(draft.items)
+        for index, item in enumerate(mutable.items)
         if item.kind is ItemKind.WALL and item.n_faces and BASEBOARD not in item.tags
     }
     accents = _accent_runs(walls, finishes)
     rest = RestOfWall(
-        foot=number_of_finish(draft, replace(scheme.plaster, name=REVEAL)),
-        flat=number_of_finish(draft, scheme.plaster),
+        foot=number_of_finish(mutable, replace(scheme.plaster, name=REVEAL)),
+        flat=number_of_finish(mutable, scheme.plaster),
     )
     render = PatternMaterial(
-        number_of_finish(draft, scheme.render), (1.0, 1.0), lambda: scheme.render.paint
+        number_of_finish(mutable, scheme.render), (1.0, 1.0), lambda: scheme.render.paint
     )
     is_painted = any(f.walls is not None for f in finishes)
     for index, wall in walls.items():
         looks = {
-            (k, r): _room_walls(draft, finishes[run.room], is_accent=(index, k, r) in accents)
+            (k, r): _room_walls(mutable, finishes[run.room], is_accent=(index, k, r) in accents)
             for k, side in enumerate(wall.sides)
             for r, run in enumerate(side.runs)
             if run.room is not None and finishes[run.room].walls is not None
         }
         # Outdoors the home has one render, but for walls with a picture.
-        if is_painted and _is_bare(draft, draft.items[index]):
+        if is_painted and _is_bare(mutable, mutable.items[index]):
             looks |= {
                 (k, r): RoomWalls(render, side.low_y)
                 for k, side in enumerate(wall.sides)
@@ -192,25 +192,25 @@ def _paint_walls(draft: Draft, scheme: FinishScheme, finishes: list[_RoomFinish]
                 if run.room is None or finishes[run.room].space.kind is RoomKind.OUTDOOR
             }
         if looks:
-            draft.change(index, painted_wall(draft.items[index], wall, looks, rest), PART)
+            mutable.change(index, painted_wall(mutable.items[index], wall, looks, rest), PART)
     for finish in finishes:
         if finish.walls is not None:
-            draft.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
+            mutable.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
 
 
-def _is_bare(draft: Draft, item: Item) -> bool:
+def _is_bare(house: MutableHouse, item: Item) -> bool:
     """Whether all of a wall may be rendered: neither pictures nor glass."""
-    return all(is_plain(draft.materials[s.material]) for s in item.surfaces)
+    return all(is_plain(house.materials[s.material]) for s in item.surfaces)
 
 
-def _room_walls(draft: Draft, finish: _RoomFinish, *, is_accent: bool) -> RoomWalls:
+def _room_walls(house: MutableHouse, finish: _RoomFinish, *, is_accent: bool) -> RoomWalls:
     walls, floor_y = finish.walls, finish.space.room.floor_y
     if walls is None:
         raise ValueError("a room without a wall finish has no wall materials")
     if is_accent and walls.accent is not None:
-        return RoomWalls(pattern_material(draft, walls.accent), floor_y)
-    low = None if walls.low is None else pattern_material(draft, walls.low)
-    return RoomWalls(pattern_material(draft, walls.main), floor_y, low, floor_y + walls.low_m)
+        return RoomWalls(pattern_material(house, walls.accent), floor_y)
+    low = None if walls.low is None else pattern_material(house, walls.low)
+    return RoomWalls(pattern_material(house, walls.main), floor_y, low, floor_y + walls.low_m)
 
 
 def _accent_runs(
@@ -238,42 +238,42 @@ _NO_ACCENT = WallFinish(Pattern("paint", 0))
 
 
 def _set_boards(
-    draft: Draft, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
+    house: MutableHouse, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
 ) -> None:
-    if has_boards(draft.source):
-        _paint_boards(draft, home, scheme, finishes)
+    if has_boards(house.source):
+        _paint_boards(house, home, scheme, finishes)
         return
-    walls = wall_plans(draft.source)
+    walls = wall_plans(house.source)
     for finish in finishes:
         room = finish.space.room
         if finish.walls is None or finish.walls.is_tiled or finish.space.kind is RoomKind.STORE:
             continue
-        board_finish = _board_finish(draft, home, scheme, finish)
-        board = skirting_board(draft.source, room, finish.space.area, walls, home.board_m, 0)
+        board_finish = _board_finish(house, home, scheme, finish)
+        board = skirting_board(house.source, room, finish.space.area, walls, home.board_m, 0)
         if board is not None:
             # A new board has no look of its own yet: the finish covers all of it.
-            looks = tuple(with_finish(draft, s, board_finish, np.eye(3)) for s in board.surfaces)
+            looks = tuple(with_finish(house, s, board_finish, np.eye(3)) for s in board.surfaces)
             board = replace(board, surfaces=looks)
-            draft.add(replace(board, tags=(*board.tags, f"seed:{draft.seed}")), PART)
-            draft.done[f"{PART}: skirting board"] += 1
+            house.add(replace(board, tags=(*board.tags, f"seed:{house.seed}")), PART)
+            house.done[f"{PART}: skirting board"] += 1
 
 
 def _paint_boards(
-    draft: Draft, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
+    house: MutableHouse, home: HomeFinish, scheme: FinishScheme, finishes: list[_RoomFinish]
 ) -> None:
     """Give the source's boards the home's finish; before tiles, the tiles'."""
-    finder = RoomFinder(draft.source.rooms, [f.space.area for f in finishes])
-    for index, item in enumerate(draft.items):
+    finder = RoomFinder(house.source.rooms, [f.space.area for f in finishes])
+    for index, item in enumerate(house.items):
         if BASEBOARD not in item.tags or item.kind is not ItemKind.WALL or not item.n_faces:
             continue
         rooms = _rooms_before(item, finder)
         if not rooms or all(finishes[k].walls is None for k in rooms):
             continue
         finish = next(finishes[k] for k in rooms if finishes[k].walls is not None)
-        board_finish = _board_finish(draft, home, scheme, finish)
-        made = item_with_finish(draft, item, board_finish)
+        board_finish = _board_finish(house, home, scheme, finish)
+        made = item_with_finish(house, item, board_finish)
         if made is not item:
-            draft.change(index, made, PART)
+            house.change(index, made, PART)
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
@@ -288,7 +288,7 @@ def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:
 
 
 def _board_finish(
-    draft: Draft, home: HomeFinish, scheme: FinishScheme, finish: _RoomFinish
+    house: MutableHouse, home: HomeFinish, scheme: FinishScheme, finish: _RoomFinish
 ) -> Finish:
     walls, floor = finish.walls, finish.floor
     if walls is not None and walls.is_tiled:
@@ -298,6 +298,6 @@ def _board_finish(
         return scheme.trim
     if floor is None or floor.pattern.family not in WOOD_FLOORS:
         return scheme.trim
-    made: PatternMaterial = pattern_material(draft, floor.pattern)
+    made: PatternMaterial = pattern_material(house, floor.pattern)
     r, g, b = srgb_from_linear(np.array(made.mean_rgb)).tolist()
     return Finish("skirting wood", (r, g, b))

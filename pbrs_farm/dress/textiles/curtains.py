@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import BLINDS, CURTAIN
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
 from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel
@@ -64,7 +64,7 @@ class WindowSide:
 
 
 def window_side(
-    draft: Draft, space: HouseSpace, room: RoomSpace, window: Passage
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, window: Passage
 ) -> WindowSide | None:
     """The window from the room; None where it has cloth already or nothing fits before it."""
     side = window.side_of(room.room.id)
@@ -75,29 +75,29 @@ def window_side(
     origin = window.face_point(side)
     origin[1] = room.room.floor_y
     ceiling = float(room.ceiling_y((origin + 0.1 * inward)[None, [0, 2]])[0])
-    number = next((n for n, i in enumerate(draft.items) if i.id == window.item_id), None)
+    number = next((n for n, i in enumerate(house.items) if i.id == window.item_id), None)
     sticks_out = 0.0
     if number is not None and len(space.points[number]):
         sticks_out = max(float(((space.points[number] - origin) @ inward).max()), 0.0)
     seen = WindowSide(window, side, origin, along, inward, room.room.floor_y, ceiling, sticks_out)
-    return None if _is_dressed(draft, space, seen) else seen
+    return None if _is_dressed(house, space, seen) else seen
 
 
-def _is_dressed(draft: Draft, space: HouseSpace, seen: WindowSide) -> bool:
+def _is_dressed(house: MutableHouse, space: HouseSpace, seen: WindowSide) -> bool:
     # A curtain or blind of the source, or of the window's other neighbour, hangs there.
     half = seen.window.width / 2
     low, high = seen.bounds(-half, half, seen.window.bottom_y, seen.window.top_y, 0.3)
     low, high = low - 0.1, high + 0.1
     return any(
-        draft.items[n].nyu40 in (CURTAIN, BLINDS)
+        house.items[n].nyu40 in (CURTAIN, BLINDS)
         and (space.bounds[n][0] < high).all()
         and (space.bounds[n][1] > low).all()
-        for n in range(len(draft.items))
+        for n in range(len(house.items))
     )
 
 
 def hang_curtains(
-    draft: Draft, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
     rng: np.random.Generator,
 ) -> bool:  # fmt: skip
     """A rod and two panels; False, with its reason counted, where they do not fit."""
@@ -106,35 +106,35 @@ def hang_curtains(
     depth = float(rng.uniform(0.026, 0.038))
     rod_z = max(seen.sticks_out_m + 1.3 * depth + 0.015, 0.075)
     if rod_y < window.top_y + 0.02 or rod_z > _MOST_OUT_M:
-        draft.refused[f"{PART}: no place for a curtain rod"] += 1
+        house.refused[f"{PART}: no place for a curtain rod"] += 1
         return False
     out = rod_z + 1.4 * depth
     panels = []
     cover = float(rng.uniform(0.15, 0.25)) * window.width
     for sign in (-1, 1):
-        found = _panel_place(space, room, seen, sign, cover, rod_y, out, draft)
+        found = _panel_place(space, room, seen, sign, cover, rod_y, out, house)
         if found is not None:
             panels.append(found)
     # One panel alone looks as if the other had been stolen.
     if len(panels) < 2:
-        draft.refused[f"{PART}: no room on both sides of a window"] += 1
+        house.refused[f"{PART}: no room on both sides of a window"] += 1
         return False
     # Both panels end at one height.
     bottom = max(p[2] for p in panels)
     piece, shape, middle = _curtain_set(seen, panels, bottom, rod_y, rod_z, depth, cloth, rng)
-    _add_at_window(draft, room, piece, shape, seen, middle, bottom)
+    _add_at_window(house, room, piece, shape, seen, middle, bottom)
     return True
 
 
 def _panel_place(
     space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int, cover: float, rod_y: float,
-    out: float, draft: Draft,
+    out: float, house: MutableHouse,
 ) -> tuple[float, float, float] | None:  # fmt: skip
     """x0, x1 across and the lowest y of a panel at one end of the window; None = no room."""
     half = seen.window.width / 2
     sill = seen.window.bottom_y
-    without = [n for n, i in enumerate(draft.items) if i.kind is ItemKind.WINDOW]
-    heaters = [n for n, i in enumerate(draft.items) if words_of_item(i) & RADIATORS]
+    without = [n for n, i in enumerate(house.items) if i.kind is ItemKind.WINDOW]
+    heaters = [n for n, i in enumerate(house.items) if words_of_item(i) & RADIATORS]
     free = shapely.difference(room.area, room.walls)
     for beyond in (_BESIDE_M, 0.34, 0.25, 0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)
@@ -182,7 +182,9 @@ class Cloth:
     rod: Material
 
 
-def room_cloth(draft: Draft, style: Style, room: RoomSpace, rng: np.random.Generator) -> Cloth:
+def room_cloth(
+    house: MutableHouse, style: Style, room: RoomSpace, rng: np.random.Generator
+) -> Cloth:
     """What the curtains of a room are made of: calm, light colours more often than loud ones."""
     tint = style.textiles[
         int(min(rng.integers(len(style.textiles)), rng.integers(len(style.textiles))))
@@ -190,9 +192,9 @@ def room_cloth(draft: Draft, style: Style, room: RoomSpace, rng: np.random.Gener
     if rng.random() < 0.45:
         tint = mix(tint, (0.93, 0.91, 0.87), float(rng.uniform(0.5, 0.85)))
     family = "weave" if rng.random() < 0.6 else "twill"
-    pattern = pattern_material(draft, Pattern(family, int(rng.integers(4)), (_round_colour(tint),)))
+    pattern = pattern_material(house, Pattern(family, int(rng.integers(4)), (_round_colour(tint),)))
     return Cloth(
-        draft.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
+        house.materials[pattern.number], pattern.size_m[0], float(rng.uniform(0.12, 0.18)),
         metal(style) if rng.random() < 0.6 else plain("rod", style.wood.mean, 0.4),
     )  # fmt: skip
 
@@ -222,7 +224,7 @@ def _curtain_set(
 
 
 def hang_blind(
-    draft: Draft, space: HouseSpace, room: RoomSpace, seen: WindowSide, style: Style,
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, seen: WindowSide, style: Style,
     rng: np.random.Generator,
 ) -> bool:  # fmt: skip
     """A roller blind or slats before the window, let down a little to half."""
@@ -232,13 +234,13 @@ def hang_blind(
     half = window.width / 2 + 0.03
     drop = float(rng.uniform(0.12, 0.5)) * (window.top_y - window.bottom_y) + top - window.top_y
     low, high = seen.bounds(-half, half, top - drop, top, z + 0.07)
-    own = [n for n, i in enumerate(draft.items) if i.id == window.item_id]
+    own = [n for n, i in enumerate(house.items) if i.id == window.item_id]
     free = shapely.difference(room.area, room.walls)
     if not (is_flat(free, seen, half) and is_flat(free, seen, -half)):
-        draft.refused[f"{PART}: the wall bends beside a window"] += 1
+        house.refused[f"{PART}: the wall bends beside a window"] += 1
         return False
     if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=own):
-        draft.refused[f"{PART}: no place for a blind"] += 1
+        house.refused[f"{PART}: no place for a blind"] += 1
         return False
     calm = mix(style.textiles[0], (0.92, 0.91, 0.88), float(rng.uniform(0.3, 0.9)))
     parts = _slats(half, drop, z, calm) if rng.random() < 0.4 else _roller(half, drop, z, calm)
@@ -248,7 +250,7 @@ def hang_blind(
         arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
         parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
     piece, shape = hung("blind", "blinds", BLINDS, parts)
-    _add_at_window(draft, room, piece, shape, seen, 0.0, top - drop)
+    _add_at_window(house, room, piece, shape, seen, 0.0, top - drop)
     return True
 
 
@@ -286,16 +288,22 @@ def _slats(
 
 
 def _add_at_window(
-    draft: Draft, room: RoomSpace, piece: Piece, shape: Shape, seen: WindowSide, x: float, y: float
+    house: MutableHouse,
+    room: RoomSpace,
+    piece: Piece,
+    shape: Shape,
+    seen: WindowSide,
+    x: float,
+    y: float,
 ) -> Item:
     at = seen.origin + seen.along * x + seen.inward * GAP_M
     at[1] = y
     placed = replace(piece, place=Place.WALL)
-    item = draft.placed(
-        placed, shape, at, seen.turn_rad, item_id=next_id(draft, PART), room_id=room.room.id,
+    item = house.placed(
+        placed, shape, at, seen.turn_rad, item_id=next_id(house, PART), room_id=room.room.id,
         level_id=room.room.level_id,
     )  # fmt: skip
-    draft.add(item, PART, placed)
+    house.add(item, PART, placed)
     return item
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import SINK, TOWEL
 from pbrs_farm.core.house import Material, Surface
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, mix, room_style
 from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
@@ -26,24 +26,24 @@ _FAR_M = 2.5  # from the basin
 
 
 def hang_towels(
-    draft: Draft, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator,
+    house: MutableHouse, catalogue: Catalogue, style: Style, room_id: str, rng: np.random.Generator,
     share: float,
 ) -> None:  # fmt: skip
     """A towel or two in a bathroom that has none, on the free wall nearest to the basin."""
-    space = house_space(draft)
+    space = house_space(house)
     room = space.room(room_id)
-    has = any(draft.items[n].nyu40 == TOWEL for n in room.items)
+    has = any(house.items[n].nyu40 == TOWEL for n in room.items)
     if room.kind is not RoomKind.BATHROOM or has or rng.random() >= 0.85 * share:
         return
-    hanging = Hanging(draft, room, PART)
+    hanging = Hanging(house, room, PART)
     for _ in range(int(rng.integers(1, 3))):
-        piece, shape = _draw_rail(catalogue, rng) or towel_rail(draft, style, rng)
+        piece, shape = _draw_rail(catalogue, rng) or towel_rail(house, style, rng)
         (x0, _y0, _z0), (x1, y1, z1) = shape.bounds
         width, height, depth = float(x1 - x0), float(y1), float(z1)
         low = room.room.floor_y + _RAIL_M - height
-        spot = _spot_near_basin(hanging, space, room, draft, width, (low, low + height), depth)
+        spot = _spot_near_basin(hanging, space, room, house, width, (low, low + height), depth)
         if spot is None:
-            draft.refused[f"{PART}: no free wall for a towel"] += 1
+            house.refused[f"{PART}: no free wall for a towel"] += 1
             return
         hanging.hang(piece, shape, spot[0], spot[1] + width / 2, low)
 
@@ -57,16 +57,16 @@ def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
     return (piece, shape) if shape is not None else None
 
 
-def towel_rail(draft: Draft, style: Style, rng: np.random.Generator) -> Made:
+def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> Made:
     """A rail with a towel over it."""
     width = float(rng.uniform(0.4, 0.6))
     towel, drop, z = width * float(rng.uniform(0.6, 0.85)), float(rng.uniform(0.45, 0.7)), 0.07
     tint = mix(style.textiles[int(rng.integers(len(style.textiles)))], (0.93, 0.92, 0.9), float(rng.choice([0.0, 0.4, 0.85])))  # fmt: skip
     r, g, b = (round(c, 2) for c in tint)
-    pattern = pattern_material(draft, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
+    pattern = pattern_material(house, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
     steel = metal(style)
     parts: list[tuple[Surface, Material]] = [
-        (towel_over_bar(towel, drop, z, rng), draft.materials[pattern.number]),
+        (towel_over_bar(towel, drop, z, rng), house.materials[pattern.number]),
         (bar("rail", -width / 2, width / 2, drop, z, 0.009), steel),
     ]
     for sign in (-1, 1):
@@ -76,11 +76,11 @@ def towel_rail(draft: Draft, style: Style, rng: np.random.Generator) -> Made:
 
 
 def _spot_near_basin(
-    hanging: Hanging, space: HouseSpace, room: RoomSpace, draft: Draft, width: float,
+    hanging: Hanging, space: HouseSpace, room: RoomSpace, house: MutableHouse, width: float,
     heights: tuple[float, float], depth: float,
 ) -> tuple[int, float] | None:  # fmt: skip
     """(face, s) of the free place nearest to a basin of the room, within reach; None = none."""
-    basins = [space.bounds[n].mean(0) for n in room.items if draft.items[n].nyu40 == SINK]
+    basins = [space.bounds[n].mean(0) for n in room.items if house.items[n].nyu40 == SINK]
     best: tuple[float, int, float] | None = None
     for k, face in enumerate(hanging.faces):
         for s in face.starts(width + 0.06, heights[0], heights[1] + 0.05, depth + 0.15):
@@ -91,48 +91,48 @@ def _spot_near_basin(
     return None if best is None else (best[1], best[2])
 
 
-def add_textiles(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
+def add_textiles(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Hang curtains, blinds and towels, lay rugs. share: 0..1 of what rooms would get."""
-    cover_drawn_rugs(draft, style, share)
-    for room_id in [r.room.id for r in house_space(draft).rooms]:
-        room = house_space(draft).room(room_id)
+    cover_drawn_rugs(house, style, share)
+    for room_id in [r.room.id for r in house_space(house).rooms]:
+        room = house_space(house).room(room_id)
         if room.kind in (RoomKind.OUTDOOR, RoomKind.STORE) or room.area.is_empty:
             continue
-        taste = room_style(style, draft.rng("textiles", room_id, "style"))
-        _dress_windows(draft, room, taste, draft.rng("textiles", room_id, "windows"), share)
+        taste = room_style(style, house.rng("textiles", room_id, "style"))
+        _dress_windows(house, room, taste, house.rng("textiles", room_id, "windows"), share)
         if room.room.has_floor:
-            lay_rugs(draft, room_id, taste, draft.rng("textiles", room_id, "rugs"), share)
+            lay_rugs(house, room_id, taste, house.rng("textiles", room_id, "rugs"), share)
         hang_towels(
-            draft, catalogue, taste, room_id, draft.rng("textiles", room_id, "towels"), share
+            house, catalogue, taste, room_id, house.rng("textiles", room_id, "towels"), share
         )
 
 
 def _dress_windows(
-    draft: Draft, room: RoomSpace, style: Style, rng: np.random.Generator, share: float
+    house: MutableHouse, room: RoomSpace, style: Style, rng: np.random.Generator, share: float
 ) -> None:
     """All windows of a room alike: people buy one cloth."""
     if not room.windows:
         return
     curtains = rng.random() < WANTS[room.kind].curtains * share
     blinds = rng.random() < WANTS[room.kind].blinds * share
-    cloth = room_cloth(draft, style, room, rng) if curtains else None
+    cloth = room_cloth(house, style, room, rng) if curtains else None
     look = int(rng.integers(1 << 30))
     for window in room.windows:
         # Inner windows between two rooms stay bare.
-        if None not in window.room_ids and not _looks_out(draft, window.room_ids):
+        if None not in window.room_ids and not _looks_out(house, window.room_ids):
             continue
-        space = house_space(draft)
-        seen = window_side(draft, space, space.room(room.room.id), window)
+        space = house_space(house)
+        seen = window_side(house, space, space.room(room.room.id), window)
         if seen is None:
             continue
         own = np.random.default_rng(look)
-        done = cloth is not None and hang_curtains(draft, space, room, seen, cloth, own)
+        done = cloth is not None and hang_curtains(house, space, room, seen, cloth, own)
         # Where no cloth fits beside it, people still want to close it.
         if not done and (blinds or cloth is not None):
-            hang_blind(draft, space, room, seen, style, own)
+            hang_blind(house, space, room, seen, style, own)
 
 
-def _looks_out(draft: Draft, room_ids: tuple[str | None, str | None]) -> bool:
+def _looks_out(house: MutableHouse, room_ids: tuple[str | None, str | None]) -> bool:
     # A balcony or a terrace is outdoors, too.
-    space = house_space(draft)
+    space = house_space(house)
     return any(i is None or space.room(i).kind is RoomKind.OUTDOOR for i in room_ids)

@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import BATHTUB, BED, FLOOR_MAT, SINK, SOFA, TABLE
 from pbrs_farm.core.house import Item, ItemKind, Material, Surface
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.textiles.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_pixels
@@ -101,10 +101,10 @@ def _fringe(rng: np.random.Generator, width: float, end: float, long: float) -> 
 
 
 def lay_rugs(
-    draft: Draft, room_id: str, style: Style, rng: np.random.Generator, share: float
+    house: MutableHouse, room_id: str, style: Style, rng: np.random.Generator, share: float
 ) -> None:
     """The rugs and mats of one room."""
-    space = house_space(draft)
+    space = house_space(house)
     room = space.room(room_id)
     lay = {
         RoomKind.LIVING: _by_sofa, RoomKind.BEDROOM: _by_bed, RoomKind.DINING: _by_table,
@@ -112,41 +112,41 @@ def lay_rugs(
     }.get(room.kind)  # fmt: skip
     likely = {RoomKind.DINING: 0.45, RoomKind.HALL: 0.6}.get(room.kind, 0.8)
     if lay is not None and rng.random() < likely * share:
-        lay(draft, space, room, style, rng)
+        lay(house, space, room, style, rng)
     if rng.random() < 0.8 * share:
-        _doormats(draft, space, room, style, rng)
+        _doormats(house, space, room, style, rng)
 
 
 def _by_sofa(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    sofas = _furniture_of_class(draft, room, SOFA)
+    sofas = _furniture_of_class(house, room, SOFA)
     if not sofas:
         if room.kind is RoomKind.LIVING:
-            _by_table(draft, space, room, style, rng)
+            _by_table(house, space, room, style, rng)
         return
-    box = max((draft.items[n].oriented_box for n in sofas), key=lambda b: float(b.half[0]))
+    box = max((house.items[n].oriented_box for n in sofas), key=lambda b: float(b.half[0]))
     front = box.axes[:, 2] * [1, 0, 1]
     # In front of the sofa, its feet on the rug; round the table that stands there.
     middle = box.centre + front * (float(box.half[2]) + 0.65)
     tables = [
-        draft.items[n].oriented_box.centre
-        for n in _furniture_of_class(draft, room, TABLE)
-        if np.linalg.norm((draft.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
+        house.items[n].oriented_box.centre
+        for n in _furniture_of_class(house, room, TABLE)
+        if np.linalg.norm((house.items[n].oriented_box.centre - middle)[[0, 2]]) < 1.0
     ]
     if tables:
         middle = np.mean([middle, *tables[:1]], axis=0)
     turn = float(np.arctan2(front[0], front[2]))
-    _lay_largest(draft, space, room, style, rng, middle, turn, _shuffled(rng))
+    _lay_largest(house, space, room, style, rng, middle, turn, _shuffled(rng))
 
 
 def _by_bed(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    beds = _furniture_of_class(draft, room, BED)
+    beds = _furniture_of_class(house, room, BED)
     if not beds:
         return
-    box = max((draft.items[n].oriented_box for n in beds), key=lambda b: float(b.half[0]))
+    box = max((house.items[n].oriented_box for n in beds), key=lambda b: float(b.half[0]))
     front, right = box.axes[:, 2] * [1, 0, 1], box.axes[:, 0] * [1, 0, 1]
     half = box.half
     turn = float(np.arctan2(front[0], front[2]))
@@ -156,20 +156,20 @@ def _by_bed(
         at = box.centre + front * float(half[2]) * 0.45
         narrow = 2 * float(half[0]) + 0.3
         sizes = [(w, min(long, 3.0)) for long in (wide, narrow) for w in (2.0, 1.7, 1.4)]
-        if _lay_largest(draft, space, room, style, rng, at, turn, sizes, from_wall=0.1):
+        if _lay_largest(house, space, room, style, rng, at, turn, sizes, from_wall=0.1):
             return
     for sign in (1.0, -1.0):
         at = box.centre + right * sign * (float(half[0]) + 0.42)
-        if _lay_largest(draft, space, room, style, rng, at, turn + np.pi / 2, [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):  # fmt: skip
+        if _lay_largest(house, space, room, style, rng, at, turn + np.pi / 2, [(0.7, 1.5), (0.6, 1.1)], from_wall=0.05):  # fmt: skip
             return
     at = box.centre + front * (float(half[2]) + 0.45)
-    _lay_largest(draft, space, room, style, rng, at, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
+    _lay_largest(house, space, room, style, rng, at, turn, [(0.7, 1.4), (0.6, 1.0)], from_wall=0.1)
 
 
 def _by_table(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
-    boxes = [draft.items[n].oriented_box for n in _furniture_of_class(draft, room, TABLE)]
+    boxes = [house.items[n].oriented_box for n in _furniture_of_class(house, room, TABLE)]
     large = [b for b in boxes if min(b.half[0], b.half[2]) > 0.35]
     if not large:
         return
@@ -182,39 +182,39 @@ def _by_table(
         (2 * float(box.half[2 - axis]) + more, 2 * float(box.half[axis]) + more)
         for more in (1.2, 1.0, 0.7)
     ]
-    _lay_largest(draft, space, room, style, rng, box.centre, turn, sizes, from_wall=0.2)
+    _lay_largest(house, space, room, style, rng, box.centre, turn, sizes, from_wall=0.2)
 
 
 def _bath_mat(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
     for wanted in (BATHTUB, SINK):
-        for number in _furniture_of_class(draft, room, wanted):
-            box = draft.items[number].oriented_box
+        for number in _furniture_of_class(house, room, wanted):
+            box = house.items[number].oriented_box
             for axis, sign in ((2, 1.0), (0, 1.0), (0, -1.0)):
                 out = box.axes[:, axis] * sign * [1, 0, 1]
                 at = box.centre + out * (float(box.half[axis]) + 0.3)
                 turn = float(np.arctan2(out[0], out[2]))
                 if _lay_largest(
-                    draft, space, room, style, rng, at, turn, [(0.5, 0.8), (0.45, 0.65)],
+                    house, space, room, style, rng, at, turn, [(0.5, 0.8), (0.45, 0.65)],
                     from_wall=0.02, patterns=BATH_MATS, forms=_MAT_FORMS, bare=True,
                 ):  # fmt: skip
                     return
 
 
 def _runner(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
     inner = room.area.representative_point()
     x, z = float(inner.x), float(inner.y)
     x0, z0, x1, z1 = room.area.bounds
     turn = 0.0 if x1 - x0 >= z1 - z0 else np.pi / 2
     sizes = [(0.8, 2.6), (0.8, 2.0), (0.7, 1.5), (0.6, 1.0)]
-    _lay_largest(draft, space, room, style, rng, np.array([x, 0.0, z]), turn, sizes, from_wall=0.12)
+    _lay_largest(house, space, room, style, rng, np.array([x, 0.0, z]), turn, sizes, from_wall=0.12)
 
 
 def _doormats(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator
 ) -> None:
     # Inside every door that leads out of the home.
     for door in room.doors:
@@ -225,19 +225,19 @@ def _doormats(
         out = door.inward(side)
         turn = float(np.arctan2(out[0], out[2]))
         _lay_largest(
-            draft, house_space(draft), room, style, rng, at, turn, [(0.45, 0.75), (0.4, 0.6)],
+            house, house_space(house), room, style, rng, at, turn, [(0.45, 0.75), (0.4, 0.6)],
             from_wall=0.05, patterns=DOOR_MATS, forms=("sharp", "sharp", "rounded", "half"),
             bare=True, at_doors=True,
         )  # fmt: skip
 
 
-def _furniture_of_class(draft: Draft, room: RoomSpace, nyu40: int) -> list[int]:
+def _furniture_of_class(house: MutableHouse, room: RoomSpace, nyu40: int) -> list[int]:
     # Toys of the class stand on tables; furniture stands on the floor.
     floor = room.room.floor_y
     return [
         n
         for n in room.items
-        if draft.items[n].nyu40 == nyu40 and draft.items[n].bounds[0, 1] < floor + 0.3
+        if house.items[n].nyu40 == nyu40 and house.items[n].bounds[0, 1] < floor + 0.3
     ]
 
 
@@ -248,7 +248,7 @@ def _shuffled(rng: np.random.Generator) -> list[tuple[float, float]]:
 
 
 def _lay_largest(
-    draft: Draft, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator,
+    house: MutableHouse, space: HouseSpace, room: RoomSpace, style: Style, rng: np.random.Generator,
     middle: F64, turn: float, sizes: list[tuple[float, float]], *, from_wall: float = _FROM_WALL_M,
     patterns: Iterable[str] = RUGS, forms: Sequence[str] = _RUG_FORMS, bare: bool = False,
     at_doors: bool = False,
@@ -258,7 +258,7 @@ def _lay_largest(
     bare: nothing may stand on it. at_doors: it may lie where a door swings.
     """
     free = shapely.buffer(shapely.difference(room.area, room.walls), -from_wall, join_style="mitre")
-    taken = _floor_mats(draft, space, room)
+    taken = _floor_mats(house, space, room)
     if not at_doors:
         swings = [d.swing(s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
         taken = shapely.union_all([taken, *swings])
@@ -280,13 +280,13 @@ def _lay_largest(
                 continue
             piece, shape = rug(rng, width, length, style, tuple(patterns), forms)
             where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
-            item: Item = draft.placed(
-                piece, shape, where, turn, item_id=next_id(draft, PART), room_id=room.room.id,
+            item: Item = house.placed(
+                piece, shape, where, turn, item_id=next_id(house, PART), room_id=room.room.id,
                 level_id=room.room.level_id, tags=(RUG_TAG,),
             )  # fmt: skip
-            draft.add(item, PART, piece)
+            house.add(item, PART, piece)
             return True
-    draft.refused[f"{PART}: no floor for a rug"] += 1
+    house.refused[f"{PART}: no floor for a rug"] += 1
     return False
 
 
@@ -303,12 +303,12 @@ def _rug_area(at: F64, turn: float, width: float, length: float) -> BaseGeometry
     return shapely.Polygon(corners)
 
 
-def _floor_mats(draft: Draft, space: HouseSpace, room: RoomSpace) -> BaseGeometry:
+def _floor_mats(house: MutableHouse, space: HouseSpace, room: RoomSpace) -> BaseGeometry:
     """The plan area of rugs that lie in the room, and of low things that rugs would cut."""
     shapes = []
     for n in room.items:
         low, high = space.bounds[n]
-        if draft.items[n].nyu40 == FLOOR_MAT or high[1] < room.room.floor_y + 0.05:
+        if house.items[n].nyu40 == FLOOR_MAT or high[1] < room.room.floor_y + 0.05:
             shapes.append(shapely.box(low[0], low[2], high[0], high[2]))
     return shapely.union_all(shapes)
 
@@ -320,23 +320,25 @@ def _is_bare(space: HouseSpace, room: RoomSpace, area: BaseGeometry) -> bool:
     return space.is_free(low, high)
 
 
-def cover_drawn_rugs(draft: Draft, style: Style, share: float) -> None:
+def cover_drawn_rugs(house: MutableHouse, style: Style, share: float) -> None:
     """Give a share of the source's plain rugs a picture of the room's style; pictures stay."""
-    for index, item in enumerate(draft.items[: len(draft.source.items)]):
+    for index, item in enumerate(house.items[: len(house.source.items)]):
         if item.kind is not ItemKind.OBJECT or item.nyu40 != FLOOR_MAT or not item.n_faces:
             continue
-        if any(draft.materials[s.material].texture_id for s in item.surfaces):
+        if any(house.materials[s.material].texture_id for s in item.surfaces):
             continue
-        rng = draft.rng(PART, "drawn rug", item.id)
+        rng = house.rng(PART, "drawn rug", item.id)
         if rng.random() < share:
-            taste = room_style(style, draft.rng(PART, item.room_id or "", "style"))
-            covered = _covered(draft, item, taste, rng)
+            taste = room_style(style, house.rng(PART, item.room_id or "", "style"))
+            covered = _covered(house, item, taste, rng)
             if covered is not None:
-                draft.change(index, covered, PART)
-                draft.done[f"{PART}: drawn rug"] += 1
+                house.change(index, covered, PART)
+                house.done[f"{PART}: drawn rug"] += 1
 
 
-def _covered(draft: Draft, item: Item, style: Style, rng: np.random.Generator) -> Item | None:
+def _covered(
+    house: MutableHouse, item: Item, style: Style, rng: np.random.Generator
+) -> Item | None:
     box = item.oriented_box
     sides = 2 * box.half
     along, across = (0, 2) if sides[0] >= sides[2] else (2, 0)
@@ -346,7 +348,7 @@ def _covered(draft: Draft, item: Item, style: Style, rng: np.random.Generator) -
     pixels = rug_pixels(rng, float(sides[across]), float(sides[along]), style, pattern)
     texture = jpeg_texture(f"rug {pattern}", pixels)
     shown = Material(f"rug {texture.id[:8]}", texture_id=texture.id, roughness=1.0)
-    number = draft.material(shown, [texture])
+    number = house.material(shown, [texture])
     # Lay the picture over the plan: its edges show at the sides, which are a centimetre high.
     surfaces = []
     for surface in item.surfaces:

@@ -1,6 +1,6 @@
 """Every kind of procedural surface by name, and the material it gives a house.
 
-Effects: JPEGs are encoded through a temporary file; a draft keeps what was made for it.
+Effects: JPEGs are encoded through a temporary file; a house keeps what was made for it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.house import Material, Texture
-from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.draft_materials import Painted
+from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.painted_materials import Painted
 from pbrs_farm.dress.style import WOODS, Rgb, Wood
 from pbrs_farm.dress.textures.laid_tiles import (
     Glaze,
@@ -82,7 +82,7 @@ class Pattern:
 class PatternMaterial:
     """A pattern as a house has it."""
 
-    number: int  # in Draft.materials
+    number: int  # in MutableHouse.materials
     size_m: tuple[float, float]  # of one repeat: uv = metres / size
     mean: Callable[[], Rgb]  # gives the mean linear colour once it is painted
 
@@ -113,19 +113,19 @@ def size_of(pattern: Pattern) -> tuple[float, float]:
     return _SIZE_M[pattern.family]
 
 
-def pattern_material(draft: Draft, pattern: Pattern) -> PatternMaterial:
-    """The pattern as a material of the draft's house, made once a draft, beside what follows."""
+def pattern_material(house: MutableHouse, pattern: Pattern) -> PatternMaterial:
+    """The pattern as a material of the house, made once and painted by a thread meanwhile."""
     key = f"pattern {pattern!r}"
-    kept = draft.kept.get(key)
+    kept = house.kept.get(key)
     if isinstance(kept, PatternMaterial):
         return kept
     if pattern.photograph:
-        number, size, mean = photograph_material(draft, pattern.photograph, pattern.family)
+        number, size, mean = photograph_material(house, pattern.photograph, pattern.family)
         made = PatternMaterial(number, size, lambda: mean)
     else:
-        number, painting = draft.materials.paint(partial(_paint_pattern, pattern))
+        number, painting = house.materials.paint(partial(_paint_pattern, pattern))
         made = PatternMaterial(number, size_of(pattern), lambda: painting.painted().mean_rgb)
-    draft.kept[key] = made
+    house.kept[key] = made
     return made
 
 
@@ -135,9 +135,9 @@ def _paint_pattern(pattern: Pattern) -> Painted:
     return Painted(material, textures, maps.mean_rgb)
 
 
-def photographed(draft: Draft, catalogue: Catalogue, pattern: Pattern) -> Pattern:
+def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:
     """The pattern, or a picture of the catalogue in its place, by its family and seed."""
-    found = photograph_for(draft, catalogue, pattern.family, pattern.seed)
+    found = photograph_for(house, catalogue, pattern.family, pattern.seed)
     return replace(pattern, photograph=found) if found else pattern
 
 

@@ -1,4 +1,4 @@
-"""Photographed surfaces of libraries in the place of procedural ones. Effects: materials of the draft."""
+"""Photographed surfaces of libraries in the place of procedural ones. Effects: adds materials to the house."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.core.catalogue import Catalogue, Picture
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import Material, Note
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Rgb
 from pbrs_farm.images import decode_texture
 
@@ -38,10 +38,10 @@ _SHOWN: Final = {
     "leather": _Shown("leather", 0.46, 0.4, 0.0),
 }  # fmt: skip
 _DRAWN: Final = 12  # pictures of which as many would be liked as much as drawn ones
-_KEPT: Final = "photograph "  # before the id of a picture's texture, in Draft.kept
+_KEPT: Final = "photograph "  # before the id of a picture's texture, in MutableHouse.kept
 
 
-def photograph_for(draft: Draft, catalogue: Catalogue, family: str, seed: int) -> str:
+def photograph_for(house: MutableHouse, catalogue: Catalogue, family: str, seed: int) -> str:
     """The texture's id of a picture of the catalogue for a surface of that family; "" = draw it.
 
     The more fitting pictures there are, the likelier one is taken: n of n + 12 times. Equal
@@ -57,25 +57,25 @@ def photograph_for(draft: Draft, catalogue: Catalogue, family: str, seed: int) -
     if rng.random() * (len(fitting) + _DRAWN) >= len(fitting):
         return ""
     picture = fitting[int(rng.integers(len(fitting)))]
-    if _KEPT + picture.texture.id in draft.kept:
+    if _KEPT + picture.texture.id in house.kept:
         return picture.texture.id
     # Take the mean colour now: a picture that cannot be read is drawn instead.
     try:
         mean = _mean_rgb(picture)
     except BadInput as error:
         note = Note("unreadable-texture", picture.texture.name[:80], error.message)
-        if note not in draft.notes:
-            draft.notes.append(note)
+        if note not in house.notes:
+            house.notes.append(note)
         return ""
-    draft.kept[_KEPT + picture.texture.id] = (picture, mean)
+    house.kept[_KEPT + picture.texture.id] = (picture, mean)
     return picture.texture.id
 
 
 def photograph_material(
-    draft: Draft, texture_id: str, family: str
+    house: MutableHouse, texture_id: str, family: str
 ) -> tuple[int, tuple[float, float], Rgb]:
     """The material that shows a picture of photograph_for: its number, size in metres, mean linear colour."""
-    kept = draft.kept[_KEPT + texture_id]
+    kept = house.kept[_KEPT + texture_id]
     assert isinstance(kept, tuple)
     picture, mean = kept
     shown = _SHOWN[family]
@@ -84,7 +84,7 @@ def photograph_material(
         specular=(shown.gloss,) * 3, roughness=shown.roughness,
         shininess=round(2.0 / max(shown.roughness, 0.1) ** 4 - 2.0, 1) if shown.gloss else 0.0,
     )  # fmt: skip
-    return draft.material(material, (picture.texture,)), picture.size, mean
+    return house.material(material, (picture.texture,)), picture.size, mean
 
 
 def _mean_rgb(picture: Picture) -> Rgb:

@@ -1,4 +1,4 @@
-"""Mirrors, clocks, sockets, radiators, shelves and cloths of one room; no effects but on the draft."""
+"""Mirrors, clocks, sockets, radiators, shelves and cloths of one room; effects: changes the house."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _CASING_M = 0.16  # from a door's hole to the middle of its switch
 def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
     """A mirror over each washbasin of a bathroom, and one in most halls, where none is."""
     room = hanging.room
-    rng = hanging.draft.rng("mirrors", room.room.id)
-    if any(hanging.draft.items[n].nyu40 == MIRROR for n in room.items):
+    rng = hanging.house.rng("mirrors", room.room.id)
+    if any(hanging.house.items[n].nyu40 == MIRROR for n in room.items):
         return
     if room.kind is RoomKind.BATHROOM and rng.random() < share:
         for number in room.items:
-            if hanging.draft.items[number].nyu40 == SINK:
+            if hanging.house.items[number].nyu40 == SINK:
                 _over_basin(hanging, space.bounds[number], rng, style)
     if rng.random() < WANTS[room.kind].mirror * share:
         _tall_mirror(hanging, rng, style)
@@ -53,7 +53,7 @@ def _over_basin(hanging: Hanging, bounds: F64, rng: np.random.Generator, style: 
             if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) > 0.12:
                 hanging.hang(*mirror(width, height, frame), k, s, low)
                 return
-    hanging.draft.refused["walls: no free wall for a mirror"] += 1
+    hanging.house.refused["walls: no free wall for a mirror"] += 1
 
 
 def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> None:
@@ -72,7 +72,7 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
 
 def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     """A clock in some kitchens, living rooms and studies."""
-    rng = hanging.draft.rng("clock", hanging.room.room.id)
+    rng = hanging.house.rng("clock", hanging.room.room.id)
     if rng.random() >= WANTS[hanging.room.kind].clock * share:
         return
     frame = frame_material(rng, style)
@@ -123,7 +123,7 @@ def hang_anywhere(
         for s in face.starts(width + 0.1, low - 0.05, low + float(y1) + above_m, depth_m)
     ]
     if not places:
-        hanging.draft.refused[f"walls: no free wall for a {piece.group}"] += 1
+        hanging.house.refused[f"walls: no free wall for a {piece.group}"] += 1
         return False
     k, s = places[int(rng.integers(len(places)))]
     hanging.hang(piece, shape, k, s + 0.05 + width / 2, low, tags=tags)
@@ -133,12 +133,12 @@ def hang_anywhere(
 def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: float) -> None:
     """A switch beside each door on its room's side, and sockets low on the walls."""
     room = hanging.room
-    rng = hanging.draft.rng("switches", room.room.id)
+    rng = hanging.house.rng("switches", room.room.id)
     colour = (0.9, 0.9, 0.88) if rng.random() < 0.8 else shade(style.metal.colour, 0.8)
     if rng.random() >= share:
         return
     # All switches of a home are of one make.
-    form = int(hanging.draft.rng("switches", "form").integers(SWITCH_FORMS))
+    form = int(hanging.house.rng("switches", "form").integers(SWITCH_FORMS))
     switch = _draw_fitting(catalogue, "switch", rng) or hung_furniture.wall_switch.make(
         rng, style, 1, colour, form
     )

@@ -10,7 +10,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import BED
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things import hung as hung_furniture
@@ -31,11 +31,11 @@ PART = "walls"
 def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
     """Hooks with what the room's people take off there, on a free stretch of wall."""
     kind = hanging.room.kind
-    rng = hanging.draft.rng("coats", hanging.room.room.id)
+    rng = hanging.house.rng("coats", hanging.room.room.id)
     if rng.random() >= WANTS[kind].coats * share:
         return
     # Nobody hangs coats where it smells of cooking.
-    items = hanging.draft.items
+    items = hanging.house.items
     if is_cooked_in(items[k] for k in hanging.room.items if k < len(items)):
         return
     beds = [space.bounds[k] for k in hanging.room.items if items[k].nyu40 == BED]
@@ -53,7 +53,7 @@ def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) 
             k, s = places[int(rng.integers(len(places)))]
             hanging.hang(piece, shape, k, s + 0.05 + width / 2, bottom)
             return
-    hanging.draft.refused["walls: no free wall for a coat rack"] += 1
+    hanging.house.refused["walls: no free wall for a coat rack"] += 1
 
 
 def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) -> bool:
@@ -66,18 +66,18 @@ def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) ->
     )
 
 
-def furnish_walls(draft: Draft, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks and sockets in the rooms of the draft.
+def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
+    """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks and sockets in the rooms of the house.
 
     share: 0..1 of what a room would get.
     """
-    space = house_space(draft)
-    is_heated = wants_radiators(draft)
-    gallery = Gallery(draft, catalogue, style)
+    space = house_space(house)
+    is_heated = wants_radiators(house)
+    gallery = Gallery(house, catalogue, style)
     for room in space.rooms:
         if not room.faces or room.kind is RoomKind.OUTDOOR:
             continue
-        hanging = Hanging(draft, room, PART)
+        hanging = Hanging(house, room, PART)
         # What has one right place comes first.
         hang_mirrors(hanging, space, style, share)
         if is_heated:

@@ -15,7 +15,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.record import Record, read_csv
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import RoomSpace, WallFace
 from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M
@@ -57,7 +57,7 @@ IN_FRONT_M = 0.35  # that a picture needs free to be seen
 class Hanging:
     """A room's wall faces, with what this part has hung taken out of them."""
 
-    draft: Draft
+    house: MutableHouse
     room: RoomSpace
     part: str
     faces: list[WallFace] = field(init=False)
@@ -66,7 +66,7 @@ class Hanging:
         sides = [(d, d.side_of(self.room.room.id)) for d in self.room.doors]
         doors = [(d.swing(s).union(d.before(s)), d.top_y) for d, s in sides if s is not None]
         # Nobody reaches what hangs over stairs.
-        flights = flights_of(self.draft, self.room.room, self.room.area)
+        flights = flights_of(self.house, self.room.room, self.room.area)
         if not flights.under.is_empty:
             doors.append((flights.under.buffer(_BESIDE_STAIRS_M), self.floor_y + _OVER_STAIRS_M))
         self.faces = [_clear_of_doors(face, doors) for face in self.room.faces]
@@ -84,12 +84,12 @@ class Hanging:
         wall = self.faces[face]
         low, high = shape.bounds
         out = GAP_M - wall.recess_m(s + float(low[0]), s + float(high[0]))
-        item = self.draft.placed(
+        item = self.house.placed(
             piece, shape, wall.point(s, low_y, out), wall.turn_rad,
-            item_id=next_id(self.draft, self.part), room_id=self.room.room.id,
+            item_id=next_id(self.house, self.part), room_id=self.room.room.id,
             level_id=self.room.room.level_id, tags=tags,
         )  # fmt: skip
-        self.draft.add(item, self.part, piece)
+        self.house.add(item, self.part, piece)
         self.faces[face] = wall.taken(
             s + float(low[0]) - margin_m, s + float(high[0]) + margin_m,
             low_y + float(low[1]) - margin_m, low_y + float(high[1]) + margin_m,
@@ -133,11 +133,11 @@ def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]])
     return face if clear is face.clear else replace(face, clear=clear)
 
 
-def next_id(draft: Draft, part: str) -> str:
+def next_id(house: MutableHouse, part: str) -> str:
     """A new id `dress-<part>-<n>`."""
-    n = draft.kept.get(f"number of {part}", 0)
+    n = house.kept.get(f"number of {part}", 0)
     assert isinstance(n, int)
-    draft.kept[f"number of {part}"] = n + 1
+    house.kept[f"number of {part}"] = n + 1
     return f"dress-{part}-{n}"
 
 

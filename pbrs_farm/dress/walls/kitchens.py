@@ -1,4 +1,4 @@
-"""Cupboards, open boxes and rails over the worktops of kitchens that have none. Effects: on the draft."""
+"""Cupboards, open boxes and rails over the worktops of kitchens that have none. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _DEEP_M: Final = 0.32  # of cupboards; open ones are 4 cm less
 
 def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
     """Cupboards over a kitchen's worktops, as far as the wall is free, and a rail below or instead."""
-    rng = hanging.draft.rng("kitchen wall", hanging.room.room.id)
+    rng = hanging.house.rng("kitchen wall", hanging.room.room.id)
     if hanging.room.kind is not RoomKind.KITCHEN or rng.random() >= share:
         return
     runs = _walls_over_worktops(hanging, space)
@@ -40,7 +40,7 @@ def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float
 
 def _has_cupboards(hanging: Hanging, space: HouseSpace) -> bool:
     return any(
-        hanging.draft.items[n].nyu40 in (CABINET, SHELVES)
+        hanging.house.items[n].nyu40 in (CABINET, SHELVES)
         and space.bounds[n][0, 1] > hanging.floor_y + 1.2
         for n in hanging.room.items
     )
@@ -50,7 +50,7 @@ def _walls_over_worktops(hanging: Hanging, space: HouseSpace) -> list[tuple[int,
     """(face, s0, s1) of the wall behind each stretch of worktops that join."""
     pieces: dict[int, list[tuple[float, float]]] = {}
     for number in hanging.room.items:
-        item, (low, high) = hanging.draft.items[number], space.bounds[number]
+        item, (low, high) = hanging.house.items[number], space.bounds[number]
         is_top = _TOP_M[0] < high[1] - hanging.floor_y < _TOP_M[1] and item.nyu40 in _WORKTOPS
         if is_top and not words_of_item(item) & _HOT:
             for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]:
@@ -117,4 +117,4 @@ def _hang_rail(
             ):
                 hanging.hang(piece, shape, k, s, low)
                 return
-    hanging.draft.refused["walls: no free wall for a kitchen rail"] += 1
+    hanging.house.refused["walls: no free wall for a kitchen rail"] += 1

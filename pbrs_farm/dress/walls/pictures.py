@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.catalogue import PRINTS, Catalogue, Picture
 from pbrs_farm.core.classes import BED, CABINET, CHAIR, DESK, DRESSER, OTHERFURNITURE, SOFA, TABLE
 from pbrs_farm.core.house import Material, Texture
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.things import hung as hung_furniture
@@ -80,11 +80,11 @@ class Gallery:
     Pictures of the catalogue that are meant for walls come before drawn ones.
     """
 
-    def __init__(self, draft: Draft, catalogue: Catalogue, style: Style) -> None:
-        self._rng = draft.rng("prints")
+    def __init__(self, house: MutableHouse, catalogue: Catalogue, style: Style) -> None:
+        self._rng = house.rng("prints")
         self._style = style
         own = [p for p in catalogue.pictures if p.group == PRINTS]
-        order = draft.rng("prints", "own").permutation(len(own))
+        order = house.rng("prints", "own").permutation(len(own))
         self._own = [own[int(k)] for k in order]
         self._prints: list[Print] = []
         self._families: Counter[str] = Counter()
@@ -131,7 +131,7 @@ def hang_pictures(
     """Pictures for one room, as many as its use and its walls allow."""
     room = hanging.room
     low, high = WANTS[room.kind].pictures, WANTS[room.kind].most_pictures
-    rng = hanging.draft.rng("pictures", room.room.id)
+    rng = hanging.house.rng("pictures", room.room.id)
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     taste = room_style(style, rng)
     frame = frame_material(rng, taste)
@@ -146,14 +146,14 @@ def hang_pictures(
         left -= len(group[0].frames)
         wanted -= 1
     if wanted > 0:
-        hanging.draft.refused["walls: no free wall for pictures"] += wanted
+        hanging.house.refused["walls: no free wall for pictures"] += wanted
 
 
 def _spots(hanging: Hanging, space: HouseSpace, rng: np.random.Generator) -> list[PictureSpot]:
     """Places for pictures, best first: over furniture, then the middles of free stretches."""
     room, found = hanging.room, []
     for number in room.items:
-        item, (low, high) = hanging.draft.items[number], space.bounds[number]
+        item, (low, high) = hanging.house.items[number], space.bounds[number]
         liked = _BENEATH.get(item.nyu40, 0.0)
         top = float(high[1]) - hanging.floor_y
         if not liked or not _LOWEST_M < top < _TALLEST_BENEATH_M:
@@ -269,7 +269,7 @@ def _framed_picture(
 def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
     """A pin board over the room's desk, else on any free wall of a kitchen, hall or study."""
     kind = hanging.room.kind
-    rng = hanging.draft.rng("pin board", hanging.room.room.id)
+    rng = hanging.house.rng("pin board", hanging.room.room.id)
     if rng.random() >= WANTS[kind].pin_board * share:
         return
     width, height = float(rng.uniform(0.55, 0.95)), float(rng.uniform(0.42, 0.65))
@@ -287,14 +287,14 @@ def hang_pin_board(hanging: Hanging, space: HouseSpace, style: Style, share: flo
         if hanging.faces[k].free_m(s - width / 2, s + width / 2, low, low + height) >= IN_FRONT_M:
             hanging.hang(*made, k, s, low)
             return
-    hanging.draft.refused["walls: no free wall for a pin board"] += 1
+    hanging.house.refused["walls: no free wall for a pin board"] += 1
 
 
 def _over_desks(hanging: Hanging, space: HouseSpace) -> list[tuple[int, float]]:
     """(face, s) of the wall behind the middle of each desk, or table in a room with a bed."""
     found = []
     for number in hanging.room.items:
-        item, (low, high) = hanging.draft.items[number], space.bounds[number]
+        item, (low, high) = hanging.house.items[number], space.bounds[number]
         if item.nyu40 in (DESK, TABLE) and 0.6 < high[1] - hanging.floor_y < 0.95:
             found += [(k, (s0 + s1) / 2) for k, s0, s1 in faces_behind(hanging.room, low, high)[:1]]
     return found

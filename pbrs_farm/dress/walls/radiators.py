@@ -1,12 +1,12 @@
-"""Panel radiators below the windows of a home that has none. Effects: on the draft."""
+"""Panel radiators below the windows of a home that has none. Effects: changes the house."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Final
 
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finish_scheme import finish_scheme
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import material_of_finish
 from pbrs_farm.dress.things import radiators
@@ -22,18 +22,18 @@ _OTHER_HEAT: Final = frozenset({"fireplace", "stove"})
 _UNHEATED = (RoomKind.STORE, RoomKind.OUTDOOR)
 
 
-def wants_radiators(draft: Draft) -> bool:
+def wants_radiators(house: MutableHouse) -> bool:
     """Whether the home is heated neither by what was drawn nor from its floors."""
-    drawn = any(words_of_item(item) & (RADIATORS | _OTHER_HEAT) for item in draft.source.items)
-    return not drawn and float(draft.rng("radiators").random()) < _HEATED
+    drawn = any(words_of_item(item) & (RADIATORS | _OTHER_HEAT) for item in house.source.items)
+    return not drawn and float(house.rng("radiators").random()) < _HEATED
 
 
 def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
     """A radiator below each window of the room whose wall is free there, in the home's scheme."""
-    room, rng = hanging.room, hanging.draft.rng("radiators", hanging.room.room.id)
+    room, rng = hanging.room, hanging.house.rng("radiators", hanging.room.room.id)
     if room.kind in _UNHEATED or rng.random() >= share:
         return
-    paint = material_of_finish(finish_scheme(hanging.draft, style).radiator)
+    paint = material_of_finish(finish_scheme(hanging.house, style).radiator)
 
     def make(wide: float, high: float) -> Made:
         return radiators.wall_radiator.make(rng, style, wide, high, paint)

@@ -1,4 +1,4 @@
-"""Shelves, boxes and cupboards on walls, towel radiators and woven cloth. Effects: on the draft."""
+"""Shelves, boxes and cupboards on walls, towel radiators and woven cloth. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _BEFORE_M: Final = 0.3  # free before it
 def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
     """Boards, open boxes and cupboards: the clutter that follows fills them. A bath's towel radiator."""
     kind = hanging.room.kind
-    rng = hanging.draft.rng("shelf", hanging.room.room.id)
+    rng = hanging.house.rng("shelf", hanging.room.room.id)
     low, high = WANTS[kind].shelves, WANTS[kind].most_shelves
     wanted = int(np.floor(rng.integers(low, high + 1) * share + rng.random()))
     is_bath = kind is RoomKind.BATHROOM
@@ -79,7 +79,7 @@ def _shelf(
 
 def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
     """A woven cloth on a rod, in some rooms."""
-    rng = hanging.draft.rng("wall cloth", hanging.room.room.id)
+    rng = hanging.house.rng("wall cloth", hanging.room.room.id)
     if rng.random() >= WANTS[hanging.room.kind].cloth * share:
         return
     width, height = float(rng.uniform(0.5, 1.0)), float(rng.uniform(0.6, 1.1))

@@ -16,7 +16,7 @@ from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import add_clutter, table_tops
 from pbrs_farm.dress.clutter.receptacles import Row, receptacle_of, shares
 from pbrs_farm.dress.clutter.stock import Stock, is_known
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
 from pbrs_farm.dress.things.books import book_covers
@@ -28,10 +28,10 @@ from tests.dress.furniture import bookcase, house, room, solid
 _BOOKS = 23
 
 
-def _dressed(home: House, seed: int = 1, share: float = 1.0) -> Draft:
-    draft = Draft(home, seed)
-    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), share)
-    return draft
+def _dressed(home: House, seed: int = 1, share: float = 1.0) -> MutableHouse:
+    mutable = MutableHouse(home, seed)
+    add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), share)
+    return mutable
 
 
 def _room() -> House:
@@ -44,8 +44,8 @@ def _room() -> House:
     )
 
 
-def _added(draft: Draft) -> list[Item]:
-    return draft.items[len(draft.source.items) :]
+def _added(mutable: MutableHouse) -> list[Item]:
+    return mutable.items[len(mutable.source.items) :]
 
 
 def _body(item: Item) -> Manifold:
@@ -63,9 +63,9 @@ def test_a_top_holds_what_whole_words_of_its_name_say(name: str, holds: str) -> 
 
 
 def test_every_thing_touches_what_it_stands_on() -> None:
-    draft = _dressed(_room())
+    mutable = _dressed(_room())
     levels = np.array([0.74, 0.9, 0.42, 0.12, 0.59, 1.06, 1.53, 2.0])
-    added = _added(draft)
+    added = _added(mutable)
     assert len(added) > 15
     for item in added:
         gap = item.bounds[0, 1] - levels
@@ -75,18 +75,18 @@ def test_every_thing_touches_what_it_stands_on() -> None:
 
 def test_nothing_penetrates_anything() -> None:
     for seed in (1, 2):
-        draft = _dressed(_room(), seed)
-        bodies = [(item, _body(item)) for item in draft.items]
+        mutable = _dressed(_room(), seed)
+        bodies = [(item, _body(item)) for item in mutable.items]
         for (one, a), (two, b) in combinations(bodies, 2):
             apart = (one.bounds[0] > two.bounds[1] + 1e-4) | (two.bounds[0] > one.bounds[1] + 1e-4)
-            if apart.any() or (one in draft.source.items and two in draft.source.items):
+            if apart.any() or (one in mutable.source.items and two in mutable.source.items):
                 continue
             assert (a ^ b).volume() < 1e-8, f"{one.name} in {two.name}"
 
 
 def test_books_stand_in_the_bookcase_with_their_spines_out() -> None:
-    draft = _dressed(_room())
-    books = [i for i in _added(draft) if i.nyu40 == _BOOKS and i.bounds[1, 2] < 0.31]
+    mutable = _dressed(_room())
+    books = [i for i in _added(mutable) if i.nyu40 == _BOOKS and i.bounds[1, 2] < 0.31]
     assert books
     for item in books:
         assert item.box is not None
@@ -138,17 +138,17 @@ def test_a_room_has_no_more_of_a_kind_than_people_keep(monkeypatch: pytest.Monke
     tables = [solid(f"Table {k}", [k, 0, 0], [k + 0.9, 0.45, 0.9], 7) for k in range(4)]
     rows = {"coffee_table": (Row(receptacle="coffee_table", kind="box", share=1.0, source="own"),)}
     monkeypatch.setattr(table_tops, "shares", lambda: rows)
-    draft = Draft(house(*tables), 1)
-    add_clutter(draft, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
-    on_tables = [i for i in _added(draft) if i.bounds[0, 1] > 0.4]
+    mutable = MutableHouse(house(*tables), 1)
+    add_clutter(mutable, catalogue, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    on_tables = [i for i in _added(mutable) if i.bounds[0, 1] > 0.4]
     assert len(on_tables) == 2
-    assert draft.refused["clutter: enough of box in the room"] > 0
+    assert mutable.refused["clutter: enough of box in the room"] > 0
 
 
 def test_a_table_full_of_things_gets_no_more() -> None:
     block = solid("Monitor", [2.6, 0.74, 0.0], [3.8, 1.0, 0.6], 40)
-    draft = _dressed(house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14), block))
-    assert not any(0.1 < i.bounds[0, 1] < 0.9 for i in _added(draft))
+    mutable = _dressed(house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14), block))
+    assert not any(0.1 < i.bounds[0, 1] < 0.9 for i in _added(mutable))
 
 
 def test_the_table_of_shares_names_kinds_that_exist() -> None:

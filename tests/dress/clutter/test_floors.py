@@ -10,30 +10,30 @@ import shapely
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.clutter import add_clutter
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import DEPTH, WIDTH, house, solid
 
 
-def _dressed(seed: int) -> Draft:
-    draft = Draft(builtin_home(), seed)
-    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
-    return draft
+def _dressed(seed: int) -> MutableHouse:
+    mutable = MutableHouse(builtin_home(), seed)
+    add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+    return mutable
 
 
-def _on_floor(draft: Draft) -> list[Item]:
-    floors = {r.id: r.floor_y for r in draft.source.rooms}
-    added = draft.items[len(draft.source.items) :]
+def _on_floor(mutable: MutableHouse) -> list[Item]:
+    floors = {r.id: r.floor_y for r in mutable.source.rooms}
+    added = mutable.items[len(mutable.source.items) :]
     return [i for i in added if abs(i.bounds[0, 1] - floors[i.room_id or ""]) < 0.01]
 
 
 def test_things_on_the_floor_touch_it_inside_their_room() -> None:
     things = [(d, i) for seed in range(3) for d in [_dressed(seed)] for i in _on_floor(d)]
     assert len(things) >= 3
-    for draft, item in things:
-        room = draft.source.room(item.room_id or "")
+    for mutable, item in things:
+        room = mutable.source.room(item.room_id or "")
         assert 0 <= item.bounds[0, 1] - room.floor_y < 0.0005
         (x0, z0), (x1, z1) = item.bounds[:, [0, 2]]
         assert shapely.Polygon(room.polygon).contains(shapely.box(x0, z0, x1, z1))
@@ -41,7 +41,7 @@ def test_things_on_the_floor_touch_it_inside_their_room() -> None:
 
 def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
     for seed in range(3):
-        bare, dressed = Draft(builtin_home(), seed), _dressed(seed)
+        bare, dressed = MutableHouse(builtin_home(), seed), _dressed(seed)
         space, before = house_space(dressed), house_space(bare)
         footprints = [shapely.box(*i.bounds[:, [0, 2]].ravel()) for i in _on_floor(dressed)]
         for room in space.rooms:
@@ -59,9 +59,9 @@ def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() ->
     table = solid("Table", [1.5, 0, 1.0], [2.5, 0.75, 2.0], 7)
     n = 0
     for seed in range(3):
-        draft = Draft(house(table, name="Garage"), seed)
-        add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
-        for item in _on_floor(draft):
+        mutable = MutableHouse(house(table, name="Garage"), seed)
+        add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        for item in _on_floor(mutable):
             (x0, z0), (x1, z1) = item.bounds[:, [0, 2]]
             assert min(x0, z0, WIDTH - x1, DEPTH - z1) < 0.35, item.name
             n += 1
@@ -74,23 +74,23 @@ def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
     low = solid("Bed", [0, 0, 1.8], [4, 0.5, 3], 4)
     before = shapely.box(0.5, 0.6, 3.5, 1.2)
     for seed in range(4):
-        draft = Draft(house(wardrobe, low, name="Bedroom"), seed)
-        add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
-        for item in _on_floor(draft):
+        mutable = MutableHouse(house(wardrobe, low, name="Bedroom"), seed)
+        add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        for item in _on_floor(mutable):
             footprint = shapely.box(*item.bounds[:, [0, 2]].ravel())
             assert before.intersection(footprint).area < 1e-4, item.name
 
 
 def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
     full = solid("Block", [0, 0, 0], [4, 1.0, 3], 39)
-    draft = Draft(house(full), 1)
-    add_clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
-    assert not _on_floor(draft)
+    mutable = MutableHouse(house(full), 1)
+    add_clutter(mutable, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    assert not _on_floor(mutable)
 
 
 def test_a_room_of_two_corners_is_left_alone() -> None:
     home = house()
     flat = replace(home.rooms[0], polygon=np.array([[0.0, 0.0], [1.0, 0.0]]))
-    draft = Draft(replace(home, rooms=(flat,)), 1)
-    add_clutter(draft, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
-    assert not _on_floor(draft)
+    mutable = MutableHouse(replace(home, rooms=(flat,)), 1)
+    add_clutter(mutable, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
+    assert not _on_floor(mutable)

@@ -12,7 +12,7 @@ from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.clutter.beds import lying_place
 from pbrs_farm.dress.clutter.cushions import find_seat
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -37,9 +37,9 @@ def _sofa() -> Item:
 
 
 def _pillows(home: House, seed: int) -> list[Item]:
-    draft = Draft(home, seed)
-    add_clutter(draft, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
-    return [i for i in draft.items[len(home.items) :] if i.nyu40 == _PILLOW]
+    mutable = MutableHouse(home, seed)
+    add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+    return [i for i in mutable.items[len(home.items) :] if i.nyu40 == _PILLOW]
 
 
 def _points(item: Item) -> F64:

@@ -15,8 +15,8 @@ from pbrs_farm.core.house import House, Item, ItemKind, Material, Surface
 from pbrs_farm.core.mesh import distances_to_triangles, triangle_bounds
 from pbrs_farm.core.recipe import Recipe, RepairFields, with_settings
 from pbrs_farm.dress import dressing
-from pbrs_farm.dress.draft import Draft
-from pbrs_farm.dress.dressing import Dressed, kept_in
+from pbrs_farm.dress.dressing import Dressed, refit_after_repair
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.things.assembly import hung
@@ -65,14 +65,14 @@ def _distance(points: F64, corners: F64) -> float:
 
 def _with_sockets(source: House) -> Dressed:
     """A socket on each wall that a room sees, hung as the dressing hangs."""
-    with closing(Draft(source, 1)) as draft:
+    with closing(MutableHouse(source, 1)) as mutable:
         lower = hung("socket", "socket", OTHERPROP, [(box_at([0, 0.04, 0.01]), Material("white"))])
-        for space in house_space(draft).rooms:
-            hanging = Hanging(draft, space, "walls")
+        for space in house_space(mutable).rooms:
+            hanging = Hanging(mutable, space, "walls")
             for k, face in enumerate(hanging.faces):
                 hanging.hang(*lower, k, face.length / 2, 0.3)
         report = DressReport(house_id=source.id, seed=1)
-        return Dressed(draft.house(), report, draft.used, len(source.items))
+        return Dressed(mutable.frozen(), report, mutable.used, len(source.items))
 
 
 def box_at(middle: list[float]) -> Surface:
@@ -83,12 +83,12 @@ def test_what_hung_on_a_wall_that_repair_drops_hangs_on_the_one_that_is_left() -
     dressed = _with_sockets(_overlapping_walls())
     repaired = _repaired(dressed.house)
     assert max(_gaps(dressed, repaired).values()) > 0.006
-    kept = kept_in(repaired, dressed, EMPTY)
+    kept = refit_after_repair(repaired, dressed, EMPTY)
     after = _repaired(kept.house)
     assert len(_gaps(kept, after)) == 8
     assert max(_gaps(kept, after).values()) <= 0.002
     assert kept.report.moved_after_repair == 2
-    assert kept_in(after, kept, EMPTY) is kept
+    assert refit_after_repair(after, kept, EMPTY) is kept
 
 
 def test_what_finds_no_wall_any_more_goes_with_what_stood_on_it() -> None:
@@ -99,7 +99,7 @@ def test_what_finds_no_wall_any_more_goes_with_what_stood_on_it() -> None:
     far = repaired.with_items(
         i for i in repaired.items if i.kind is not ItemKind.WALL or _is_far(i, first)
     )
-    kept = kept_in(far, dressed, EMPTY)
+    kept = refit_after_repair(far, dressed, EMPTY)
     assert first.id not in {i.id for i in kept.house.items}
     assert kept.report.refused["walls: floated or sank after repair"] >= 1
     assert sum(kept.report.added.values()) == len(kept.house.items) - kept.n_source
@@ -112,7 +112,7 @@ def _is_far(wall: Item, thing: Item) -> bool:
 def test_a_house_whose_walls_stay_is_the_one_that_was_dressed() -> None:
     a = replace(room("0_0", LEFT), name="Living room")
     dressed = _with_sockets(house([*walls_around(LEFT), *covers(a)], [a]))
-    assert kept_in(_repaired(dressed.house), dressed, EMPTY) is dressed
+    assert refit_after_repair(_repaired(dressed.house), dressed, EMPTY) is dressed
 
 
 def test_a_run_measures_the_gates_on_the_repaired_house(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.gates import keep_gates
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import Gate
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -24,18 +24,18 @@ def piece(group: str, place: Place = Place.SURFACE, nyu40: int = 40) -> Piece:
 
 
 def with_box(
-    draft: Draft, name: str, low: list[float], high: list[float], kind: Piece | None = None
+    mutable: MutableHouse, name: str, low: list[float], high: list[float], kind: Piece | None = None
 ) -> Item:
     """Add a box as dressing adds things."""
     low_, high_ = np.array(low), np.array(high)
     half = (high_ - low_) / 2
     surface = box("", np.array([0.0, half[1], 0.0]), half, 0)
     kind = kind or piece("cup")
-    item = draft.placed(
+    item = mutable.placed(
         kind, Shape((surface,), (Material("white"),)), np.array([*(low_ + half)]) - [0, half[1], 0],
         0.0, item_id=f"dress-test-{name}", room_id="0_0", level_id="0",
     )  # fmt: skip
-    draft.add(item, "test", kind)
+    mutable.add(item, "test", kind)
     return item
 
 
@@ -45,142 +45,142 @@ def empty_home() -> House:
     return home.with_items(i for i in home.items if not i.id.startswith("piece_"))
 
 
-def gates_of(draft: Draft) -> dict[str, Gate]:
-    return {gate.name: gate for gate in keep_gates(draft, draft.used)}
+def gates_of(mutable: MutableHouse) -> dict[str, Gate]:
+    return {gate.name: gate for gate in keep_gates(mutable, mutable.used)}
 
 
-def names(draft: Draft) -> set[str]:
-    return {item.id.removeprefix("dress-test-") for item in draft.items}
+def names(mutable: MutableHouse) -> set[str]:
+    return {item.id.removeprefix("dress-test-") for item in mutable.items}
 
 
 def test_what_stands_stays_and_what_floats_or_sinks_goes():
-    draft = Draft(house(TABLE), 1)
-    with_box(draft, "stands", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
-    with_box(draft, "almost", [1.3, 0.7515, 1.1], [1.4, 0.85, 1.2])
-    with_box(draft, "floats", [1.5, 0.755, 1.1], [1.6, 0.85, 1.2])
-    with_box(draft, "sunk", [1.7, 0.745, 1.1], [1.8, 0.85, 1.2])
-    gates = gates_of(draft)
-    assert names(draft) == {"table", "stands", "almost"}
+    mutable = MutableHouse(house(TABLE), 1)
+    with_box(mutable, "stands", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
+    with_box(mutable, "almost", [1.3, 0.7515, 1.1], [1.4, 0.85, 1.2])
+    with_box(mutable, "floats", [1.5, 0.755, 1.1], [1.6, 0.85, 1.2])
+    with_box(mutable, "sunk", [1.7, 0.745, 1.1], [1.8, 0.85, 1.2])
+    gates = gates_of(mutable)
+    assert names(mutable) == {"table", "stands", "almost"}
     assert (gates["support"].n_taken_out, gates["support"].n_left) == (2, 0)
-    assert draft.refused["test: floated or sank"] == 2
+    assert mutable.refused["test: floated or sank"] == 2
 
 
 def test_what_stood_on_a_thing_that_goes_goes_too():
-    draft = Draft(house(TABLE), 1)
-    with_box(draft, "tray", [1.1, 0.76, 1.1], [1.4, 0.78, 1.4])
-    with_box(draft, "cup", [1.2, 0.78, 1.2], [1.25, 0.85, 1.25])
-    with_box(draft, "plate", [1.6, 0.75, 1.2], [1.7, 0.77, 1.3])
-    gates = gates_of(draft)
-    assert names(draft) == {"table", "plate"}
+    mutable = MutableHouse(house(TABLE), 1)
+    with_box(mutable, "tray", [1.1, 0.76, 1.1], [1.4, 0.78, 1.4])
+    with_box(mutable, "cup", [1.2, 0.78, 1.2], [1.25, 0.85, 1.25])
+    with_box(mutable, "plate", [1.6, 0.75, 1.2], [1.7, 0.77, 1.3])
+    gates = gates_of(mutable)
+    assert names(mutable) == {"table", "plate"}
     assert gates["support"].n_taken_out == 2
     assert all(gate.n_left == 0 for gate in gates.values())
 
 
 def test_of_two_things_in_one_place_the_later_goes():
-    draft = Draft(house(TABLE), 1)
-    with_box(draft, "first", [1.1, 0.75, 1.1], [1.3, 0.85, 1.3])
-    with_box(draft, "second", [1.2, 0.75, 1.2], [1.4, 0.85, 1.4])
-    gates = gates_of(draft)
-    assert names(draft) == {"table", "first"}
+    mutable = MutableHouse(house(TABLE), 1)
+    with_box(mutable, "first", [1.1, 0.75, 1.1], [1.3, 0.85, 1.3])
+    with_box(mutable, "second", [1.2, 0.75, 1.2], [1.4, 0.85, 1.4])
+    gates = gates_of(mutable)
+    assert names(mutable) == {"table", "first"}
     assert (gates["penetration"].n_taken_out, gates["penetration"].n_left) == (1, 0)
 
 
 def test_a_thing_of_the_home_is_never_taken_out():
     twin = replace(TABLE, id="twin")
-    draft = Draft(house(TABLE, twin), 1)
-    assert gates_of(draft)["penetration"].n_checked == 0
-    assert names(draft) == {"table", "twin"}
+    mutable = MutableHouse(house(TABLE, twin), 1)
+    assert gates_of(mutable)["penetration"].n_checked == 0
+    assert names(mutable) == {"table", "twin"}
 
 
 def test_a_model_that_stands_in_another_thing_gives_way_to_the_one_that_stood_there():
     cup = solid("shelf", [1.0, 0.0, 1.9], [2.2, 1.0, 2.1])
-    draft = Draft(house(TABLE, cup), 1)
+    mutable = MutableHouse(house(TABLE, cup), 1)
     large = solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 2.0])
-    draft.change(0, large, "swap")
-    gates_of(draft)
-    assert draft.items[0] is TABLE
-    assert draft.refused["swap: stood in another thing"] == 1
+    mutable.change(0, large, "swap")
+    gates_of(mutable)
+    assert mutable.items[0] is TABLE
+    assert mutable.refused["swap: stood in another thing"] == 1
 
 
 def test_a_replaced_thing_may_hang_as_loosely_as_the_one_it_replaces():
     lamp = solid("lamp", [1.0, 1.5, 1.0], [1.2, 1.7, 1.2])
-    draft = Draft(house(TABLE, lamp), 1)
-    draft.change(1, solid("lamp", [1.05, 1.5, 1.05], [1.15, 1.7, 1.15]), "swap")
-    gates_of(draft)
-    assert not draft.refused
+    mutable = MutableHouse(house(TABLE, lamp), 1)
+    mutable.change(1, solid("lamp", [1.05, 1.5, 1.05], [1.15, 1.7, 1.15]), "swap")
+    gates_of(mutable)
+    assert not mutable.refused
 
 
 def test_a_replaced_thing_of_another_class_is_put_back():
-    draft = Draft(house(TABLE), 1)
-    draft.change(0, solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8], nyu40=5), "swap")
-    gates = gates_of(draft)
-    assert draft.items[0] is TABLE
+    mutable = MutableHouse(house(TABLE), 1)
+    mutable.change(0, solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8], nyu40=5), "swap")
+    gates = gates_of(mutable)
+    assert mutable.items[0] is TABLE
     assert gates["must_haves"].n_taken_out == 1
 
 
 def test_other_materials_are_no_other_mesh():
-    draft = Draft(house(TABLE), 1)
+    mutable = MutableHouse(house(TABLE), 1)
     surfaces = tuple(replace(s, material=0) for s in TABLE.surfaces)
-    draft.change(0, replace(TABLE, surfaces=surfaces), "parts")
-    assert gates_of(draft)["support"].n_checked == 0
+    mutable.change(0, replace(TABLE, surfaces=surfaces), "parts")
+    assert gates_of(mutable)["support"].n_checked == 0
 
 
 @pytest.mark.parametrize(
     ("out_m", "stays"), [(0.0, True), (0.0015, True), (0.02, False), (-0.02, False)]
 )
 def test_a_picture_hangs_at_its_wall(out_m, stays):
-    draft = Draft(empty_home(), 1)
+    mutable = MutableHouse(empty_home(), 1)
     low = [0.6, 1.4, out_m]
     picture = piece("picture", Place.WALL, 11)
-    with_box(draft, "picture", low, [1.0, 1.8, out_m + 0.03], picture)
-    gates_of(draft)
-    assert ("picture" in names(draft)) is stays
+    with_box(mutable, "picture", low, [1.0, 1.8, out_m + 0.03], picture)
+    gates_of(mutable)
+    assert ("picture" in names(mutable)) is stays
 
 
 def test_nothing_stands_before_a_door_or_in_its_swing():
     home = empty_home()
-    draft = Draft(home, 1)
+    mutable = MutableHouse(home, 1)
     door = next(i for i in home.items if i.id == "door_inner")
     x, _y, z = door.bounds.mean(0)
     shelf = piece("shelves", Place.FLOOR, 15)
-    with_box(draft, "before", [x - 0.75, 0.0, z - 0.1], [x - 0.65, 0.5, z + 0.1], shelf)
-    with_box(draft, "beside", [x - 0.75, 0.0, z - 0.75], [x - 0.65, 0.5, z - 0.6], shelf)
+    with_box(mutable, "before", [x - 0.75, 0.0, z - 0.1], [x - 0.65, 0.5, z + 0.1], shelf)
+    with_box(mutable, "beside", [x - 0.75, 0.0, z - 0.75], [x - 0.65, 0.5, z - 0.6], shelf)
     with_box(
-        draft, "mat", [x - 0.6, 0.0, z - 0.3], [x - 0.2, 0.01, z + 0.3], piece("rug", nyu40=20)
+        mutable, "mat", [x - 0.6, 0.0, z - 0.3], [x - 0.2, 0.01, z + 0.3], piece("rug", nyu40=20)
     )
-    gates = gates_of(draft)
-    assert {"beside", "mat"} <= names(draft)
-    assert "before" not in names(draft)
+    gates = gates_of(mutable)
+    assert {"beside", "mat"} <= names(mutable)
+    assert "before" not in names(mutable)
     assert gates["doors"].n_taken_out == 1
     assert gates["doors"].n_checked >= 3
 
 
 def test_furniture_may_not_cover_a_fifth_of_a_window_and_curtains_may():
-    draft = Draft(empty_home(), 1)
+    mutable = MutableHouse(empty_home(), 1)
     tall, low = piece("bookcase", Place.FLOOR, 10), piece("chest", Place.FLOOR, 10)
-    with_box(draft, "tall", [1.7, 0.0, 0.1], [2.4, 2.0, 0.4], tall)
-    with_box(draft, "low", [2.5, 0.0, 0.1], [3.3, 1.0, 0.4], low)
+    with_box(mutable, "tall", [1.7, 0.0, 0.1], [2.4, 2.0, 0.4], tall)
+    with_box(mutable, "low", [2.5, 0.0, 0.1], [3.3, 1.0, 0.4], low)
     with_box(
-        draft, "curtain", [1.5, 0.3, 0.0], [1.6, 2.2, 0.05], piece("curtain", Place.OPENING, 16)
+        mutable, "curtain", [1.5, 0.3, 0.0], [1.6, 2.2, 0.05], piece("curtain", Place.OPENING, 16)
     )
-    gates = gates_of(draft)
-    assert {"low", "curtain"} <= names(draft)
-    assert "tall" not in names(draft)
+    gates = gates_of(mutable)
+    assert {"low", "curtain"} <= names(mutable)
+    assert "tall" not in names(mutable)
     assert gates["windows"].n_taken_out == 1
 
 
 def test_what_closes_the_way_between_two_doors_goes():
-    draft = Draft(empty_home(), 1)
+    mutable = MutableHouse(empty_home(), 1)
     for k, z in enumerate((0.0, 1.0, 2.0, 3.0)):
-        with_box(draft, f"wall{k}", [2.6, 0.0, z], [2.8, 1.0, z + 1.0], piece("box", Place.FLOOR))
-    gates = gates_of(draft)
+        with_box(mutable, f"wall{k}", [2.6, 0.0, z], [2.8, 1.0, z + 1.0], piece("box", Place.FLOOR))
+    gates = gates_of(mutable)
     assert gates["path"].n_taken_out >= 1
     assert gates["path"].n_left == 0
 
 
 def test_people_are_no_obstacle():
     person = replace(solid("person", [1.0, 0.0, 1.0], [1.5, 1.8, 1.5]), kind=ItemKind.PERSON)
-    draft = Draft(house(TABLE, person), 1)
-    with_box(draft, "cup", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
-    gates_of(draft)
-    assert "cup" in names(draft)
+    mutable = MutableHouse(house(TABLE, person), 1)
+    with_box(mutable, "cup", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
+    gates_of(mutable)
+    assert "cup" in names(mutable)

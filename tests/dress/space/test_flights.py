@@ -5,7 +5,7 @@ from dataclasses import replace
 import shapely
 
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.flights import Flights, flights_of
 from tests.dress.furniture import boards, house, room
 
@@ -20,7 +20,7 @@ def flights(floor_y: float = 0.0) -> Flights:
     ]
     stairs = replace(boards("stairs", boxes, 38), kind=ItemKind.STAIRS)
     own = replace(room(), floor_y=floor_y, ceiling_y=floor_y + 2.5)
-    return flights_of(Draft(house(stairs), 1), own, shapely.Polygon(own.polygon))
+    return flights_of(MutableHouse(house(stairs), 1), own, shapely.Polygon(own.polygon))
 
 
 def test_the_floor_before_the_first_step_is_kept_and_that_at_the_side_of_the_last_is_not() -> None:
@@ -39,6 +39,6 @@ def test_upstairs_one_steps_off_at_the_last_step_and_the_stairs_stand_below() ->
 
 def test_a_room_without_stairs_keeps_nothing() -> None:
     own = room()
-    found = flights_of(Draft(house(), 1), own, shapely.Polygon(own.polygon))
+    found = flights_of(MutableHouse(house(), 1), own, shapely.Polygon(own.polygon))
     assert found.under.is_empty
     assert found.before.is_empty

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from pbrs_farm.core.house import House, Item, ItemKind, Room
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import (
     HouseSpace,
     RoomSpace,
@@ -30,7 +30,7 @@ def home() -> House:
 
 @pytest.fixture(scope="module")
 def space(home: House) -> HouseSpace:
-    return house_space(Draft(home, 1))
+    return house_space(MutableHouse(home, 1))
 
 
 def _face(room: RoomSpace, normal: tuple[float, float, float]) -> WallFace:
@@ -56,7 +56,7 @@ def test_the_face_follows_the_wall_and_not_an_outline_that_is_off(home: House) -
     wide = shapely.Polygon(home.rooms[0].polygon).buffer(0.06, join_style="mitre")
     outline = np.array(wide.exterior.coords)[:-1]
     moved = replace(home, rooms=(replace(home.rooms[0], polygon=outline), home.rooms[1]))
-    east = _face(house_space(Draft(moved, 1)).room("0_0"), (-1, 0, 0))
+    east = _face(house_space(MutableHouse(moved, 1)).room("0_0"), (-1, 0, 0))
     assert east.origin[0] == pytest.approx(5.0, abs=1e-6)
 
 
@@ -120,7 +120,7 @@ def test_an_openings_middle_lies_in_its_wall_however_deep_the_box_of_its_door_is
         cutter=replace(inner.cutter, positions=cutter.astype(np.float32)),
     )  # fmt: skip
     openings = tuple(drawn if o is inner else o for o in home.openings)
-    moved = house_space(Draft(replace(home, openings=openings), 1))
+    moved = house_space(MutableHouse(replace(home, openings=openings), 1))
     (door,) = (p for p in moved.passages if p.item_id == "door_inner")
     assert abs(float((door.centre - inner.quad.mean(0)) @ normal)) < 0.01
     assert set(door.room_ids) == {"0_0", "0_1"}
@@ -143,7 +143,7 @@ def test_a_door_without_an_opening_stands_in_the_hole_of_its_wall(has_hole: bool
     )
     base = builtin_home()
     house = replace(base, rooms=rooms, items=(*walls, door), openings=())
-    (passage,) = house_space(Draft(house, 1)).passages
+    (passage,) = house_space(MutableHouse(house, 1)).passages
     assert passage.centre[[0, 2]] == pytest.approx([2.0, 1.45], abs=0.02)
     assert abs(passage.normal[0]) == pytest.approx(1.0)
     assert passage.width == pytest.approx(0.9, abs=0.03)
@@ -168,29 +168,29 @@ def test_things_are_in_the_room_they_stand_in(home: House, space: HouseSpace) ->
 
 
 def test_a_shelf_across_the_room_parts_its_doors(home: House) -> None:
-    draft = Draft(home, 1)
-    space = house_space(draft)
+    mutable = MutableHouse(home, 1)
+    space = house_space(mutable)
     assert doors_are_joined(floor_bitmap(space, space.room("0_0")), space.room("0_0"))
-    draft.items.append(_block("across", (2.6, 0.0, 0.0), (2.8, 2.0, 4.0)))
-    space = house_space(draft)
+    mutable.items.append(_block("across", (2.6, 0.0, 0.0), (2.8, 2.0, 4.0)))
+    space = house_space(mutable)
     room = space.room("0_0")
     assert not doors_are_joined(floor_bitmap(space, room), room)
-    new = len(draft.items) - 1
+    new = len(mutable.items) - 1
     assert doors_are_joined(floor_bitmap(space, room, without=(new,)), room)
 
 
 def test_a_new_item_takes_wall_and_the_rest_is_kept(home: House) -> None:
-    draft = Draft(home, 1)
-    before = house_space(draft)
-    assert house_space(draft) is before
+    mutable = MutableHouse(home, 1)
+    before = house_space(mutable)
+    assert house_space(mutable) is before
     east = _face(before.room("0_0"), (-1, 0, 0))
     s = float(east.starts(0.6, 1.3, 1.8, 0.3)[0])
     middle = east.point(s + 0.3, 1.5, 0.05)
-    draft.items.append(_block("thing", tuple(middle - 0.04), tuple(middle + 0.04)))
-    after = _face(house_space(draft).room("0_0"), (-1, 0, 0))
+    mutable.items.append(_block("thing", tuple(middle - 0.04), tuple(middle + 0.04)))
+    after = _face(house_space(mutable).room("0_0"), (-1, 0, 0))
     assert after.free_m(s + 0.28, s + 0.32, 1.48, 1.52) < 0.05
     west = (1, 0, 0)
-    assert _face(house_space(draft).room("0_0"), west) is _face(before.room("0_0"), west)
+    assert _face(house_space(mutable).room("0_0"), west) is _face(before.room("0_0"), west)
 
 
 def test_a_footprint_is_that_of_the_mesh_and_not_of_its_box() -> None:
@@ -205,7 +205,7 @@ def test_a_footprint_is_that_of_the_mesh_and_not_of_its_box() -> None:
 def test_rooms_without_walls_or_outline_have_no_faces_and_do_no_harm(home: House) -> None:
     bare = replace(home, items=tuple(i for i in home.items if i.kind is not ItemKind.WALL))
     odd = Room("0_9", "", "0", np.zeros((2, 2)), 0.0, 2.5)
-    space = house_space(Draft(replace(bare, rooms=(*bare.rooms, odd)), 1))
+    space = house_space(MutableHouse(replace(bare, rooms=(*bare.rooms, odd)), 1))
     assert [len(r.faces) for r in space.rooms] == [0, 0, 0]
     for room in space.rooms:
         floor_bitmap(space, room)
@@ -214,6 +214,6 @@ def test_rooms_without_walls_or_outline_have_no_faces_and_do_no_harm(home: House
 def test_a_sloped_ceiling_hides_the_wall_above_it(home: House) -> None:
     slope = replace(box("slope", np.array([0.0, 1.5, 2.0]), np.array([3.0, 0.02, 3.0]), 0))
     roof = Item("roof", "roof", ItemKind.CEILING, "0", (slope,), 22)
-    space = house_space(Draft(replace(home, items=(*home.items, roof)), 1))
+    space = house_space(MutableHouse(replace(home, items=(*home.items, roof)), 1))
     west = _face(space.room("0_0"), (1, 0, 0))
     assert west.free_m(1.0, 1.2, 1.6, 1.8) == 0

@@ -10,7 +10,7 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.core.mesh import edges_are_paired, face_areas, triangle_corners
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.surfaces import dress_surfaces
 from pbrs_farm.dress.surfaces.cut_triangles import cut_triangles
@@ -22,9 +22,9 @@ from pbrs_farm.repair import repair
 
 
 def dressed(seed: int, house: House | None = None, share: float = 1.0) -> House:
-    draft = Draft(builtin_home() if house is None else house, seed)
-    dress_surfaces(draft, EMPTY, style_for(draft.rng("style")), share)
-    return draft.house()
+    mutable = MutableHouse(builtin_home() if house is None else house, seed)
+    dress_surfaces(mutable, EMPTY, style_for(mutable.rng("style")), share)
+    return mutable.frozen()
 
 
 def long_wall() -> Item:

@@ -12,7 +12,7 @@ import shapely
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import add_textiles
@@ -41,14 +41,14 @@ def _empty(*more: Item) -> House:
     return replace(home, items=(*bare, *more))
 
 
-def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> Draft:
-    draft = Draft(house or _bare(), seed)
-    add_textiles(draft, EMPTY, STYLE, share)
-    return draft
+def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> MutableHouse:
+    mutable = MutableHouse(house or _bare(), seed)
+    add_textiles(mutable, EMPTY, STYLE, share)
+    return mutable
 
 
-def _added(draft: Draft, nyu40: int) -> list[Item]:
-    return [i for i in draft.items[len(draft.source.items) :] if i.nyu40 == nyu40]
+def _added(mutable: MutableHouse, nyu40: int) -> list[Item]:
+    return [i for i in mutable.items[len(mutable.source.items) :] if i.nyu40 == nyu40]
 
 
 def _is_closed(surface: Surface) -> bool:
@@ -87,9 +87,9 @@ def test_a_panel_has_the_folds_that_were_asked_for() -> None:
 
 @pytest.mark.parametrize("seed", range(1, 9))
 def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
-    draft = _dressed(seed)
+    mutable = _dressed(seed)
     faces = {"window_living": (2, 0.0, 1.0), "window_bedroom": (2, 4.0, -1.0)}
-    for item in _added(draft, CURTAIN) + _added(draft, BLINDS):
+    for item in _added(mutable, CURTAIN) + _added(mutable, BLINDS):
         points = np.concatenate([s.positions for s in item.surfaces])
         axis, at, sign = faces["window_living" if item.room_id == "0_0" else "window_bedroom"]
         out = sign * (points[:, axis] - at)
@@ -150,15 +150,15 @@ def test_a_window_that_has_curtains_keeps_them() -> None:
     own = Item("own", "Curtains", ItemKind.OBJECT, "0", (cloth,), CURTAIN)
     full = replace(home, items=(*home.items, own))
     for seed in range(1, 6):
-        draft = _dressed(seed, full)
-        assert all(i.room_id != "0_0" for i in _added(draft, CURTAIN) + _added(draft, BLINDS))
+        mutable = _dressed(seed, full)
+        assert all(i.room_id != "0_0" for i in _added(mutable, CURTAIN) + _added(mutable, BLINDS))
 
 
 @pytest.mark.parametrize("seed", range(1, 9))
 def test_rugs_lie_flat_in_the_room_clear_of_doors(seed: int) -> None:
-    draft = _dressed(seed)
-    space = house_space(draft)
-    for item in _added(draft, RUG):
+    mutable = _dressed(seed)
+    space = house_space(mutable)
+    for item in _added(mutable, RUG):
         low, high = item.bounds
         assert 0 <= low[1] < 0.001
         assert 0.008 < high[1] < 0.0105
@@ -185,10 +185,10 @@ def test_some_seed_lays_a_large_rug_before_the_sofa() -> None:
 
 def test_a_room_with_a_rug_there_gets_no_second_one_on_it() -> None:
     for seed in range(1, 5):
-        draft = _dressed(seed, builtin_home())
-        old = next(i for i in draft.items if i.nyu40 == RUG)
+        mutable = _dressed(seed, builtin_home())
+        old = next(i for i in mutable.items if i.nyu40 == RUG)
         a = shapely.box(*old.bounds[0, [0, 2]], *old.bounds[1, [0, 2]])
-        for item in _added(draft, RUG):
+        for item in _added(mutable, RUG):
             b = shapely.box(*item.bounds[0, [0, 2]], *item.bounds[1, [0, 2]])
             assert not a.intersects(b)
 
@@ -213,8 +213,8 @@ def test_a_rug_shows_its_picture_on_top() -> None:
 
 
 def test_a_towel_hangs_over_its_rail() -> None:
-    draft = Draft(builtin_home(), 1)
-    piece, shape = towel_rail(draft, STYLE, np.random.default_rng(2))
+    mutable = MutableHouse(builtin_home(), 1)
+    piece, shape = towel_rail(mutable, STYLE, np.random.default_rng(2))
     assert piece.nyu40 == 27
     assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-6)
     assert shape.bounds[0, 1] == pytest.approx(0, abs=0.005)
@@ -236,9 +236,9 @@ def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
     plain = tuple(replace(m, texture_id=None) for m in home.materials)
     # What has a picture keeps it.
     assert _dressed(3, home).items[place] is home.items[place]
-    draft = _dressed(3, replace(home, materials=plain))
-    item = draft.items[place]
-    assert draft.materials[item.surfaces[0].material].texture_id is not None
+    mutable = _dressed(3, replace(home, materials=plain))
+    item = mutable.items[place]
+    assert mutable.materials[item.surfaces[0].material].texture_id is not None
     for now, was in zip(item.surfaces, home.items[place].surfaces, strict=True):
         assert np.array_equal(now.positions, was.positions)
         assert now.uvs is not None

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import WOODS
 from pbrs_farm.dress.textures import families
 from pbrs_farm.dress.textures.families import FAMILIES, Pattern, pattern_material, size_of
@@ -79,10 +79,10 @@ def test_noise_is_of_unit_deviation_and_a_blur_keeps_its_mean() -> None:
 
 def test_a_pattern_is_one_material_of_a_draft_however_often_it_is_asked_for() -> None:
     house = builtin_home()
-    draft = Draft(house, 1)
+    mutable = MutableHouse(house, 1)
     pattern = Pattern("tiles", 7, GREEN, variant="30")
-    first, second = pattern_material(draft, pattern), pattern_material(draft, pattern)
+    first, second = pattern_material(mutable, pattern), pattern_material(mutable, pattern)
     assert first == second
-    material = draft.materials[first.number]
-    assert set(material.texture_ids) <= set(draft.textures)
+    material = mutable.materials[first.number]
+    assert set(material.texture_ids) <= set(mutable.textures)
     assert len(material.texture_ids) == 3

@@ -7,7 +7,7 @@ import pytest
 
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Picture
 from pbrs_farm.core.house import Texture
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -24,8 +24,8 @@ def _catalogue(*pictures: Picture) -> Catalogue:
 
 
 def _shown(catalogue: Catalogue, family: str, n: int = 60) -> list[str]:
-    draft = Draft(builtin_home(), 1)
-    return [photographed(draft, catalogue, Pattern(family, seed)).photograph for seed in range(n)]
+    mutable = MutableHouse(builtin_home(), 1)
+    return [photographed(mutable, catalogue, Pattern(family, seed)).photograph for seed in range(n)]
 
 
 def test_as_many_pictures_as_drawn_ones_take_half_of_the_floors() -> None:
@@ -43,23 +43,23 @@ def test_a_picture_that_repeats_every_few_centimetres_is_for_furniture_alone() -
 
 def test_a_photographed_material_has_its_size_and_its_mean() -> None:
     catalogue = _catalogue(*(_picture(f"c{k}", "cloth", 0.4) for k in range(100)))
-    draft = Draft(builtin_home(), 1)
-    several = (photographed(draft, catalogue, Pattern("weave", seed)) for seed in range(9))
+    mutable = MutableHouse(builtin_home(), 1)
+    several = (photographed(mutable, catalogue, Pattern("weave", seed)) for seed in range(9))
     pattern = next(p for p in several if p.photograph)
-    made = pattern_material(draft, pattern)
+    made = pattern_material(mutable, pattern)
     assert made.size_m == (0.4, 0.4)
     assert made.mean_rgb == pytest.approx([0.216] * 3, abs=0.01)
-    assert draft.materials[made.number].texture_id == pattern.photograph
-    assert pattern.photograph in draft.textures
+    assert mutable.materials[made.number].texture_id == pattern.photograph
+    assert pattern.photograph in mutable.textures
 
 
 def test_a_damaged_picture_is_one_note_and_the_surface_is_drawn() -> None:
     broken = _catalogue(*(_picture(f"x{k}", "tiles", 1.0, b"\xff\xd8\xff") for k in range(50)))
-    draft = Draft(builtin_home(), 1)
-    shown = [photographed(draft, broken, Pattern("tiles", seed)).photograph for seed in range(9)]
+    mutable = MutableHouse(builtin_home(), 1)
+    shown = [photographed(mutable, broken, Pattern("tiles", seed)).photograph for seed in range(9)]
     assert not any(shown)
-    assert {n.kind for n in draft.notes} == {"unreadable-texture"}
-    places = [n.place for n in draft.notes]
+    assert {n.kind for n in mutable.notes} == {"unreadable-texture"}
+    places = [n.place for n in mutable.notes]
     assert len(places) == len(set(places))
 
 

@@ -11,8 +11,8 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import BED
 from pbrs_farm.core.house import Item, ItemKind, Material
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.draft import Draft
 from pbrs_farm.dress.finish_scheme import finish_scheme
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surface_finishes import material_of_finish
@@ -33,26 +33,26 @@ def _style() -> Style:
     return style_for(np.random.default_rng(1))
 
 
-def _drafts(n: int = 8) -> list[Draft]:
-    drafts = [Draft(builtin_home(), seed) for seed in range(1, n)]
-    for draft in drafts:
-        furnish_walls(draft, EMPTY, _style(), 1.0)
-    return drafts
+def _houses(n: int = 8) -> list[MutableHouse]:
+    houses = [MutableHouse(builtin_home(), seed) for seed in range(1, n)]
+    for mutable in houses:
+        furnish_walls(mutable, EMPTY, _style(), 1.0)
+    return houses
 
 
-def _bare_drafts(n: int) -> list[Draft]:
-    """Drafts of a home without furniture, radiators hung below its windows."""
+def _bare_houses(n: int) -> list[MutableHouse]:
+    """Houses made of a home without furniture, radiators hung below its windows."""
     home = builtin_home()
     bare = home.with_items(i for i in home.items if i.kind is not ItemKind.OBJECT)
-    drafts = [Draft(bare, seed) for seed in range(1, n)]
-    for draft in drafts:
-        for room in house_space(draft).rooms if wants_radiators(draft) else ():
-            hang_radiators(Hanging(draft, room, "walls"), _style(), 1.0)
-    return drafts
+    houses = [MutableHouse(bare, seed) for seed in range(1, n)]
+    for mutable in houses:
+        for room in house_space(mutable).rooms if wants_radiators(mutable) else ():
+            hang_radiators(Hanging(mutable, room, "walls"), _style(), 1.0)
+    return houses
 
 
-def _named(draft: Draft, name: str) -> list[Item]:
-    return [i for i in draft.items if i.name == name]
+def _named(mutable: MutableHouse, name: str) -> list[Item]:
+    return [i for i in mutable.items if i.name == name]
 
 
 @pytest.mark.parametrize(
@@ -76,14 +76,14 @@ def test_what_hangs_begins_at_its_wall_and_faces_outwards(
 
 
 def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
-    drafts = _bare_drafts(9)
-    wanted = [wants_radiators(draft) for draft in drafts]
+    houses = _bare_houses(9)
+    wanted = [wants_radiators(mutable) for mutable in houses]
     assert len(set(wanted)) == 2
-    for draft, wants in zip(drafts, wanted, strict=True):
-        found = _named(draft, "Panel radiator")
+    for mutable, wants in zip(houses, wanted, strict=True):
+        found = _named(mutable, "Panel radiator")
         assert bool(found) == wants
         for item in found:
-            windows = [w for r in house_space(draft).rooms for w in r.windows]
+            windows = [w for r in house_space(mutable).rooms for w in r.windows]
             middle = item.bounds.mean(0)
             nearest = min(windows, key=lambda w, m=middle: float(np.linalg.norm((w.centre - m)[[0, 2]])))  # fmt: skip
             assert item.bounds[1, 1] < nearest.bottom_y
@@ -92,10 +92,10 @@ def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
 
 def test_added_radiators_have_the_coat_of_the_home() -> None:
     coats = set()
-    for draft in _bare_drafts(24):
-        coat = material_of_finish(finish_scheme(draft, _style()).radiator)
-        for item in _named(draft, "Panel radiator"):
-            assert coat in [draft.materials[s.material] for s in item.surfaces]
+    for mutable in _bare_houses(24):
+        coat = material_of_finish(finish_scheme(mutable, _style()).radiator)
+        for item in _named(mutable, "Panel radiator"):
+            assert coat in [mutable.materials[s.material] for s in item.surfaces]
             coats.add(coat)
     assert len(coats) > 2
 
@@ -103,11 +103,11 @@ def test_added_radiators_have_the_coat_of_the_home() -> None:
 def test_a_home_that_has_a_radiator_gets_none() -> None:
     house = builtin_home()
     drawn = replace(house.items[-1], id="drawn", name="Radiator", source_class="radiator")
-    assert not wants_radiators(Draft(house.with_items((*house.items, drawn)), 3))
+    assert not wants_radiators(MutableHouse(house.with_items((*house.items, drawn)), 3))
 
 
 def test_coats_hang_free_of_the_floor() -> None:
-    coats = [i for draft in _drafts() for i in _named(draft, "Coat rack")]
+    coats = [i for mutable in _houses() for i in _named(mutable, "Coat rack")]
     assert coats
     for item in coats:
         assert item.bounds[0, 1] > 0.3
@@ -120,10 +120,10 @@ def test_no_coats_hang_over_a_bed_or_beside_it() -> None:
     home = wall_rooms.house([*walls_around(rect), *covers(own), bed], [own])
     n = 0
     for seed in range(12):
-        draft = Draft(home, seed)
-        space = house_space(draft)
-        hang_coats(Hanging(draft, space.rooms[0], "walls"), space, _style(), 1.0)
-        for item in draft.items[len(draft.source.items) :]:
+        mutable = MutableHouse(home, seed)
+        space = house_space(mutable)
+        hang_coats(Hanging(mutable, space.rooms[0], "walls"), space, _style(), 1.0)
+        for item in mutable.items[len(mutable.source.items) :]:
             apart = np.maximum(item.bounds[0] - bed.bounds[1], bed.bounds[0] - item.bounds[1])
             assert apart[[0, 2]].max() >= 0.5
             n += 1

@@ -17,7 +17,7 @@ from pbrs_farm.core.classes import (
 )
 from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Texture
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.draft import Draft
+from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.things.hung import round_mirror
@@ -34,14 +34,14 @@ def _style(seed: int = 1) -> Style:
     return style_for(np.random.default_rng(seed))
 
 
-def _dressed(seed: int, share: float = 1.0, catalogue: Catalogue = EMPTY) -> Draft:
-    draft = Draft(builtin_home(), seed)
-    furnish_walls(draft, catalogue, _style(seed), share)
-    return draft
+def _dressed(seed: int, share: float = 1.0, catalogue: Catalogue = EMPTY) -> MutableHouse:
+    mutable = MutableHouse(builtin_home(), seed)
+    furnish_walls(mutable, catalogue, _style(seed), share)
+    return mutable
 
 
-def _added(draft: Draft) -> list[Item]:
-    return draft.items[len(draft.source.items) :]
+def _added(mutable: MutableHouse) -> list[Item]:
+    return mutable.items[len(mutable.source.items) :]
 
 
 def _face_of(item: Item, space: HouseSpace) -> WallFace:
@@ -53,10 +53,10 @@ def _face_of(item: Item, space: HouseSpace) -> WallFace:
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
-    draft = _dressed(seed)
-    space = house_space(Draft(builtin_home(), 1))
-    assert _added(draft)
-    for item in _added(draft):
+    mutable = _dressed(seed)
+    space = house_space(MutableHouse(builtin_home(), 1))
+    assert _added(mutable)
+    for item in _added(mutable):
         points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
         out = _face_of(item, space).out_of(points)
         assert 0.0005 <= out.min() <= 0.001, item.name
@@ -64,9 +64,9 @@ def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
-    draft = _dressed(seed)
-    space = house_space(Draft(builtin_home(), 1))
-    for item in _added(draft):
+    mutable = _dressed(seed)
+    space = house_space(MutableHouse(builtin_home(), 1))
+    for item in _added(mutable):
         low, high = item.bounds
         assert low[1] > 0.0
         assert high[1] < 2.5
@@ -80,26 +80,26 @@ def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_things_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
-    draft = _dressed(seed)
-    space = house_space(draft)
-    added = range(len(draft.source.items), len(draft.items))
+    mutable = _dressed(seed)
+    space = house_space(mutable)
+    added = range(len(mutable.source.items), len(mutable.items))
     for n in added:
         low, high = space.bounds[n]
-        for m, other in enumerate(draft.items):
+        for m, other in enumerate(mutable.items):
             if m != n and len(space.points[m]) and other.kind is not ItemKind.DOOR:
                 inside = ((space.points[m] > low) & (space.points[m] < high)).all(1)
-                assert not inside.any(), (draft.items[n].name, other.name)
+                assert not inside.any(), (mutable.items[n].name, other.name)
 
 
 def test_a_home_gets_pictures_and_every_thing_its_class_source_and_seed() -> None:
-    draft = _dressed(3)
-    classes = [i.nyu40 for i in _added(draft)]
+    mutable = _dressed(3)
+    classes = [i.nyu40 for i in _added(mutable)]
     assert classes.count(PICTURE) >= 2
-    for item in _added(draft):
+    for item in _added(mutable):
         assert item.nyu40 in _HUNG
         assert item.tags[:2] == (f"dressed:{item.source_class}", "seed:3")
         assert item.room_id in ("0_0", "0_1")
-    ids = [i.id for i in _added(draft)]
+    ids = [i.id for i in _added(mutable)]
     assert len(set(ids)) == len(ids)
 
 
@@ -181,15 +181,15 @@ def _photograph(width: int, height: int) -> Picture:
 
 def test_the_users_own_photographs_hang_before_drawn_prints() -> None:
     own = Catalogue((), lambda _piece: None, "own", pictures=(_photograph(90, 60),))
-    draft = _dressed(2, catalogue=own)
-    names = [t.name for t in draft.textures.values() if t.name.startswith("print")]
+    mutable = _dressed(2, catalogue=own)
+    names = [t.name for t in mutable.textures.values() if t.name.startswith("print")]
     assert names.count("print photograph.jpg") == 1
     # The rest is drawn, as without them.
     assert len(names) > 1
 
 
 def test_a_photograph_fills_its_frame_and_is_not_stretched() -> None:
-    gallery = Gallery(Draft(builtin_home(), 1), Catalogue((), lambda _p: None, "own", pictures=(_photograph(90, 60),)), _style())  # fmt: skip
+    gallery = Gallery(MutableHouse(builtin_home(), 1), Catalogue((), lambda _p: None, "own", pictures=(_photograph(90, 60),)), _style())  # fmt: skip
     shown = gallery.print_for(0.5)
     pixels = decode_photo(shown.texture.data, "print")
     assert pixels.shape[:2] == (60, 30)

@@ -1,11 +1,11 @@
-"""A draft's materials: painted beside what follows, once each, in the order they were asked for."""
+"""A mutable house's materials: painted beside what follows, once each, in the order they were asked for."""
 
 from threading import Event
 
 import pytest
 
 from pbrs_farm.core.house import Material, Texture
-from pbrs_farm.dress.draft_materials import DraftMaterials, Painted
+from pbrs_farm.dress.painted_materials import Painted, PaintedMaterials
 
 PLAIN = Material("plain")
 
@@ -19,7 +19,7 @@ def _painted(name: str) -> Painted:
 
 
 def test_who_needs_a_material_paints_it_while_the_thread_is_at_another() -> None:
-    materials, begun, go_on = DraftMaterials([PLAIN], {}), Event(), Event()
+    materials, begun, go_on = PaintedMaterials([PLAIN], {}), Event(), Event()
 
     def held() -> Painted:
         begun.set()
@@ -37,7 +37,7 @@ def test_who_needs_a_material_paints_it_while_the_thread_is_at_another() -> None
 
 
 def test_a_thread_paints_what_nobody_has_asked_for_yet() -> None:
-    materials, done = DraftMaterials([], {}), Event()
+    materials, done = PaintedMaterials([], {}), Event()
 
     def paint() -> Painted:
         done.set()
@@ -48,7 +48,7 @@ def test_a_thread_paints_what_nobody_has_asked_for_yet() -> None:
 
 
 def test_a_material_is_painted_once_however_often_it_is_read() -> None:
-    materials, calls = DraftMaterials([], {}), list[int]()
+    materials, calls = PaintedMaterials([], {}), list[int]()
 
     def paint() -> Painted:
         calls.append(1)
@@ -61,7 +61,7 @@ def test_a_material_is_painted_once_however_often_it_is_read() -> None:
 
 
 def test_textures_stand_in_the_order_of_asking_not_of_painting() -> None:
-    materials, go_on = DraftMaterials([], {"old": _texture("old")}), Event()
+    materials, go_on = PaintedMaterials([], {"old": _texture("old")}), Event()
 
     def held() -> Painted:
         go_on.wait(60)
@@ -76,7 +76,7 @@ def test_textures_stand_in_the_order_of_asking_not_of_painting() -> None:
 
 
 def test_the_error_of_a_painter_reaches_who_reads_the_material() -> None:
-    materials = DraftMaterials([PLAIN], {})
+    materials = PaintedMaterials([PLAIN], {})
 
     def fail() -> Painted:
         raise KeyError("no such family")
@@ -88,7 +88,7 @@ def test_the_error_of_a_painter_reaches_who_reads_the_material() -> None:
 
 
 def test_equal_materials_have_one_number() -> None:
-    materials = DraftMaterials([PLAIN], {})
+    materials = PaintedMaterials([PLAIN], {})
     number, _ = materials.paint(lambda: _painted("a"))
     assert materials.add(PLAIN, ()) == 0
     assert materials.add(Material("new"), ()) == materials.add(Material("new"), ()) == 2
@@ -97,14 +97,14 @@ def test_equal_materials_have_one_number() -> None:
 
 
 def test_a_painted_material_that_was_read_keeps_its_number_when_it_is_added() -> None:
-    materials = DraftMaterials([PLAIN], {})
+    materials = PaintedMaterials([PLAIN], {})
     number, _ = materials.paint(lambda: _painted("a"))
     assert materials.add(materials[number], ()) == number
     assert len(materials) == 2
 
 
 def test_a_draft_that_is_given_up_paints_no_more() -> None:
-    materials, begun, go_on, painted = DraftMaterials([], {}), Event(), Event(), list[str]()
+    materials, begun, go_on, painted = PaintedMaterials([], {}), Event(), Event(), list[str]()
 
     def held() -> Painted:
         begun.set()

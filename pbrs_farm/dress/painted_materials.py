@@ -38,7 +38,7 @@ class Painting:
             return self._painted
 
 
-class DraftMaterials(Sequence[Material]):
+class PaintedMaterials(Sequence[Material]):
     """Materials by number; reading one that is not painted yet waits for it, and raises its error."""
 
     def __init__(self, materials: Iterable[Material], textures: Mapping[str, Texture]) -> None:

@@ -1,4 +1,4 @@
-"""A house while it is dressed: what was added, changed and refused; state: the draft itself.
+"""A house while it is dressed: what was added, changed and refused; state: the house itself.
 
 Effects: a thread paints materials.
 """
@@ -16,29 +16,41 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
-from pbrs_farm.dress.draft_materials import DraftMaterials
+from pbrs_farm.dress.painted_materials import PaintedMaterials
 
 ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
 CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source
 
 
-class Draft:
-    """The house being dressed. Items keep their order; what is added comes after them."""
+class MutableHouse:
+    """A house that passes of dressing change: items are added and changed, materials drawn.
+
+    Items of the source keep their order and their numbers; what is added comes after them. A pass
+    draws from `rng` with words of its own, so that it disturbs no other, and counts what it refused
+    and why. Use it in `contextlib.closing`: a thread paints its textures meanwhile.
+
+        with closing(MutableHouse(house, seed=1)) as mutable:
+            item = mutable.placed(piece, shape, at, 0.0, item_id="dress-mine-0", room_id="0_0", level_id="0")
+            mutable.add(item, "mine", piece)
+            dressed = mutable.frozen()
+
+    Not for edits of users: those are values (core/edits.py).
+    """
 
     def __init__(self, house: House, seed: int, mess: float = 0.0) -> None:
         self.source = house
         self.seed = seed
         self.mess = mess  # 0..1: how little people have tidied up
         self.items: list[Item] = list(house.items)
-        self.materials = DraftMaterials(house.materials, house.textures)
+        self.materials = PaintedMaterials(house.materials, house.textures)
         self.notes: list[Note] = []
-        self.done: Counter[str] = Counter()  # what was added or changed, by part and group
-        self.refused: Counter[str] = Counter()  # `<part>: <reason>` of what was not
+        self.done: Counter[str] = Counter()  # what was added or changed, by pass and group
+        self.refused: Counter[str] = Counter()  # tries that were given up, by `<pass>: <reason>`
         self.used: dict[str, Piece] = {}  # pieces of the catalogue in the house, by id
-        self.kept: dict[str, object] = {}  # what parts compute from the items and use again
+        self.kept: dict[str, object] = {}  # what passes compute from the items and use again
 
     def close(self) -> None:
-        """End the thread that paints: the draft is a house now, or was given up."""
+        """End the thread that paints: the house is frozen, or was given up."""
         self.materials.close()
 
     @property
@@ -47,11 +59,18 @@ class Draft:
         return self.materials.textures()
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """A random stream of its own for each (house, seed, words): parts do not disturb another."""
+        """A random stream of its own for each (house, seed, words): passes do not disturb one another.
+
+        Equal words give the same stream from its start at each call.
+        """
         return np.random.default_rng(keys.seed(self.source.id, "dress", self.seed, *words))
 
     def material(self, material: Material, textures: Iterable[Texture] = ()) -> int:
-        """The number of a material, the same for equal ones; textures: those that it names."""
+        """Add a material where no equal one is there; its number, for Surface.material.
+
+        textures: those that it names. Numbers are of this house while it is dressed: `frozen` leaves
+        out what nothing uses and numbers the rest anew.
+        """
         return self.materials.add(material, textures)
 
     def placed(
@@ -59,10 +78,13 @@ class Draft:
         item_id: str, room_id: str | None, level_id: str, scale: F64 | float = 1.0,
         tags: tuple[str, ...] = (),
     ) -> Item:  # fmt: skip
-        """The piece as an item of this house, not added yet.
+        """The piece as an item of this house; `add` puts it there.
 
-        at: (3,) metres, where the middle of its base comes to stand. turn_rad: about +y.
-        scale: of its own axes, (3,) or one for all.
+        at: (3,) world metres of the shape's origin, which for pieces of the catalogue is the middle of
+        the base (of what hangs on a wall, of its back). turn_rad: about +y; 0 looks to +z. scale: along
+        the piece's own axes, (3,) or one for all. item_id must be new in the house; ids
+        `dress-<pass>-<n>` tell the report which pass added it. The shape's materials and textures
+        come into the house, too. Nothing is checked for room: gates do that at the end.
         """
         turn, factor = rotation_y(turn_rad), np.broadcast_to(np.asarray(scale, np.float64), 3)
 
@@ -83,19 +105,19 @@ class Draft:
         )  # fmt: skip
 
     def add(self, item: Item, part: str, piece: Piece | None = None) -> None:
-        """Add an item; part: which part of the dressing it belongs to, for the report."""
+        """Add an item after all others; part: the pass that adds it, for the report."""
         self.items.append(item)
         if piece is not None:
             self.used[piece.id] = piece
             self.done[f"{part}: {piece.group}"] += 1
 
     def change(self, index: int, item: Item, part: str) -> None:
-        """Put a changed item in the place of items[index]."""
+        """Put a changed item in the place of items[index] and tag it; part: the pass, for the report."""
         tag = f"{CHANGED_TAG}{part}"
         self.items[index] = item if tag in item.tags else replace(item, tags=(*item.tags, tag))
 
-    def house(self) -> House:
-        """The house as dressed so far, without the materials and textures that nothing uses."""
+    def frozen(self) -> House:
+        """The house as dressed so far, as a value, without materials and textures that nothing uses."""
         used = sorted({s.material for item in self.items for s in item.surfaces})
         number = {old: new for new, old in enumerate(used)}
         items = tuple(
