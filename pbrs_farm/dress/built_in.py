@@ -30,7 +30,7 @@ from pbrs_farm.dress.surface_finishes import (
 )
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
-PART: Final = "joinery"
+PASS: Final = "joinery"  # in reports and random streams
 _SMALL_M: Final = 0.25  # handles and hinges; what is larger belongs to the frame or the leaf
 _FRAME: Final = 0.97  # of the width: what reaches so far is the frame
 _SLENDER_M: Final = 0.13  # rails, balusters and pipes: their second longest side
@@ -50,7 +50,7 @@ def finish_built_in_parts(
     """
     scheme = finish_scheme(house, style)
     kinds = {
-        kind: float(house.rng(PART, kind).random()) < share
+        kind: float(house.rng(PASS, kind).random()) < share
         for kind in (
             "door",
             "window",
@@ -70,8 +70,8 @@ def finish_built_in_parts(
             continue
         made = _finish_by_scheme(house, item, kind, scheme)
         if made is not item:
-            house.change(index, made, PART)
-            house.done[f"{PART}: {kind}"] += 1
+            house.change(index, made, PASS)
+            house.done[f"{PASS}: {kind}"] += 1
 
 
 def _kind_in_scheme(item: Item) -> str:
@@ -128,7 +128,7 @@ def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
 def _finish_opening(
     house: MutableHouse, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
 ) -> Item:
-    """A door or window by its connected parts: what spans its width is frame, small parts fittings."""
+    """A door or window by its connected surfaces: what spans its width is frame, small ones are fittings."""
     # What lights is named by the number of its surface, which parting would change.
     if any(light.emitting for light in item.lights) or not has_plain(house, item):
         return item

@@ -16,11 +16,11 @@ from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.home.room_use import RoomKind
 
-PART = "lamps"
-_HEAD_M = 1.95  # below a lamp over free floor
-_TABLE_M = 1.45  # of a lamp over a table, above the floor
-_FROM_WALL_M = 0.25  # of a lamp's edge
-_MOST_ROOM_M = 3.6  # a higher ceiling is out of a cord's reach
+PASS = "lamps"
+_HEAD_M = 1.95  # lowest height above free floor at which a lamp may hang
+_TABLE_M = 1.45  # lowest height above the floor of a lamp over a table
+_FROM_WALL_M = 0.25  # least distance from a lamp's edge to a wall
+_MOST_ROOM_M = 3.6  # no lamp is hung from a higher ceiling
 _GRID_M = 0.15
 _PLAIN = (RoomKind.BATHROOM, RoomKind.HALL, RoomKind.KITCHEN, RoomKind.STORE)
 # Pieces that suit every room, by words of their names; tubes are for rooms where people work.
@@ -52,12 +52,12 @@ def hang_from_ceiling(
             lit = with_flux(shape, flux_lm)
             turn = float(rng.choice([0.0, np.pi / 2]))
             item = house.placed(
-                piece, lit, at, turn, item_id=next_id(house, PART), room_id=room_id,
+                piece, lit, at, turn, item_id=next_id(house, PASS), room_id=room_id,
                 level_id=room.room.level_id, scale=factor,
             )  # fmt: skip
-            house.add(item, PART, piece)
+            house.add(item, PASS, piece)
             return True
-    house.refused[f"{PART}: no place under the ceiling"] += 1
+    house.refused[f"{PASS}: no place under the ceiling"] += 1
     return False
 
 

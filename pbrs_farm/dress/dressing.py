@@ -86,11 +86,13 @@ class Dressed(NamedTuple):
 
 def dressed_house(
     house: House, catalogue: Catalogue, fields: DressFields, seed: int,
-    tell: Callable[[float], None] = lambda _share: None,
+    on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Dressed:  # fmt: skip
-    """As dress, with what refit_after_repair needs. tell: called with the share of the passes that are done."""
+    """As dress, with what refit_after_repair needs. on_progress: called with the share of the passes that are done."""
     with closing(MutableHouse(house, seed, fields.mess)) as mutable:
-        return Dressed(*_dressed(mutable, catalogue, fields, tell), mutable.used, len(house.items))
+        return Dressed(
+            *_dressed(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
+        )
 
 
 def refit_after_repair(repaired: House, dressed: Dressed, catalogue: Catalogue) -> Dressed:
@@ -110,7 +112,10 @@ def refit_after_repair(repaired: House, dressed: Dressed, catalogue: Catalogue) 
 
 
 def _dressed(
-    house: MutableHouse, catalogue: Catalogue, fields: DressFields, tell: Callable[[float], None]
+    house: MutableHouse,
+    catalogue: Catalogue,
+    fields: DressFields,
+    on_progress: Callable[[float], None],
 ) -> tuple[House, DressReport]:
     style = style_for(house.rng("style"), fields.style)
     pieces = {p.id: p for p in catalogue.pieces}
@@ -123,7 +128,7 @@ def _dressed(
             if share > 0:
                 dressing_pass(house, catalogue, style, share)
             n_done += 1
-            tell(n_done / len(_FURNITURE + _THINGS))
+            on_progress(n_done / len(_FURNITURE + _THINGS))
         gates = _merge_gates(gates, keep_gates(house, pieces | house.used))
     if fields.passes:
         for name in fields.passes.split(":"):

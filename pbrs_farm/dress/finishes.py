@@ -1,4 +1,4 @@
-"""The part `parts`: wood, cloth, leather and metals on furniture that has plain colours.
+"""The pass `parts`: wood, cloth, leather and metals on furniture that has plain colours.
 
 Wood keeps near the part's own colour and takes the grain of the home's wood; cloth and leather
 take colours of the style; metals have measured colours. White lacquer, glass, mirrors, bulbs,
@@ -40,12 +40,12 @@ from pbrs_farm.dress.part_kinds import (
 from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, Wood
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 
-PART: Final = "parts"
-_LEAST_BOARD_M2: Final = 0.05  # a part of no class that is smaller stays: knobs, feet
+PASS: Final = "parts"
+_LEAST_BOARD_M2: Final = 0.05  # smaller parts of no known kind stay as they are: knobs, feet
 _UPWARD: Final = 0.7  # cosine: what one sits or lies on
-_LEATHER_SHARE: Final = 0.25  # of sofas and armchairs
+_LEATHER_SHARE: Final = 0.25  # share of sofas and armchairs
 _MAX_SATURATION, _MAX_VALUE = 0.5, 0.72  # of painted furniture, as people buy it
-_PAINT_STAYS: Final = 0.15  # of furniture painted in a colour that wood never has
+_PAINT_STAYS: Final = 0.15  # chance that furniture in a colour that wood never has stays painted
 _GREY_STAYS: Final = 0.6
 _DARKEST: Final = 0.02  # linear: black wood still shows its grain, black paint some light
 _SHEEN: Final = (0.5, 0.5, 0.5)  # Ks of lacquer: 4 % at normal incidence
@@ -79,8 +79,8 @@ def finish_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, sh
             for surface, kind in zip(item.surfaces, kinds, strict=True)
         )
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
-            house.change(index, replace(item, surfaces=surfaces), PART)
-            house.done[f"{PART}: {item.kind.value}"] += 1
+            house.change(index, replace(item, surfaces=surfaces), PASS)
+            house.done[f"{PASS}: {item.kind.value}"] += 1
 
 
 def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[PartKind]:
@@ -136,7 +136,7 @@ def _finish_surface(
         return surface
     shade = "".join(f"{round(31 * c):02x}" for c in material.diffuse)
     rng = house.rng(
-        PART, item.level_id, item.room_id or "", kind.value, group * (kind is PartKind.SOFT), shade
+        PASS, item.level_id, item.room_id or "", kind.value, group * (kind is PartKind.SOFT), shade
     )
     if rng.random() >= share:
         return surface
@@ -181,7 +181,7 @@ def _finish_wood(
 
 def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
     """The one veneer that a home's furniture of that wood shows."""
-    seed = int(house.rng(PART, "grain", wood.name).integers(2**31))
+    seed = int(house.rng(PASS, "grain", wood.name).integers(2**31))
     return Pattern("grain", seed, wood=wood)
 
 
@@ -204,7 +204,7 @@ def _finish_soft(
     if family == "leather":
         hides = COLOURS["hides"]
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
-    seed = int(house.rng(PART, family).integers(2**31))
+    seed = int(house.rng(PASS, family).integers(2**31))
     pattern = photographed(house, catalogue, Pattern(family, seed))
     return _tinted(house, pattern, wanted, is_grained=False)
 

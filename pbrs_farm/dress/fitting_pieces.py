@@ -9,8 +9,8 @@ from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.old_place import OldPlace
 
-LEAST_SIDE: Final = 0.75  # of the old footprint's sides
-HEIGHT: Final = 0.15  # how far the height may differ
+LEAST_SIDE: Final = 0.75  # least side of the new footprint, as a share of the old one
+HEIGHT: Final = 0.15  # greatest difference in height, as a share of the old one
 SCALE: Final = (0.8, 1.25)  # models are of their true size
 STRETCH: Final = 1.2
 ALIKE: Final = 0.93

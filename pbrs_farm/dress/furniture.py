@@ -1,4 +1,4 @@
-"""The part `furniture` of dressing: what people add along free walls, room by room; no effects.
+"""The pass `furniture`: what people add along free walls, room by room; no effects.
 
 A thing stands with its back at a wall where nothing is before it, closes no way, blocks no door,
 and leaves most of the floor and a good part of the wall free.
@@ -18,7 +18,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.record import Nyu40, Record, read_toml
-from pbrs_farm.dress.furniture_look import Look, grained, look_of
+from pbrs_farm.dress.furniture_look import BoardLook, grained, look_of
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
 from pbrs_farm.dress.space import RoomSpace, house_space
@@ -30,20 +30,20 @@ from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 Range = tuple[float, float]
-PART = "furniture"
-_LEAST_M2 = 3.0  # of a room
-_SIDE_M = 0.03  # to what stands beside it
+PASS = "furniture"
+_LEAST_M2 = 3.0  # smaller rooms get nothing
+_SIDE_M = 0.03  # distance to what stands beside it
 _LIFT_M = 0.0001  # above the floor, so that no faces coincide
-_FREE_BEFORE_M = 1.19  # of a wall, at most: no more is measured
+_FREE_BEFORE_M = 1.19  # free depth before a wall is measured up to this
 _TRIES = 8  # places of one thing
-_MOST_FACES = 12_000  # of a model of the catalogue
-_FROM_CATALOGUE = 0.35  # of what both have
+_MOST_FACES = 12_000  # models of the catalogue with more are left out
+_FROM_CATALOGUE = 0.35  # chance that a thing is of the catalogue, where it can be generated, too
 _ALIKE, _BESIDE_ALIKE = 0.7, 0.8  # how much less a room wants of what it has
-_FROM_KITCHEN_M = 1.0  # that bookcases keep from worktops, cookers, fridges
-_BESIDE_M = 0.15  # from a bed to its nightstand
+_FROM_KITCHEN_M = 1.0  # least distance of bookcases from worktops, cookers and fridges
+_BESIDE_M = 0.15  # greatest gap between a bed and its nightstand
 _END_LIKED = 0.5  # an end of a free stretch, where all its other places together count 1
-_FILLED = ("full", "filled")  # in names of models that hold things of their own
-_LOOKS = 3  # of a home's added furniture
+_FILLED = ("full", "filled")  # models whose names have these words hold things of their own
+_LOOKS = 3  # different looks of the furniture added to one home
 
 
 class WantedKind(Record):
@@ -84,13 +84,13 @@ def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share
         wanted = WANTED.get(room.kind, ())
         if not wanted or not room.room.has_floor or room.area.area < _LEAST_M2:
             continue
-        rng = house.rng(PART, room.room.id)
+        rng = house.rng(PASS, room.room.id)
         names = _draw_wanted(house, room, wanted, rng, share)
         floor = RoomFloor.of(house, space, room) if names else None
         if floor is None:
             continue
         own = room_style(style, house.rng("style", room.room.id))
-        look = look_of(house, catalogue, own, house.rng(PART, "look", int(rng.integers(_LOOKS))))
+        look = look_of(house, catalogue, own, house.rng(PASS, "look", int(rng.integers(_LOOKS))))
         for name in names:
             _stand_at_wall(house, catalogue, floor, name, look, rng)
 
@@ -112,7 +112,7 @@ def _draw_wanted(
 
 
 def _stand_at_wall(
-    house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, name: str, look: Look,
+    house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, name: str, look: BoardLook,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """Put a thing of that kind where it fits; narrower ones are tried."""
@@ -134,10 +134,12 @@ def _stand_at_wall(
         if name == "desk":
             _chair_before(house, floor, spot, look, rng)
         return
-    house.refused[f"{PART}: no free wall for a {name}"] += 1
+    house.refused[f"{PASS}: no free wall for a {name}"] += 1
 
 
-def _generated(kind: WantedKind, look: Look, size: tuple[float, float, float], own: int) -> Made:
+def _generated(
+    kind: WantedKind, look: BoardLook, size: tuple[float, float, float], own: int
+) -> Made:
     rng = np.random.default_rng(own)
     return grained(CASE_GOODS[kind.model].make(rng, look.style, look.boards, size), look)
 
@@ -254,7 +256,11 @@ def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Made, spot: FloorS
 
 
 def _chair_before(
-    house: MutableHouse, floor: RoomFloor, spot: FloorSpot, look: Look, rng: np.random.Generator
+    house: MutableHouse,
+    floor: RoomFloor,
+    spot: FloorSpot,
+    look: BoardLook,
+    rng: np.random.Generator,
 ) -> None:
     """A chair before a desk, turned to it; none where it would be in the way."""
     made = grained(case_goods.desk_chair.make(rng, look.style, look.boards), look)
@@ -282,6 +288,6 @@ def _add_to_floor(
 ) -> None:
     room = floor.room.room
     item = house.placed(
-        *made, at, turn_rad, item_id=next_id(house, PART), room_id=room.id, level_id=room.level_id
+        *made, at, turn_rad, item_id=next_id(house, PASS), room_id=room.id, level_id=room.level_id
     )
-    house.add(item, PART, made[0])
+    house.add(item, PASS, made[0])

@@ -22,7 +22,7 @@ _WHITE: Rgb = (0.9, 0.9, 0.88)
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class BoardLook:
     """Boards, and of materials that show a picture how large one repeat of it is."""
 
     style: Style
@@ -32,7 +32,7 @@ class Look:
 
 def look_of(
     house: MutableHouse, catalogue: Catalogue, style: Style, rng: np.random.Generator
-) -> Look:
+) -> BoardLook:
     """What the added furniture of a room is made of."""
     pattern = photographed(house, catalogue, grain_pattern(house, style.wood))
     grain = pattern_material(house, pattern)
@@ -53,10 +53,10 @@ def look_of(
     else:
         body, front, top = painted, painted, wood
     cloth = style.textiles[int(rng.integers(len(style.textiles)))]
-    return Look(style, Boards(body, front, top, cloth), {wood: grain.size_m})
+    return BoardLook(style, Boards(body, front, top, cloth), {wood: grain.size_m})
 
 
-def grained(made: Made, look: Look) -> Made:
+def grained(made: Made, look: BoardLook) -> Made:
     """The piece with the grain of its wood along each board."""
     piece, shape = made
     surfaces = []

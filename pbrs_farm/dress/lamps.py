@@ -1,4 +1,4 @@
-"""The part `lamps` of dressing: which rooms lack light, and what lamps they get; no effects."""
+"""The pass `lamps`: which rooms lack light, and what lamps they get; floor and table lamps. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import NIGHT_STAND, SOFA
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.dress.ceiling_lamps import PART, hang_from_ceiling
+from pbrs_farm.dress.ceiling_lamps import PASS, hang_from_ceiling
 from pbrs_farm.dress.made_lamps import floor_lamp, table_lamp, with_flux
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
@@ -20,14 +20,14 @@ from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.home.lamps import flux_for_floor, flux_of_lamps
 from pbrs_farm.home.room_use import RoomKind
 
-_BY_SOFA, _BY_BED = 0.75, 0.75  # how often
+_BY_SOFA, _BY_BED = 0.75, 0.75  # chances
 _FLOOR_LM, _TABLE_LM = 900.0, 400.0
 _STANDING_FROM_WALL_M = (
     0.6  # of a floor lamp's edge, at most: no lamp stands in the middle of a room
 )
-_WEAK_LX = 20  # a room with less gets a lamp beside those it has
+_WEAK_LX = 20  # rooms with less light get one more lamp
 _LEAST_M2 = 0.8
-_FLUX_LM = (500.0, 9000.0)  # of one lamp
+_FLUX_LM = (500.0, 9000.0)  # least and greatest flux of an added lamp
 
 
 def stand_by_sofas(
@@ -54,8 +54,8 @@ def stand_by_sofas(
                 if _ways_are_open(house, room_id):
                     return
                 house.items.pop()
-                house.done[f"{PART}: {piece.group}"] -= 1
-    house.refused[f"{PART}: no floor beside a sofa"] += 1
+                house.done[f"{PASS}: {piece.group}"] -= 1
+    house.refused[f"{PASS}: no floor beside a sofa"] += 1
 
 
 def stand_by_beds(
@@ -73,7 +73,7 @@ def stand_by_beds(
         middle = ((low + high) / 2)[[0, 2]]
         at = _spot_on_top(house, space, number, middle, shape)
         if at is None:
-            house.refused[f"{PART}: no free nightstand"] += 1
+            house.refused[f"{PASS}: no free nightstand"] += 1
             continue
         turn = house.items[number].oriented_box.axes[:, 2]
         _stand_lamp(
@@ -97,10 +97,10 @@ def _stand_lamp(
     house: MutableHouse, room: RoomSpace, piece: Piece, shape: Shape, at: F64, turn_rad: float
 ) -> None:
     item = house.placed(
-        piece, shape, at, turn_rad, item_id=next_id(house, PART), room_id=room.room.id,
+        piece, shape, at, turn_rad, item_id=next_id(house, PASS), room_id=room.room.id,
         level_id=room.room.level_id,
     )  # fmt: skip
-    house.add(item, PART, piece)
+    house.add(item, PASS, piece)
 
 
 def _stands_on_floor(space: HouseSpace, room: RoomSpace, number: int) -> bool:

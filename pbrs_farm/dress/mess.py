@@ -1,4 +1,4 @@
-"""The part `mess` of dressing: chairs as people leave them, pictures a degree askew; no effects.
+"""The pass `mess`: chairs as people leave them, pictures a degree askew; no effects.
 
 What lies about is untidy by the same share: beds, clothes, tables, shoes, books (clutter/).
 """
@@ -22,16 +22,17 @@ from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space, item_footp
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.swap import FREE_CUBES
 
-PART: Final = "mess"
-_WIDEST_M: Final = 0.72  # of a chair; wider ones are armchairs
+PASS: Final = "mess"
+_WIDEST_M: Final = 0.72  # wider chairs are armchairs and stay
 _TALLEST_M: Final = 1.3
-_AT_TABLE_M: Final = 0.45  # from a chair to the table it belongs to
-_SETTLED: Final = (0.05, np.radians(4))  # how far and by which angle chairs stand apart anyway
-_LEFT_M: Final = (0.12, 0.45)  # how far one is left that somebody got up from
+_AT_TABLE_M: Final = 0.45  # greatest distance from a chair to the table it belongs to
+# Standard deviations of a chair's distance (m) and angle when nobody has just got up.
+_SETTLED: Final = (0.05, np.radians(4))
+_LEFT_M: Final = (0.12, 0.45)  # range of how far a chair is pulled out by someone who got up
 _LEFT_TURN: Final = np.radians(28)
 _TRIES: Final = 3
 _ASKEW: Final = np.radians(1.6)
-_HUNG_M: Final = 0.2  # a picture that hangs is larger
+_HUNG_M: Final = 0.2  # smaller pictures stand on furniture
 
 
 def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
@@ -42,7 +43,7 @@ def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share
     space = house_space(house)
     around = Neighbours(house.items)
     for room in space.rooms:
-        rng = house.rng(PART, "chairs", room.room.id)
+        rng = house.rng(PASS, "chairs", room.room.id)
         tables = [k for k in room.items if house.items[k].nyu40 in (TABLE, DESK)]
         free = shapely.difference(room.area, room.walls)
         zone = _door_zone(room)
@@ -58,7 +59,7 @@ def tilt_pictures(house: MutableHouse, _catalogue: Catalogue, _style: Style, sha
         item = house.items[index]
         if item.nyu40 != PICTURE or item.box is None or item.box.half[:2].min() < _HUNG_M / 2:
             continue
-        angle = float(house.rng(PART, item.id).normal(0, _ASKEW)) * min(2 * share, 1.0)
+        angle = float(house.rng(PASS, item.id).normal(0, _ASKEW)) * min(2 * share, 1.0)
         house.items[index] = moved_item(
             item, np.zeros(3), _about(item.box.axes[:, 2], angle), item.box.centre
         )
@@ -113,12 +114,12 @@ def _pull_out(
         moved = moved_item(item, step, rotation_y(float(turn) * factor), middle)
         if _chair_is_free(around, moved, index, before, areas):
             if index < len(house.source.items):
-                house.change(index, moved, PART)
+                house.change(index, moved, PASS)
             else:
                 house.items[index] = moved
-            house.done[f"{PART}: chair"] += 1
+            house.done[f"{PASS}: chair"] += 1
             return
-    house.refused[f"{PART}: no room behind a chair"] += 1
+    house.refused[f"{PASS}: no room behind a chair"] += 1
 
 
 def _outwards(space: HouseSpace, index: int, table: int) -> F64:

@@ -18,8 +18,8 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
 from pbrs_farm.dress.painted_materials import PaintedMaterials
 
-ADDED_TAG = "dressed:"  # before the id of the piece that an item was made from
-CHANGED_TAG = "changed:"  # before the part of the dressing that changed an item of the source
+ADDED_TAG = "dressed:"  # tag of an added item, followed by its piece's id
+CHANGED_TAG = "changed:"  # tag of a changed item of the source, followed by the pass
 
 
 class MutableHouse:
@@ -104,16 +104,16 @@ class MutableHouse:
             box=_placed_box(shape, turn, factor, at),
         )  # fmt: skip
 
-    def add(self, item: Item, part: str, piece: Piece | None = None) -> None:
+    def add(self, item: Item, pass_name: str, piece: Piece | None = None) -> None:
         """Add an item after all others; part: the pass that adds it, for the report."""
         self.items.append(item)
         if piece is not None:
             self.used[piece.id] = piece
-            self.done[f"{part}: {piece.group}"] += 1
+            self.done[f"{pass_name}: {piece.group}"] += 1
 
-    def change(self, index: int, item: Item, part: str) -> None:
+    def change(self, index: int, item: Item, pass_name: str) -> None:
         """Put a changed item in the place of items[index] and tag it; part: the pass, for the report."""
-        tag = f"{CHANGED_TAG}{part}"
+        tag = f"{CHANGED_TAG}{pass_name}"
         self.items[index] = item if tag in item.tags else replace(item, tags=(*item.tags, tag))
 
     def frozen(self) -> House:

@@ -21,7 +21,7 @@ from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 CUBE_M: Final = 0.02
-_BITS: Final = 21  # of a cube's number along each axis
+_BITS: Final = 21  # bits of a cube's index along each axis
 
 Cubes = NDArray[np.int64]
 
@@ -75,9 +75,9 @@ def _cubes(corners: F64) -> Cubes:
     return np.unique((cube[:, 0] << 2 * _BITS) | (cube[:, 1] << _BITS) | cube[:, 2])
 
 
-_ROUNDING_M: Final = 1e-3  # of the bounds
-_CONTACT_M: Final = 0.015  # how far a thing may hang above or sink into what it stands on
-_LOW_PART_M: Final = 0.05  # of a thing, at its bottom: what can touch
+_ROUNDING_M: Final = 1e-3  # rounding of bounds
+_CONTACT_M: Final = 0.015  # greatest gap or overlap between a thing and what it stands on
+_LOW_PART_M: Final = 0.05  # vertices this near to a thing's bottom may touch what it stands on
 _FLAT_M: Final = 0.06  # rugs and mats lie under everything
 _LEFT_ALONE: Final = frozenset(
     {ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS}
@@ -113,7 +113,7 @@ def _stands_on(item: Item, corners: F64, top_y: float) -> bool:
     return bool(np.isfinite(height).any() and abs(float(gap.min())) <= _CONTACT_M)
 
 
-_STANDS_M: Final = 0.03  # above the floor, at most
+_STANDS_M: Final = 0.03  # a thing this near above the floor stands on it
 ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
     Place.FLOOR: frozenset({Place.FLOOR, Place.KITCHEN, Place.SURFACE}),
     Place.SURFACE: frozenset({Place.FLOOR, Place.SURFACE}),

@@ -18,8 +18,9 @@ from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import triangle_bounds
 
 _UPRIGHT: Final = 0.999  # cosine to the vertical of what is not tilted
-_HIGH_PART: Final = 0.25  # of the height, at the top: where the back of a seat is
-_CLEAR: Final = 0.12  # of the depth: how far the top must lie behind the middle
+_HIGH_PART: Final = 0.25  # top share of a seat's height in which its back is looked for
+# Least offset of the top from the middle, as a share of the depth, that tells where the back is.
+_CLEAR: Final = 0.12
 _BOARD_M: Final = 0.04  # a thicker one is no skirting board
 _APART_M: Final = 0.0005
 _OFF_WALL_M: Final = 0.03

@@ -47,10 +47,10 @@ class _Finishes(Record):
 
     @field_validator("metals")
     @classmethod
-    def _metals_are_known(cls, told: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
-        if unknown := told.keys() - METALS.keys():
+    def _metals_are_known(cls, metals: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+        if unknown := metals.keys() - METALS.keys():
             raise ValueError(f"no metal {', '.join(sorted(unknown))}")
-        return told
+        return metals
 
 
 _FILE: Final = read_toml(Path(__file__).with_name("finishes.toml"), _Finishes)

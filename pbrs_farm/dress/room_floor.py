@@ -18,12 +18,12 @@ from pbrs_farm.dress.space.floor_bitmaps import doors_are_joined, floor_bitmap, 
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.walls.hanging import Hanging
 
-OUT_M = 0.015  # from a wall to a back: skirting boards are between
-LOWER_M = 0.1  # above the floor, where a free wall begins
+OUT_M = 0.015  # distance from a wall to a back: skirting boards are between
+LOWER_M = 0.1  # height above the floor from which a wall must be free
 
-_MOST_COVERED = 0.58  # of a floor
-_WALL_SHARE = 0.75  # of the free wall that may be stood at
-_WAYS_KEPT = 0.6  # of the floor that one could walk on
+_MOST_COVERED = 0.58  # greatest share of a floor under furniture
+_WALL_SHARE = 0.75  # greatest share of the free wall with furniture before it
+_WAYS_KEPT = 0.6  # least share of the walkable floor that stays walkable
 _DOOR_MARGIN_M = 0.05
 _FRENCH_M = 0.4  # a window whose sill is lower is walked through
 
@@ -62,7 +62,7 @@ class RoomFloor:
     kept: BaseGeometry  # doors' swings, and where one stands before doors and windows
     has_ways: bool  # one way joins its doors
     walkable: int  # cells of its largest way, before anything was put
-    wall_m: float  # of wall that may still be stood at
+    wall_m: float  # length of wall that furniture may still stand at
     bodies: list[BaseGeometry] = field(default_factory=list)  # of what was put
     fronts: list[BaseGeometry] = field(default_factory=list)  # the floor before it
 

@@ -19,7 +19,7 @@ from pbrs_farm.core.record import Record, read_toml
 _T = TypeVar("_T")
 Rgb = tuple[float, float, float]
 
-OUTLIER_SHARE = 0.2  # of rooms that another taste has furnished
+OUTLIER_SHARE = 0.2  # share of rooms furnished in another taste than the home's
 
 
 def rgb(code: str) -> Rgb:
@@ -30,12 +30,12 @@ def rgb(code: str) -> Rgb:
     return (r, g, b)
 
 
-def _rgb_if_text(told: object) -> object:
-    return rgb(told) if isinstance(told, str) else told
+def _rgb_if_text(value: object) -> object:
+    return rgb(value) if isinstance(value, str) else value
 
 
-def _rgbs_if_text(told: object) -> object:
-    return [rgb(code) for code in told.split()] if isinstance(told, str) else told
+def _rgbs_if_text(value: object) -> object:
+    return [rgb(code) for code in value.split()] if isinstance(value, str) else value
 
 
 # In tables: a colour, several with spaces between them, and five of those.

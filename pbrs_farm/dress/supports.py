@@ -26,13 +26,13 @@ LEAST_FREE_M = 0.12  # lower spaces hold nothing
 MOST_FREE_M = 3.0  # clearance is capped at this height
 _LEAST_NORMAL_Y = 0.95
 _FLAT_M = 0.0006  # heights of one support differ by less
-_BORDER_M = 0.05  # of the grid around a support
+_BORDER_M = 0.05  # border of the grid around a support
 _NEAR_M = 0.003  # a face of another thing less than this below a support lies on it
 _LEVEL_M = (
     0.0002  # furniture's own face counts as the support up to here; a higher one is an obstacle
 )
 _OPEN_SHARE = 0.5  # a side is open where this share of its length is
-_OUT_OF_REACH_M = 2.35  # above the floor
+_OUT_OF_REACH_M = 2.35  # supports higher above the floor are left out
 _RIM_M = 0.03  # a bowl's rim rises at least this much above its bottom
 _RIM_WITHIN_M = 0.16  # a rim is looked for this far beyond the edge of the bottom
 _FLOOR_CELL_M = 0.02

@@ -27,7 +27,7 @@ class Finish:
 
 
 FINISHED = "coated"
-"""First word of the names of these materials: the part `parts` leaves them as they are."""
+"""First word of the names of these materials: the pass `parts` leaves them as they are."""
 
 _SHEEN = (0.4, 0.4, 0.4)
 

@@ -1,7 +1,7 @@
-"""The part `swap`: furniture gets another model of its group within its old footprint; no effects.
+"""The pass `swap`: furniture gets another model of its group within its old footprint; no effects.
 
 Sets swap together: what is the same model in one room (chairs round a table, both bedside tables).
-What stood on it is set down on the new one.
+Things on the old piece are set down on the new one.
 """
 
 from __future__ import annotations
@@ -42,11 +42,12 @@ from pbrs_farm.dress.surfaces.skirting import BASEBOARD
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.home.room_use import is_outdoors
 
-PART: Final = "swap"
-FREE_CUBES: Final = 6  # of 2 cm, shared with neighbours beyond what the old one shared: a touch
+PASS: Final = "swap"
+# 2 cm cubes that a new piece may share with neighbours beyond what the old one shared.
+FREE_CUBES: Final = 6
 _TRIES: Final = 5  # pieces that are tried for a set
-_MOST_LIFT_M: Final = 0.3  # a thing that stands on it goes no farther up or down
-_ON_FLOOR_M: Final = 0.005  # what the source draws so little above a floor stands on it
+_MOST_LIFT_M: Final = 0.3  # things on a swapped piece go at most so far up or down
+_ON_FLOOR_M: Final = 0.005  # what the source draws less than this above a floor is set on it
 _ON_WALLS: Final = frozenset({"radiator", "wall_lamp"})
 _NEAR_WALL_M: Final = 0.05
 _UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
@@ -73,7 +74,7 @@ def swap_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, shar
     around = Neighbours(house.items)
     for key, indices in _sets_of_models(house, catalogue).items():
         group = key[0]
-        rng = house.rng(PART, *key)
+        rng = house.rng(PASS, *key)
         if rng.random() >= share:
             continue
         members = _members_of_set(house, indices, group, around)
@@ -104,13 +105,13 @@ def _members_of_set(
         item = house.items[index]
         place = old_place(item, group)
         if place is None:
-            house.refused[f"{PART}: which way it faces is not known"] += 1
+            house.refused[f"{PASS}: which way it faces is not known"] += 1
             return None
         on, inside = things_on(around, index)
         if group in _UNDER_TABLES:
             inside = [k for k in inside if house.items[k].nyu40 != CHAIR]
         if inside:
-            house.refused[f"{PART}: things stand in it or under it"] += 1
+            house.refused[f"{PASS}: things stand in it or under it"] += 1
             return None
         if HELD[group] is HeldBy.BACK:
             place = before_boards(place, _boards_near(house, item))
@@ -161,7 +162,7 @@ def _swap_set(
         if plain_id(piece.id) != old and (scale := common_scale(piece, places)) is not None
     ]
     if not candidates:
-        house.refused[f"{PART}: no other model fits"] += 1
+        house.refused[f"{PASS}: no other model fits"] += 1
         return
     # What hangs stays hung, what stands keeps standing.
     candidates = [
@@ -170,7 +171,7 @@ def _swap_set(
         if all(piece.held_by in ALIKE_HELD[m.held_by] for m in members)
     ]
     if not candidates:
-        house.refused[f"{PART}: no other model is held as the old one is"] += 1
+        house.refused[f"{PASS}: no other model is held as the old one is"] += 1
         return
     why = "no other model can be used"
     for k in rng.permutation(len(candidates))[:_TRIES]:
@@ -187,7 +188,7 @@ def _swap_set(
         else:
             _put_set(house, group, piece, members, new, lifts)
             return
-    house.refused[f"{PART}: {why}"] += 1
+    house.refused[f"{PASS}: {why}"] += 1
 
 
 def _item_at_old_place(
@@ -264,9 +265,9 @@ def _put_set(
     lifts: dict[int, float],
 ) -> None:  # fmt: skip
     for member, item in zip(members, new, strict=True):
-        house.change(member.index, item, PART)
-        house.done[f"{PART}: {group}"] += 1
+        house.change(member.index, item, PASS)
+        house.done[f"{PASS}: {group}"] += 1
     for index, up in lifts.items():
         step = np.array([0.0, up, 0.0])
-        house.change(index, moved_item(house.items[index], step), PART)
+        house.change(index, moved_item(house.items[index], step), PASS)
     house.used[piece.id] = piece

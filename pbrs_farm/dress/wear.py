@@ -21,11 +21,11 @@ from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textures.maps import normals_from_height, roughness_bytes, texture_from_pixels
 from pbrs_farm.dress.textures.noise import blurred, noise, smoothstep
 
-PART: Final = "parts"
-SIZE_M: Final = (0.6, 0.6)  # of one repeat
+PASS: Final = "parts"
+SIZE_M: Final = (0.6, 0.6)  # size of one repeat
 _SHAPE: Final = (512, 512)
 _QUALITY: Final = 90
-_LEAST_M: Final = 0.35  # the longest side of a thing that shows what hands do to it
+_LEAST_M: Final = 0.35  # things whose longest side is shorter show no marks of hands
 _LEAST_M2: Final = 0.04
 _SMOOTH: Final = (0.08, 0.5)  # roughness of what shows a smudge
 _COATED: Final = 0.55  # Ks: more is metal
@@ -36,7 +36,7 @@ def add_wear(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: f
     """Give smooth parts of furniture a roughness map, in share of the homes' pieces."""
     smudges = brushed = None
     for index, item in enumerate(house.items):
-        if not _is_handled(item) or house.rng(PART, "wear", item.id).random() >= share:
+        if not _is_handled(item) or house.rng(PASS, "wear", item.id).random() >= share:
             continue
         surfaces = []
         for surface in item.surfaces:
@@ -58,8 +58,8 @@ def add_wear(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: f
             mapped = box_mapped(surface, axes, SIZE_M, is_grained=True)
             surfaces.append(replace(mapped, material=number))
         if any(a is not b for a, b in zip(surfaces, item.surfaces, strict=True)):
-            house.change(index, replace(item, surfaces=tuple(surfaces)), PART)
-            house.done[f"{PART}: worn"] += 1
+            house.change(index, replace(item, surfaces=tuple(surfaces)), PASS)
+            house.done[f"{PASS}: worn"] += 1
 
 
 def smudge_map(rng: np.random.Generator) -> F32:
@@ -95,13 +95,13 @@ def _stamp_oval(
 
 
 def _smudges(house: MutableHouse) -> Texture:
-    pixels = roughness_bytes(smudge_map(house.rng(PART, "smudges")))
+    pixels = roughness_bytes(smudge_map(house.rng(PASS, "smudges")))
     return texture_from_pixels("smudges-roughness.jpg", pixels, _QUALITY)
 
 
 def _brushed(house: MutableHouse) -> tuple[Texture, Texture]:
     """(normals, roughness) of steel that was brushed along u."""
-    rng = house.rng(PART, "brushed")
+    rng = house.rng(PASS, "brushed")
     lines = noise(rng, _SHAPE, slope=0.4, stretch=(1.0, 60.0), band=(20.0, 1e9))
     rough = np.asarray(0.72 + 0.06 * lines, np.float32) * (smudge_map(rng) / np.float32(_CLEAN))
     normal = normals_from_height(np.asarray(4e-5 * lines, np.float32), SIZE_M)

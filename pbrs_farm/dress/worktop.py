@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.dress.supports import LEAST_FREE_M, Support
 
 MARGIN_M = 0.02  # between things
-_HEADROOM_M = 0.01  # above a thing
+_HEADROOM_M = 0.01  # free height left above a thing
 LIFT_M = 0.0001  # above the support, so that no faces coincide
 
 

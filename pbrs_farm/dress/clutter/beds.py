@@ -28,9 +28,9 @@ from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
-_DOUBLE_M = 1.08  # from which a mattress is wide enough for two pillows
-_PILLOW_UP_M = 0.06  # what rises so far above the mattress is a pillow, or a board
-_PILLOW_SUNK = 0.45  # of its half thickness that a pillow's middle stands above what it lies on
+_DOUBLE_M = 1.08  # a mattress at least this wide gets two pillows
+_PILLOW_UP_M = 0.06  # whatever rises more above the mattress is a pillow or a board
+_PILLOW_SUNK = 0.45  # height of a pillow's middle above what it lies on, in half thicknesses
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,8 +29,8 @@ from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
-_AROUND_M: Final = 0.2  # of cloth, that its ground is known
-_OVER_M: Final = 0.5  # above what it is laid on, where other things begin to hang over it
+_AROUND_M: Final = 0.2  # margin around the cloth in which obstacle heights are sampled
+_OVER_M: Final = 0.5  # obstacles that begin higher above the cloth's support are ignored
 _LINEN: Final[Rgb] = (0.91, 0.9, 0.88)
 _DUVET_M: Final = 0.03  # thick
 _SUNK_M, _MOST_GAP_M = 0.01, 0.04
@@ -38,7 +38,7 @@ _BESIDE_M: Final = (
     0.15  # above the floor: what rises beside a bed keeps its duvet from hanging there
 )
 _SMALLER: Final = (1.0, 0.8, 0.6)  # sizes that clothes are tried at, by the first
-_MOST_RISE_M: Final = 0.1  # of what clothes fall on
+_MOST_RISE_M: Final = 0.1  # clothes fall only where nothing below them is higher than this
 _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 
 

@@ -1,4 +1,4 @@
-"""The part `clutter` of the dressing: every room's surfaces, shelves, beds, seats and floor."""
+"""The pass `clutter`: small things on every room's furniture, shelves, beds, seats and floor. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from pbrs_farm.home.names import words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
 _LEAST_SHELF_DEPTH_M = 0.12
-_DOOR_MARGIN_M = 0.02  # around where doors swing
-_THROWN = 0.9  # of sofas, where nobody tidies up
+_DOOR_MARGIN_M = 0.02  # kept free around the area that a door sweeps
+_THROWN = 0.9  # chance that a sofa has a throw, at mess 1
 _SEAT_M = 0.72  # wide: a chair, wider ones are armchairs
-_ON_SEAT_M = 0.2  # before its back
-_LAID = 0.3  # of the dining tables
-_ON_TOP_M = 0.1
+_ON_SEAT_M = 0.2  # distance of dropped clothes from a seat's back
+_LAID = 0.3  # chance that a dining table is laid
+_ON_TOP_M = 0.1  # a screen's foot at most this far above a piece stands on it
 _SCREENS = ("laptop", "monitor")
 _SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook", "pc", "imac"})
 

@@ -20,14 +20,14 @@ from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 CELL_M = 0.02
-LEAST_AIR_M = 0.6  # above a mattress
+LEAST_AIR_M = 0.6  # least free height above a mattress
 TOUCH_M = 0.0003  # soft things keep this from what they lie on
 _SEAT_M = (0.22, 0.62)  # heights of seats above the floor
-_BACK_M = 0.15  # a back is at least so much higher than the seat
-_LEAST_DEPTH_M = 0.3  # of a seat
-_SUNK = 0.55  # of its half thickness that a cushion's middle keeps from the back
-_MOST_PRESSED_M = 0.03  # that a cushion gives way
-_SINKS_M = 0.0015  # of a cushion into the seat, so that its lowest edge touches, too
+_BACK_M = 0.15  # least height of a seat's back above the seat
+_LEAST_DEPTH_M = 0.3  # least depth of a seat
+_SUNK = 0.55  # distance of a cushion's middle from the back, in half thicknesses
+_MOST_PRESSED_M = 0.03  # greatest depth by which a cushion is pressed in
+_SINKS_M = 0.0015  # depth by which a cushion sinks into the seat, so that its lowest edge touches
 _SIDE_M = 0.04  # kept from arms
 
 

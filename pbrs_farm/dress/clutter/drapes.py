@@ -17,26 +17,26 @@ from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.textiles.hanging_cloth import solid_sheet
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over
 
-CELL_M: Final = 0.0125  # of the heights that cloth falls on
-TOUCH_M: Final = 0.0004  # that its lower side keeps from what it lies on
-_STEPS: Final = 45
-_PULLS: Final = 3  # of all threads in a step
-_FALL_M: Final = 0.006  # a step, at first; speed is kept but for what air takes
-_AIR: Final = 0.12
-_CLEARED: Final = 3  # times that threads are lifted off edges
+CELL_M: Final = 0.0125  # cell size of the height map that cloth falls on
+TOUCH_M: Final = 0.0004  # gap between the cloth's lower side and what it lies on
+_STEPS: Final = 45  # time steps until the cloth lies
+_PULLS: Final = 3  # constraint iterations a step
+_FALL_M: Final = 0.006  # downward velocity that gravity adds in a step, metres a step
+_AIR: Final = 0.12  # share of velocity lost to drag in a step
+_CLEARED: Final = 3  # passes that lift edges of the net out of obstacles
 _MOST_LIFT_M: Final = 0.06
-_WALL_M: Final = 0.05  # what rises more under a corner of the net is a wall and no slope
-_SLACK: Final = 0.2  # how stiff a thread is against being pushed together
-_BEND: Final = 0.25  # how stiff over two threads
+_WALL_M: Final = 0.05  # a vertex deeper than this below the height map went through a wall
+_SLACK: Final = 0.2  # stiffness of a thread in compression; 1 in tension
+_BEND: Final = 0.25  # stiffness between vertices two threads apart: resists bending
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """What cloth falls on: heights in cells of CELL_M, in a frame of its own (x, y up, z)."""
+    """What cloth falls on: a height map in cells of CELL_M, in a frame of its own (x, y up, z)."""
 
     grid: PlanGrid  # its axes are the frame's
-    heights: F64  # (rows, columns) metres, of all within reach of the cloth
-    tight: F64  # the same of what it may not enter
+    heights: F64  # (rows, columns) metres, obstacles grown by half a thickness and a cell
+    tight: F64  # the same, grown by half a thickness alone
     corners: F64  # (F, 3, 3) of the world: what it falls on
 
     @staticmethod
@@ -82,9 +82,11 @@ class Folds:
 
 
 def fallen(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: float) -> F64:
-    """The net (R, C, 3) of the ground's frame after it fell; thread_m: lengths along rows, columns.
+    """The net (R, C, 3) of vertices after it fell, with twice the resolution (2 R - 1, 2 C - 1, 3).
 
-    No corner of it ends lower than half its thickness over the ground.
+    net: metres in the ground's frame. thread_m: rest lengths along rows and columns. Verlet steps with
+    drag, each followed by constraint iterations and collision with the height map. No vertex ends
+    lower than half the thickness above the ground.
     """
     at, before = net.copy(), net.copy()
     above = thick_m / 2 + TOUCH_M
@@ -101,7 +103,7 @@ def fallen(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: flo
             _pull_threads(at, 0, 2, 2 * down, _BEND)
             _pull_threads(at, 1, 2, 2 * across, _BEND)
         _lift(at, before, ground, above)
-    # Twice as many corners, so that folds are round; none ends in the ground.
+    # Double the vertices so that folds are round, and lift those that end in the ground.
     fine = np.stack(
         [
             ndimage.zoom(
@@ -122,7 +124,7 @@ def fallen(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: flo
 
 def _lift(at: F64, before: F64, ground: Ground, above: float) -> None:
     low = ground.at(at[..., 0], at[..., 2]) + above - at[..., 1]
-    # What went through a wall goes back before it; what sank into the top is lifted and holds there.
+    # Move what went through a wall back before it; lift what sank into the top, and stop it there.
     through = low > _WALL_M
     for k in (0, 2):
         at[..., k] = np.where(through, before[..., k], at[..., k])
@@ -133,10 +135,13 @@ def _lift(at: F64, before: F64, ground: Ground, above: float) -> None:
 
 
 def _pull_threads(at: F64, axis: int, apart: int, length: float, stiff: float) -> None:
-    """Bring corners that are so many apart along an axis to a thread's length; cloth gives way less to pull than to push."""
+    """Enforce the rest length between vertices `apart` steps along `axis`, in place.
+
+    Stretching is corrected fully (times `stiff`), compression by _SLACK of that.
+    """
     view = at if axis == 0 else at.swapaxes(0, 1)
     for start in range(2 * apart):
-        # Pairs that share no corner are pulled at once.
+        # Correct pairs that share no vertex at once.
         first = np.arange(start, view.shape[0] - apart, 2 * apart)
         if not len(first):
             continue
@@ -148,7 +153,7 @@ def _pull(view: F64, first: F64, second: F64, length: float, stiff: float) -> No
     along = b - a
     now = np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
     step = 0.5 * stiff * along * (1 - length / now)
-    # A slack thread folds: it is pushed apart but little.
+    # Correct compression partly: a slack thread folds.
     step = np.where(now < length, _SLACK * step, step)
     view[first] = a + step
     view[second] = b - step
@@ -169,14 +174,14 @@ def _pull_slants(at: F64, length: float) -> None:
 
 
 def folded(net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator) -> F64:
-    """The net with ridges as cloth has that was not smoothed, no corner of it lower than its thickness."""
+    """The net with random ridges, as of cloth that nobody smoothed; no vertex sinks into the ground."""
     size = np.array([_length(net, 0), _length(net, 1)])
     v, u = np.meshgrid(
         *(np.linspace(0, x, n) for x, n in zip(size, net.shape[:2], strict=True)), indexing="ij"
     )
     rise = np.zeros(net.shape[:2])
     for _ in range(folds.n):
-        # Along a bent line somewhere on the cloth; s along it, d across it.
+        # Draw a bent ridge line somewhere on the cloth: s along it, d across it.
         middle, angle = rng.uniform(0, 1, 2) * size, float(rng.uniform(0, np.pi))
         long, bent = float(rng.uniform(*folds.length_m)), float(rng.normal(0, 0.8))
         wide = folds.width_m * float(rng.uniform(0.7, 1.4))
@@ -195,7 +200,7 @@ def folded(net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.rando
 
 
 def _clear_threads(net: F64, ground: Ground, above: float) -> None:
-    """Lift both ends of threads and of the diagonals between them that would cut an edge."""
+    """Lift both ends of edges and diagonals of the net that would cut through an obstacle."""
     for _ in range(_CLEARED):
         for a, b in (
             (net[:-1], net[1:]), (net[:, :-1], net[:, 1:]), (net[:-1, :-1], net[1:, 1:]),

@@ -29,17 +29,17 @@ from pbrs_farm.dress.worktop import LIFT_M
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
-_WALK_M = 0.65  # the width of a way, with something to spare
-_REACH_M = 0.35  # a thing's middle is no farther from a wall or furniture
-_NEAR_WALLS_M = 0.5  # of a room: farther ones are not its own
-_AT_WALL_M = 0.12  # beyond its own radius, of what stands at walls
-_KEPT_M = 0.04  # between things
+_WALK_M = 0.65  # width of the ways that stay open
+_REACH_M = 0.35  # greatest distance from a thing's edge to a wall or furniture
+_NEAR_WALLS_M = 0.5  # walls farther from the room's outline belong to other rooms
+_AT_WALL_M = 0.12  # greatest distance from a wall of what stands at walls
+_KEPT_M = 0.04  # least distance between things
 _DOOR_M = 1.0  # kept free before doors
-_OPEN_M = 0.6  # the same before what has doors or drawers
+_OPEN_M = 0.6  # kept free before furniture with doors or drawers
 _OPENED = (CABINET, COUNTER, REFRIGERATOR, DRESSER, OTHERFURNITURE)
 _STANDS_M, _LEAST_FRONT_M = 0.15, 0.4  # above the floor, how low and how high it reaches
 _HEAD_M = 1.9
-_RUG_M = 0.03  # what is lower may lie anywhere, but carries nothing
+_RUG_M = 0.03  # lower things may lie anywhere, but carry nothing
 
 
 @dataclass(slots=True)

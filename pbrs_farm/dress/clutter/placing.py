@@ -21,7 +21,7 @@ from pbrs_farm.dress.things.assembly import Made
 from pbrs_farm.dress.worktop import TopSpot, Worktop, turned_size
 from pbrs_farm.home.room_use import RoomKind
 
-PART = "clutter"
+PASS = "clutter"
 _NEAR_M = 0.06
 _MOST_IN_ROOM = 4
 
@@ -85,10 +85,10 @@ class Placing:
         number = sum(self.house.done.values())
         item = self.house.placed(
             piece, shape, at - rotation_y(turn_rad) @ base, turn_rad,
-            item_id=f"dress-{PART}-{len(self.house.items)}-{number}",
+            item_id=f"dress-{PASS}-{len(self.house.items)}-{number}",
             room_id=self.room.id, level_id=self.room.level_id,
         )  # fmt: skip
-        self.house.add(item, PART, piece)
+        self.house.add(item, PASS, piece)
 
     def laid_near(self, low: F64, high: F64) -> list[F64]:
         """The triangles of cloth in the room that may meet the box low..high (3,)."""
@@ -99,7 +99,7 @@ class Placing:
 
     def refuse(self, reason: str) -> None:
         """Count a thing that was not put down."""
-        self.house.refused[f"{PART}: {reason}"] += 1
+        self.house.refused[f"{PASS}: {reason}"] += 1
 
     def drop(self, top: Worktop, made: Made, *, faces_anywhere: bool, depth_pull: float) -> bool:
         """Put the thing where it fits on the worktop; False where it fits nowhere.

@@ -16,7 +16,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 _LEAST_BOOK_M = 0.14  # free height that upright books need
 _HEADROOM_M = 0.015
-_TOUCH_M = 0.0003  # between a run and the book that leans on it
+_TOUCH_M = 0.0003  # gap between a row of books and the book that leans on it
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,11 @@ from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_
 from pbrs_farm.dress.things.things import THINGS
 from pbrs_farm.home.room_use import RoomKind
 
-_MOST_FACES: Final = 1500  # of a small thing from a catalogue, and of most kinds
+# Faces of one small thing of a catalogue, where its kind gives no other limit.
+_MOST_FACES: Final = 1500
 _MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
-_GENERATED_SHARE: Final = 0.5  # where there are both
-_DESIGNS: Final = 1  # of a kind in one home
+_GENERATED_SHARE: Final = 0.5  # chance that a thing is generated, where the catalogue has it, too
+_DESIGNS: Final = 1  # models of a kind in one home
 _MOST_TRIES: Final = 2  # models that are loaded to find them
 
 

@@ -16,13 +16,13 @@ from pbrs_farm.dress.worktop import Worktop
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 _MOST_OF_A_KIND = 3  # on one surface
-_ANOTHER = 0.35  # chance of one more of the kind
+_ANOTHER = 0.35  # factor on the chance of one more of the same kind
 _FULL = 0.45  # no more is put where less than this share of the surface is free
 _MOST_FACTOR = 1.6
 _LEFT_M, _NAPKINS, _NAPKIN_M = 0.025, 0.6, 0.12  # after a meal: how far aside; napkins
-_CHAIR_M = 0.6  # from a chair's middle to the table it belongs to
+_CHAIR_M = 0.6  # a chair's middle is this near to the table it belongs to
 
-_USUAL_M2 = 0.4  # of receptacles that the file does not name
+_USUAL_M2 = 0.4  # usual area of receptacles that clutter.toml does not name
 
 
 def fill_top(placing: Placing, top: Worktop, receptacle: str, there: Collection[str] = ()) -> int:

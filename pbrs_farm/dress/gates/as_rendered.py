@@ -28,11 +28,11 @@ from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.walls.hanging import GAP_M
 from pbrs_farm.geometry.heights import highest_below
 
-_REACH_M: Final = 0.12  # that a thing is moved to another wall, at most
-_BACK_M: Final = 0.003  # of a thing: what touches a wall
+_REACH_M: Final = 0.12  # a hung thing is moved at most this far to another wall
+_BACK_M: Final = 0.003  # depth of the layer at a thing's back that counts as touching
 _MOST_POINTS: Final = 200
-_FLAT_M: Final = 0.0015  # that a back's distances to a wall may differ
-_SEES_WALL: Final = 0.95  # of the back
+_FLAT_M: Final = 0.0015  # greatest difference among a back's distances to a wall
+_SEES_WALL: Final = 0.95  # share of a back that must have the wall behind it
 
 
 def refit_to_walls(
@@ -67,7 +67,7 @@ def refit_to_walls(
     refused = dict(report.refused)
     for reason, n in why.items():
         refused[f"{reason} after repair"] = refused.get(f"{reason} after repair", 0) + n
-    told = report.model_copy(
+    new_report = report.model_copy(
         update={
             "refused": dict(sorted(refused.items())),
             "moved_after_repair": report.moved_after_repair + len(moved),
@@ -77,7 +77,7 @@ def refit_to_walls(
             ),
         }
     )
-    return replace(dressed, items=tuple(items)), told
+    return replace(dressed, items=tuple(items)), new_report
 
 
 def _is_held(bodies: Sequence[Body]) -> bool:

@@ -83,7 +83,7 @@ def bodies_of(
         if not len(corners):
             continue
         low, high = points_bounds(corners.reshape(-1, 3))
-        # Walls are cut where rooms meet, but stand where they stood; boards lie along them.
+        # Walls are cut where rooms meet, but stay in place; boards lie along them.
         is_new = not item.kind.is_structure and (was is None or not has_same_mesh(item, was))
         piece = pieces.get(piece_id(item)) if is_new else None
         found.append(Body(index, item, corners, low, high, is_new, was, piece))

@@ -27,7 +27,7 @@ from pbrs_farm.dress.report import Gate
 from pbrs_farm.dress.space import HouseSpace, floor_space
 
 _ROUNDS: Final = 12
-_LARGE_M: Final = 0.35  # of the longest side
+_LARGE_M: Final = 0.35  # smaller added things off the floor stand in nobody's way
 _ON_FLOOR_M: Final = 0.1
 _WAYS: Final = {"doors": blocked_doors, "windows": covered_windows, "path": closed_ways}
 _NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path")
@@ -189,7 +189,7 @@ def _take_out(house: MutableHouse, out: Mapping[int, str]) -> None:
 
 
 def pass_that_added(item: Item) -> str:
-    """The part of the dressing that added an item, of its id `dress-<part>-<n>`."""
+    """The pass that added an item, read from its id `dress-<pass>-<n>`."""
     words = item.id.split("-")
     return words[1] if len(words) > 2 and words[0] == "dress" else "dress"
 

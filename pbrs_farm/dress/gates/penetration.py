@@ -20,8 +20,8 @@ from pbrs_farm.dress.gates.shells import Solids, crossing_m, depths_inside, thic
 from pbrs_farm.geometry.surface_points import surface_points
 
 MOST_M: Final = 0.01
-_SPACING_M: Final = 0.015  # of points on open meshes
-_MOST_POINTS: Final = 500  # of one shell in another
+_SPACING_M: Final = 0.015  # spacing of sample points on open meshes
+_MOST_POINTS: Final = 500  # sample points of one shell in another
 _UNMEASURED = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
 _BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 

@@ -15,11 +15,12 @@ from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.geometry.heights import heights_in
 
 _CELLS_M: Final = (0.1, 1.0)
-_MANY_CELLS: Final = 400  # a triangle over more goes into the next larger cells
-_NEAR_M: Final = 0.5  # above and below a body
+_MANY_CELLS: Final = 400  # a triangle that covers more cells goes into the next coarser grid
+_NEAR_M: Final = 0.5  # faces are looked for this far above and below a body
 _STEEP: Final = 1e-9  # square metres in plan: a triangle with less stands upright
-_EDGE: Final = 1e-6  # of a triangle's extent: a place on its edge is on it
-_SPARE: Final = 1e-3  # of a triangle's extent: far beyond what _EDGE and rounding let in
+_EDGE: Final = 1e-6  # tolerance at a triangle's edge, as a share of its extent
+# Margin around a triangle's bounds, as a share of its extent: far above _EDGE and rounding.
+_SPARE: Final = 1e-3
 _BESIDE_M: Final = 1e-6
 
 Ints = NDArray[np.int64]

@@ -13,7 +13,7 @@ from pbrs_farm.core.mesh import area_vectors, triangle_bounds
 from pbrs_farm.dress.gates.bodies import Shell
 
 _STEEP: Final = 0.5  # cosine of edge and normal: an edge that grazes a round thing crosses nothing
-_PAIRS: Final = 1_000_000  # of edge and face at once
+_PAIRS: Final = 1_000_000  # edge-face pairs tested at once: bounds memory
 
 
 def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
@@ -133,7 +133,7 @@ def _met(plan: F64, corners: F64, u: int, v: int, axis: int) -> F64:
     return np.where(inside, height, np.nan)
 
 
-_LEAST_M3: Final = 1e-8  # of what two shells share: less is rounding
+_LEAST_M3: Final = 1e-8  # smaller shared volumes are rounding
 _MANY: Final = 48  # directions that a solid's width is measured in
 
 

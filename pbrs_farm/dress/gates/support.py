@@ -21,12 +21,12 @@ from pbrs_farm.dress.gates.plumb import Plumb
 from pbrs_farm.geometry.surface_points import item_triangles
 
 MOST_M: Final = 0.002
-_ROUNDING_M: Final = 1e-5  # of single precision
-_RING_M: Final = 0.003  # above the lowest point of a thing: what it stands on
-_MOST_PLACES: Final = 12  # of one thing
-_REACH_M: Final = 0.3  # up or down, that a gap is told of
+_ROUNDING_M: Final = 1e-5  # rounding of single precision
+_RING_M: Final = 0.003  # vertices this near to a thing's lowest point are its foot
+_MOST_PLACES: Final = 12  # foot points tested of one thing
+_REACH_M: Final = 0.3  # gaps are measured up to this, up or down
 _ALL: Final = 1_000_000
-_PAIRS: Final = 1_000_000  # of vertex and face at once
+_PAIRS: Final = 1_000_000  # vertex-face pairs tested at once: bounds memory
 _SOFT: Final = frozenset({"blanket", "throw", "towel", "pillow", "cushion", "curtain"})
 
 
@@ -75,7 +75,7 @@ def _may_stand(body: Body) -> bool:
 
 
 def _may_hang(body: Body) -> bool:
-    # A piece of the source that was replaced may have stood or hung.
+    # A piece of the source that was replaced may stand or hang.
     is_swapped = body.was is not None
     hangs = _place_of_piece(body) in (Place.WALL, Place.OPENING, Place.CEILING, None)
     return is_swapped or hangs or body.group in _SOFT
@@ -147,7 +147,7 @@ def _distance_m(a: Body, b: Body) -> float:
 
 
 def _vertices_to_faces(a: Body, b: Body) -> float:
-    # Look for what touches; tell a gap by some vertices alone where nothing does.
+    # Look for what touches; where nothing does, measure the gap at some vertices alone.
     for reach, most in ((2 * MOST_M, _ALL), (_REACH_M / 10, 400)):
         i, j = _vertices_and_faces_near(a, b, reach, most)
         if len(i):

@@ -17,11 +17,11 @@ from pbrs_farm.core.mesh import clipped_to_box
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
 
-MOST_COVERED: Final = 0.2  # of a window
-_HEAD_M: Final = 2.0  # above the floor: what is higher blocks no door
-_STEP_M: Final = 0.03  # what is lower is walked over
-_FACE_M: Final = 0.03  # before the wall: sockets and mouldings are no obstacle
-_BESIDE_M: Final = 0.01  # of a door's width, at either end
+MOST_COVERED: Final = 0.2  # share of a window that furniture may cover
+_HEAD_M: Final = 2.0  # what is higher above the floor blocks no door
+_STEP_M: Final = 0.03  # what is lower can be stepped over
+_FACE_M: Final = 0.03  # depth before a wall in which sockets and mouldings are no obstacle
+_BESIDE_M: Final = 0.01  # left out of a door's width at either end
 _BEFORE_WINDOW_M: Final = 0.6
 _CELL_M: Final = 0.05
 _ROUNDING_M: Final = 1e-6

@@ -16,8 +16,8 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.footprints import plan_area
 from pbrs_farm.geometry.surface_points import item_triangles
 
-_STEP_M: Final = 0.45  # from a floor to the treads that one reaches from it
-_BEFORE_M: Final = 0.85  # that is kept before them
+_STEP_M: Final = 0.45  # treads this near to a floor's height are stepped on from it
+_BEFORE_M: Final = 0.85  # kept free before the first tread
 _FLAT: Final = 0.9  # cosine to the vertical of treads
 _COARSE_M: Final = 0.02  # outlines of stairs are drawn so roughly
 _REACH_M: Final = 0.4  # stairs are taken for a room's own so far outside it

@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.walkable import CELL_M, HEAD_M, STEP_M, WALK_M, FloorGrid, connected_ways
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 
-_DOOR_REACH_M = 0.15  # beyond half the way's width, in front of a door
+_DOOR_REACH_M = 0.15  # a way leads to a door if it comes this near to where one stands before it
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,8 +30,8 @@ from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 from pbrs_farm.home.room_use import RoomKind, room_kind
 
 _ABOVE_FLOOR_M = 0.5  # structure lower than this above a floor is no ceiling
-_CHEST_M = 1.2  # above the floor, where walls are cut for their plan
-_INSIDE_SHARE = 0.34  # of a thing's points, in its room
+_CHEST_M = 1.2  # height above the floor at which walls are cut for their plan
+_INSIDE_SHARE = 0.34  # share of a thing's points inside a room from which it belongs to the room
 _STRUCTURE = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND)
 
 

@@ -16,19 +16,21 @@ from pbrs_farm.dress.space.footprints import plan_area
 
 WallsAt = Callable[[float], BaseGeometry]
 
-BEFORE_DOOR_M = 0.8  # that must be free in front of a door
-_REACH_M = (0.1, 0.25, 0.4, 0.6, 0.8)  # from the wall's middle, where a room is looked for
+BEFORE_DOOR_M = 0.8  # depth that must be free before a door
+# Distances from the wall's middle at which a room is looked for.
+_REACH_M = (0.1, 0.25, 0.4, 0.6, 0.8)
 _MOST_HALF_WALL_M = 0.6
-_HALF_WALL_M = 0.05  # where no wall is found
+_HALF_WALL_M = 0.05  # half thickness assumed where no wall is found
 _LEAST_DOOR_M = 1.6  # a lower hole is a hatch
-_STEP_M = 0.004  # at which walls are looked for: half of one without thickness
+_STEP_M = 0.004  # sampling step across walls: half of a wall without thickness
 _CELL_M = 0.01  # along a wall
-_BESIDE_M = 0.4  # of a leaf: where the jambs of its doorway are looked for
+_BESIDE_M = 0.4  # distance beside a leaf within which its jambs are looked for
 _DOORWAY_M = (0.5, 2.6)  # least and greatest width
-_OFF_M = 0.01  # a quad nearer to the middle of its wall stays there
+_OFF_M = 0.01  # an opening nearer to its wall's middle plane stays there
 _SAME_WALL_M = 0.1  # walls this near to one another have one hole
-_COVERED = 0.8  # of the most that a line along the hole lies in walls
-_LEAST_COVERED = 0.3  # of the hole's width
+# A line along the hole is in the wall if walls cover this share of the most covered line.
+_COVERED = 0.8
+_LEAST_COVERED = 0.3  # least share of the hole's width that walls must cover
 
 
 @dataclass(frozen=True, slots=True, eq=False)

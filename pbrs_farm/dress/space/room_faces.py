@@ -16,10 +16,11 @@ from pbrs_farm.dress.space.footprints import areal
 from pbrs_farm.dress.space.passages import Passage
 from pbrs_farm.dress.space.wall_faces import CELL_M, FAR_M, Hidden, WallFace, WallPlane, runs
 
-_IN_FRONT_M = (0.1, 0.3, 0.02)  # of a wall's face, where its room is looked for
-_WALL_BEFORE_M = (0.02, 0.1, 0.2, 0.35, 0.5, 0.8)  # where another wall may stand in front
-_BY_OPENING_M = 0.1  # of wall round an opening that stays free
-_OPENING_WALL_M = 0.45  # from a wall's face to the middle plane of an opening in it
+_IN_FRONT_M = (0.1, 0.3, 0.02)  # distances before a wall's face at which its room is looked for
+# Distances before a face at which another wall is looked for.
+_WALL_BEFORE_M = (0.02, 0.1, 0.2, 0.35, 0.5, 0.8)
+_BY_OPENING_M = 0.1  # margin of wall around an opening that stays free
+_OPENING_WALL_M = 0.45  # greatest distance from a wall's face to the middle plane of its openings
 _UNDER_CEILING_M = 0.01
 
 

@@ -19,7 +19,7 @@ CELL_M = 0.025
 FAR_M = 1.2  # free space is measured up to here
 _SAME_PLANE_M = 0.002
 _LEAST_LENGTH_M = 0.25
-_LEAST_AREA_M2 = 0.02  # of a triangle that begins a plane
+_LEAST_AREA_M2 = 0.02  # smaller triangles start no plane of their own
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""The part of dressing that gives every room its floor, walls, ceiling and skirting boards.
+"""The pass `surfaces`: gives every room its floor, walls, ceiling and skirting boards.
 
 Effects: changes the house.
 """
@@ -47,8 +47,8 @@ from pbrs_farm.dress.textures.families import (
 )
 from pbrs_farm.home.room_use import RoomKind
 
-PART = "surfaces"
-_KEPT_SHARE = 0.1  # of photographed floors and walls that stay
+PASS = "surfaces"
+_KEPT_SHARE = 0.1  # share of photographed floors and walls that stay as they are
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:
@@ -96,7 +96,7 @@ class _RoomFinish:
 def dress_surfaces(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
     """Give a share of the rooms floors, walls and ceilings of the style, and skirting boards."""
     rooms = house_space(house).rooms
-    home = home_finish(house.rng(PART, "home"), style)
+    home = home_finish(house.rng(PASS, "home"), style)
     finishes = [_room_finish(house, catalogue, style, home, room, share) for room in rooms]
     _lay_floors(house, home, finishes)
     scheme = finish_scheme(house, style)
@@ -109,10 +109,10 @@ def _room_finish(
     share: float,
 ) -> _RoomFinish:  # fmt: skip
     # Streams of their own: what one room draws changes nothing in another.
-    rng = house.rng(PART, room.room.id)
+    rng = house.rng(PASS, room.room.id)
     taste = room_style(style, rng)
-    floor = floor_of(house.rng(PART, room.room.id, "floor"), taste, home, room.kind)
-    walls = walls_of(house.rng(PART, room.room.id, "walls"), taste, home, room.kind)
+    floor = floor_of(house.rng(PASS, room.room.id, "floor"), taste, home, room.kind)
+    walls = walls_of(house.rng(PASS, room.room.id, "walls"), taste, home, room.kind)
     if rng.random() >= share:
         return _RoomFinish(room, None, None)
     # Now and then a photographed floor stays.
@@ -155,8 +155,8 @@ def _lay_floors(house: MutableHouse, home: HomeFinish, finishes: list[_RoomFinis
         else:
             continue
         material = pattern_material(house, pattern)
-        house.change(index, laid(item, material, finish.space.area, turn), PART)
-        house.done[f"{PART}: {pattern.family} {item.kind}"] += 1
+        house.change(index, laid(item, material, finish.space.area, turn), PASS)
+        house.done[f"{PASS}: {pattern.family} {item.kind}"] += 1
 
 
 def _paint_walls(mutable: MutableHouse, scheme: FinishScheme, finishes: list[_RoomFinish]) -> None:
@@ -192,10 +192,10 @@ def _paint_walls(mutable: MutableHouse, scheme: FinishScheme, finishes: list[_Ro
                 if run.room is None or finishes[run.room].space.kind is RoomKind.OUTDOOR
             }
         if looks:
-            mutable.change(index, painted_wall(mutable.items[index], wall, looks, rest), PART)
+            mutable.change(index, painted_wall(mutable.items[index], wall, looks, rest), PASS)
     for finish in finishes:
         if finish.walls is not None:
-            mutable.done[f"{PART}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
+            mutable.done[f"{PASS}: {(finish.walls.low or finish.walls.main).family} walls"] += 1
 
 
 def _is_bare(house: MutableHouse, item: Item) -> bool:
@@ -254,8 +254,8 @@ def _set_boards(
             # A new board has no look of its own yet: the finish covers all of it.
             looks = tuple(with_finish(house, s, board_finish, np.eye(3)) for s in board.surfaces)
             board = replace(board, surfaces=looks)
-            house.add(replace(board, tags=(*board.tags, f"seed:{house.seed}")), PART)
-            house.done[f"{PART}: skirting board"] += 1
+            house.add(replace(board, tags=(*board.tags, f"seed:{house.seed}")), PASS)
+            house.done[f"{PASS}: skirting board"] += 1
 
 
 def _paint_boards(
@@ -273,7 +273,7 @@ def _paint_boards(
         board_finish = _board_finish(house, home, scheme, finish)
         made = item_with_finish(house, item, board_finish)
         if made is not item:
-            house.change(index, made, PART)
+            house.change(index, made, PASS)
 
 
 def _rooms_before(board: Item, finder: RoomFinder) -> list[int]:

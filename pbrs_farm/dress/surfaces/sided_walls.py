@@ -15,11 +15,11 @@ from pbrs_farm.core.house import Item, Room
 from pbrs_farm.core.mesh import area_vectors, edges_are_paired
 from pbrs_farm.dress.surfaces.cut_triangles import Ints
 
-_STEP_M = 0.04  # between the places along a side where a room is looked for
-_BEFORE_M = (0.03, 0.08, 0.15)  # how far in front of the side
+_STEP_M = 0.04  # spacing of the places along a side at which a room is looked for
+_BEFORE_M = (0.03, 0.08, 0.15)  # distances before the side at which a room is looked for
 _SAME_PLANE_M = 0.003
 _LEAST_RUN_M = 0.03
-_LEAST_HEIGHT_M = 0.1  # that a room and a side must share
+_LEAST_HEIGHT_M = 0.1  # least overlap in height of a room and a side
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
-from pbrs_farm.dress.surroundings.scenery import Look, Rgb, Scenery, lit, mottled, paved
+from pbrs_farm.dress.surroundings.scenery import Rgb, Scenery, SceneryMaterial, lit, mottled, paved
 from pbrs_farm.dress.textures.noise import noise
 
 STOREY_M: Final = 3.0
-_PX: Final = 512  # of a facade's picture, which shows two bays by two storeys
+_PX: Final = 512  # size of a facade's picture, which shows two bays by two storeys
 
 _WALLS: Final[tuple[Rgb, ...]] = (
     (0.72, 0.66, 0.55), (0.62, 0.50, 0.36), (0.78, 0.76, 0.72), (0.50, 0.36, 0.28), (0.66, 0.58, 0.36),
@@ -30,7 +30,7 @@ _GLOWS: Final[tuple[Rgb, ...]] = ((0.45, 0.37, 0.25), (0.45, 0.40, 0.31), (0.42,
 class Facade(NamedTuple):
     """How a building's front is divided and painted."""
 
-    look: Look
+    look: SceneryMaterial
     bay_m: float
     window: tuple[float, float, float, float]  # x0, y0, x1, y1 as shares of bay and storey
 
@@ -50,7 +50,7 @@ def facade(rng: np.random.Generator, number: int) -> Facade:
         for column in range(2):
             own = picture[row * half : (row + 1) * half, column * half : (column + 1) * half]
             _draw_window(rng, own, window, wall, frame, has_surround=surround)
-    look = Look(f"facade {number}", picture=picture, size_m=(2 * bay_m, 2 * STOREY_M))
+    look = SceneryMaterial(f"facade {number}", picture=picture, size_m=(2 * bay_m, 2 * STOREY_M))
     return Facade(look, bay_m, window)
 
 
@@ -124,7 +124,7 @@ def _rectangles(front: Front, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | flo
 
 
 def _front_box(
-    scenery: Scenery, thing: str, look: Look, front: Front, s0: float, s1: float, y0: float, y1: float,
+    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: float, s1: float, y0: float, y1: float,
     out0: float, out1: float,
 ) -> None:  # fmt: skip
     low, high = np.array([s0, y0, out0]), np.array([s1, y1, out1])
@@ -141,7 +141,7 @@ def block(
     """A building of several storeys: a front with windows, sides, a roof and what sticks out."""
     width, plinth = n_bays * own.bay_m, 0.5
     top = plinth + n_storeys * STOREY_M
-    stone = Look("stone", picture=None, rgb=(0.46, 0.45, 0.43))
+    stone = SceneryMaterial("stone", picture=None, rgb=(0.46, 0.45, 0.43))
     u0, v0 = rng.integers(0, 2, 2) / 2
     uvs = np.array([[0, 0], [n_bays / 2, 0], [n_bays / 2, n_storeys / 2], [0, n_storeys / 2]])
     scenery.add(thing, own.look, _rectangles(front, np.array([0.0]), np.array([plinth]), np.array([width]), np.array([top]), 0.0), (uvs + np.array([u0, v0]))[None])  # fmt: skip
@@ -150,7 +150,7 @@ def block(
     tint = own.look.picture
     assert tint is not None
     r, g, b = (float(c) for c in np.sqrt(np.median(tint.reshape(-1, 3), 0)))
-    plain = Look(f"{own.look.name} plain", rgb=(r, g, b))
+    plain = SceneryMaterial(f"{own.look.name} plain", rgb=(r, g, b))
     for s in (0.0, width):
         side = np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth_m), (top, -depth_m), (top, 0))])  # fmt: skip
         scenery.add(thing, plain, side[None])
@@ -163,7 +163,7 @@ def block(
     scenery.add(thing, stone, np.concatenate([over, lip]))
     _lit_windows(scenery, thing, rng, front, windows, is_lit)
     if has_balconies:
-        iron = Look("iron", rgb=(0.2, 0.2, 0.21))
+        iron = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
         for k in np.flatnonzero((low > plinth + STOREY_M) & (rng.random(len(left)) < 0.4)):
             floor = float(low[k] - own.window[1] * STOREY_M)
             _front_box(scenery, thing, stone, front, left[k] - 0.3, right[k] + 0.3, floor - 0.12, floor, 0, 1.1)  # fmt: skip
@@ -193,7 +193,7 @@ def _roof(
     scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, width: float, top: float, depth: float
 ) -> None:  # fmt: skip
     rgb = _ROOFS[int(rng.integers(0, len(_ROOFS)))]
-    look = Look(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
+    look = SceneryMaterial(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
     ridge = top + rng.uniform(1.2, 3.2)
     a, b = front.at(-0.2, top, 0.3), front.at(width + 0.2, top, 0.3)
     c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
@@ -215,7 +215,7 @@ def house(
     scenery.add(thing, own.look, _rectangles(front, np.array([0.0]), np.array([0.4]), np.array([width]), np.array([top]), 0.0), uvs[None])  # fmt: skip
     assert own.look.picture is not None
     r, g, b = (float(c) for c in np.sqrt(np.median(own.look.picture.reshape(-1, 3), 0)))
-    plain = Look(f"{own.look.name} plain", rgb=(r, g, b))
+    plain = SceneryMaterial(f"{own.look.name} plain", rgb=(r, g, b))
     _front_box(scenery, thing, plain, front, 0, width, -0.5, 0.4, -0.2, 0.02)
     for s in (0.0, width):
         scenery.add(thing, plain, np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))])[None])  # fmt: skip
@@ -225,7 +225,7 @@ def house(
         gable = np.stack([front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)])  # fmt: skip
         scenery.add(thing, plain, gable[None])
         rgb = _ROOFS[int(rng.integers(0, len(_ROOFS)))]
-        look = Look(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
+        look = SceneryMaterial(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
         for s in (-0.4, width + 0.4):
             eave = top - 0.2
             slope = np.stack([front.at(s, eave, 0.35), front.at(middle, ridge + 0.05, 0.35), front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)])  # fmt: skip
@@ -246,8 +246,14 @@ def _windows(own: Facade, n_bays: int, n_storeys: int, plinth: float) -> tuple[F
 def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) -> None:
     """A parked car, its flank to the home; foot is its left end on the road."""
     paint = _PAINTS[int(rng.integers(0, len(_PAINTS)))]
-    body = Look(f"paint {paint[0]:.2f}{paint[2]:.2f}", rgb=tuple(float(c**0.45) for c in paint))  # type: ignore[arg-type]
-    glass, tyre = Look("car glass", rgb=(0.2, 0.23, 0.26)), Look("tyre", rgb=(0.12, 0.12, 0.12))
+    body = SceneryMaterial(
+        f"paint {paint[0]:.2f}{paint[2]:.2f}",
+        rgb=tuple(float(c**0.45) for c in paint),  # type: ignore[arg-type]
+    )
+    glass, tyre = (
+        SceneryMaterial("car glass", rgb=(0.2, 0.23, 0.26)),
+        SceneryMaterial("tyre", rgb=(0.12, 0.12, 0.12)),
+    )
     scale = rng.uniform(0.94, 1.12)
     flank = np.array([[0, 0.3], [0.05, 0.72], [0.75, 0.88], [3.9, 0.9], [4.2, 0.7], [4.2, 0.3]]) * scale  # fmt: skip
     cabin = np.array([[0.85, 0.87], [1.5, 1.42], [3.0, 1.45], [3.75, 0.89]]) * scale
@@ -277,7 +283,7 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
 
 def lamp_post(scenery: Scenery, thing: str, front: Front) -> None:
     """A street lamp, which shines."""
-    iron = Look("iron", rgb=(0.2, 0.2, 0.21))
+    iron = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
     _front_box(scenery, thing, iron, front, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
     _front_box(scenery, thing, iron, front, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
     _front_box(scenery, thing, lit((0.9, 0.82, 0.68), 9), front, -0.1, 0.1, 4.82, 4.9, -1.3, -0.8)
@@ -287,7 +293,9 @@ def fence(
     scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, length: float, height: float
 ) -> None:  # fmt: skip
     """A fence of boards along the front's line."""
-    wood = Look("fence boards", picture=mottled(rng, (0.10, 0.07, 0.045), (0.30, 0.22, 0.15)))
+    wood = SceneryMaterial(
+        "fence boards", picture=mottled(rng, (0.10, 0.07, 0.045), (0.30, 0.22, 0.15))
+    )
     s = np.arange(0, length, 0.14)
     tall = height * rng.uniform(0.97, 1.0, len(s))
     scenery.add(thing, wood, _rectangles(front, s, np.full(len(s), 0.05), s + 0.115, tall, 0.0))
@@ -297,20 +305,20 @@ def fence(
 
 def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
     """A railing 1 m high along the front's line."""
-    iron = Look("railing", rgb=(0.16, 0.16, 0.17))
+    iron = SceneryMaterial("railing", rgb=(0.16, 0.16, 0.17))
     for y in (0.08, 0.98):
         _front_box(scenery, thing, iron, front, 0, length, y, y + 0.035, 0, 0.03)
     s = np.linspace(0.01, length - 0.01, max(round(length / 0.11), 2))
     scenery.add(thing, iron, _rectangles(front, s - 0.008, np.full(len(s), 0.1), s + 0.008, np.full(len(s), 0.98), 0.015))  # fmt: skip
 
 
-def ground_looks(rng: np.random.Generator) -> dict[str, Look]:
+def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
     """What the ground is made of."""
     return {
-        "lawn": Look("lawn", picture=mottled(rng, (0.035, 0.07, 0.014), (0.10, 0.17, 0.04), size=192), size_m=(2.3, 2.3)),
-        "asphalt": Look("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048), (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)),
-        "slabs": Look("slabs", picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
-        "gravel": Look("gravel", picture=mottled(rng, (0.14, 0.13, 0.11), (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)),
-        "kerb": Look("kerb", rgb=(0.58, 0.57, 0.55)),
-        "line": Look("road line", rgb=(0.85, 0.85, 0.83)),
+        "lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.035, 0.07, 0.014), (0.10, 0.17, 0.04), size=192), size_m=(2.3, 2.3)),
+        "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048), (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)),
+        "slabs": SceneryMaterial("slabs", picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
+        "gravel": SceneryMaterial("gravel", picture=mottled(rng, (0.14, 0.13, 0.11), (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)),
+        "kerb": SceneryMaterial("kerb", rgb=(0.58, 0.57, 0.55)),
+        "line": SceneryMaterial("road line", rgb=(0.85, 0.85, 0.83)),
     }  # fmt: skip

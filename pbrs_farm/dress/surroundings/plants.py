@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.dress.surroundings.scenery import Look, Rgb, Scenery, mottled
+from pbrs_farm.dress.surroundings.scenery import Rgb, Scenery, SceneryMaterial, mottled
 from pbrs_farm.geometry.solids import box_quads
 
 _LEAF_TILE_M: Final = 0.9
@@ -20,22 +20,22 @@ _GREENS: Final[tuple[tuple[Rgb, Rgb], ...]] = (
 FIR: Final = 3
 
 
-def leaf_looks(rng: np.random.Generator) -> list[Look]:
+def leaf_looks(rng: np.random.Generator) -> list[SceneryMaterial]:
     """A look of leaves for each kind of tree."""
     return [
-        Look(f"leaves {k}", picture=mottled(rng, dark, light, slope=0.8), size_m=(_LEAF_TILE_M,) * 2)
+        SceneryMaterial(f"leaves {k}", picture=mottled(rng, dark, light, slope=0.8), size_m=(_LEAF_TILE_M,) * 2)
         for k, (dark, light) in enumerate(_GREENS)
     ]  # fmt: skip
 
 
-def bark(rng: np.random.Generator) -> Look:
+def bark(rng: np.random.Generator) -> SceneryMaterial:
     """The look of trunks."""
-    return Look("bark", picture=mottled(rng, (0.03, 0.022, 0.015), (0.12, 0.09, 0.065)))
+    return SceneryMaterial("bark", picture=mottled(rng, (0.03, 0.022, 0.015), (0.12, 0.09, 0.065)))
 
 
 def tree(
     scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, height: float,
-    leaves: Look, trunk: Look, *, is_fir: bool = False, n: int = 340,
+    leaves: SceneryMaterial, trunk: SceneryMaterial, *, is_fir: bool = False, n: int = 340,
 ) -> None:  # fmt: skip
     """A tree on foot (3,): a trunk, clumps of leaves about it, of a fir in a cone."""
     crown_low = (0.12 if is_fir else 0.3) * height
@@ -65,7 +65,12 @@ def tree(
 
 
 def bush(
-    scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, size: float, leaves: Look
+    scenery: Scenery,
+    thing: str,
+    rng: np.random.Generator,
+    foot: F64,
+    size: float,
+    leaves: SceneryMaterial,
 ) -> None:
     """A bush as wide as it is high."""
     n = 110
@@ -76,7 +81,12 @@ def bush(
 
 
 def hedge(
-    scenery: Scenery, thing: str, rng: np.random.Generator, ends: F64, height: float, leaves: Look
+    scenery: Scenery,
+    thing: str,
+    rng: np.random.Generator,
+    ends: F64,
+    height: float,
+    leaves: SceneryMaterial,
 ) -> None:
     """A clipped hedge along the line ends (2, 3) on the ground."""
     along = ends[1] - ends[0]
@@ -101,7 +111,9 @@ def hedge(
     scenery.add(thing, leaves, _leaves(rng, places, outward, 0.15))
 
 
-def _trunk(scenery: Scenery, thing: str, look: Look, foot: F64, radius: float, top: float) -> None:
+def _trunk(
+    scenery: Scenery, thing: str, look: SceneryMaterial, foot: F64, radius: float, top: float
+) -> None:
     turn = np.linspace(0, 2 * np.pi, 7)
     ring = np.stack([np.cos(turn), np.zeros(7), np.sin(turn)], 1)
     low, high = foot + radius * ring, foot + 0.55 * radius * ring + [0, top, 0]

@@ -24,10 +24,10 @@ from pbrs_farm.geometry.solids import quads_surface
 
 Rgb = tuple[float, float, float]
 
-_QUALITY: Final = 85  # of the JPEG
+_QUALITY: Final = 85  # JPEG quality
 
 
-class Look(NamedTuple):
+class SceneryMaterial(NamedTuple):
     """A material of the outside: its colour or picture, and how many metres the picture covers."""
 
     name: str
@@ -40,18 +40,18 @@ class Scenery:
     """Quads by thing and look; becomes items once all is there."""
 
     def __init__(self) -> None:
-        self._looks: dict[str, Look] = {}
+        self._looks: dict[str, SceneryMaterial] = {}
         self._quads: dict[str, dict[str, list[tuple[F64, F64 | None]]]] = {}
         self._level: dict[str, list[tuple[str, Surface]]] = {}
 
-    def add(self, thing: str, look: Look, quads: F64, uvs: F64 | None = None) -> None:
+    def add(self, thing: str, look: SceneryMaterial, quads: F64, uvs: F64 | None = None) -> None:
         """Add quads (N, 4, 3) in the world; uvs (N, 4, 2), without them metres over the look's size."""
         quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
         if len(quads):
             self._looks.setdefault(look.name, look)
             self._quads.setdefault(thing, {}).setdefault(look.name, []).append((quads, uvs))
 
-    def lay(self, thing: str, look: Look, area: BaseGeometry, y: float) -> None:
+    def lay(self, thing: str, look: SceneryMaterial, area: BaseGeometry, y: float) -> None:
         """Add the polygons of a plan area at a height, to be seen from above."""
         polygons = [
             p for p in shapely.get_parts(area) if p.geom_type == "Polygon" and p.area > 0.01
@@ -116,7 +116,9 @@ class Scenery:
         return items, materials, textures
 
 
-def _surface_of_quads(look: Look, rows: list[tuple[F64, F64 | None]], material: int) -> Surface:
+def _surface_of_quads(
+    look: SceneryMaterial, rows: list[tuple[F64, F64 | None]], material: int
+) -> Surface:
     made = quads_surface(look.name, np.concatenate([q for q, _ in rows]), material)
     assert made.uvs is not None
     own = made.uvs.reshape(-1, 4, 2) / np.array(look.size_m, np.float32)
@@ -153,6 +155,6 @@ def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:
     return np.clip(picture, 0, 1)
 
 
-def lit(rgb: Rgb, number: int) -> Look:
+def lit(rgb: Rgb, number: int) -> SceneryMaterial:
     """A look that shines by itself."""
-    return Look(f"{LIT} {number}", rgb)
+    return SceneryMaterial(f"{LIT} {number}", rgb)

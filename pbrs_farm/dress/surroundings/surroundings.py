@@ -32,7 +32,7 @@ from pbrs_farm.dress.surroundings.buildings import (
     railing,
 )
 from pbrs_farm.dress.surroundings.plants import FIR, bark, bush, hedge, leaf_looks, tree
-from pbrs_farm.dress.surroundings.scenery import Look, Scenery, mottled
+from pbrs_farm.dress.surroundings.scenery import Scenery, SceneryMaterial, mottled
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 LEAST_M: Final = 3.0
@@ -40,8 +40,8 @@ LEAST_M: Final = 3.0
 
 MAX_FACES: Final = 60_000
 
-_WALL_M: Final = 0.3  # of the walls about the rooms
-_REACH_M: Final = 46.0  # from the home to the far ring
+_WALL_M: Final = 0.3  # assumed thickness of the walls around rooms
+_REACH_M: Final = 46.0  # distance from the home to the horizon's ring
 _BELOW_FLOOR_M: Final = 0.15  # ground below the floor of a ground storey
 _BELOW_SILL_M: Final = 0.3
 _FRENCH_SILL_M, _FRENCH_HEIGHT_M = 0.25, 1.7  # of a window that one can walk through
@@ -51,7 +51,7 @@ KINDS: Final = ("street", "garden", "court", "blocks", "hills")
 _N_RING: Final = 220
 _ROAD: Final = (5.0, 11.5)  # away from the home's side
 _PAVEMENT_M: Final = 2.0
-_PATH_M: Final = 1.2  # of slabs about a house
+_PATH_M: Final = 1.2  # width of the paving around a house
 
 
 class _Side(NamedTuple):
@@ -76,10 +76,10 @@ class _Place(NamedTuple):
 
     scenery: Scenery
     rng: np.random.Generator
-    leaves: list[Look]
-    trunk: Look
+    leaves: list[SceneryMaterial]
+    trunk: SceneryMaterial
     facades: list[Facade]
-    ground: dict[str, Look]
+    ground: dict[str, SceneryMaterial]
     eye_m: float  # of a person at the home's highest window, above the ground
 
 
@@ -336,8 +336,8 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
     grain = rng.uniform(-1, 1, _N_RING + 1)
     grain[-1] = grain[0]
     far = "hills" in kinds
-    trees = Look("far trees", picture=mottled(rng, (0.012, 0.024, 0.010), (0.05, 0.085, 0.032), slope=0.6), size_m=(4.0, 4.0))  # fmt: skip
-    hills = Look("far hills", picture=mottled(rng, (0.06, 0.10, 0.085), (0.12, 0.17, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
+    trees = SceneryMaterial("far trees", picture=mottled(rng, (0.012, 0.024, 0.010), (0.05, 0.085, 0.032), slope=0.6), size_m=(4.0, 4.0))  # fmt: skip
+    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.06, 0.10, 0.085), (0.12, 0.17, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
     for look, away, share, wave_m, grain_m in (
         (trees, radius, 0.17, 1.2, 1.1),
         (hills, radius + 8.0, 0.32 if far else 0.27, 5.0 if far else 2.0, 0.0),

@@ -15,7 +15,7 @@ from pbrs_farm.core.house import Item, ItemKind, Material, Surface
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
-from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel
+from pbrs_farm.dress.textiles.hanging_cloth import Pleats, pleated_panel, round_rail
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import hung
 from pbrs_farm.dress.things.materials import metal, plain
@@ -23,16 +23,16 @@ from pbrs_farm.dress.walls.hanging import GAP_M, next_id
 from pbrs_farm.geometry.solids import box, sphere
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
-PART = "textiles"
+PASS = "textiles"
 _FROM_FLOOR_M = 0.015
-_OVER_WINDOW_M = 0.12  # of the rod above the hole
+_OVER_WINDOW_M = 0.12  # height of the rod above the opening
 _UNDER_CEILING_M = 0.05
 _HIGH_SILL_M = 1.25
-_BESIDE_M = 0.48  # how far a panel covers the wall beside a window, at most
-_MOST_OUT_M = 0.2  # of the rod from the wall
-_OVER_THINGS_M = 0.4  # that a short panel ends above what stands below it
+_BESIDE_M = 0.48  # greatest width of wall that a panel covers beside a window
+_MOST_OUT_M = 0.2  # greatest distance of the rod from the wall
+_OVER_THINGS_M = 0.4  # a short panel ends at least this far above what stands below it
 _ROD_M = 0.012  # its radius
-_FLAT_M = 0.0015  # how far the wall may be from its face at the window where a bracket ends
+_FLAT_M = 0.0015  # the wall is flat if it deviates less than this where brackets end
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def hang_curtains(
     depth = float(rng.uniform(0.026, 0.038))
     rod_z = max(seen.sticks_out_m + 1.3 * depth + 0.015, 0.075)
     if rod_y < window.top_y + 0.02 or rod_z > _MOST_OUT_M:
-        house.refused[f"{PART}: no place for a curtain rod"] += 1
+        house.refused[f"{PASS}: no place for a curtain rod"] += 1
         return False
     out = rod_z + 1.4 * depth
     panels = []
@@ -117,7 +117,7 @@ def hang_curtains(
             panels.append(found)
     # One panel alone looks as if the other had been stolen.
     if len(panels) < 2:
-        house.refused[f"{PART}: no room on both sides of a window"] += 1
+        house.refused[f"{PASS}: no room on both sides of a window"] += 1
         return False
     # Both panels end at one height.
     bottom = max(p[2] for p in panels)
@@ -209,12 +209,12 @@ def _curtain_set(
     middle = (x0 + x1) / 2
     parts: list[tuple[Surface, Material]] = []
     for a, b, _low in panels:
-        folds = Folds(cloth.fold_m, depth, float(rng.uniform(0, 6)), float(rng.uniform(0.1, 0.6)))
-        sheet = panel("curtain", b - a, height, rod_z, folds, cloth.tile_m)
+        folds = Pleats(cloth.fold_m, depth, float(rng.uniform(0, 6)), float(rng.uniform(0.1, 0.6)))
+        sheet = pleated_panel("curtain", b - a, height, rod_z, folds, cloth.tile_m)
         parts.append((_shift_surface(sheet, (a - middle, 0.0, 0.0)), cloth.material))
     # The rod passes over the panels and rests on two brackets.
     half, y = (x1 - x0) / 2 + 0.03, height + _ROD_M
-    parts.append((bar("rod", -half, half, y, rod_z, _ROD_M), cloth.rod))
+    parts.append((round_rail("rod", -half, half, y, rod_z, _ROD_M), cloth.rod))
     for sign in (-1, 1):
         parts.append((sphere("finial", np.array([sign * half, y, rod_z]), 0.022, 0), cloth.rod))
         arm = np.array([sign * (half - 0.06), y - _ROD_M - 0.004, rod_z / 2])
@@ -237,10 +237,10 @@ def hang_blind(
     own = [n for n, i in enumerate(house.items) if i.id == window.item_id]
     free = shapely.difference(room.area, room.walls)
     if not (is_flat(free, seen, half) and is_flat(free, seen, -half)):
-        house.refused[f"{PART}: the wall bends beside a window"] += 1
+        house.refused[f"{PASS}: the wall bends beside a window"] += 1
         return False
     if z > 0.1 or top < window.top_y + 0.01 or not space.is_free(low, high, without=own):
-        house.refused[f"{PART}: no place for a blind"] += 1
+        house.refused[f"{PASS}: no place for a blind"] += 1
         return False
     calm = mix(style.textiles[0], (0.92, 0.91, 0.88), float(rng.uniform(0.3, 0.9)))
     parts = _slats(half, drop, z, calm) if rng.random() < 0.4 else _roller(half, drop, z, calm)
@@ -258,9 +258,9 @@ def _roller(
     half: float, drop: float, z: float, colour: tuple[float, float, float]
 ) -> list[tuple[Surface, Material]]:
     cloth = plain("blind cloth", colour, 0.9)
-    roll = bar("roll", -half + 0.01, half - 0.01, drop - 0.03, z + 0.03, 0.024)
+    roll = round_rail("roll", -half + 0.01, half - 0.01, drop - 0.03, z + 0.03, 0.024)
     sheet = np.array([0.0, (drop - 0.03) / 2, z + 0.008])
-    weight = bar("weight", -half + 0.01, half - 0.01, 0.008, z + 0.008, 0.008)
+    weight = round_rail("weight", -half + 0.01, half - 0.01, 0.008, z + 0.008, 0.008)
     return [
         (roll, cloth),
         (box("sheet", sheet, np.array([half - 0.015, (drop - 0.03) / 2, 0.0008]), 0), cloth),
@@ -300,10 +300,10 @@ def _add_at_window(
     at[1] = y
     placed = replace(piece, place=Place.WALL)
     item = house.placed(
-        placed, shape, at, seen.turn_rad, item_id=next_id(house, PART), room_id=room.room.id,
+        placed, shape, at, seen.turn_rad, item_id=next_id(house, PASS), room_id=room.room.id,
         level_id=room.room.level_id,
     )  # fmt: skip
-    house.add(item, PART, placed)
+    house.add(item, PASS, placed)
     return item
 
 

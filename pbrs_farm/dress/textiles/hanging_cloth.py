@@ -18,7 +18,7 @@ _ALONG_X = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
 
 
 @dataclass(frozen=True, slots=True)
-class Folds:
+class Pleats:
     """How a panel is pleated."""
 
     length_m: float  # of one fold across
@@ -35,7 +35,9 @@ class Folds:
         return np.asarray(self.depth_m * (0.62 + 0.38 * (1 - v)) * (wave + second), np.float64)
 
 
-def panel(name: str, width: float, height: float, z: float, folds: Folds, tile_m: float) -> Surface:
+def pleated_panel(
+    name: str, width: float, height: float, z: float, folds: Pleats, tile_m: float
+) -> Surface:
     """A pleated panel with its lower left corner at x = 0, y = 0, its middle plane at z."""
     n = max(int(np.ceil(width / folds.length_m * _COLUMNS_PER_FOLD)), 8)
     x, v = np.meshgrid(np.linspace(0, width, n + 1), np.linspace(0, 1, _ROWS + 1))
@@ -85,8 +87,8 @@ def solid_sheet(name: str, middle: F64, uv: F64, thick_m: float = _THICK_M) -> S
     )
 
 
-def bar(name: str, x0: float, x1: float, y: float, z: float, radius: float) -> Surface:
-    """A round bar along x with closed ends."""
+def round_rail(name: str, x0: float, x1: float, y: float, z: float, radius: float) -> Surface:
+    """A round rail along x with closed ends, metres."""
     profile = np.array([[0, x0], [radius, x0], [radius, x1], [0, x1]])
     upright = lathe(name, profile, np.zeros(3), 0, n=12)
     normals = upright.normals
@@ -98,12 +100,12 @@ def bar(name: str, x0: float, x1: float, y: float, z: float, radius: float) -> S
     )
 
 
-def towel_over_bar(width: float, drop: float, z: float, rng: np.random.Generator) -> Surface:
-    """A towel folded over a bar at height drop, both halves hanging, gently waved."""
+def towel_over_rail(width: float, drop: float, z: float, rng: np.random.Generator) -> Surface:
+    """A towel folded over a rail at height drop, both halves hanging, gently waved."""
     n_side, columns = 8, 14
     short = drop * float(rng.uniform(0.55, 0.9))
     radius = 0.014
-    # Go up the back, over the bar, down the front.
+    # Go up the back, over the rail, down the front.
     back = [(drop - short * (1 - t), -radius) for t in np.linspace(0, 1, n_side)]
     over = [
         (drop + radius * np.sin(a), -radius * np.cos(a)) for a in np.linspace(0, np.pi, 7)[1:-1]

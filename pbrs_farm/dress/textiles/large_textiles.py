@@ -11,7 +11,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, mix, room_style
 from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cloth, window_side
-from pbrs_farm.dress.textiles.hanging_cloth import bar, towel_over_bar
+from pbrs_farm.dress.textiles.hanging_cloth import round_rail, towel_over_rail
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
 from pbrs_farm.dress.things.assembly import Made, hung
@@ -20,9 +20,9 @@ from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.home.room_use import RoomKind
 
-PART = "textiles"
-_RAIL_M = 1.25  # above the floor
-_FAR_M = 2.5  # from the basin
+PASS = "textiles"
+_RAIL_M = 1.25  # height of a towel rail above the floor
+_FAR_M = 2.5  # greatest distance of a towel from the basin
 
 
 def hang_towels(
@@ -35,7 +35,7 @@ def hang_towels(
     has = any(house.items[n].nyu40 == TOWEL for n in room.items)
     if room.kind is not RoomKind.BATHROOM or has or rng.random() >= 0.85 * share:
         return
-    hanging = Hanging(house, room, PART)
+    hanging = Hanging(house, room, PASS)
     for _ in range(int(rng.integers(1, 3))):
         piece, shape = _draw_rail(catalogue, rng) or towel_rail(house, style, rng)
         (x0, _y0, _z0), (x1, y1, z1) = shape.bounds
@@ -43,7 +43,7 @@ def hang_towels(
         low = room.room.floor_y + _RAIL_M - height
         spot = _spot_near_basin(hanging, space, room, house, width, (low, low + height), depth)
         if spot is None:
-            house.refused[f"{PART}: no free wall for a towel"] += 1
+            house.refused[f"{PASS}: no free wall for a towel"] += 1
             return
         hanging.hang(piece, shape, spot[0], spot[1] + width / 2, low)
 
@@ -66,8 +66,8 @@ def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> M
     pattern = pattern_material(house, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
     steel = metal(style)
     parts: list[tuple[Surface, Material]] = [
-        (towel_over_bar(towel, drop, z, rng), house.materials[pattern.number]),
-        (bar("rail", -width / 2, width / 2, drop, z, 0.009), steel),
+        (towel_over_rail(towel, drop, z, rng), house.materials[pattern.number]),
+        (round_rail("rail", -width / 2, width / 2, drop, z, 0.009), steel),
     ]
     for sign in (-1, 1):
         arm = np.array([sign * (width / 2 - 0.01), drop, z / 2])

@@ -25,15 +25,15 @@ from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.dress.walls.hung_things import jpeg_texture
 from pbrs_farm.home.room_use import RoomKind
 
-PART = "textiles"
+PASS = "textiles"
 RUG_TAG = "rug"
 _FROM_WALL_M = 0.3
 _BORDERED = ("bordered", "plain", "sisal", "diamonds", "faded")
 _RUG_FORMS = ("sharp", "sharp", "rounded", "fringed", "oval")
 _MAT_FORMS = ("sharp", "rounded", "oval")
-_GAP_M = 0.0005  # between the floor and the rug's back
+_GAP_M = 0.0005  # gap between the floor and the rug's back
 _SIZES = ((1.6, 2.3), (1.7, 2.4), (2.0, 3.0), (2.0, 2.9), (1.4, 2.0), (1.2, 1.7))
-_LEAST_M, _MOST_M = 0.3, 6.0  # of a rug's sides
+_LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 
 
 def rug(
@@ -281,12 +281,12 @@ def _lay_largest(
             piece, shape = rug(rng, width, length, style, tuple(patterns), forms)
             where = np.array([at[0], room.room.floor_y + _GAP_M, at[2]])
             item: Item = house.placed(
-                piece, shape, where, turn, item_id=next_id(house, PART), room_id=room.room.id,
+                piece, shape, where, turn, item_id=next_id(house, PASS), room_id=room.room.id,
                 level_id=room.room.level_id, tags=(RUG_TAG,),
             )  # fmt: skip
-            house.add(item, PART, piece)
+            house.add(item, PASS, piece)
             return True
-    house.refused[f"{PART}: no floor for a rug"] += 1
+    house.refused[f"{PASS}: no floor for a rug"] += 1
     return False
 
 
@@ -327,13 +327,13 @@ def cover_drawn_rugs(house: MutableHouse, style: Style, share: float) -> None:
             continue
         if any(house.materials[s.material].texture_id for s in item.surfaces):
             continue
-        rng = house.rng(PART, "drawn rug", item.id)
+        rng = house.rng(PASS, "drawn rug", item.id)
         if rng.random() < share:
-            taste = room_style(style, house.rng(PART, item.room_id or "", "style"))
+            taste = room_style(style, house.rng(PASS, item.room_id or "", "style"))
             covered = _covered(house, item, taste, rng)
             if covered is not None:
-                house.change(index, covered, PART)
-                house.done[f"{PART}: drawn rug"] += 1
+                house.change(index, covered, PASS)
+                house.done[f"{PASS}: drawn rug"] += 1
 
 
 def _covered(

@@ -50,7 +50,7 @@ from pbrs_farm.dress.textures.planks import (
 )
 from pbrs_farm.dress.textures.wallpaper import WIDTH_M, wallpaper_maps
 
-_TEXEL_M: Final = 0.0015  # at most: what a camera of 640 pixels a metre away tells apart
+_TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves from a metre away
 _STEP_PX: Final = 128
 _COARSE = (512, 512)  # pixels of one repeat of what is finer by itself
 _FLOOR_M = (2.0, 2.0)

@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import F32
 
 Shape2 = tuple[int, int]  # rows, columns
 
-_LEAST_GAIN = 2e-4  # of the strongest frequency's
+_LEAST_GAIN = 2e-4  # frequencies weaker than this share of the strongest are left out
 
 
 def noise(

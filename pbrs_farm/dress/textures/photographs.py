@@ -38,7 +38,8 @@ _SHOWN: Final = {
     "leather": _Shown("leather", 0.46, 0.4, 0.0),
 }  # fmt: skip
 _DRAWN: Final = 12  # pictures of which as many would be liked as much as drawn ones
-_KEPT: Final = "photograph "  # before the id of a picture's texture, in MutableHouse.kept
+# Prefix in MutableHouse.kept, followed by the id of a picture's texture.
+_KEPT: Final = "photograph "
 
 
 def photograph_for(house: MutableHouse, catalogue: Catalogue, family: str, seed: int) -> str:

@@ -12,7 +12,7 @@ from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.textures.maps import SurfaceMaps, surface_maps
 from pbrs_farm.dress.textures.noise import Shape2, noise, smoothstep
 
-WIDTH_M = 0.53  # of a roll
+WIDTH_M = 0.53  # width of a roll
 
 PATTERNS = ("stripes", "damask", "geometric", "leaves")
 

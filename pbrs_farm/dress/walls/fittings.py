@@ -23,7 +23,7 @@ from pbrs_farm.dress.walls.hung_things import (
 from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
-_CASING_M = 0.16  # from a door's hole to the middle of its switch
+_CASING_M = 0.16  # distance from a door's opening to the middle of its switch
 
 
 def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:

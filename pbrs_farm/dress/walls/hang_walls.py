@@ -22,10 +22,10 @@ from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
 from pbrs_farm.dress.walls.wall_shelves import hang_cloth, hang_shelves
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
-_HOOKS_M: Final = 1.68  # of the board's lower edge above the floor
+_HOOKS_M: Final = 1.68  # height of the hook board's lower edge above the floor
 _RACK_BEFORE_M: Final = 0.55
 _FROM_BED_M: Final = 0.6  # nobody sleeps below coats or against them
-PART = "walls"
+PASS = "walls"
 
 
 def hang_coats(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
@@ -77,7 +77,7 @@ def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share
     for room in space.rooms:
         if not room.faces or room.kind is RoomKind.OUTDOOR:
             continue
-        hanging = Hanging(house, room, PART)
+        hanging = Hanging(house, room, PASS)
         # What has one right place comes first.
         hang_mirrors(hanging, space, style, share)
         if is_heated:

@@ -44,13 +44,13 @@ class RoomWants(Record):
 
 WANTS: Final = {row.room: row for row in read_csv(Path(__file__).with_name("rooms.csv"), RoomWants)}
 
-GAP_M = 0.0008  # between a wall's face and the back of what hangs on it
-_LEAF_M = (0.03, 0.12, 0.22)  # before a wall: where the leaf of a door would stand
+GAP_M = 0.0008  # gap between a wall's face and the back of what hangs on it
+_LEAF_M = (0.03, 0.12, 0.22)  # distances before a wall at which an open door's leaf is looked for
 _WAY_M = (0.36, 0.5, 0.7, 0.9)  # farther out it is in the way of deep things alone
-_DEEP_M = 0.06  # what comes farther out of a wall is in the way of the walls beside it
+_DEEP_M = 0.06  # what stands out farther is in the way of the walls beside it
 _BESIDE_STAIRS_M = 0.1
-_OVER_STAIRS_M = 2.1  # above the floor
-IN_FRONT_M = 0.35  # that a picture needs free to be seen
+_OVER_STAIRS_M = 2.1  # things over stairs hang at least so high above the floor
+IN_FRONT_M = 0.35  # free depth before a picture, so that it is seen
 
 
 @dataclass

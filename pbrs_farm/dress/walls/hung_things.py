@@ -65,13 +65,13 @@ def framed(
     frame: Material,
 ) -> Made:  # fmt: skip
     """A print behind a moulding, with or without a mat; outer size in metres."""
-    bar, depth = _moulding(rng, min(width, height))
+    frame_m, depth = _moulding(rng, min(width, height))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     shown = _printed(print_)
-    parts = [(ring("frame", low, high, bar, depth), frame)]
+    parts = [(ring("frame", low, high, frame_m, depth), frame)]
     at = depth - 0.006
     mat = float(rng.uniform(0.1, 0.17)) * min(width, height) if rng.random() < 0.6 else 0.0
-    inner_low, inner_high = low + bar, high - bar
+    inner_low, inner_high = low + frame_m, high - frame_m
     if mat:
         card = ring("mat", inner_low, inner_high, mat, at)
         parts.append((card, plain("mat", (0.93, 0.92, 0.89), 0.9)))
@@ -99,15 +99,15 @@ def poster(width: float, height: float, print_: Texture) -> Made:
     return hung("poster", "picture_frame", PICTURE, parts, [print_])
 
 
-def mirror(width: float, height: float, frame: Material | None, bar: float = 0.02) -> Made:
+def mirror(width: float, height: float, frame: Material | None, frame_m: float = 0.02) -> Made:
     """A mirror, framed or with a bare edge."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     glass = Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9))
     parts = []
     depth = 0.006
     if frame is not None:
-        parts.append((ring("frame", low, high, bar, 0.022), frame))
-        low, high, depth = low + bar, high - bar, 0.014
+        parts.append((ring("frame", low, high, frame_m, 0.022), frame))
+        low, high, depth = low + frame_m, high - frame_m, 0.014
     face, back = faced_slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]
     return hung("mirror", "mirror", MIRROR, parts)
@@ -128,10 +128,10 @@ def clock(diameter: float, dial: Texture, frame: Material) -> Made:
 
 
 def _moulding(rng: np.random.Generator, short: float) -> tuple[float, float]:
-    # Width and depth of the bars, small pictures have slim ones.
+    # Width and depth of the frame: small pictures have slim ones.
     wide = rng.random() < 0.25
-    bar = float(rng.uniform(0.03, 0.05) if wide else rng.uniform(0.012, 0.024))
-    return min(bar, 0.09 * short + 0.008), float(rng.uniform(0.018, 0.032))
+    frame_m = float(rng.uniform(0.03, 0.05) if wide else rng.uniform(0.012, 0.024))
+    return min(frame_m, 0.09 * short + 0.008), float(rng.uniform(0.018, 0.032))
 
 
 def _printed(texture: Texture, roughness: float = 0.7) -> Material:

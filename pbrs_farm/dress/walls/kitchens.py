@@ -18,12 +18,12 @@ from pbrs_farm.home.room_use import RoomKind
 
 _WORKTOPS: Final = frozenset({CABINET, COUNTER, OTHERFURNITURE, SINK})
 _TOP_M: Final = (0.7, 1.15)  # heights of worktops
-_OVER_M: Final = 1.42  # above the floor: the lower edge of cupboards
+_OVER_M: Final = 1.42  # height of cupboards' lower edge above the floor
 _BEFORE_M: Final = 0.38
 _HOT: Final = frozenset({"cooker", "stove", "hob", "oven"})  # nothing hangs over them
 _CHANCE, _RAIL, _OPEN = 0.75, 0.6, 0.3
 _LEAST_M: Final = 0.35
-_DEEP_M: Final = 0.32  # of cupboards; open ones are 4 cm less
+_DEEP_M: Final = 0.32  # depth of cupboards; open ones are 4 cm less
 
 
 def hang_kitchen(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:

@@ -24,11 +24,11 @@ from pbrs_farm.dress.walls.prints import print_pixels
 from pbrs_farm.home.room_use import RoomKind
 from pbrs_farm.images import decode_photo
 
-MOST_PICTURES = 7  # in a room
+MOST_PICTURES = 7  # in one room
 _MOST_PRINTS = 24  # drawn for a home; further pictures show one of them again
 _EYE_M = 1.55  # height of a picture's middle above the floor
 _CEILING_M = 0.12  # kept free below the ceiling
-_APART_M = 0.25  # between one group of pictures and the next
+_APART_M = 0.25  # least distance between groups of pictures
 
 # Over what pictures hang, and how much it is liked.
 _BENEATH = {

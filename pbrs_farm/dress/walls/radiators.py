@@ -15,7 +15,7 @@ from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
 
-_HEATED: Final = 0.75  # of homes without any, that are heated so
+_HEATED: Final = 0.75  # share of homes without radiators that get some
 _LOW_M, _SPACE_M = 0.12, 0.1  # above the floor; below the sill
 _LEAST_SILL_M: Final = 0.6
 _OTHER_HEAT: Final = frozenset({"fireplace", "stove"})

@@ -20,8 +20,8 @@ from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging
 from pbrs_farm.dress.walls.hung_things import CUPBOARD_FORMS, faced_slab, jpeg_texture
 from pbrs_farm.home.room_use import RoomKind
 
-_RADIATORS: Final = 0.65  # of bathrooms
-_LADDER_M: Final = 0.45  # of a towel radiator's foot above the floor
+_RADIATORS: Final = 0.65  # share of bathrooms with a towel radiator
+_LADDER_M: Final = 0.45  # height of a towel radiator's foot above the floor
 _ABOVE_M: Final = 0.32  # free over the highest board: things stand there
 _BEFORE_M: Final = 0.3  # free before it
 

@@ -17,7 +17,12 @@ from pbrs_farm.dress.space import Passage, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.textiles import add_textiles
 from pbrs_farm.dress.textiles.curtains import WindowSide, is_flat
-from pbrs_farm.dress.textiles.hanging_cloth import Folds, bar, panel, towel_over_bar
+from pbrs_farm.dress.textiles.hanging_cloth import (
+    Pleats,
+    pleated_panel,
+    round_rail,
+    towel_over_rail,
+)
 from pbrs_farm.dress.textiles.large_textiles import towel_rail
 from pbrs_farm.dress.textiles.rug_patterns import PATTERNS, inks_of, rug_pixels
 from pbrs_farm.dress.textiles.rugs import rug
@@ -60,9 +65,9 @@ def _is_closed(surface: Surface) -> bool:
 @pytest.mark.parametrize(
     "surface",
     [
-        panel("p", 0.6, 2.2, 0.1, Folds(0.15, 0.03, 1.0), 0.25),
-        towel_over_bar(0.4, 0.6, 0.07, np.random.default_rng(1)),
-        bar("b", -0.5, 0.5, 2.0, 0.1, 0.012),
+        pleated_panel("p", 0.6, 2.2, 0.1, Pleats(0.15, 0.03, 1.0), 0.25),
+        towel_over_rail(0.4, 0.6, 0.07, np.random.default_rng(1)),
+        round_rail("b", -0.5, 0.5, 2.0, 0.1, 0.012),
     ],
     ids=["panel", "towel", "bar"],
 )
@@ -77,10 +82,10 @@ def test_cloth_is_a_closed_body_with_its_front_outside(surface: Surface) -> None
 
 
 def test_a_panel_has_the_folds_that_were_asked_for() -> None:
-    folds = Folds(0.15, 0.03, sway=0.0)
+    folds = Pleats(0.15, 0.03, sway=0.0)
     depth = folds.depths(np.linspace(0, 0.9, 400), np.zeros(400))
     assert 5 <= np.count_nonzero(np.diff((depth > 0).astype(int)) == 1) <= 7
-    sheet = panel("p", 0.9, 2.0, 0.1, folds, 0.25)
+    sheet = pleated_panel("p", 0.9, 2.0, 0.1, folds, 0.25)
     assert 0.04 < np.ptp(sheet.positions[:, 2]) < 0.09
     assert np.ptp(sheet.positions[:, 0]) == pytest.approx(0.9, abs=0.005)
 
