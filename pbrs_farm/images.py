@@ -168,7 +168,7 @@ def decode_photo(data: bytes, name: str) -> NDArray[np.uint8]:
 def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.uint8]:
     """(H, W, 3) or (H, W, 4) uint8 sRGB, row 0 = top, of a PNG, JPEG, GIF, BMP or TGA.
 
-    The kind is told by the bytes; TGA, which has no signature, by name or media_type. Grey is
+    The kind follows from the bytes; TGA, which has no signature, by name or media_type. Grey is
     repeated to three channels; alpha is not multiplied into the colours and a wholly opaque one
     is dropped. EXIF orientation is ignored. Raises BadInput naming name.
     """

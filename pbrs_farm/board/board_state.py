@@ -36,7 +36,7 @@ class Board:
     assets: dict[str, Asset]
     audit: Audit
     streams: threading.Semaphore  # pages that listen
-    ending: threading.Event  # set when the board is told to end
+    ending: threading.Event  # set when the board is to end
     farm: LiveFarm | None = None  # None: a folder alone is shown
 
     def start(self) -> None:

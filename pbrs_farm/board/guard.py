@@ -105,13 +105,15 @@ class Guard:
         address = (scope.get("client") or ("", 0))[0]
         # Who looks whether the board lives is answered whatever else its address asks.
         if path != HEALTH and not self._rates.takes(address):
-            return _told(429, "too many requests: wait a little", {"Retry-After": "2"})
+            return _text_response(429, "too many requests: wait a little", {"Retry-After": "2"})
         if len(scope["raw_path"]) + len(scope["query_string"]) > self._options.limits.target_bytes:
-            return _told(414, "the address is too long")
+            return _text_response(414, "the address is too long")
         if not self._is_our_host(headers.get("host", "")):
-            return _told(400, "this board is not called so: pbrs-farm board --allow-host NAME")
+            return _text_response(
+                400, "this board is not called so: pbrs-farm board --allow-host NAME"
+            )
         if method not in (*_READS, "POST"):
-            return _told(405, "the board knows GET and POST", {"Allow": "GET, HEAD, POST"})
+            return _text_response(405, "the board knows GET and POST", {"Allow": "GET, HEAD, POST"})
         # Who asks: a session's cookie, or a script that shows the token itself.
         cookie = _cookie(headers.get("cookie", ""))
         user = self._sessions.user_of(cookie) if cookie else None
@@ -141,18 +143,18 @@ class Guard:
     ) -> Response | None:
         headers, path = Headers(scope=scope), scope["path"]
         if not _is_own_page(headers):
-            return _told(403, "a change must come from the board's own pages")
+            return _text_response(403, "a change must come from the board's own pages")
         is_login = path == LOGIN
         if self._options.is_readonly and not is_login:
-            return _told(403, "this board was started with --readonly")
+            return _text_response(403, "this board was started with --readonly")
         limits = self._options.limits
         try:
             with anyio.fail_after(limits.receive_s):
                 body = await _body(receive, limits.body_bytes)
         except TimeoutError:
-            return _told(408, "the form did not come in time", {"Connection": "close"})
+            return _text_response(408, "the form did not come in time", {"Connection": "close"})
         if body is None:
-            return _told(413, "the form is too large")
+            return _text_response(413, "the form is too large")
         scope["board_body"] = body
         if is_login:
             if not self._logins.takes((scope.get("client") or ("", 0))[0]):
@@ -161,14 +163,14 @@ class Guard:
         if is_script:
             return None
         if not session:
-            return _told(401, "show the board's token first: /login")
+            return _text_response(401, "show the board's token first: /login")
         word = form_values(body).get("form_word", "") or headers.get("x-form-word", "")
         if not self._sessions.is_form_word(session, word):
-            return _told(403, "the form is not of this session: load the page again")
+            return _text_response(403, "the form is not of this session: load the page again")
         return None
 
     def _is_our_host(self, host: str) -> bool:
-        """A name we were told, or an address: no foreign name can be made to point here."""
+        """A name from the options, or an address: no foreign name can be made to point here."""
         name = _host_name(host)
         try:
             ipaddress.ip_address(name)
@@ -240,10 +242,10 @@ def _with_headers(send: Send) -> Send:
 
 
 def _too_many_tries() -> Response:
-    return _told(429, "too many tries: wait a minute", {"Retry-After": "60"})
+    return _text_response(429, "too many tries: wait a minute", {"Retry-After": "60"})
 
 
-def _told(status: int, text: str, headers: dict[str, str] | None = None) -> Response:
+def _text_response(status: int, text: str, headers: dict[str, str] | None = None) -> Response:
     return PlainTextResponse(f"{text}\n", status, headers)
 
 

@@ -64,7 +64,9 @@ class PictureCache:
 
     def sweep(self) -> None:
         """Remove the files made first until the folder is within its size."""
-        found = sorted((e.stat().st_mtime, e.stat().st_size, e.path) for e in _files(self.folder))
+        found = sorted(
+            (e.stat().st_mtime, e.stat().st_size, e.path) for e in _cached_files(self.folder)
+        )
         excess = sum(size for _time, size, _path in found) - self._max_bytes
         for _time, size, path in found:
             if excess <= 0:
@@ -73,7 +75,7 @@ class PictureCache:
             excess -= size
 
 
-def _files(folder: Path) -> list[os.DirEntry[str]]:
+def _cached_files(folder: Path) -> list[os.DirEntry[str]]:
     with os.scandir(folder) as parts:
         folders = [entry.path for entry in parts if entry.is_dir()]
     found: list[os.DirEntry[str]] = []

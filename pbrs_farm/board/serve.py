@@ -1,4 +1,4 @@
-"""Serves a board over HTTP until it is told to end. Effects: opens a port, writes to stderr."""
+"""Serves a board over HTTP until a signal ends it. Effects: opens a port, writes to stderr."""
 
 from __future__ import annotations
 
@@ -84,16 +84,16 @@ def _routes() -> list[Route]:
 
 def _not_found(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    return page(request, "told.html", error.status_code, text=error.detail)
+    return page(request, "message.html", error.status_code, text=error.detail)
 
 
 def _failed(request: Request, error: Exception) -> Response:
     status = 404 if isinstance(error, BadInput) else 502
-    return page(request, "told.html", status, text=str(error))
+    return page(request, "message.html", status, text=str(error))
 
 
 def _broken(_request: Request, _error: Exception) -> Response:
-    # The traceback is in the log; a browser is told nothing of it.
+    # The traceback is in the log; a browser gets none of it.
     return PlainTextResponse("the board failed at this: its log says why\n", 500)
 
 

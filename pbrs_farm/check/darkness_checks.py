@@ -33,7 +33,7 @@ def check_darkness(
         what = f"all light together leaves nine tenths of it below {_BLACK_CD_M2:g} cd/m2"
         is_bright = _ninth_tenth(level, valid > 0) >= _BLACK_CD_M2
         tally.expect("black pictures", view.place, is_bright, what)
-    # A dark room is told of, not failed.
+    # A dark room is noted, not failed.
     room = str(view.table.get("room", ""))
     lux = _lux_of_rooms(view.folder.parent.parent / "illuminance.json").get(room)
     if lux is not None and lux < _DARK_LX:

@@ -37,27 +37,27 @@ def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally:
     if not modes or view.recipe is None or not view.has("radiance.exr"):
         return
     try:
-        light = _light(view, tally)
+        light = _stored_light(view, tally)
     except BadInput as error:
         tally.expect("light developed", view.place, False, str(error))
         return
     if light is None:
         return
-    told = view.table.get("modes", {}).get("develop", {})
+    stated = view.table.get("modes", {}).get("develop", {})
     for mode in modes:
-        _check_mode(view, mode, arrays[mode], light, told.get(mode, {}), view.recipe, tally)
-    _check_tone(view, view.recipe, told.get("tone"), tally)
+        _check_mode(view, mode, arrays[mode], light, stated.get(mode, {}), view.recipe, tally)
+    _check_tone(view, view.recipe, stated.get("tone"), tally)
 
 
-def _check_tone(view: StoredView, recipe: Recipe, told: Any, tally: Tally) -> None:
+def _check_tone(view: StoredView, recipe: Recipe, stated: Any, tally: Tally) -> None:
     """What view.json tells of the choices drawn for the view is what the recipe draws."""
-    if recipe.tone.spread == 0 and told is None:
+    if recipe.tone.spread == 0 and stated is None:
         return
     tone = _tone_of(view, recipe)
     names = ("exposure_ev", "contrast", "black", "white")
     drawn = {name: getattr(tone, name) for name in names} if recipe.tone.spread > 0 else None
-    what = f"view.json tells of its tone {told}, the recipe draws {drawn}"
-    tally.expect("light developed", view.place, told == drawn, what)
+    what = f"view.json tells of its tone {stated}, the recipe draws {drawn}"
+    tally.expect("light developed", view.place, stated == drawn, what)
 
 
 def _tone_of(view: StoredView, recipe: Recipe) -> ToneFields:
@@ -69,7 +69,7 @@ def _check_mode(
     mode: str,
     stored: NDArray[Any],
     light: Mapping[str, NDArray[np.float32]],
-    told: Mapping[str, Any],
+    stated: Mapping[str, Any],
     recipe: Recipe,
     tally: Tally,
 ) -> None:
@@ -82,10 +82,10 @@ def _check_mode(
     exposure = _exposure(balanced, tone)
     # A sensor's exposure is what its shutter and speed gave.
     if sensor.is_on:
-        exposure = float(told.get("exposure", exposure))
+        exposure = float(stated.get("exposure", exposure))
     else:
-        off = abs(float(told.get("exposure", exposure)) / exposure - 1)
-        off = max(off, float(np.abs(np.array(told.get("gains", gains)) - gains).max()))
+        off = abs(float(stated.get("exposure", exposure)) / exposure - 1)
+        off = max(off, float(np.abs(np.array(stated.get("gains", gains)) - gains).max()))
         what = f"view.json tells other factors, by {off:.4f}"
         tally.expect("light developed", place, off <= _FACTOR, what)
     expected = _toned(balanced, exposure, tone, sensor)
@@ -126,13 +126,13 @@ def _tiles(picture: NDArray[Any]) -> Floats:
     return np.asarray(parts.mean(axis=(1, 3)))
 
 
-def _light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | None:
+def _stored_light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | None:
     """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had."""
     channels = view.exr("radiance.exr")
     names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
     names["normal"] = [f"normal.{c}" for c in "XYZ"]
     if not all(n in channels for row in names.values() for n in row):
-        return None  # told by the check of radiance
+        return None  # the check of radiance says so
     planes = {g: np.stack([channels[n] for n in row], axis=-1) for g, row in names.items()}
     if view.recipe is None or not view.recipe.light.denoise:
         return planes
@@ -188,13 +188,13 @@ def _glared(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
 def _white_balance(total: NDArray[Any], albedo: NDArray[Any], strength: float) -> Floats:
     """(3,) gains against the median of radiance over albedo, of constant luminance."""
     level = total @ _LUMINANCE
-    told = (level > 0) & (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
-    if strength == 0 or told.sum() < 16:
+    known = (level > 0) & (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
+    if strength == 0 or known.sum() < 16:
         return np.ones(3)
-    low, high = np.percentile(level[told], [10, 90])
-    told &= (level >= low) & (level <= high)
-    surface = albedo[told].astype(np.float64)
-    logs = np.median(np.log(total[told] / surface), axis=0)
+    low, high = np.percentile(level[known], [10, 90])
+    known &= (level >= low) & (level <= high)
+    surface = albedo[known].astype(np.float64)
+    logs = np.median(np.log(total[known] / surface), axis=0)
     # Walls of one hue colour the light they reflect at each other: hold it to lamps and skies.
     most, least = surface.max(axis=1), surface.min(axis=1)
     is_colour = most - least > 0.35 * most

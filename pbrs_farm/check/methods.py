@@ -52,7 +52,7 @@ _NEVER = (
 
 def looked_at(views: list[StoredView]) -> tuple[str, ...]:
     """A line for each kind of file that was recomputed: its name, in how many views, how."""
-    counts = _files(views)
+    counts = _file_counts(views)
     return tuple(
         f"{file} ({counts[file]}): {how}"
         for file, how in HOW.items()
@@ -62,7 +62,7 @@ def looked_at(views: list[StoredView]) -> tuple[str, ...]:
 
 def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
     """A line for each kind of file that a hash alone speaks for, or little more."""
-    counts = _files(views)
+    counts = _file_counts(views)
     layers = {layer.file for layer in LAYERS}
     lines = []
     for file in sorted(counts):
@@ -75,7 +75,7 @@ def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
     return (*lines, *_NEVER)
 
 
-def _files(views: list[StoredView]) -> Counter[str]:
+def _file_counts(views: list[StoredView]) -> Counter[str]:
     return Counter(
         str(file.relative_to(view.folder).as_posix())
         for view in views

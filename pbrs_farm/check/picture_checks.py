@@ -112,12 +112,12 @@ def _differing(
     counts = np.bincount(bins.astype(int), minlength=n)
     same["depth"] = bool((_dense(stored["depth"]) == counts).all())
     for mode in modes:
-        picture, told = arrays[mode], stored["picture"][mode]
+        picture, written = arrays[mode], stored["picture"][mode]
         luma = np.floor(picture[::2, ::2].astype(float) @ [54, 183, 19] / 256)
         median = np.sort(luma.reshape(-1))[(luma.size + 1) // 2 - 1]
         blown = float((picture.max(axis=-1) >= 254).mean())
-        same[f"brightness of {mode}"] = abs(told["brightness"] - median / 255) < 1e-4
-        same[f"share blown of {mode}"] = abs(told["blown"] - blown) < 1e-4
+        same[f"brightness of {mode}"] = abs(written["brightness"] - median / 255) < 1e-4
+        same[f"share blown of {mode}"] = abs(written["blown"] - blown) < 1e-4
     return same | _same_scene(view, arrays["depth"], stored["scene"], settings)
 
 
@@ -158,15 +158,15 @@ def _same_scene(
         if row["nyu40"] > 0:
             key = str(row["nyu40"])
             classes[key] = classes.get(key, 0.0) + float(row["fraction"])
-    told = scene["classes"]
+    written = scene["classes"]
     noise = view.table.get("modes", {}).get("light", {}).get("noise")
     noise = noise.get("sum") if isinstance(noise, dict) else noise
     return {
         "surface": abs(scene["surface"] - max(shares, default=0.0)) < 1e-4,
         "near": abs(scene["near"] - near) < 1e-4,
         "n_objects": scene["n_objects"] == n_objects,
-        "classes": told.keys() == classes.keys()
-        and all(abs(told[k] - v) < 1e-3 for k, v in classes.items()),
+        "classes": written.keys() == classes.keys()
+        and all(abs(written[k] - v) < 1e-3 for k, v in classes.items()),
         "noise": (noise is None) == (scene["noise"] is None)
         and (noise is None or abs(scene["noise"] - noise) < 1e-4),
     }

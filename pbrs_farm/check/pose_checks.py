@@ -61,7 +61,7 @@ def check_reprojection(views: list[SeenView], tally: Tally) -> None:
     they may fall between its pixels; up to MAX_SEEN_PAST of a pair's points may still be wrong,
     and are counted as ties. Every view is held against every other, or _MAX_PARTNERS of them.
     """
-    points = [_points(seen) for seen in views]
+    points = [_model_points(seen) for seen in views]
     nearest = [_nearest(seen.depth) for seen in views]
     rng = np.random.default_rng(0)
     for a, seen in enumerate(views):
@@ -80,7 +80,7 @@ def check_reprojection(views: list[SeenView], tally: Tally) -> None:
                 tally.add("reprojection", n, ties=wrong)
 
 
-def _points(seen: SeenView) -> NDArray[np.float64]:
+def _model_points(seen: SeenView) -> NDArray[np.float64]:
     """(N, 3, 3) world positions, normals and eye of a grid of the view's pixels.
 
     Only pixels amid a flat patch of 5 x 5: what is thinner here may be thinner than a pixel there.

@@ -143,13 +143,13 @@ def _share_fault(
         hits = int((rays.first(origin, directions) >= 0).sum())
     hidden = hits * n_all / max(len(rows), 1)
     # Compare counts of pixels: what a sample of so many may miss, and what lies on the outline.
-    told = seen / share - seen
-    part = max(min(told / n_all, 1.0), 1 / len(rows)) if len(rows) else 0.0
+    stated = seen / share - seen
+    part = max(min(stated / n_all, 1.0), 1 / len(rows)) if len(rows) else 0.0
     spread = n_all * np.sqrt(part * (1 - part) / len(rows)) if 0 < len(rows) < n_all else 0.0
     slack = _SIGMAS * spread + 2 + _EDGE * (seen + hidden)
     if view.lens is not None:
         slack += _LENS * (seen + hidden) + 4 * np.sqrt(seen)
-    if abs(told - hidden) <= slack:
+    if abs(stated - hidden) <= slack:
         return ""
     return f"is {share:.4f}, here {seen / (seen + hidden):.4f}"
 

@@ -160,7 +160,7 @@ def _check_rays(
         labels = {name: arrays[file][rows, columns] for name, file in present.items()}
         labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}
         verdict = judge(view, labels, rows, columns, scene)
-        # Coincident surfaces of the source are a class of their own, told by pairs of items.
+        # Coincident surfaces of the source are a class of their own, by pairs of items.
         item, instance = scene[0].item, scene[0].instance
         for k in np.nonzero(verdict.coincident)[0]:
             pair = instance[verdict.first[k]], instance[verdict.face[k]]

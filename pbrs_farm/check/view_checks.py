@@ -32,13 +32,13 @@ def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | Non
     for layer in LAYERS:
         # A basic layer that is missing fails; an optional one may be absent.
         if layer.name in BASIC or (view.has(layer.file) and layer.name != "radiance"):
-            array = _read(view, layer, tally)
+            array = _read_layer(view, layer, tally)
             if array is not None:
                 arrays[layer.name] = array
     return arrays if all(name in arrays for name in BASIC) else None
 
 
-def _read(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
+def _read_layer(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | None:
     place = f"{view.place}/{layer.file}"
     if not tally.expect("layers", place, view.has(layer.file), "is missing"):
         return None

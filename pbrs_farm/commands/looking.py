@@ -122,9 +122,9 @@ def _recipes(args: argparse.Namespace) -> int:
 
 
 def _layers(_args: argparse.Namespace) -> int:
-    from pbrs_farm.core.layers import table, text_table
+    from pbrs_farm.core.layers import layer_table, text_table
 
-    echo(text_table(shutil.get_terminal_size().columns) if sys.stdout.isatty() else table())
+    echo(text_table(shutil.get_terminal_size().columns) if sys.stdout.isatty() else layer_table())
     return 0
 
 

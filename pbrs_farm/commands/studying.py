@@ -233,25 +233,25 @@ _EXPORTS = {"onnx": _export, "weights": _pack}
 
 
 def _print_run(out: Path) -> None:
-    from pbrs_farm.study.judging.evaluation import notes, open_run, table
+    from pbrs_farm.study.judging.evaluation import figures_table, notes, open_run
 
     run = open_run(out)
-    echo("\n".join([table(run, []), "", *notes(run, []), str(out)]))
+    echo("\n".join([figures_table(run, []), "", *notes(run, []), str(out)]))
 
 
 def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
-    from pbrs_farm.study.judging.evaluation import evaluate, notes, open_run, report, table
+    from pbrs_farm.study.judging.evaluation import evaluate, figures_table, notes, open_run, report
     from pbrs_farm.study.judging.judged_places import judged_place
     from pbrs_farm.study.judging.others_predictions import others_predictions
-    from pbrs_farm.study.training.run_folder import made_folder
+    from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT
 
     others = [others_predictions(word) for word in args.predictions]
     run = open_run(args.run, exact=args.exact)
     out = args.out or args.run / "evaluation"
     if args.on:
-        made_folder(out)  # before anything is judged
+        make_folder(out)  # before anything is judged
     trained_on = frozenset(run.record["homes"]["train"])
     held = frozenset(run.record["homes"]["held_out"]) or None
     # Homes are looked at in the run's own light, photographs have none of the four.
@@ -270,7 +270,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     if args.json:
         echo_json(rows)
     else:
-        echo("\n".join([table(run, evaluations), "", *notes(run, evaluations)]))
+        echo("\n".join([figures_table(run, evaluations), "", *notes(run, evaluations)]))
     if evaluations:
         from pbrs_farm.study.judging.error_page import write_evaluation
 
@@ -334,13 +334,13 @@ def _ablation(args: argparse.Namespace) -> int:
     )
     from pbrs_farm.study.judging.evaluation import check_exact
     from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
-    from pbrs_farm.study.training.run_folder import made_folder
+    from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import TrainingSource
 
     at_least("--seeds", args.seeds, 1)
     check_exact(args.task, exact=args.exact)
     plan, common = _plan(args, args.task), TrainingSource((), (), _hold_out(args), most=args.views)
-    made_folder(args.out)
+    make_folder(args.out)
     # A set of training views a row; all rows share plan, seeds and held-out homes.
     sets = training_sets(args.root, args.modes, replace(common, all_there=False))
     for note in hold_out_notes(sets):

@@ -71,14 +71,14 @@ class Layer:
         return self.title or self.name.replace("_", " ").capitalize()
 
 
-def _picture(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
+def _picture_layer(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
     return Layer(
         name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional,
         shown_as="picture", resized="area", title=title,
     )  # fmt: skip
 
 
-def _label(
+def _label_layer(
     name: str,
     channels: str,
     dtype: str,
@@ -174,10 +174,10 @@ def _behind_glass(
 # Layers that every view has, and (optional) those written when --layers names them.
 OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
-    _picture("opengl_dl", "opengl_dl", "OpenGL, directional"),
-    _picture("opengl_il", "opengl_il", "OpenGL, indoor"),
-    _picture("mlt_ol", "develop", "Physical, outdoor"),
-    _picture("mlt_il_ol", "develop", "Physical, indoor + outdoor"),
+    _picture_layer("opengl_dl", "opengl_dl", "OpenGL, directional"),
+    _picture_layer("opengl_il", "opengl_il", "OpenGL, indoor"),
+    _picture_layer("mlt_ol", "develop", "Physical, outdoor"),
+    _picture_layer("mlt_il_ol", "develop", "Physical, indoor + outdoor"),
     Layer(
         "radiance",
         "radiance.exr",
@@ -188,15 +188,15 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         "light",
     ),
     # Labels of every view, all from one hit record.
-    _label("depth", "Y", "uint16", "planar z, mm", shown_as="depth"),
-    _label(
+    _label_layer("depth", "Y", "uint16", "planar z, mm", shown_as="depth"),
+    _label_layer(
         "normal", "RGB", "uint16", "camera frame x right, y forward, z up; round((n + 1) 65535 / 2)",
         "32768 in all three, valid = 0", shown_as="high_byte", title="Normals",
     ),
-    _label("valid", "Y", "uint8", "0 / 255", shown_as="mask"),
-    _label("semantic", "Y", "uint8", "NYU40 id", shown_as="classes", title="Classes"),
-    _label("instance", "Y", "uint16", "instance id", shown_as="ids", title="Instances"),
-    _label("boundary", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines", title="Boundaries"),
+    _label_layer("valid", "Y", "uint8", "0 / 255", shown_as="mask"),
+    _label_layer("semantic", "Y", "uint8", "NYU40 id", shown_as="classes", title="Classes"),
+    _label_layer("instance", "Y", "uint16", "instance id", shown_as="ids", title="Instances"),
+    _label_layer("boundary", "Y", "uint8", "0 / 255", shown_as="mask", resized="lines", title="Boundaries"),
     # Labels that --layers asks for.
     optional_layer("depth_z", "Z", "float32", "planar z, m", file="depth_z.exr", shown_as="depth_m"),
     optional_layer("position", "X Y Z", "float32", "world, m", file="position.exr", shown_as="range"),
@@ -269,7 +269,7 @@ def _of_plugins() -> tuple[Layer, ...]:
 
 def _pictures_of_plugins() -> tuple[Layer, ...]:
     """The pictures of installed plugins, by name: written by the step `develop` when asked for."""
-    return tuple(_picture(name, "develop", optional=True) for name in plugins("pictures"))
+    return tuple(_picture_layer(name, "develop", optional=True) for name in plugins("pictures"))
 
 
 LAYERS: Final[tuple[Layer, ...]] = (*OWN_LAYERS, *_of_plugins(), *_pictures_of_plugins())
@@ -291,7 +291,7 @@ def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
     return [*shown, *(f"{layer.name} {layer.version}" for layer in known if layer.version > 1)]
 
 
-def table() -> str:
+def layer_table() -> str:
     """The layers as a Markdown table."""
     rows = ["| file | channels | type | unit | nothing |", "|---|---|---|---|---|"]
     rows += [f"| `{x.file}` | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |" for x in LAYERS]
@@ -316,4 +316,4 @@ def text_table(width: int) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")
+    sys.stdout.write(layer_table() + "\n")

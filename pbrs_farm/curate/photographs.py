@@ -79,7 +79,7 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
 
 
 def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[PhotoFiles]:
-    pictures, depths = _files(rgb, _RGB_FILES), _files(depth, _DEPTH_FILES)
+    pictures, depths = _photograph_files(rgb, _RGB_FILES), _photograph_files(depth, _DEPTH_FILES)
     # Pair the only files of two folders whatever they are called (SUN RGB-D).
     if len(pictures) == len(depths) == 1 and pictures.keys() != depths.keys():
         (one,), (other,) = pictures.values(), depths.values()
@@ -94,7 +94,7 @@ def _pairs_of_folders(root: Path, inner: Path, rgb: Path, depth: Path) -> list[P
     return [PhotoFiles((place / n).as_posix(), pictures[n], depths[n]) for n in pictures]
 
 
-def _files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
+def _photograph_files(folder: Path, endings: tuple[str, ...]) -> dict[str, Path]:
     # Know pictures by their name without ending.
     found: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):

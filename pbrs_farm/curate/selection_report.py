@@ -73,17 +73,17 @@ def selection_report(
         summary=summary,
         fields=fields,
         reference=summary.reference,
-        numbers=_numbers(summary),
+        numbers=_number_cells(summary),
         charts=_charts(table, scored, summary, fields),
         reasons=sorted(summary.reasons.items(), key=lambda pair: -pair[1]),
         room_types=_tally_table(summary.room_types),
         houses=_tally_table(summary.houses),
-        credits=_credits(store, *shown.values()),
+        credits=_report_credits(store, *shown.values()),
         **{name: [examples.example(row) for row in t.to_pylist()] for name, t in shown.items()},
     )
 
 
-def _numbers(summary: SelectionSummary) -> list[tuple[str, str]]:
+def _number_cells(summary: SelectionSummary) -> list[tuple[str, str]]:
     """The large numbers at the top of the page: (number, what it counts)."""
     share = summary.kept / summary.views if summary.views else 0.0
     return [
@@ -131,7 +131,7 @@ def _tally_table(tallies: Sequence[KeptCount]) -> dict[str, Any]:
     return {"shown": ordered[:MAX_ROWS], "rest": sums if rest else None, "most": most}
 
 
-def _credits(store: Store, *shown: Any) -> list[str]:
+def _report_credits(store: Store, *shown: Any) -> list[str]:
     """The attribution lines of the houses whose pictures are shown, each once."""
     lines: dict[str, None] = {}
     for house in dict.fromkeys(h for table in shown for h in table["house"].to_pylist()):

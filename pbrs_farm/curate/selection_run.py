@@ -65,7 +65,7 @@ def select(
 
     def packs() -> Iterator[HistogramPack]:
         for done, house in enumerate(todo):
-            pack = _pack(store, house, houses[house], sources[house], score_mode)
+            pack = _house_pack(store, house, houses[house], sources[house], score_mode)
             if any(pack.modes):
                 check_comparable(reference, pack.settings, reference_name)
             yield pack
@@ -73,7 +73,7 @@ def select(
                 progress(done + 1, len(todo))
 
     scores = merged(old, *Scorer(reference).score_all(packs()))
-    return _write(store, run, scores, fields, facts, reference, n_scored_houses=len(todo))
+    return _write_run(store, run, scores, fields, facts, reference, n_scored_houses=len(todo))
 
 
 def verdict_table(store: Store, run: str = "default") -> Any:
@@ -88,7 +88,7 @@ def verdict_table(store: Store, run: str = "default") -> Any:
 def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
     """The histograms of one house, from its pack when that is up to date."""
     views = _houses(store, house)[house]
-    return _pack(store, house, views, _source(store, house, views, score_mode), score_mode)
+    return _house_pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
 
 def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
@@ -125,7 +125,7 @@ def _source(store: Store, house: str, views: Mapping[str, bool], score_mode: Mod
     return keys.digest(house, digests, str(score_mode))
 
 
-def _pack(
+def _house_pack(
     store: Store, house: str, views: Mapping[str, bool], source: str, score_mode: Mode
 ) -> HistogramPack:
     key = keys.histogram_pack_key(house)
@@ -196,7 +196,7 @@ def _kept_rows(store: Store, run: str, facts: dict[str, str], sources: Mapping[s
     return table.filter(pa.array(holds))
 
 
-def _write(
+def _write_run(
     store: Store,
     run: str,
     scores: Any,

@@ -149,7 +149,7 @@ class ChosenView:
     def facts_json(self) -> bytes:
         """facts as a file: the stored one where nothing is resized and classes are NYU40's."""
         if self.choice.size is None and self.choice.classes is None:
-            return _read(self.entry.folder / "view.json")
+            return _view_file(self.entry.folder / "view.json")
         return json.dumps(self.facts, separators=(",", ":")).encode()
 
     def data(self, name: str) -> bytes:
@@ -157,7 +157,7 @@ class ChosenView:
         if name == _CLASSES and self.choice.classes is not None:
             return png_from_array(self.array(name))
         if self.choice.size is None:
-            return _read(self.entry.folder / LAYER[name].file)
+            return _view_file(self.entry.folder / LAYER[name].file)
         return layer_bytes(name, self.array(name), self.house.attribution)
 
     def array(self, name: str) -> NDArray[Any]:
@@ -168,7 +168,7 @@ class ChosenView:
         if name == _CLASSES and self.choice.classes is not None:
             return self.choice.classes.label(self.array("instance"), self.facts["instances"])
         file = self.entry.folder / LAYER[name].file
-        array = layer_from_bytes(name, _read(file), str(file))
+        array = layer_from_bytes(name, _view_file(file), str(file))
         return array if self.choice.size is None else resized_layer(name, array, *self.choice.size)
 
     def _resized_facts(self) -> dict[str, Any]:
@@ -184,7 +184,7 @@ class ChosenView:
             "instances": _instances_in(self.array("instance"), facts["instances"]),
         }
         if "layout" in facts:
-            facts["layout"] = [_moved(row, x, y) for row in facts["layout"]]
+            facts["layout"] = [_layout_row_at_size(row, x, y) for row in facts["layout"]]
         return facts
 
 
@@ -262,12 +262,12 @@ def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[di
     return seen
 
 
-def _moved(row: dict[str, Any], x: float, y: float) -> dict[str, Any]:
+def _layout_row_at_size(row: dict[str, Any], x: float, y: float) -> dict[str, Any]:
     pixel = row.get("pixel")
     return row if not pixel else row | {"pixel": [pixel[0] * x, pixel[1] * y]}
 
 
-def _read(file: Path) -> bytes:
+def _view_file(file: Path) -> bytes:
     try:
         return read_regular(file)
     except OSError as error:

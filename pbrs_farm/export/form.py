@@ -113,7 +113,7 @@ def forms_with_classes() -> tuple[str, ...]:
     return tuple(form.name for form in found if isinstance(form, ViewForm) and form.has_classes)
 
 
-def table(of: str) -> str:
+def forms_table(of: str) -> str:
     """The package's forms of "views", or of "homes", as a Markdown table."""
     rows = ["| form | what is written |", "|---|---|"]
     own = (form_of(name) for name in form_names() if name not in plugins(_GROUP))
@@ -157,4 +157,4 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write("\n\n".join(table(of) for of in ("views", "homes")) + "\n")
+    sys.stdout.write("\n\n".join(forms_table(of) for of in ("views", "homes")) + "\n")

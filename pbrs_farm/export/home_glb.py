@@ -77,7 +77,7 @@ def glb_of_pieces(
             nodes += [
                 _lamp_node(lamp, inside, len(lights) + k) for k, lamp in enumerate(piece.lamps)
             ]
-            lights += [_light(lamp) for lamp in piece.lamps]
+            lights += [_punctual_light(lamp) for lamp in piece.lamps]
     scene: dict[str, Any] = {"name": house.name} | ({"nodes": roots} if roots else {})
     if rooms is not None:
         scene["extras"] = {"rooms": rooms}
@@ -103,7 +103,7 @@ def _placement(world_from_local: F64) -> dict[str, Any]:
     return found
 
 
-def _light(lamp: Lamp) -> dict[str, Any]:
+def _punctual_light(lamp: Lamp) -> dict[str, Any]:
     light: dict[str, Any] = {"type": "spot" if lamp.spot else "point", "intensity": lamp.candela}
     if lamp.is_coloured or min(lamp.rgb_linear) < 1:
         light["color"] = [float(c) for c in lamp.rgb_linear]

@@ -63,7 +63,7 @@ class Lamp:
     flux_lm: float  # what leaves the lamp
     rgb_linear: tuple[float, float, float]  # largest 1
     radius_m: float
-    is_coloured: bool  # rgb_linear is told, also where it is white
+    is_coloured: bool  # the source gives a colour, even if it is white
     spot: tuple[tuple[float, float, float], float] | None  # direction in the world, half angle rad
 
     @property
@@ -195,12 +195,12 @@ def _piece(item: Item, name: str, is_resting: bool) -> Piece:
         frame[:3, :3] = axes
         frame[:3, 3] = box.centre - axes[:, 1] * box.half[1]
     local_from_world = np.asarray(np.linalg.inv(frame), np.float64)
-    surfaces = tuple(_moved(s, local_from_world) for s in item.surfaces if len(s.faces))
+    surfaces = tuple(_surface_in_frame(s, local_from_world) for s in item.surfaces if len(s.faces))
     is_fixed = item.kind in BUILDING or item.nyu40 in _FIXED or not is_resting
     return Piece(item, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights)))
 
 
-def _moved(surface: Surface, b_from_a: F64) -> Surface:
+def _surface_in_frame(surface: Surface, b_from_a: F64) -> Surface:
     positions = transform_points(b_from_a, surface.positions).astype(np.float32)
     normals = surface.normals
     if normals is not None:

@@ -1,1 +1,1 @@
-"""One file per stored file, its writer beside its reader; pure."""
+"""One file per stored file, its writer beside its reader; no effects."""

@@ -1,4 +1,4 @@
-"""cameras.json: the views of a house and the sampler's report, written and read; pure."""
+"""cameras.json: the views of a house and the sampler's report, written and read; no effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""unfinished/<step>.<view>.npz: what a render under way has kept, gone when its view is done; pure.
+"""unfinished/<step>.<view>.npz: what a render under way has kept, gone when its view is done; no effects.
 
 Arrays named `<part>/<name>`, beside the digest of the step they belong to and the seconds they took.
 """

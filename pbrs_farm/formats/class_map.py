@@ -106,7 +106,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
     name_of: dict[int, str] = {}
     id_of: dict[str, int] = {}
     for line, cells in _cells(path):
-        row = _row(path, line, cells)
+        row = _table_row(path, line, cells)
         if row.word in rows:
             text = f"{_quoted(row.word)} stands in line {line_of[row.word]} already"
             raise BadInput(path, f"line {line}", text, hint="the first row that fits wins")
@@ -166,7 +166,7 @@ def _hint(columns: Sequence[str]) -> str:
     return f"the columns are {','.join(columns)}"
 
 
-def _row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
+def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
     word, number, name = cells["from"].lower(), cells["id"], cells["name"]
     place = f"line {line}"
     if not word:

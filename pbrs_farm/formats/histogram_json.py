@@ -1,4 +1,4 @@
-"""histogram.json: all that selection needs of a view, so that no picture is opened again; pure.
+"""histogram.json: all that selection needs of a view, so that no picture is opened again; no effects.
 
 Written by the step `view`, read by `select`.
 """

@@ -1,4 +1,4 @@
-"""manifest.jsonl: a line per stored object of a house, and of all houses of a root; pure."""
+"""manifest.jsonl: a line per stored object of a house, and of all houses of a root; no effects."""
 
 from __future__ import annotations
 

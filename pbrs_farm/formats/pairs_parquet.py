@@ -1,4 +1,4 @@
-"""pairs.parquet: how much each pair of views of a room has in common, written and read; pure."""
+"""pairs.parquet: how much each pair of views of a room has in common, written and read; no effects."""
 
 from __future__ import annotations
 

@@ -118,7 +118,9 @@ def _schema(hint: Any, shape: tuple[int | None, ...] | None = None) -> CoreSchem
         return _schema(aliased[args], shape)
     if origin is np.ndarray:
         dtype = typing.get_args(args[1])[0]
-        return cs.no_info_plain_validator_function(functools.partial(_array, dtype, shape))
+        return cs.no_info_plain_validator_function(
+            functools.partial(_array_from_json, dtype, shape)
+        )
     # "X | None" is the only union among the fields.
     if type(None) in args:
         return cs.nullable_schema(_schema(args[0], shape))
@@ -147,7 +149,9 @@ def _schema_of_dataclass(cls: Any) -> CoreSchema:
     return cs.dataclass_schema(cls, arguments, [row["name"] for row in rows], slots=True)
 
 
-def _array(dtype: Any, shape: tuple[int | None, ...] | None, data: Any) -> np.ndarray[Any, Any]:
+def _array_from_json(
+    dtype: Any, shape: tuple[int | None, ...] | None, data: Any
+) -> np.ndarray[Any, Any]:
     # Arrays from house.glb stand in the data already.
     if isinstance(data, np.ndarray):
         if data.dtype != dtype:
@@ -156,7 +160,7 @@ def _array(dtype: Any, shape: tuple[int | None, ...] | None, data: Any) -> np.nd
     try:
         # Convert from the widest type, to see what the asked one cannot hold.
         wide = np.array(data, np.int64 if np.issubdtype(dtype, np.integer) else np.float64)
-        with np.errstate(over="ignore"):  # what overflows is told below
+        with np.errstate(over="ignore"):  # an overflow is an error below
             array = wide.astype(dtype)
     except (ValueError, TypeError, OverflowError):
         raise ValueError(f"expected an array of {np.dtype(dtype)}") from None

@@ -1,4 +1,4 @@
-"""view.json: which view this is, its camera, tables and facts (docs/formats.md), written by `view`; pure."""
+"""view.json: which view this is, its camera, tables and facts (docs/formats.md), written by `view`; no effects."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
         by_rule[d.rule] += d.n_items
     lines = ["| rule | class | items | name | source |", "|---|---|---|---|---|"]
     lines += [
-        f"| {d.rule} | {d.name} | {d.n_items} | {_cell(d.item)} | {_cell(d.source_class)} |"
+        f"| {d.rule} | {d.name} | {d.n_items} | {_decision_cell(d.item)} | {_decision_cell(d.source_class)} |"
         for d in decisions
     ]
     n_items = sum(by_rule.values())
@@ -70,8 +70,8 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
     return "\n".join([*lines, "", f"{n_items} items: {rules}; {n_prop} are otherprop"])
 
 
-def _cell(text: str) -> str:
-    # A bar would end the cell.
+def _decision_cell(text: str) -> str:
+    # A | would end the cell.
     return shown(text, 60).replace("|", " ")
 
 

@@ -51,8 +51,8 @@ def contact_sheet(
     there = made or {}
     rows = [(view, there.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
     heights = [_row_height(tiles) for _view, tiles in rows]
-    classes = _classes([tiles for _view, tiles in rows])
-    credits = _credits(everything)
+    classes = _classes_shown([tiles for _view, tiles in rows])
+    credits = _sheet_credits(everything)
 
     # Lay out: header, a row per view, legend, credits.
     width = 2 * _MARGIN_PX + len(TILES) * TILE_PX + (len(TILES) - 1) * _GAP_PX
@@ -102,7 +102,7 @@ def _row_height(tiles: Sequence[Tile]) -> int:
     return 34 + max(heights) + 12  # title above, gap below
 
 
-def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
+def _classes_shown(rows: Sequence[Sequence[Tile]]) -> list[int]:
     """NYU40 ids seen, most frequent first."""
     total: dict[int, float] = defaultdict(float)
     for tile in (tile for tiles in rows for tile in tiles):
@@ -111,7 +111,7 @@ def _classes(rows: Sequence[Sequence[Tile]]) -> list[int]:
     return sorted(total, key=lambda i: -total[i])
 
 
-def _credits(views: Sequence[ViewEntry]) -> list[str]:
+def _sheet_credits(views: Sequence[ViewEntry]) -> list[str]:
     return [shown(line, 260) for line in attributions(views)]
 
 

@@ -33,8 +33,8 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
     Raises BadInput when the view has no labels or no picture.
     """
     # Lay the classes over the picture and find the busiest edge of both.
-    picture = _picture(view)
-    semantic, boundary = _layer(view, "semantic.png"), _layer(view, "boundary.png")
+    picture = _best_picture(view)
+    semantic, boundary = _read_label(view, "semantic.png"), _read_label(view, "boundary.png")
     over = _overlaid(picture, semantic, boundary)
     window = _busiest(boundary)
     near = [_magnified(image[window]) for image in (picture, over)]
@@ -62,14 +62,14 @@ def legend(semantic: NDArray[Any], width_px: int) -> Srgb8Image:
     return np.asarray(sheet, np.uint8)
 
 
-def _picture(view: ViewEntry) -> Srgb8Image:
+def _best_picture(view: ViewEntry) -> Srgb8Image:
     for mode in PICTURES:
         if view.file(f"{mode}.png"):
-            return np.asarray(_layer(view, f"{mode}.png")[..., :3], np.uint8)
+            return np.asarray(_read_label(view, f"{mode}.png")[..., :3], np.uint8)
     raise BadInput(view.folder, "", "has no picture to lay labels over")
 
 
-def _layer(view: ViewEntry, file: str) -> NDArray[Any]:
+def _read_label(view: ViewEntry, file: str) -> NDArray[Any]:
     path = view.file(file)
     if path is None:
         raise BadInput(view.folder, file, "is missing")

@@ -48,7 +48,7 @@ def make_homes(
         else:
             yield from map(one, homes)
     finally:
-        _write(folder / PAGE, plans_page(folder).encode())
+        _write_home_file(folder / PAGE, plans_page(folder).encode())
 
 
 def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
@@ -69,9 +69,9 @@ def write_home(path: Path, home: Made) -> None:
     if path.exists():
         _check_same(path, home.origin)
     else:
-        _write(path, home.data)
+        _write_home_file(path, home.data)
     picture = plan_svg(home.storeys, path.stem, home.stair)
-    _write(path.with_suffix(".svg"), picture.encode())
+    _write_home_file(path.with_suffix(".svg"), picture.encode())
 
 
 def plans_page(folder: Path) -> str:
@@ -95,7 +95,7 @@ def _check_same(path: Path, expected: str) -> None:
         )  # fmt: skip
 
 
-def _write(path: Path, data: bytes) -> None:
+def _write_home_file(path: Path, data: bytes) -> None:
     """Write a file whole or not at all."""
     scratch = path.with_name(f".{path.name}.part")
     try:

@@ -36,7 +36,7 @@ class SheetParts:
         """Begin the parts of a view whose files are all written."""
         folder = self._folder / keys.view_key(house_id, view_id, "view.json")
         view = ViewEntry(OutputHouse(house_id, "", ""), view_id, "", "", folder.parent)
-        self._made[view.folder] = self._thread.submit(_parts, view)
+        self._made[view.folder] = self._thread.submit(_part_sizes, view)
 
     def tiles(self) -> dict[Path, Sequence[Tile]]:
         """View folder -> the tiles of its row, of all views whose parts could be made."""
@@ -52,7 +52,7 @@ class SheetParts:
         return {folder: part.result() for folder, part in done.items()}
 
 
-def _parts(view: ViewEntry) -> _Parts:
+def _part_sizes(view: ViewEntry) -> _Parts:
     # The thread loads what it needs: whoever starts a run waits for none of it.
     from pbrs_farm.gallery.contact_sheet import TILE_PX
     from pbrs_farm.gallery.gallery_page import TEMPLATE, THUMBNAIL_PX, card_tiles

@@ -63,11 +63,11 @@ def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
 
 def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]]:
     """As tiles_of for each of several sizes; every layer is read once."""
-    layers = [_layer(view, kind) for kind in TILES]
+    layers = [_shown_layer(view, kind) for kind in TILES]
     return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]
 
 
-def _layer(view: ViewEntry, kind: Layer) -> _Layer:
+def _shown_layer(view: ViewEntry, kind: Layer) -> _Layer:
     path = view.file(kind.file)
     if path is None:
         return _Layer(kind, missing="not rendered")
@@ -80,7 +80,7 @@ def _layer(view: ViewEntry, kind: Layer) -> _Layer:
         pixels = colours.shown_colours(kind, stored)
     except (BadInput, OSError, ValueError, IndexError):
         return _Layer(kind, missing="cannot be read")
-    return _Layer(kind, pixels, note=_note(kind, stored), classes=_classes(kind, stored))
+    return _Layer(kind, pixels, note=_note(kind, stored), classes=_class_shares(kind, stored))
 
 
 def _note(kind: Layer, stored: NDArray[Any]) -> str:
@@ -92,7 +92,7 @@ def _note(kind: Layer, stored: NDArray[Any]) -> str:
     return ""
 
 
-def _classes(kind: Layer, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
+def _class_shares(kind: Layer, stored: NDArray[Any]) -> tuple[tuple[int, float], ...]:
     if kind.name != "semantic":
         return ()
     # Count the pixels of each class, largest first.

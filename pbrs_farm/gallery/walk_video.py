@@ -88,7 +88,7 @@ def _mode(frame: ViewEntry) -> str:
     )
 
 
-def _layer(frame: ViewEntry, name: str) -> Any:
+def _frame_layer(frame: ViewEntry, name: str) -> Any:
     path = frame.file(LAYER[name].file)
     if path is None:
         return None
@@ -96,7 +96,7 @@ def _layer(frame: ViewEntry, name: str) -> Any:
 
 
 def _photo(frame: ViewEntry, mode: str) -> Srgb8Image:
-    rgb = _layer(frame, mode)
+    rgb = _frame_layer(frame, mode)
     if rgb is None:
         raise BadInput(frame.folder, f"{mode}.png", "is missing", hint="finish the run first")
     return np.asarray(rgb[..., :3], np.uint8)
@@ -106,7 +106,7 @@ def _depth_range(frames: Sequence[ViewEntry]) -> tuple[float, float]:
     """Near and far end of the scale of depth for the whole film, so that it does not flicker."""
     ranges = []
     for frame in frames[:: max(len(frames) // 10, 1)]:
-        depth = _layer(frame, "depth")
+        depth = _frame_layer(frame, "depth")
         if depth is not None:
             ranges.append(colours.depth_range_m(depth))
     return min((r[0] for r in ranges), default=0.0), max((r[1] for r in ranges), default=1.0)
@@ -117,7 +117,7 @@ def _beside(frame: ViewEntry, mode: str, depth_m: tuple[float, float]) -> Srgb8I
     picture = _photo(frame, mode)
     tiles = [picture]
     for name in _LABELS:
-        stored = _layer(frame, name)
+        stored = _frame_layer(frame, name)
         tiles.append(
             np.full_like(picture, 255) if stored is None else _shown(name, stored, depth_m)
         )

@@ -1,4 +1,4 @@
-"""A house's histograms in one small object: what scoring reads, thousands a second; pure.
+"""A house's histograms in one small object: what scoring reads, thousands a second; no effects.
 
 A pack is a line of JSON, then the counts of all its views, compressed. It is made from the
 histogram.json files of a house and holds all that they hold for one scored mode per view.
@@ -94,7 +94,7 @@ def pack_house(
         room_types=(*(r.room_type for r in rows), *blank),
         modes=(*(str(m or "") for m in modes), *blank),
         faults=(*("" if m else "unscored" for m in modes), *(fault for _view, fault in lost)),
-        classes=(*(_classes(r) for r in rows), *blank),
+        classes=(*(_class_text(r) for r in rows), *blank),
         black=(*(_black(r) for r in rows), *blank),
         colour=colour,
         depth=depth,
@@ -102,7 +102,7 @@ def pack_house(
     )
 
 
-def _classes(record: ViewRecord) -> str:
+def _class_text(record: ViewRecord) -> str:
     return " ".join(f"{nyu40}:{share:g}" for nyu40, share in record.scene.classes.items())
 
 

@@ -135,7 +135,7 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             text, hint = archive.read("reference.json"), "build the reference again"
             facts = checked(ReferenceFacts, text, name, hint=hint)
-            colour, depth = (_array(archive.read(f"{k}.npy")) for k in ("colour", "depth"))
+            colour, depth = (_counts_array(archive.read(f"{k}.npy")) for k in ("colour", "depth"))
     except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError):
         hint = "`pbrs-farm reference build` makes one"
         raise BadInput(name, "", "not a reference file, or damaged", hint=hint) from None
@@ -147,7 +147,7 @@ def reference_from_bytes(data: bytes, name: str) -> Reference:
     return Reference(facts, colour, depth)
 
 
-def _array(data: bytes) -> Counts:
+def _counts_array(data: bytes) -> Counts:
     array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     if array.dtype != np.dtype("<u4") or array.ndim != 2:
         raise ValueError("not a table of counts")

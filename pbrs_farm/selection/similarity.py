@@ -64,7 +64,7 @@ def _faiss_nearest(q: Shares, r: Shares, leave_out_self: bool) -> I64:
         r = np.ascontiguousarray(np.hstack([r, short]))
     knn: Any = faiss.knn
     if leave_out_self:
-        # An image among its own two nearest is left out; a twin of it may stand before it.
+        # An image among its own two nearest is left out; a duplicate may come before it.
         _, index = knn(q, r, 2, metric=faiss.METRIC_L1)
         first_is_self = index[:, 0] == np.arange(len(q))
         return np.asarray(np.where(first_is_self, index[:, 1], index[:, 0]), np.int64)

@@ -53,7 +53,7 @@ def verdicts(scores: Any, fields: SelectionFields) -> Any:
     first = np.where(kept, len(REASONS), table.argmax(axis=1))
     names = np.array([*REASONS, ""], object)
     added = {"kept": pa.array(kept), "reason": pa.array(names[first], pa.string())}
-    added["reasons"] = pa.array(_joined(table), pa.string())
+    added["reasons"] = pa.array(_reasons_joined(table), pa.string())
     for name, column in added.items():
         scores = scores.append_column(name, column)
     return scores
@@ -141,7 +141,7 @@ def _ranks(column: Any) -> I64:
     return np.asarray(pc.rank(column.combine_chunks(), tiebreaker="dense"), np.int64)
 
 
-def _joined(table: Bools) -> list[str]:
+def _reasons_joined(table: Bools) -> list[str]:
     """(n,) the names of the reasons that hold, with commas."""
     # Number each combination of reasons, and write each number's text once.
     weights = 1 << np.arange(len(REASONS))

@@ -166,7 +166,7 @@ class LaidOutStore:
         self._flush_unless(at.house, at.view, group)
         task = self._task
         pending = (task and task.pending) or _Pending(at.house, at.view, group)
-        members = {file_or_marker(_parsed(file)): data for file, data in files.items()}
+        members = {file_or_marker(_house_key(file)): data for file, data in files.items()}
         pending.steps[at.step] = {marker_of(at.step): marker, **members}
         if task is not None:
             task.pending = pending
@@ -493,7 +493,7 @@ def _others(group: str, step: str) -> Iterable[str]:
     return (other for other in GROUPS.get(group, ()) if other not in (step, group))
 
 
-def _parsed(key: str) -> keys.HouseKey:
+def _house_key(key: str) -> keys.HouseKey:
     at = keys.parse_house_key(key)
     if at is None or at.view is None:
         raise StoreFailed(key, "no file of a view")

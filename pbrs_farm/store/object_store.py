@@ -122,7 +122,7 @@ def check_prefix(prefix: str) -> str:
 
 
 def content_type(key: str) -> str:
-    """The content type told by the key's ending."""
+    """The content type by the key's ending."""
     return CONTENT_TYPES.get(key.rpartition(".")[2], "application/octet-stream")
 
 

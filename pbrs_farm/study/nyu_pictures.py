@@ -82,7 +82,7 @@ def _numbers_of_split(path: Path, split: str) -> set[int]:
             _splits_of(path), "", "needed beside the .mat: it says which train", hint=hint
         )
     # Numbers below 1 are none.
-    return {n for n in _numbers(_splits_of(path), f"{split}Ndxs").tolist() if n > 0}
+    return {n for n in _mat_numbers(_splits_of(path), f"{split}Ndxs").tolist() if n > 0}
 
 
 def _truth(
@@ -91,17 +91,17 @@ def _truth(
     """A whole picture's truth in the form of the task's targets."""
     if plan.task in ("normals", "depth"):
         return photo_truth(photo, _K, plan)
-    labels = _row(path, "labels", at)
+    labels = _mat_row(path, "labels", at)
     if plan.task == "segmentation":
         if int(labels.max(initial=0)) >= len(classes):
             raise BadInput(path, f"image {at + 1}", f"label {labels.max()} is beyond the class map")
         return {"labels": classes_of(classes[labels], plan)}
     # An instance is a number within its class.
-    instance = labels.astype(np.int64) * 1000 + _row(path, "instances", at)
+    instance = labels.astype(np.int64) * 1000 + _mat_row(path, "instances", at)
     return {"edges": instance_boundary(instance) > 0}
 
 
-def _row(path: Path, table: str, at: int) -> NDArray[Any]:
+def _mat_row(path: Path, table: str, at: int) -> NDArray[Any]:
     import h5py
 
     try:
@@ -118,11 +118,11 @@ def _class_map(path: Path) -> NDArray[np.uint8]:
     if not path.is_file():
         hint = "from the code of Gupta et al. 2013"
         raise BadInput(path, "", "needed beside the .mat for classes", hint=hint)
-    classes = _numbers(path, "mapClass")
+    classes = _mat_numbers(path, "mapClass")
     return np.concatenate([[0], classes]).astype(np.uint8)
 
 
-def _numbers(path: Path, name: str) -> NDArray[np.int64]:
+def _mat_numbers(path: Path, name: str) -> NDArray[np.int64]:
     """A table of whole numbers of a MATLAB 5 file."""
     from scipy.io import loadmat
 

@@ -1,4 +1,4 @@
-"""Ground truth: one hit record at pixel centres -> every label layer; pure functions, no effects."""
+"""Ground truth: one hit record at pixel centres -> every label layer; no effects, no effects."""
 
 from pbrs_farm.truth.boundary import typed_boundaries
 from pbrs_farm.truth.coverage import coverage

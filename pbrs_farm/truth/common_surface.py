@@ -39,7 +39,7 @@ def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
     for room, own in rooms.items():
         shares = shared_surface(own, first_hit)
         for a in range(len(own)):
-            rows += [_row(room, own, a, b, shares) for b in range(a + 1, len(own))]
+            rows += [_pair_row(room, own, a, b, shares) for b in range(a + 1, len(own))]
     return rows
 
 
@@ -66,7 +66,7 @@ def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
     return shares
 
 
-def _row(room: str, views: Sequence[View], a: int, b: int, shares: F64) -> ViewPairRow:
+def _pair_row(room: str, views: Sequence[View], a: int, b: int, shares: F64) -> ViewPairRow:
     first, second = views[a].camera, views[b].camera
     cosine = float(np.clip(first.towards @ second.towards, -1, 1))
     a_in_b, b_in_a = float(shares[a, b]), float(shares[b, a])

@@ -130,7 +130,9 @@ def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
         mask = hit.valid & (hit.item == instance)
         model_from_world = np.linalg.inv(np.array(item.pose.world_from_model))
         centre, diagonal = _model_box(item, model_from_world)
-        points = _moved(hit.points.position_world[mask].astype(np.float64), model_from_world)
+        points = _transformed_normals(
+            hit.points.position_world[mask].astype(np.float64), model_from_world
+        )
         share = (points - centre) / diagonal + 0.5
         out[mask] = np.rint(65535 * np.clip(share, 0, 1)).astype(np.uint16)
     return out
@@ -138,12 +140,14 @@ def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
 
 def _model_box(item: Item, model_from_world: F64) -> tuple[F64, float]:
     """(3,) centre and diagonal of the item's triangles in its model's frame, metres."""
-    corners = _moved(corners_of_surfaces(item.surfaces).reshape(-1, 3), model_from_world)
+    corners = _transformed_normals(
+        corners_of_surfaces(item.surfaces).reshape(-1, 3), model_from_world
+    )
     low, high = corners.min(0), corners.max(0)
     return (low + high) / 2, float(np.linalg.norm(high - low))
 
 
-def _moved(points: F64, matrix: F64) -> F64:
+def _transformed_normals(points: F64, matrix: F64) -> F64:
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 

@@ -62,7 +62,7 @@ def array_of_rows(png: bytes, place: str) -> NDArray[Any] | None:
 
     Raises BadInput, naming place, where it is no PNG or is damaged.
     """
-    width, height, bits, kind, interlaced, data = _parsed(png, place)
+    width, height, bits, kind, interlaced, data = _png_parts(png, place)
     if bits not in (8, 16) or kind not in _CHANNELS or interlaced:
         return None
     dtype = np.dtype(np.uint8 if bits == 8 else ">u2")
@@ -94,7 +94,7 @@ def _chunk(name: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + name + data + struct.pack(">I", checksum)
 
 
-def _parsed(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
+def _png_parts(png: bytes, place: str) -> tuple[int, int, int, int, int, bytes]:
     """Width, height, bits, colour type, interlacing, and the compressed rows."""
     if not png.startswith(_SIGNATURE) or png[12:16] != b"IHDR" or len(png) < 33:
         raise BadInput(place, "", "not a PNG file")

@@ -127,7 +127,7 @@ class StoredRoot:
     def credits(self, houses: Iterable[str]) -> tuple[str, ...]:
         """The lines that every product of these houses must carry, each once."""
         lines = [attribution(self._store, house) for house in houses]
-        # What dressed homes show is told in a file of its own.
+        # Dressed homes have their credits in a file of its own.
         with suppress(ObjectMissing):
             lines += self._get(keys.ATTRIBUTION).decode("utf-8", "replace").splitlines()
         return tuple(dict.fromkeys(line for line in lines if line))

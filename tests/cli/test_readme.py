@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from pbrs_farm.cli import build_parser
-from pbrs_farm.core.layers import table
+from pbrs_farm.core.layers import layer_table
 
 REPO = Path(__file__).parents[2]
 README = (REPO / "README.md").read_text(encoding="utf-8")
@@ -14,7 +14,7 @@ COMMANDS = (REPO / "docs/commands.md").read_text(encoding="utf-8")
 
 
 def test_the_layers_table_is_the_one_of_layers_py() -> None:
-    assert table() in (REPO / "docs/formats.md").read_text(encoding="utf-8")
+    assert layer_table() in (REPO / "docs/formats.md").read_text(encoding="utf-8")
 
 
 def test_every_verb_shown_exists() -> None:

@@ -12,7 +12,7 @@ from pbrs_farm.export import forms
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_homes import export_homes
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.form import form_names, form_of, table
+from pbrs_farm.export.form import form_names, form_of, forms_table
 from pbrs_farm.formats.class_map import class_map
 from tests.check.roots import make_root
 
@@ -35,7 +35,7 @@ def test_a_form_is_called_as_its_file(name: str) -> None:
 
 @pytest.mark.parametrize("of", ["views", "homes"])
 def test_the_docs_have_the_table(of: str) -> None:
-    assert table(of) in DOCS.read_text()
+    assert forms_table(of) in DOCS.read_text()
 
 
 def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: Path) -> None:
@@ -81,4 +81,4 @@ def test_a_file_is_all_that_a_new_form_takes(
     choice = Choice(classes=class_map(tmp_path / "mine.csv"))
     with pytest.raises(BadInput, match=r"my-lines"):
         export(root, tmp_path / "x", "bop", choice=choice)
-    assert "| `my-lines` | `lines.txt`: a line a view |" in table("views")
+    assert "| `my-lines` | `lines.txt`: a line a view |" in forms_table("views")

@@ -12,7 +12,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resized_layer
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.forms.colmap import _camera as colmap_camera
+from pbrs_farm.export.forms.colmap import _camera_line as colmap_camera
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.local import Run, run_local

@@ -251,11 +251,11 @@ def test_names_are_drawn_in_the_script_they_are_written_in(tmp_path: Path) -> No
     write_house(tmp_path, "a", ("0_0_1",), "Modèle d’Élise – Спальня")
     assert sheet.contact_sheet(tmp_path)
     assert "Modèle d’Élise – Спальня" in gallery(tmp_path)
-    assert not any("?" in part for _font, part in sheet_text._parts("Modèle d’Élise –"))
+    assert not any("?" in part for _font, part in sheet_text._runs_of_one_font("Modèle d’Élise –"))
 
 
 def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
-    assert "".join(part for _font, part in sheet_text._parts("a\u0378b\ufe0f")) == "a?b"
+    assert "".join(part for _font, part in sheet_text._runs_of_one_font("a\u0378b\ufe0f")) == "a?b"
 
 
 def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:

@@ -81,7 +81,7 @@ async def events(request: Request) -> Response:
     if not board.streams.acquire(blocking=False):
         raise HTTPException(503, "Too many pages listen already.")
     answer = StreamingResponse(
-        _stream(partial(_parts, request, farm, name), board.ending, board.streams.release),
+        _stream(partial(_farm_parts, request, farm, name), board.ending, board.streams.release),
         media_type="text/event-stream",
     )
     answer.headers["Cache-Control"] = "no-store"
@@ -113,7 +113,7 @@ async def _stream(
         release()
 
 
-def _parts(request: Request, farm: LiveFarm, job: str) -> dict[str, str]:
+def _farm_parts(request: Request, farm: LiveFarm, job: str) -> dict[str, str]:
     """Id of an element -> its HTML now."""
     templates, prices = board_of(request).templates, _prices(request)
     may = request.scope.get("may_change", False)
@@ -157,7 +157,7 @@ async def steer(request: Request) -> Response:
         )
     except PbrsError as error:
         note(answer=f"refused: {error}")
-        return page(request, "told.html", 409, text=str(error))
+        return page(request, "message.html", 409, text=str(error))
     note(answer=answer)
     farm.forget()
     return RedirectResponse(f"/farm/jobs/{of}" if what in _OF_JOBS else "/farm", 303)

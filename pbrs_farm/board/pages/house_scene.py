@@ -43,7 +43,7 @@ def scene(request: Request) -> Response:
     return JSONResponse(
         {
             "rooms": [_room(r) for r in _dicts(house.get("rooms")) if "id" in r],
-            "cameras": [c for c in map(_camera(stored), _dicts(cameras.get("views"))) if c],
+            "cameras": [c for c in map(_camera_row(stored), _dicts(cameras.get("views"))) if c],
             "refused": {
                 shown(name): n
                 for name, n in (refused.items() if isinstance(refused, dict) else ())
@@ -78,7 +78,7 @@ def _room(row: dict[str, Any]) -> dict[str, str]:
     return {"id": str(row["id"]), "name": shown(row.get("name") or f"Room {row['id']}")}
 
 
-def _camera(stored: dict[str, ListedView]) -> Any:
+def _camera_row(stored: dict[str, ListedView]) -> Any:
     """A row of cameras.json -> what the page draws of it, None where it is damaged."""
 
     def drawn(row: dict[str, Any]) -> dict[str, Any] | None:

@@ -134,7 +134,7 @@ def _tone_facts(tone: ToneFields) -> dict[str, Any]:
     return facts | {"knee": knee_of(tone.white)}
 
 
-def _files(data: bytes) -> tuple[Sequence[bytes], bool]:
+def _view_files(data: bytes) -> tuple[Sequence[bytes], bool]:
     n_radiance, n_view, n_recipe, denoise = _HEAD.unpack_from(data)
     at, parts = _HEAD.size, []
     for n in (n_radiance, n_view, n_recipe):
@@ -145,7 +145,7 @@ def _files(data: bytes) -> tuple[Sequence[bytes], bool]:
 
 def main() -> int:
     """Read a view's files from stdin, write its packet to stdout."""
-    (radiance, view_json, recipe), denoise = _files(sys.stdin.buffer.read())
+    (radiance, view_json, recipe), denoise = _view_files(sys.stdin.buffer.read())
     try:
         sys.stdout.buffer.write(light_packet(radiance, view_json, recipe, denoise=denoise))
     except PbrsError as error:

@@ -71,14 +71,14 @@ def views(request: Request) -> Response:
         menus=queries.menus(),
         modes=[mode.value for mode in ALL_MODES],
         verdicts=VERDICTS,
-        credits=sorted(_credits(queries.home(h) for h in {v.house for v in found.rows})),
+        credits=sorted(_credits_of_homes(queries.home(h) for h in {v.house for v in found.rows})),
     )
     # The address leaves out what the form leaves empty.
     answer.headers["HX-Push-Url"] = wanted.url(page=wanted.page)
     return answer
 
 
-def _credits(homes: Iterable[ListedHome | None]) -> set[str]:
+def _credits_of_homes(homes: Iterable[ListedHome | None]) -> set[str]:
     return {h.credit for h in homes if h is not None and h.credit}
 
 

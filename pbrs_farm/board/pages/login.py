@@ -51,7 +51,7 @@ def asset(request: Request) -> Response:
     found = board_of(request).assets.get(request.path_params["name"])
     if found is None:
         raise HTTPException(404, "There is no such file.")
-    # A browser that has these bytes is told so.
+    # Answer 304 to a browser that has these bytes.
     etag = f'"{found.version}"'
     if request.headers.get("if-none-match") == etag:
         return Response(status_code=304, headers={"ETag": etag})

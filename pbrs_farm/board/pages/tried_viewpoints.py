@@ -1,6 +1,6 @@
 """Every viewpoint that the sampler tried in a stored house, with its verdict. Effects: a process.
 
-The root keeps how many candidates each rule refused, not where they stood: they are sampled again
+The root keeps how many candidates each rule refused, not where they were: they are sampled again
 from the stored house, recipe and seed, which gives the same ones. In a process of its own, since
 the ray caster keeps much memory: `python -m` this module, STORE HOUSE, writes JSON to stdout.
 """

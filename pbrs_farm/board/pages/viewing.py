@@ -56,7 +56,7 @@ def view(request: Request) -> Response:
         facts=_camera_facts(facts),
         recipe=recipe_words(board.reader),
         seconds=_seconds(board.reader, found),
-        files=_files(board.reader, found),
+        files=_stored_file_rows(board.reader, found),
         before=before,
         after=after,
         packed=json.dumps({"layers": layers, "instances": _packed_instances(facts)}),
@@ -70,7 +70,7 @@ def thumb(request: Request) -> Response:
     def make() -> bytes:
         return thumbnail_jpeg(layer, *_stored(board_of(request).reader, found, layer))
 
-    return _picture(request, found, ("thumb", layer), "jpg", make)
+    return _picture_response(request, found, ("thumb", layer), "jpg", make)
 
 
 def shown(request: Request) -> Response:
@@ -84,7 +84,7 @@ def shown(request: Request) -> Response:
     if LAYER[layer].is_photo:
         data, _key = _stored(board_of(request).reader, found, layer)
         return Response(data, media_type="image/png", headers={"Cache-Control": FOREVER})
-    return _picture(request, found, ("shown", layer), "png", make)
+    return _picture_response(request, found, ("shown", layer), "png", make)
 
 
 def file(request: Request) -> Response:
@@ -158,7 +158,7 @@ def _stored(reader: RootReader, found: ListedView, layer: str) -> tuple[bytes, s
     return data, key
 
 
-def _picture(
+def _picture_response(
     request: Request, found: ListedView, what: tuple[str, ...], ending: str, make: Any
 ) -> Response:
     words = (*what, found.house, found.id, found.version)
@@ -258,7 +258,7 @@ def _seconds(reader: RootReader, found: ListedView) -> list[tuple[str, float, st
     return rows
 
 
-def _files(reader: RootReader, found: ListedView) -> list[tuple[str, str, int]]:
+def _stored_file_rows(reader: RootReader, found: ListedView) -> list[tuple[str, str, int]]:
     """(layer, file, bytes) of what can be saved."""
     sizes = (
         (x.name, x.file, reader.size(keys.view_key(found.house, found.id, x.file)))

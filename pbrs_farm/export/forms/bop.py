@@ -66,7 +66,7 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     if not meshes:
         hint = "place or scatter models first: docs/python.md"
         raise BadInput("--to bop", "", "no home of these views holds a placed model", hint=hint)
-    numbers = _numbers(sorted(meshes))
+    numbers = _object_numbers(sorted(meshes))
     n_files = _write_models(out / "models", meshes, numbers)
     scenes: dict[str, list[ChosenView]] = {}
     for view in views:
@@ -75,11 +75,11 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     for scene, (house_id, own) in enumerate(scenes.items()):
         folder = out / _SPLIT / f"{scene:06d}"
         n_files += _write_scene(folder, own, houses[house_id], numbers)
-    _write_json(out / "camera.json", _camera(views[0]))
+    _write_json(out / "camera.json", _camera_json(views[0]))
     return n_files + 1
 
 
-def _numbers(models: list[str]) -> dict[str, int]:
+def _object_numbers(models: list[str]) -> dict[str, int]:
     """Model -> its obj_id."""
     own = {m: int(found[1]) for m in models if (found := _OWN_NUMBER.fullmatch(m))}
     free = (
@@ -163,7 +163,7 @@ def _write_scene(
         (folder / "depth" / f"{image:06d}.png").write_bytes(view.data("depth"))
         rows = [row for row in view.facts["instances"] if row.get("model") in numbers]
         camera[str(image)] = _scene_camera(view)
-        poses[str(image)] = [_pose(row, numbers) for row in rows]
+        poses[str(image)] = [_pose_row(row, numbers) for row in rows]
         info[str(image)] = []
         size = view.facts["width_px"], view.facts["height_px"]
         file = f"rgb/{image:06d}.png"
@@ -221,7 +221,7 @@ def _box(mask: NDArray[Any]) -> list[int]:
     return [x, y, int(columns[-1]) - x + 1, int(rows[-1]) - y + 1]
 
 
-def _pose(row: dict[str, Any], numbers: dict[str, int]) -> dict[str, Any]:
+def _pose_row(row: dict[str, Any], numbers: dict[str, int]) -> dict[str, Any]:
     pose = np.array(row["camera_from_model_opencv"])
     return {
         "obj_id": numbers[row["model"]],
@@ -240,7 +240,7 @@ def _scene_camera(view: ChosenView) -> dict[str, Any]:
     }
 
 
-def _camera(view: ChosenView) -> dict[str, Any]:
+def _camera_json(view: ChosenView) -> dict[str, Any]:
     (fx, _skew, cx), (_zero, fy, cy), _last = blenderproc_k(view.facts["K"])
     width, height = view.facts["width_px"], view.facts["height_px"]
     return {

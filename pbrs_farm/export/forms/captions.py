@@ -30,8 +30,8 @@ LEAST_VISIBLE: Final = 0.3
 """Share of a thing's own pixels that are seen, from which it counts."""
 LEAST_FRACTION: Final = 0.003
 """Share of the picture's pixels from which a thing counts."""
-_RELATED: Final = 6  # largest things of which relations are told
-_SAID: Final = 4  # relations that the text tells
+_RELATED: Final = 6  # largest things that relations are given of
+_SAID: Final = 4  # relations in the text
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 _TOUCH_M: Final = 0.05  # between a thing and what it stands on
 _SLACK_M: Final = 0.02  # by which things that stand apart may overlap
@@ -172,7 +172,7 @@ def caption(view: ChosenView) -> dict[str, Any]:
     things = _things(view)
     relations = _relations(view, things)
     objects = [{"id": t.id, "noun": t.noun, "box2d": t.row["box2d"]} for t in things]
-    sentences = [_first_sentence(view, things), *_told(relations, _titles(things))]
+    sentences = [_first_sentence(view, things), *_relation_sentences(relations, _titles(things))]
     return {"text": " ".join(sentences), "objects": objects, "relations": relations}
 
 
@@ -201,7 +201,7 @@ def _room(view: ChosenView) -> str:
     return f'a room called "{name}"' if is_named else "a room"
 
 
-def _told(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
+def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
     """A sentence for each of the first relations; of one thing, one."""
     first: dict[int, dict[str, Any]] = {}
     for row in relations:

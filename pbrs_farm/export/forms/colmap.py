@@ -32,23 +32,25 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         for number, view in enumerate(own, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
-            camera = cameras.setdefault(_camera(view), len(cameras) + 1)
+            camera = cameras.setdefault(_camera_line(view), len(cameras) + 1)
             # A line of its pose and an empty one: no points of it are named.
-            images.append(f"{number} {_pose(view)} {camera} {view.id}.png\n\n")
-            points += _points(view, picture)
-        _write(out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for c, n in cameras.items()))
-        _write(out / house / "sparse/0/images.txt", images)
+            images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n\n")
+            points += _point_lines(view, picture)
+        _write_lines(
+            out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for c, n in cameras.items())
+        )
+        _write_lines(out / house / "sparse/0/images.txt", images)
         numbered = (f"{n} {point} 0\n" for n, point in enumerate(points, start=1))
-        _write(out / house / "sparse/0/points3D.txt", numbered)
+        _write_lines(out / house / "sparse/0/points3D.txt", numbered)
         n_files += len(own) + 3
     return n_files
 
 
-def _write(file: Path, lines: Iterable[str]) -> None:
+def _write_lines(file: Path, lines: Iterable[str]) -> None:
     file.write_text("".join(lines))
 
 
-def _camera(view: ChosenView) -> str:
+def _camera_line(view: ChosenView) -> str:
     require_lens(view, "colmap", "radtan", "fisheye")
     i = intrinsics_of(view.facts)
     # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
@@ -59,14 +61,14 @@ def _camera(view: ChosenView) -> str:
     return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
 
 
-def _pose(view: ChosenView) -> str:
+def _pose_words(view: ChosenView) -> str:
     """`qw qx qy qz tx ty tz`, camera from world."""
     camera_from_world = np.linalg.inv(pose_opencv(view))
     x, y, z, w = Rotation.from_matrix(camera_from_world[:3, :3]).as_quat(canonical=True)
     return " ".join(f"{v:.9g}" for v in (w, x, y, z, *camera_from_world[:3, 3]))
 
 
-def _points(view: ChosenView, picture: str) -> list[str]:
+def _point_lines(view: ChosenView, picture: str) -> list[str]:
     """`x y z r g b` of a grid of the view's pixels."""
     depth, rgb = view.array("depth"), view.array(picture)
     height, width = depth.shape

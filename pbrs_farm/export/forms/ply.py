@@ -41,7 +41,7 @@ def write_ply(views: list[ChosenView], out: Path, choice: Choice) -> int:
 
 def point_cloud(view: ChosenView) -> NDArray[np.void]:
     """(N,) records of the pixels that see a surface, row by row: x y z float32, and where the view has them red green blue, nx ny nz, label, instance."""
-    points, seen = _points(view)
+    points, seen = _seen_points(view)
     columns: dict[str, NDArray[Any]] = dict(zip("xyz", points.astype(np.float32).T, strict=True))
     if view.has("normal"):
         normals = _world_normals(view)[seen].astype(np.float32)
@@ -76,7 +76,7 @@ def _header(view: ChosenView, choice: Choice, vertices: NDArray[np.void]) -> byt
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 
-def _points(view: ChosenView) -> tuple[F64, Mask]:
+def _seen_points(view: ChosenView) -> tuple[F64, Mask]:
     """(N, 3) points in the world, metres, and (H, W) the pixels that they are of."""
     if view.has("position"):
         position = view.array("position")

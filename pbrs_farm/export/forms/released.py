@@ -41,7 +41,7 @@ def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             place = {"house": house, "id": f"{number:06d}"}
             for layer, published in FILES.items():
                 if view.has(layer):
-                    _write(out / published.format(**place), view.data(layer))
+                    _write_file(out / published.format(**place), view.data(layer))
                     n_files += 1
             good.append("{house}/{id}\n".format(**place))
         n_files += _write_cameras(out / "camera_v2" / house, own)
@@ -58,7 +58,7 @@ def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
     return 2
 
 
-def _write(target: Path, data: bytes) -> None:
+def _write_file(target: Path, data: bytes) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(data)
 

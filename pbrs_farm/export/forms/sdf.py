@@ -51,7 +51,7 @@ class _World:
         world = ET.SubElement(self.document, "world", name=home.house.id)
         _put(world, "gravity", *_GRAVITY)
         self._building(world)
-        for piece, name in zip(home.things, _names(home.things), strict=True):
+        for piece, name in zip(home.things, _model_names(home.things), strict=True):
             self._thing(world, piece, name)
         ET.indent(self.document)
 
@@ -71,7 +71,7 @@ class _World:
     def _thing(self, world: ET.Element, piece: Piece, name: str) -> None:
         model = ET.SubElement(world, "model", name=name)
         world_from_model = _Z_UP @ piece.world_from_local @ _Z_UP.T
-        _pose(model, world_from_model)
+        _put_pose(model, world_from_model)
         ET.SubElement(model, "static").text = "true" if piece.is_fixed else "false"
         link = ET.SubElement(model, "link", name="link")
         _inertial(link, piece)
@@ -92,7 +92,7 @@ class _World:
         return name
 
 
-def _names(pieces: Iterable[Piece]) -> list[str]:
+def _model_names(pieces: Iterable[Piece]) -> list[str]:
     """The pieces' names, but none that SDF or the building has."""
     taken, found = set(_RESERVED), []
     for piece in pieces:
@@ -110,7 +110,7 @@ def _put(parent: ET.Element, tag: str, *numbers: float) -> ET.Element:
     return child
 
 
-def _pose(parent: ET.Element, b_from_a: F64) -> None:
+def _put_pose(parent: ET.Element, b_from_a: F64) -> None:
     turn = Rotation.from_matrix(b_from_a[:3, :3]).as_quat()
     child = _put(parent, "pose", *b_from_a[:3, 3], *turn)
     child.set("rotation_format", "quat_xyzw")
@@ -119,7 +119,7 @@ def _pose(parent: ET.Element, b_from_a: F64) -> None:
 def _shape(link: ET.Element, tag: str, name: str, uri: str) -> None:
     """A visual or a collision: a mesh with y up, turned to z up."""
     shape = ET.SubElement(link, tag, name=name)
-    _pose(shape, _Z_UP)
+    _put_pose(shape, _Z_UP)
     mesh = ET.SubElement(ET.SubElement(shape, "geometry"), "mesh")
     ET.SubElement(mesh, "uri").text = uri
 
@@ -144,7 +144,7 @@ def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world:
         light = ET.SubElement(link, "light", name=f"{name}_light_{k}", type=kind)
         frame = np.eye(4)
         frame[:3, 3] = (link_from_home @ [*lamp.position, 1])[:3]
-        _pose(light, frame)
+        _put_pose(light, frame)
         ET.SubElement(light, "cast_shadows").text = "false"
         intensity = lamp.candela / _BRIGHT_CD
         _put(light, "intensity", intensity)
@@ -158,7 +158,7 @@ def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world:
             direction, half_angle = lamp.spot
             _put(light, "direction", *(link_from_home[:3, :3] @ direction))
             spot = ET.SubElement(light, "spot")
-            # Gazebo's cones are told by their whole angle and end at a half space.
+            # Gazebo has a cone's whole angle, and cones end at a half space.
             for tag, value in (("inner_angle", 0.0), ("outer_angle", min(2 * half_angle, np.pi))):
                 _put(spot, tag, value)
             _put(spot, "falloff", 1)

@@ -68,8 +68,8 @@ class _Stage:
         root.AddTransformOp().Set(_matrix(np.array(_Z_UP, np.float64).T))
         Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
         self._stage.SetDefaultPrim(root.GetPrim())
-        told = root.GetPrim().CreateAttribute("pbrs:rooms", Sdf.ValueTypeNames.String)
-        told.Set(json.dumps(rooms_json(home.house), allow_nan=False))
+        attribute = root.GetPrim().CreateAttribute("pbrs:rooms", Sdf.ValueTypeNames.String)
+        attribute.Set(json.dumps(rooms_json(home.house), allow_nan=False))
         for scope in ("Items", "Rooms"):
             group = UsdGeom.Xform.Define(self._stage, f"/Home/{scope}")
             Usd.ModelAPI(group).SetKind(Kind.Tokens.group)
@@ -103,8 +103,8 @@ class _Stage:
             extras["solid"] = True  # cut by repair: not to be parted by its planes
         if not piece.item.kind.is_structure:
             extras["has_frame"] = True  # its box lies along its own axes
-        told = prim.CreateAttribute("pbrs:item", Sdf.ValueTypeNames.String)
-        told.Set(json.dumps(extras, allow_nan=False))
+        attribute = prim.CreateAttribute("pbrs:item", Sdf.ValueTypeNames.String)
+        attribute.Set(json.dumps(extras, allow_nan=False))
         for k, surface in enumerate(piece.surfaces):
             mesh = self._mesh(f"{path}/Mesh_{k}", surface, looks[surface.material])
             if piece.is_building:
@@ -187,8 +187,8 @@ class _Stage:
         light.CreateIntensityAttr(float(lamp.flux_lm / (4 * np.pi**2 * radius**2)))
         if lamp.is_coloured or min(lamp.rgb_linear) < 1:
             light.CreateColorAttr(Gf.Vec3f(*map(float, lamp.rgb_linear)))
-        told = light.GetPrim().CreateAttribute("pbrs:lumen", Sdf.ValueTypeNames.Float)
-        told.Set(float(lamp.flux_lm))
+        attribute = light.GetPrim().CreateAttribute("pbrs:lumen", Sdf.ValueTypeNames.Float)
+        attribute.Set(float(lamp.flux_lm))
         frame = np.eye(4)
         frame[:3, 3] = local_from_world[:3, :3] @ lamp.position + local_from_world[:3, 3]
         if lamp.spot:
@@ -232,8 +232,8 @@ class _Stage:
         look = UsdShade.Material.Define(self._stage, path)
         if material.name:
             look.GetPrim().SetDisplayName(material.name)
-        told = look.GetPrim().CreateAttribute("pbrs:kind", Sdf.ValueTypeNames.Token)
-        told.Set(row["extras"]["kind"])
+        attribute = look.GetPrim().CreateAttribute("pbrs:kind", Sdf.ValueTypeNames.Token)
+        attribute.Set(row["extras"]["kind"])
         shader = UsdShade.Shader.Define(self._stage, f"{path}/Surface")
         shader.CreateIdAttr("UsdPreviewSurface")
         types = Sdf.ValueTypeNames

@@ -18,12 +18,12 @@ def write_webdataset(views: list[ChosenView], out: Path, choice: Choice) -> int:
     starts = range(0, len(views), choice.views_per_shard)
     for number, start in enumerate(starts):
         own = views[start : start + choice.views_per_shard]
-        samples = ((f"{view.house.id}__{view.id}", _parts(view)) for view in own)
+        samples = ((f"{view.house.id}__{view.id}", _sample_parts(view)) for view in own)
         write_samples(out / f"shard-{number:06d}.tar", samples)
     return len(starts)
 
 
-def _parts(view: ChosenView) -> dict[str, bytes]:
+def _sample_parts(view: ChosenView) -> dict[str, bytes]:
     files = {f"{layer.name}{Path(layer.file).suffix}": layer.name for layer in view.layers}
     return {"json": view.facts_json} | {part: view.data(name) for part, name in files.items()}
 

@@ -120,10 +120,12 @@ def ablation_table(result: dict[str, Any]) -> str:
     for name, row in result["rows"].items():
         runs = row["seeds"]
         cells = [
-            _cell(figure, [run["network"].get(part) for run in runs])
+            _figure_cell(figure, [run["network"].get(part) for run in runs])
             for part in ("train", "held_out")
         ]
-        cells += [_cell(figure, [run["on"][other]["network"] for run in runs]) for other in others]
+        cells += [
+            _figure_cell(figure, [run["on"][other]["network"] for run in runs]) for other in others
+        ]
         paper = paper_row(task.name, row["mode"], result["n_classes"])
         known = paper.figures[0] if paper and not paper.tuned else float("nan")
         rows.append([name, str(row["views"]), *cells, spread_text(figure, [known])])
@@ -140,7 +142,7 @@ def ablation_table(result: dict[str, Any]) -> str:
     return text + "\n\n" + "\n".join(said) + "\n"
 
 
-def _cell(figure: str, figures: Sequence[dict[str, float] | None]) -> str:
+def _figure_cell(figure: str, figures: Sequence[dict[str, float] | None]) -> str:
     values = [row[figure] for row in figures if row is not None]
     return spread_text(figure, values) if values else "-"
 
@@ -150,8 +152,8 @@ def _baseline_row(result: dict[str, Any], figure: str, others: Sequence[str]) ->
     row = next(iter(result["rows"].values()))
     run = row["seeds"][0]
     name = run["baseline_name"]
-    parts = [_cell(figure, [run["baseline"].get(part)]) for part in ("train", "held_out")]
-    parts += [_cell(figure, [run["on"][other][name]]) for other in others]
+    parts = [_figure_cell(figure, [run["baseline"].get(part)]) for part in ("train", "held_out")]
+    parts += [_figure_cell(figure, [run["on"][other][name]]) for other in others]
     return [f"baseline: {name}", "-", *parts, "-"]
 
 

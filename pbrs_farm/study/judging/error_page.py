@@ -16,14 +16,14 @@ from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.study.judging.evaluation import (
     Evaluation,
     Trained,
+    figures_table,
     notes,
     predictions_of,
     report,
-    table,
 )
 from pbrs_farm.study.judging.figure_text import shown_figure, title_of
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
-from pbrs_farm.study.training.run_folder import made_folder
+from pbrs_farm.study.training.run_folder import make_folder
 from pbrs_farm.views.png_rows import png_of_rows
 
 N_SHOWN: Final = 8  # of the worst views, and of the best
@@ -31,8 +31,8 @@ N_SHOWN: Final = 8  # of the worst views, and of the best
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
     """Write the folder; the page's path. Raises BadInput where it cannot be written to."""
-    made_folder(out)
-    text = "\n".join([table(run, evaluations), "", *notes(run, evaluations), ""])
+    make_folder(out)
+    text = "\n".join([figures_table(run, evaluations), "", *notes(run, evaluations), ""])
     (out / "table.md").write_text(text)
     (out / "evaluation.json").write_text(json.dumps(report(run, evaluations), indent=1) + "\n")
     page = out / "index.html"

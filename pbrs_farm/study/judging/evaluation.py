@@ -141,9 +141,9 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
     return Trained(folder, record, plan, task, placed(network, plan), baseline)
 
 
-def _check_sha256(path: Path, told: str) -> None:
+def _check_sha256(path: Path, expected: str) -> None:
     """Raise BadInput where packed weights are not those their record names."""
-    if told and path.exists() and hashlib.sha256(path.read_bytes()).hexdigest() != told:
+    if expected and path.exists() and hashlib.sha256(path.read_bytes()).hexdigest() != expected:
         raise BadInput(path, "", "other bytes than run.json's weights_sha256: damaged or changed")
 
 
@@ -192,7 +192,7 @@ def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
     return predicted(placed(network, plan), views.colour, run.task, plan, views.sizes)
 
 
-def table(run: Trained, evaluations: list[Evaluation]) -> str:
+def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:
     """Figures by row; training homes, held-out homes and what was judged, side by side, as Markdown."""
     paper = _paper(run)
     columns: list[tuple[str, dict[str, float]]] = []

@@ -64,13 +64,13 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
     for place in above[: last + 1]:
         for name in _FILES:
             if (place / name).is_file():
-                return _camera(place / name)
+                return _read_camera(place / name)
     text = "photographs without intrinsics: normals cannot be taken from their depth"
     hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
     raise BadInput(folder, "", text, hint=hint)
 
 
-def _camera(path: Path) -> PhotoCamera:
+def _read_camera(path: Path) -> PhotoCamera:
     try:
         text = read_regular(path)[:_MAX_BYTES].decode()
     except (OSError, UnicodeDecodeError) as error:

@@ -73,10 +73,10 @@ def predictions_in(
         return None
     for at, file in zip(views.ids, files, strict=True):
         if file is None:
-            text = f"no prediction of {at}: {_names(at, kind)[0]} and the like"
+            text = f"no prediction of {at}: {_prediction_names(at, kind)[0]} and the like"
             raise BadInput(others.folder, "", text, hint="all pictures of a place, or none")
     return (
-        _fitted(_read(file, plan.task), size)
+        _fitted(_read_prediction(file, plan.task), size)
         for file, size in zip(files, views.sizes, strict=True)
         if file is not None
     )
@@ -88,21 +88,23 @@ def _files_of(folder: Path, ids: Sequence[str], kind: str) -> list[Path | None]:
     found: list[Path | None] = []
     for at in ids:
         end = at.rpartition("/")[2]
-        names = _names(at, kind) + (_names(end, kind) if ends[end] == 1 else [])
+        names = _prediction_names(at, kind) + (
+            _prediction_names(end, kind) if ends[end] == 1 else []
+        )
         found.append(next((folder / name for name in names if (folder / name).is_file()), None))
     return found
 
 
-def _names(at: str, kind: str) -> list[str]:
+def _prediction_names(at: str, kind: str) -> list[str]:
     # A photograph that is called NAME_rgb is predicted under that name.
     return [f"{at}{more}{end}" for more in ("", "_rgb") for end in (f"_{kind}.png", ".npy")]
 
 
-def _read(path: Path, task: str) -> NDArray[Any]:
+def _read_prediction(path: Path, task: str) -> NDArray[Any]:
     """A prediction as a task's scorer takes it."""
     data = read_given(path)
     if path.suffix == ".npy":
-        return _checked(_array(path, data), path, task)
+        return _checked(_prediction_array(path, data), path, task)
     stored = array_from_png(data, str(path))
     if task == "normals":
         if stored.dtype != np.uint16 or stored.ndim != 3:
@@ -115,7 +117,7 @@ def _read(path: Path, task: str) -> NDArray[Any]:
     return _checked(stored / unit if unit else stored, path, task)
 
 
-def _array(path: Path, data: bytes) -> NDArray[Any]:
+def _prediction_array(path: Path, data: bytes) -> NDArray[Any]:
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, OSError, EOFError):

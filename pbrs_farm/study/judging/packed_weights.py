@@ -19,7 +19,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.judging.evaluation import Trained, open_run
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
-from pbrs_farm.study.training.run_folder import RunFolder, made_folder
+from pbrs_farm.study.training.run_folder import RunFolder, make_folder
 from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import plan_as_json
 
@@ -46,9 +46,9 @@ def shipped_run(task: str) -> Path:
 def pack_weights(root: Path, out: Path) -> RunFolder:
     """Write a finished run's weights as half floats, with what is known of them, into out.
 
-    What `evaluate` left in RUN/evaluation is told on the card. Raises BadInput for any other folder.
+    What `evaluate` left in RUN/evaluation is on the card. Raises BadInput for any other folder.
     """
-    run, packed = open_run(root), RunFolder(made_folder(out))
+    run, packed = open_run(root), RunFolder(make_folder(out))
     tensors, position = read_tensors(run.folder.weights)
     halves = {name: x.half() if x.is_floating_point() else x for name, x in tensors.items()}
     write_tensor_file(packed.weights, halves, {"position": json.dumps(asdict(position))})
@@ -102,7 +102,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         " It knows rooms of homes by day and by lamplight; other places, people, animals and close-ups"
         " are unlike anything it saw.",
         "## Whose works it saw",
-        "\n".join(f"- {line}" for line in _credits(record)) or "The run names none.",
+        "\n".join(f"- {line}" for line in _training_credits(record)) or "The run names none.",
         f"weights.safetensors, sha256 {record['weights_sha256']}",
     ]  # fmt: skip
     return "\n\n".join(said) + "\n"
@@ -120,7 +120,7 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
     return f"{said} No photograph was trained on."
 
 
-def _credits(record: Mapping[str, Any]) -> list[str]:
+def _training_credits(record: Mapping[str, Any]) -> list[str]:
     """Each credit once; headings between them left out."""
     lines = (str(line).removeprefix("- ") for line in record.get("credits", []))
     return list(dict.fromkeys(line for line in lines if not line.endswith(":")))

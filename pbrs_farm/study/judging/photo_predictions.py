@@ -30,7 +30,7 @@ from pbrs_farm.study.judging.evaluation import Trained
 from pbrs_farm.study.judging.others_predictions import file_kind
 from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training.prediction import predicted
-from pbrs_farm.study.training.run_folder import made_folder
+from pbrs_farm.study.training.run_folder import make_folder
 
 SUFFIXES: Final = (".jpg", ".jpeg", ".png", ".bmp", ".tga", ".gif")
 _MAX_PIXELS: Final = 100_000_000  # of a photograph; more is refused
@@ -110,7 +110,7 @@ def predict_photographs(run: Trained, files: Sequence[Path], out: Path) -> Itera
     an edge is), each behind the photograph's name; NAME_shown.png is for eyes. Raises BadInput where
     out cannot be written to.
     """
-    made_folder(out)
+    make_folder(out)
     rows: list[dict[str, Any]] = []
     for batch in _batches(run, files):
         began = time.perf_counter()
@@ -134,7 +134,7 @@ def _batches(run: Trained, files: Sequence[Path]) -> Iterator[list[Photograph | 
     """Photographs that the network gets at one size, in their order; a row for what is none."""
     batch: list[Photograph | dict[str, Any]] = []
     size: tuple[int, int] | None = None
-    for path, name in zip(files, _names(files), strict=True):
+    for path, name in zip(files, _output_names(files), strict=True):
         try:
             one: Photograph | dict[str, Any] = read_photograph(path, name)
         except BadInput as error:
@@ -149,7 +149,7 @@ def _batches(run: Trained, files: Sequence[Path]) -> Iterator[list[Photograph | 
         yield batch
 
 
-def _names(files: Sequence[Path]) -> list[str]:
+def _output_names(files: Sequence[Path]) -> list[str]:
     """A name a file, its own where no other has it."""
     names: list[str] = []
     for path in files:

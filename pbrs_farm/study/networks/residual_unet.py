@@ -1,6 +1,6 @@
 """A U-Net of residual blocks with attention at its deepest stage, for two cores; no effects.
 
-Our own, about 2.3 million weights. Which way a bare wall faces is told by corners and edges far
+Our own, about 2.3 million weights. Which way a bare wall faces follows from corners and edges far
 from it, so that at a 32nd of the picture's size every cell attends to every other (Vaswani et
 al. 2017), each knowing where it lies. Blocks are those of He et al. 2016, section 3.
 """

@@ -1,4 +1,4 @@
-"""A network for two cores: a U-Net on blocks of 2x2 pixels that knows where in the picture it is; pure.
+"""A network for two cores: a U-Net on blocks of 2x2 pixels that knows where in the picture it is; no effects.
 
 Our own, about 1.2 million weights. Full resolution costs most on a processor, so pixels are folded
 into channels first and unfolded last; half of what is known of a room's normals is where they lie

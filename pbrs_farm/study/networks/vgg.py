@@ -1,4 +1,4 @@
-"""The 13 convolutions of VGG-16 (Simonyan and Zisserman 2015), which three networks begin with; pure."""
+"""The 13 convolutions of VGG-16 (Simonyan and Zisserman 2015), which three networks begin with; no effects."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def card(views: Views, packing: Packing, facts: RootFacts, *, form: str) -> str:
         "## How it was made",
         _list(_making(packing, facts)),
         "## Classes",
-        _classes(facts),
+        _class_table(facts),
         "## Known limits",
         _list(_limits(packing, facts)),
     ]
@@ -90,7 +90,7 @@ def _loading(form: str, split: str) -> str:
 
 def _homes(facts: RootFacts) -> str:
     rows = [
-        (_cell(h.id), h.n_views, _cell(h.licence) or "none named", _cell(h.author))
+        (_card_cell(h.id), h.n_views, _card_cell(h.licence) or "none named", _card_cell(h.author))
         for h in facts.homes[:_MOST_HOMES]
     ]
     left = len(facts.homes) - len(rows)
@@ -98,7 +98,7 @@ def _homes(facts: RootFacts) -> str:
     return _table(("home", "views", "licence", "author"), rows) + more
 
 
-def _cell(text: str) -> str:
+def _card_cell(text: str) -> str:
     return shown(text).replace("|", "\\|")
 
 
@@ -131,7 +131,7 @@ def _making(packing: Packing, facts: RootFacts) -> Iterator[str]:
     yield f"Seeds: {recipe.seed} of the recipe, {packing.seed} of the order of views{dressed}."
 
 
-def _classes(facts: RootFacts) -> str:
+def _class_table(facts: RootFacts) -> str:
     total = sum(facts.pixels_of_class.values())
     if not total:
         return "No view names an instance."

@@ -1,4 +1,4 @@
-"""Depth along the camera's axis, trained and judged up to the room's scale; pure."""
+"""Depth along the camera's axis, trained and judged up to the room's scale; no effects."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class StudyTask(Protocol):
 
     name: str
     layers: tuple[str, ...]  # of a Request
-    figures: tuple[str, ...]  # what a table shows, the first is what runs are told apart by
+    figures: tuple[str, ...]  # what a table shows, runs are compared by the first
     error_name: str  # what `error` is, with its unit
     error_scale: float  # of an error as it is written: 1, or 100 for shares
     error_unit: str  # written behind it: " degrees", " %"

@@ -64,13 +64,13 @@ def save_checkpoint(
             if value is not None:
                 tensors[f"optimiser.{number}.{key}"] = torch.as_tensor(value)
     tensors["generator"] = torch.get_rng_state()
-    _write(path, tensors, position)
+    _write_whole(path, tensors, position)
 
 
 def save_weights(path: Path, network: nn.Module, position: Position) -> None:
     """Write the weights alone: what evaluation and fine-tuning read."""
     named = {f"model.{name}": tensor for name, tensor in network.state_dict().items()}
-    _write(path, named, position)
+    _write_whole(path, named, position)
 
 
 def load_checkpoint(
@@ -121,6 +121,6 @@ def _below(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
     return {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
 
 
-def _write(path: Path, tensors: dict[str, Tensor], position: Position) -> None:
+def _write_whole(path: Path, tensors: dict[str, Tensor], position: Position) -> None:
     row: dict[str, Any] = {name: getattr(position, name) for name in position.__slots__}
     write_tensor_file(path, tensors, {"position": json.dumps(row, sort_keys=True)})

@@ -1,4 +1,4 @@
-"""Metrics of a training told to TensorBoard or Weights & Biases as they are made. Effects: theirs.
+"""Metrics of a training sent to TensorBoard or Weights & Biases as they are made. Effects: theirs.
 
 A row of metrics.jsonl is a point of each of its values' curves, at the row's step.
 """

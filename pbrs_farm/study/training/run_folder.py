@@ -82,7 +82,7 @@ class RunFolder:
             self._check_same(older, row)
             if older["state"] == FINISHED:
                 return False
-        made_folder(self.root)
+        make_folder(self.root)
         self.write("run.json", {**row, "state": RUNNING})
         return True
 
@@ -141,7 +141,7 @@ class RunFolder:
             file.write(json.dumps(row) + "\n")
 
 
-def made_folder(path: Path) -> Path:
+def make_folder(path: Path) -> Path:
     """The folder, made where it was missing; BadInput where it cannot be written to."""
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -96,7 +96,7 @@ def _faster(
 ) -> tuple[TrainingPlan, dict[str, Any]]:  # fmt: skip
     """The plan with bfloat16 where that was asked for and is the faster, and what was measured.
 
-    A run that goes on keeps what it began with. GPUs and several processes do as they are told.
+    A run that goes on keeps what it began with. GPUs and several processes follow the plan.
     """
     if not plan.bf16 or share.of > 1 or device_of(plan).type != "cpu":
         return plan, {}

@@ -87,7 +87,7 @@ def train_network(
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
     average = running_mean(network, plan)
     first = _resumed(folder, network, optimiser, where, average)
-    told: nn.Module = network if average is None else average.module
+    judged: nn.Module = network if average is None else average.module
     if share.is_first:
         # Rows of steps after the checkpoint go: these steps are run again.
         folder.keep_metrics_until(first)
@@ -112,19 +112,19 @@ def train_network(
             started, loss_sum, n_summed = time.monotonic(), 0.0, 0
         if _is_judged(plan, done, stop_on):
             judging = time.monotonic()
-            errors, least = judge(told), folder.least(stop_on)
+            errors, least = judge(judged), folder.least(stop_on)
             folder.add_metrics({"step": done} | errors)
             observe({"step": done} | errors)
             if stop_on and (errors[stop_on] < least or least == inf):
-                save_weights(folder.best, told, _at(where, done))
+                save_weights(folder.best, judged, _at(where, done))
             started += time.monotonic() - judging
         # A checkpoint holds no gradients, so it waits until none are accumulated.
         if done % plan.checkpoint_every == 0 and done % plan.accumulate == 0 and done < plan.steps:
             save_checkpoint(folder.checkpoint, network, optimiser, _at(where, done), average)
     if share.is_first:
-        best = load_checkpoint(folder.best, told) if stop_on else _at(where, plan.steps)
-        save_weights(folder.weights, told, best)
-    return told
+        best = load_checkpoint(folder.best, judged) if stop_on else _at(where, plan.steps)
+        save_weights(folder.weights, judged, best)
+    return judged
 
 
 def _is_judged(plan: TrainingPlan, done: int, stop_on: str) -> bool:

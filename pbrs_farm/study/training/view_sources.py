@@ -100,9 +100,11 @@ def credits_of(source: TrainingSource, homes: Sequence[str]) -> tuple[str, ...]:
     lines: dict[str, None] = {}
     for place in () if source.is_nyu else source.places:
         views = open_views(place)
-        told = getattr(views.source, "credits", None)
+        credits_of_homes = getattr(views.source, "credits", None)
         own = set(views.homes)
-        lines |= dict.fromkeys(told([home for home in homes if home in own]) if told else ())
+        lines |= dict.fromkeys(
+            credits_of_homes([home for home in homes if home in own]) if credits_of_homes else ()
+        )
     return tuple(lines)
 
 

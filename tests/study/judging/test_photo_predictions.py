@@ -81,7 +81,9 @@ def test_thirteen_classes_are_a_layer_and_names_of_their_own(tmp_path: Path) -> 
     assert 1 <= stored.min() <= stored.max() <= 13
     (row,) = json.loads((out / "predictions.json").read_text())
     assert set(row["classes"]) <= set(NYU13_NAMES)
-    assert "33." not in evaluation.table(open_run(tmp_path / "run"), [])  # the paper's 40 classes
+    assert "33." not in evaluation.figures_table(
+        open_run(tmp_path / "run"), []
+    )  # the paper's 40 classes
 
 
 def test_the_same_picture_turned_by_exif_is_predicted_alike(run: Path, tmp_path: Path) -> None:
