@@ -24,7 +24,7 @@ from benchmarks.light.table_rows import DENOISED_COUNTS as COUNTS
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
-from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs
 from pbrs_farm.transport.light_result import LightResult, result_from_sums
 from pbrs_farm.transport.light_scene import LightScene
 
@@ -95,7 +95,7 @@ def measured(
     """(way to denoise, samples, CPU seconds, relMSE, FLIP) of one view, all ways and counts."""
     rows = []
     truth = reference.outdoor + reference.indoor
-    clean_reference = denoised(reference)
+    clean_reference = denoise_aovs(reference)
     for sampled in sampled_view(scene, camera, recipe):
         for name, way in WAYS.items():
             began = time.process_time()
@@ -184,7 +184,7 @@ def _prefiltered(aovs: LinearAovs) -> LinearAovs:
         prefiltered(n, x) for n, x in (("albedo", aovs.albedo), ("normal", aovs.normal))
     )
     guided = replace(aovs, albedo=albedo, normal=normal)
-    clean = denoised(guided)
+    clean = denoise_aovs(guided)
     return replace(aovs, outdoor=clean.outdoor, indoor=clean.indoor)
 
 
@@ -205,7 +205,7 @@ def prefiltered(name: str, image: F32) -> F32:
 
 WAYS: Final[dict[str, Callable[[LinearAovs], LinearAovs]]] = {
     "raw": _raw,
-    "fast": denoised,
+    "fast": denoise_aovs,
     "together": _together,
     "demodulated": _demodulated,
     "prefiltered guides": _prefiltered,

@@ -20,7 +20,7 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.camera_report import CameraReport
-from pbrs_farm.sample.house_sampler import Sampling, sample_cameras, with_right_views
+from pbrs_farm.sample.house_sampler import Sampling, add_right_views, sample_cameras
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
@@ -35,7 +35,7 @@ def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster
     sampling = _one_by_one(house, fields, seed, caster)
     if fields.stereo_m <= 0:
         return sampling
-    views = with_right_views(sampling.views, fields.stereo_m)
+    views = add_right_views(sampling.views, fields.stereo_m)
     report = sampling.report.model_copy(update={"n_views": len(views)})
     return replace(sampling, views=views, report=report)
 

@@ -30,7 +30,7 @@ from pbrs_farm.store.object_store import Store
 from pbrs_farm.transport.develop.camera_sensor import SensorShot
 from pbrs_farm.transport.develop.mode_pictures import (
     LinearAovs,
-    denoised,
+    denoise_aovs,
     develop,
     wanted_exposures,
 )
@@ -54,7 +54,7 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     tone = work.recipe.tone_of(work.house_id, work.view_id or "")
     if tone.pictures and denoise:
         # Denoise once for the modes and for the plugins' pictures.
-        aovs, denoise = denoised(aovs, wraps=_wraps(work)), False
+        aovs, denoise = denoise_aovs(aovs, wraps=_wraps(work)), False
     shot = _sensor_shot(work, cached)
     images = develop(aovs, tone, denoise=denoise, shot=shot, wraps=_wraps(work))
     # Write a PNG a mode; its exposure and white balance become facts.

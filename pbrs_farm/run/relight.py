@@ -27,7 +27,7 @@ from pbrs_farm.run.output_root import attribution
 from pbrs_farm.store import StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
-from pbrs_farm.transport.develop.mode_pictures import Factor, LinearAovs, denoised, develop
+from pbrs_farm.transport.develop.mode_pictures import Factor, LinearAovs, denoise_aovs, develop
 from pbrs_farm.transport.lamp_layers import indoor_from_lamps, lamp_shares, relit_indoor
 
 
@@ -61,7 +61,7 @@ def relight_layers(
     layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
     if not denoise:
         return RelightLayers(aovs, layers)
-    clean = denoised(aovs)
+    clean = denoise_aovs(aovs)
     return RelightLayers(clean, lamp_shares(clean.indoor, _denoised_lamps(aovs, layers)))
 
 
@@ -79,7 +79,7 @@ def relit(
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
     radiance = radiance_from_exr(read_given(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
     aovs = linear_aovs(radiance)
-    clean = denoised(aovs) if denoise else aovs
+    clean = denoise_aovs(aovs) if denoise else aovs
     # Sum indoor light anew from the lamps' own layers.
     if lamps:
         rows = lamps_of_view(view)

@@ -138,7 +138,7 @@ def _camera_report(
     )
 
 
-def with_right_views(views: Iterable[View], baseline_m: float) -> tuple[View, ...]:
+def add_right_views(views: Iterable[View], baseline_m: float) -> tuple[View, ...]:
     """The views, each followed by the right one of its pair; as they are when baseline_m is 0.
 
     Both have the same intrinsics and axes, so that rows of the two pictures correspond.

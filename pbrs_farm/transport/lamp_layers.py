@@ -20,7 +20,7 @@ from pbrs_farm.transport.scene_tables.area_emitters import AreaEmitter
 MAX_SUMS: Final = 2**32  # pixels x lamps x 3 of one launch: the kernel counts them in 32 bits
 
 
-def with_lamp_layers(
+def add_lamp_layers(
     result: LightResult, sums: F32 | None, spp: int, lamps: Sequence[AreaEmitter]
 ) -> LightResult:
     """The result with a layer for each lamp that lights the view, and indoor their sum to the bit.

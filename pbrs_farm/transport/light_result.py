@@ -53,7 +53,7 @@ class LightResult:
         return total
 
 
-def blackened(result: LightResult, mask: Mask) -> LightResult:
+def blacken(result: LightResult, mask: Mask) -> LightResult:
     """The result with every image 0 where the mask (H, W) is."""
 
     def cleared(image: F32) -> F32:
@@ -166,7 +166,7 @@ def result_from_sums(
     )
 
 
-def joined_result(
+def join_results(
     direct: LightResult | None,
     guides: LightResult,
     halves: Mapping[Group, tuple[RadianceImage, ...]],

@@ -19,8 +19,8 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
-from pbrs_farm.transport.lamp_layers import MAX_SUMS, with_lamp_layers
-from pbrs_farm.transport.light_result import LightResult, blackened, joined_result, result_from_sums
+from pbrs_farm.transport.lamp_layers import MAX_SUMS, add_lamp_layers
+from pbrs_farm.transport.light_result import LightResult, blacken, join_results, result_from_sums
 from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, tables_from_house
@@ -131,7 +131,7 @@ class LightScene:
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         own = pilot or Pilot(camera, seed)
         result = self._render(camera, room_id, fields, seed, checkpoint or NoCheckpoint(), own)
-        return result if camera.blind is None else blackened(result, camera.blind)
+        return result if camera.blind is None else blacken(result, camera.blind)
 
     def _render(
         self,
@@ -163,7 +163,7 @@ class LightScene:
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
         sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
-        return with_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+        return add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
 
     def _weights_by_name(self, weights: EmitterWeights) -> dict[str, float]:
         names = [lamp.name for lamp in self.tables.lamps]
@@ -195,7 +195,7 @@ class LightScene:
         facts |= {"tail_pixels": fields.tail_pixels, "direct_spp": fields.direct_spp}
         n_bad = direct.n_nonfinite + sum(e.n_bad for e in estimates.values())
         base = direct if fields.direct_spp > 0 else None
-        return joined_result(base, direct, halves, n_bad, facts)
+        return join_results(base, direct, halves, n_bad, facts)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
         """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
@@ -273,4 +273,4 @@ class LightScene:
         black = np.zeros((camera.intrinsics.height_px, camera.intrinsics.width_px, 3), np.float32)
         guides = LightResult(black, black, np.ones_like(black), black, {}, 0, 0, {})
         facts = {"integrator": "mitsuba path", "seed": seed}
-        return joined_result(None, guides, halves, 0, facts, spp=2 * half.spp)
+        return join_results(None, guides, halves, 0, facts, spp=2 * half.spp)

@@ -14,7 +14,7 @@ import pytest
 from pbrs_farm.board.pages.light_packet import lamp_rows, light_packet, packet, scale_of
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.serialise import json_bytes
-from pbrs_farm.transport.develop.tone_mapping import with_glare
+from pbrs_farm.transport.develop.tone_mapping import add_glare
 from tests.board.roots import HEIGHT, WIDTH, light_images, write_root
 from tests.board.served import served
 
@@ -65,7 +65,7 @@ def test_a_lens_that_glares_glares_in_the_sum_that_a_browser_makes(tmp_path: Pat
     stored = light_images(2)
     for factor in (1.0, 0.25):
         total = sum(planes[n] for n in ("lamp1", "lamp2")) * factor + planes["outdoor"]
-        wanted = with_glare(stored["indoor"] * np.float32(factor) + stored["outdoor"], 0.3)
+        wanted = add_glare(stored["indoor"] * np.float32(factor) + stored["outdoor"], 0.3)
         np.testing.assert_allclose(total / facts["scale"], wanted, rtol=2e-3)
 
 

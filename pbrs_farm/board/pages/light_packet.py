@@ -57,7 +57,7 @@ def light_packet_in_process(
 def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool) -> bytes:
     """The packet of a view's light. Raises BadInput, and MachineFailed without a denoiser."""
     from pbrs_farm.run.relight import relight_layers
-    from pbrs_farm.transport.develop.tone_mapping import exposure_of, with_glare
+    from pbrs_farm.transport.develop.tone_mapping import add_glare, exposure_of
 
     tone = _tone_of(view_json, recipe)
     rows = lamp_rows(view_json)
@@ -67,7 +67,7 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
     if not layers.lamps:
         light["indoor"] = layers.aovs.indoor
     # Glare is linear: that of a sum is the sum of the layers', so that a browser need not know of it.
-    light = {name: with_glare(layer, tone.glare) for name, layer in light.items()}
+    light = {name: add_glare(layer, tone.glare) for name, layer in light.items()}
     # Bring the picture's typical radiance near the middle of a half float's range.
     total = np.asarray(sum(light.values()), np.float32)
     scale = scale_of(exposure_of(total, tone), float(total.max(initial=0.0)))

@@ -11,7 +11,7 @@ from manifold3d import Manifold
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.repair.repair_report import Floating, FurnitureAudit, Overlap
-from pbrs_farm.repair.structure.booleans import TagTable, common, united
+from pbrs_farm.repair.structure.booleans import TagTable, common, unite
 from pbrs_farm.repair.structure.closed_shells import closed_shells
 
 _TOUCH_M = 0.02  # boxes nearer than this touch
@@ -83,7 +83,7 @@ def _solid(item: Item) -> Manifold | None:
     if item.n_faces > _MAX_FACES:
         return None
     shells = closed_shells(item, TagTable())
-    return united(shells) if shells else None
+    return unite(shells) if shells else None
 
 
 def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floating]:

@@ -145,12 +145,12 @@ def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
     return _Welded(vertices, faces, duplicates.astype(np.uint64), merge_to)
 
 
-def united(solids: Iterable[Manifold]) -> Manifold:
+def unite(solids: Iterable[Manifold]) -> Manifold:
     """The union of solids; faces inside it are gone, of coinciding faces one is left."""
     return Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
 
 
-def reduced(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
+def subtract(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
     """solid without what lies in any of the cutters."""
     if not cutters:
         return solid

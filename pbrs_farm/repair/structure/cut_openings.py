@@ -19,9 +19,9 @@ from pbrs_farm.repair.structure.booleans import (
     common,
     overlap_of_bounds,
     patches_from_solid,
-    reduced,
     solid_from_patches,
-    united,
+    subtract,
+    unite,
 )
 from pbrs_farm.repair.structure.closed_shells import patch_from_surface, surface_from_patch
 from pbrs_farm.repair.structure.slabs import GAP_M
@@ -83,11 +83,11 @@ def cut_openings(
         if opening.is_cut:
             plugs[opening.id] = (opening.cutter,)
         elif fills:
-            plug = patches_from_solid(united(fills), table)
+            plug = patches_from_solid(unite(fills), table)
             plugs[opening.id] = tuple(s for p in plug if (s := surface_from_patch(p)) is not None)
     # Cut all openings of a part at once.
     idle = [o.id for o in openings if o.id not in plugs]
-    cut = [reduced(p.solid, c) for p, c in zip(parts, cutters_of, strict=True)]
+    cut = [subtract(p.solid, c) for p, c in zip(parts, cutters_of, strict=True)]
     return cut, plugs, idle
 
 

@@ -17,7 +17,7 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import TagTable, reduced
+from pbrs_farm.repair.structure.booleans import TagTable, subtract
 from pbrs_farm.repair.structure.prisms import level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import GAP_M
 from pbrs_farm.repair.structure.walls import Wall
@@ -53,7 +53,7 @@ def with_own_sides_visible(
             cutters += solid_prisms(polygons, low, high, (wall.tag("hidden"),) * 3, table)
             footprint = plan.without(footprint, *polygons)
         if cutters:
-            wall = replace(wall, solid=reduced(wall.solid, cutters), footprint=footprint)
+            wall = replace(wall, solid=subtract(wall.solid, cutters), footprint=footprint)
         found.append(wall)
     return found
 

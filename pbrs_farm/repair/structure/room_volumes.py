@@ -12,7 +12,7 @@ from manifold3d import Manifold
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Room
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, reduced
+from pbrs_farm.repair.structure.booleans import Tag, TagTable, bounds, subtract
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
 from pbrs_farm.repair.structure.prisms import Plane, level_plane, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.slabs import SAME_HEIGHT_M
@@ -102,7 +102,7 @@ def without_volumes(
             continue
         # Cut with the volume, its faces tagged as the solid's own.
         cutters += solid_prisms([volume.area], volume.low, volume.high, (tag,) * 3, table)
-    return reduced(solid, cutters)
+    return subtract(solid, cutters)
 
 
 def _overlapping(box: F64, volumes: Sequence[RoomVolume]) -> list[RoomVolume]:

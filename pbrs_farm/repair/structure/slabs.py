@@ -122,7 +122,7 @@ def slab(
     return solids
 
 
-def bridged(
+def bridge_gaps(
     surfaces: Sequence[PlanarSurface], thickness_m: float, table: TagTable
 ) -> list[Manifold]:
     """Solids that join the planes of one ceiling behind its creases, where slabs only abut."""

@@ -163,14 +163,14 @@ def _thickened(
         shapely.Point(middle - side)
     ):
         normal = -normal
-    patches = extruded(flat.patch, normal, thickness_m)
+    patches = extrude(flat.patch, normal, thickness_m)
     if patches is None:
         return None
     solid = solid_from_patches(patches, table)
     return None if solid is None else _wall_of_solid(item, index, solid, patches, thickened=True)
 
 
-def extruded(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
+def extrude(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
     """The flat patch as a solid: its own face kept, the opposite one thickness_m behind it.
 
     normal: (3,) unit, out of the face that is kept. uv is carried on by its affine map.

@@ -12,7 +12,7 @@ from pbrs_farm.repair.measure.enclosure import Space, spaces_of_rooms
 from pbrs_farm.repair.measure.room_interiors import RoomInterior, interiors_of_room
 from pbrs_farm.repair.repair_report import LeftAsIs, Removed, StructureReport
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, united
+from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, unite
 from pbrs_farm.repair.structure.closed_shells import surface_from_patch
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds
 from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_surface
@@ -24,7 +24,12 @@ from pbrs_farm.repair.structure.planar_surfaces import (
     floors_and_ceilings_from_house,
 )
 from pbrs_farm.repair.structure.room_volumes import RoomVolume, volumes_of_rooms, without_volumes
-from pbrs_farm.repair.structure.slabs import bridged, footprints_of_surfaces, slab, visible_areas
+from pbrs_farm.repair.structure.slabs import (
+    bridge_gaps,
+    footprints_of_surfaces,
+    slab,
+    visible_areas,
+)
 from pbrs_farm.repair.structure.stairwells import stairwells_of_house
 from pbrs_farm.repair.structure.wall_loss import lost_walls, side_areas
 from pbrs_farm.repair.structure.walls import Wall, walls_from_house, with_metric_uv
@@ -45,7 +50,7 @@ class Structure:
 
 
 def repaired_structure(house: House, thickness_m: float) -> Structure:
-    """Thicken what is planar, join, cut, unite. Faces keep item, surface name, material and uv."""
+    """Thicken what is planar, join, cut, united. Faces keep item, surface name, material and uv."""
     # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
     table, rooms = TagTable(), plan.union(plan.polygon_of_room(r.polygon) for r in house.rooms)
     uprights, left = walls_from_house(house, table, rooms, thickness_m)
@@ -68,10 +73,10 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
     parts = [WallPart(w, w.solid, is_joint=False) for w in wholes]
     parts += _parts_of_joints(joints, volumes, table)
 
-    # Cut the openings, unite everything, and take the faces back by item.
+    # Cut the openings, united everything, and take the faces back by item.
     cut_parts, plugs, idle = cut_openings(house.openings, parts, table)
     solids = [*cut_parts, *slabs, *(s for found in horizontal.solid.values() for s in found)]
-    surfaces = _surfaces_by_item(united(solids), table) if solids else {}
+    surfaces = _surfaces_by_item(unite(solids), table) if solids else {}
     touched = {w.item for w in uprights} | {s.item for s in planar} | set(horizontal.solid)
     areas = side_areas(house, uprights, wholes, cut_parts[: len(wholes)], surfaces, table)
     report = _report_of_counts(walls, planar, set(horizontal.solid)).model_copy(
@@ -143,7 +148,7 @@ def _slabs(
         # Keep slabs out of every room but their own.
         for solid in slab(surface, footprint, own, thickness_m, table):
             found.append(without_volumes(solid, surface.tag("hidden"), surface.item, volumes, table))  # fmt: skip
-    return found + bridged(planar, thickness_m, table)
+    return found + bridge_gaps(planar, thickness_m, table)
 
 
 def _surfaces_by_item(solid: Manifold, table: TagTable) -> dict[int, tuple[Surface, ...]]:

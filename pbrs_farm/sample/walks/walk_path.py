@@ -30,7 +30,7 @@ class Motion:
     length_m: float  # of the path that is walked
 
 
-def relaxed(way: F64, space: WalkSpace) -> F64:
+def relax_path(way: F64, space: WalkSpace) -> F64:
     """The way (M, 2) with its corners rounded; no point comes nearer to anything than half a way."""
     places = _resampled(way, CELL_M)
     # Move each point towards its neighbours' middle, where that stays clear; the ends stay.
@@ -74,7 +74,7 @@ def spline_through(places: F64) -> F64:
     return _resampled(np.asarray(curve(at)), _DENSE_M)
 
 
-def walked(path: F64, times: F64, speed_mps: float) -> Motion:
+def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
     """The walker on a path (M, 2) at ascending times (N,) s from 0; no faster than speed_mps.
 
     It slows in turns and sets off and stops gently; at the path's end it stays.

@@ -21,7 +21,7 @@ from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.stored_cameras import OUTSIDE, sector_of
 from pbrs_farm.sample.walks.camera_shake import Shake, shake
 from pbrs_farm.sample.walks.gaze import Walker, gaze, things_of
-from pbrs_farm.sample.walks.walk_path import relaxed, spline_through, walked
+from pbrs_farm.sample.walks.walk_path import relax_path, spline_through, time_walk
 from pbrs_farm.sample.walks.walk_space import WalkSpace, shut_doors, walk_spaces
 from pbrs_farm.sample.walks.way_graph import way_through_rooms
 
@@ -50,7 +50,7 @@ def sample_walk(
     shaken = shake(times, fields.walk_shake, rng)
     speed = max(_SPEED_PART * (fields.walk_speed_mps - shaken.speed_mps), 0.05)
     way = way_through_rooms(space, speed * float(times[-1]) + 1.0, rng)
-    motion = walked(spline_through(relaxed(way, space)), times, speed)
+    motion = time_walk(spline_through(relax_path(way, space)), times, speed)
     eyes = _eyes(space, motion.places, fields, rng)
     turn_rps = math.radians(fields.walk_turn_dps) - shaken.turn_rps
     azimuth, tilt = gaze(

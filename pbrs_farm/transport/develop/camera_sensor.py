@@ -21,7 +21,7 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F32, F64, RadianceImage, Srgb8Image
 from pbrs_farm.core.frames import LM_PER_W
 from pbrs_farm.core.recipe import SensorFields, ToneFields
-from pbrs_farm.transport.develop.tone_mapping import encoded, rolled_off
+from pbrs_farm.transport.develop.tone_mapping import encode_tone, roll_off
 
 _ABERRATION_WIDTH_PX: Final = 640.0  # of the picture that aberration_px is of
 _SATURATION_LX_S: Final = 78.0  # times 1 / ISO: exposure that saturates, ISO 12232:2019
@@ -49,7 +49,7 @@ class Exposure:
         return {"shutter_s": self.shutter_s, "iso": round(self.iso, 1), "exposure": self.factor}
 
 
-def chosen_exposure(wanted: float, fields: SensorFields) -> Exposure:
+def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
     """The exposure nearest to a wanted factor that shutter and ISO allow: the shutter opens first."""
     goal = wanted * 2**fields.compensation_ev
     # What one second at ISO 1 makes of radiance.
@@ -64,7 +64,7 @@ def chosen_exposure(wanted: float, fields: SensorFields) -> Exposure:
     return Exposure(shutter, iso, shutter * iso * unit)
 
 
-def lagged_exposure(wanted: Sequence[float], times_s: Sequence[float], lag_s: float) -> float:
+def lag_exposure(wanted: Sequence[float], times_s: Sequence[float], lag_s: float) -> float:
     """The factor of the last of some frames when it follows the wanted ones with a delay of lag_s.
 
     A first-order filter of the logarithm: after lag_s, 63 % of a step is made up.
@@ -90,11 +90,11 @@ class SensorShot:
     def exposure(self, mode: str, wanted: float) -> Exposure:
         """What it takes a mode's picture with, whose own wanted factor is given."""
         path = [frame[mode] for frame in self.before]
-        lagged = lagged_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
-        return chosen_exposure(lagged, self.fields)
+        lagged = lag_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
+        return choose_exposure(lagged, self.fields)
 
 
-def sensed(
+def take_by_sensor(
     radiance: RadianceImage,
     gains: F32,
     exposure: Exposure,
@@ -111,16 +111,16 @@ def sensed(
     rng = np.random.default_rng(seed)
     # Saturation is white in all channels after the gains: scale them to 1 at least.
     scaled = gains.astype(np.float64) / float(gains.min())
-    light = through_lens(radiance.astype(np.float64), sensor) * exposure.factor * float(gains.min())
+    light = apply_lens(radiance.astype(np.float64), sensor) * exposure.factor * float(gains.min())
     raw = _electrons_read(mosaic(light) if sensor.mosaic else light, exposure.iso, sensor, rng)
-    rgb = demosaiced(raw) if sensor.mosaic else raw
+    rgb = demosaic(raw) if sensor.mosaic else raw
     # Balance white, hold to what saturates, and let that be the curve's end.
     balanced = np.clip(rgb * scaled, 0, sensor.headroom)
-    picture = encoded(rolled_off(balanced, sensor.headroom), fields)
-    return jpeg_loss(picture, sensor.jpeg_quality) if sensor.jpeg_quality > 0 else picture
+    picture = encode_tone(roll_off(balanced, sensor.headroom), fields)
+    return compress_as_jpeg(picture, sensor.jpeg_quality) if sensor.jpeg_quality > 0 else picture
 
 
-def through_lens(light: F64, sensor: SensorFields) -> F64:
+def apply_lens(light: F64, sensor: SensorFields) -> F64:
     """Radiance with lateral chromatic aberration and vignetting, both by the distance from the middle."""
     height, width = light.shape[:2]
     y, x = np.mgrid[0:height, 0:width] + 0.5
@@ -149,7 +149,7 @@ def mosaic(rgb: F64) -> F64:
     return raw
 
 
-def demosaiced(raw: F64) -> F64:
+def demosaic(raw: F64) -> F64:
     """(H, W, 3) from a mosaic RGGB (H, W), by the linear filters of Malvar, He and Cutler 2004."""
     padded = np.pad(raw, 2, mode="reflect")
 
@@ -189,7 +189,7 @@ def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random
     return np.asarray((read - black) / (1 - black) * sensor.headroom)
 
 
-def jpeg_loss(picture: Srgb8Image, quality: int) -> Srgb8Image:
+def compress_as_jpeg(picture: Srgb8Image, quality: int) -> Srgb8Image:
     """The picture as it comes out of JPEG of that quality, 1..100."""
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, "JPEG", quality=quality)

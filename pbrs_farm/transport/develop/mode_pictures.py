@@ -11,9 +11,9 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, RadianceImage, Srgb8Image, UnitVectors
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group
 from pbrs_farm.core.recipe import ToneFields
-from pbrs_farm.transport.develop.camera_sensor import Exposure, SensorShot, sensed
+from pbrs_farm.transport.develop.camera_sensor import Exposure, SensorShot, take_by_sensor
 from pbrs_farm.transport.develop.denoiser import denoise_radiance
-from pbrs_farm.transport.develop.tone_mapping import exposure_of, tone, with_glare
+from pbrs_farm.transport.develop.tone_mapping import add_glare, exposure_of, tone
 from pbrs_farm.transport.develop.white_balance import all_channels, white_balance
 
 # Of a light group: of all, or of R, G and B.
@@ -64,9 +64,9 @@ def develop(
 
     Each group is denoised by itself, so that the modes stay sums. indoor, outdoor: factors of
     all, or of R, G and B; they scale what is denoised, so that every picture is linear in them.
-    shot: the sensor that takes the pictures, None for a perfect one. wraps: see denoised.
+    shot: the sensor that takes the pictures, None for a perfect one. wraps: see denoise_aovs.
     """
-    clean = denoised(aovs, wraps=wraps) if denoise else aovs
+    clean = denoise_aovs(aovs, wraps=wraps) if denoise else aovs
     groups = {
         Group.OUTDOOR: clean.outdoor * np.asarray(outdoor, np.float32),
         Group.INDOOR: clean.indoor * np.asarray(indoor, np.float32),
@@ -76,12 +76,12 @@ def develop(
     for mode, names in GROUPS_OF_MODE.items():
         if names:
             total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
-            total = with_glare(total, fields.glare)
+            total = add_glare(total, fields.glare)
             gains = white_balance(total, aovs.albedo, fields.white_balance)
             exposure = exposure_of(total * gains, fields)
             if shot is not None:
                 taken = shot.exposure(mode.value, exposure)
-                rgb = sensed(total, gains, taken, shot.fields, fields, seed=shot.seed)
+                rgb = take_by_sensor(total, gains, taken, shot.fields, fields, seed=shot.seed)
                 images[mode.value] = ToneMappedImage(rgb, gains, taken.factor, taken)
                 continue
             rgb = tone(total * gains, fields, exposure=exposure)
@@ -100,7 +100,7 @@ def wanted_exposures(
     return {mode: image.exposure for mode, image in images.items()}
 
 
-def denoised(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
+def denoise_aovs(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
     """The same view with each light group denoised by itself; what hits nothing stays black.
 
     wraps: the left edge adjoins the right one, as in a panorama, and must show no seam.
@@ -112,7 +112,7 @@ def denoised(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
             f.name: np.pad(getattr(aovs, f.name), ((0, 0), (n, n), (0, 0)), mode="wrap")
             for f in fields_of(LinearAovs)
         }
-        clean = denoised(LinearAovs(**wide))
+        clean = denoise_aovs(LinearAovs(**wide))
         return replace(aovs, outdoor=clean.outdoor[:, n:-n], indoor=clean.indoor[:, n:-n])
     # The denoiser would smear light over pixels without a surface.
     light = aovs.outdoor + aovs.indoor

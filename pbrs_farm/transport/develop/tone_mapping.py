@@ -39,11 +39,11 @@ def tone(
         linear = _reinhard(rgb, fields.key, exposure)
     else:
         factor = exposure_of(radiance, fields) if exposure is None else exposure
-        linear = rolled_off(rgb * factor, fields.white)
-    return encoded(linear, fields)
+        linear = roll_off(rgb * factor, fields.white)
+    return encode_tone(linear, fields)
 
 
-def encoded(linear: F64, fields: ToneFields) -> Srgb8Image:
+def encode_tone(linear: F64, fields: ToneFields) -> Srgb8Image:
     """(H, W, 3) uint8 sRGB of linear light; `photo` with its contrast and black level.
 
     Both act on the encoded luma, as a camera's own curve does: the contrast is an S through the
@@ -94,7 +94,7 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
     return np.asarray(rgb * ratio[..., None])
 
 
-def rolled_off(rgb: F64, white: float) -> F64:
+def roll_off(rgb: F64, white: float) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
 
     It maps the largest component and keeps the hue; colours far beyond white fade to white.
@@ -127,7 +127,7 @@ def knee_of(white: float) -> float:
     return low
 
 
-def with_glare(radiance: RadianceImage, share: float) -> RadianceImage:
+def add_glare(radiance: RadianceImage, share: float) -> RadianceImage:
     """Radiance (H, W, 3) with a share of each pixel's light spread wide about it, as in lens and eye.
 
     A third each by Gaussians of 1, 4 and 16 % of the picture's width; light is neither lost nor

@@ -44,7 +44,9 @@ class SunRays(NamedTuple):
     lit: Any  # Bool: the sun shines on a surface that scatters and lets nothing through
 
 
-def sun_rays(scene: DeviceScene, sun: SunDisc, plane: SunPlane, cell: Any, sampler: Any) -> SunRays:
+def trace_sun_rays(
+    scene: DeviceScene, sun: SunDisc, plane: SunPlane, cell: Any, sampler: Any
+) -> SunRays:
     """A ray through a point of each cell; takes dimensions 0 to 3."""
     through = plane.point(cell, sampler.get_2d(mi.UInt32(0)))
     d = sun.sample(sampler.get_2d(mi.UInt32(2)))
@@ -60,7 +62,7 @@ def sun_rays(scene: DeviceScene, sun: SunDisc, plane: SunPlane, cell: Any, sampl
     return SunRays(si, d, cos_sun, light, irradiance, may & (dr.max(irradiance) > 0))
 
 
-def lit_points(
+def trace_lit_points(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, cells: Any, pdfs: Any, seed: int
 ) -> tuple[F32, Any]:
     """(points that rays light (N, POINT_FLOATS), number of each one's ray (N,)).
@@ -70,7 +72,7 @@ def lit_points(
     key = stream_key(dr.opaque(mi.UInt32, _POINTS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     sampler = SobolSampler(key, dr.arange(mi.UInt32, len(cells)))
     cell = device_array(mi.UInt32, cells)
-    rays = sun_rays(scene, sun, plane, cell, sampler)
+    rays = trace_sun_rays(scene, sun, plane, cell, sampler)
     # Keep the cell that the other technique finds: at an edge rounding may say the next one.
     at, inside = plane.cell(rays.si.p, rays.d)
     lit = rays.lit & inside & (at == cell)
@@ -89,7 +91,7 @@ def lit_points(
     return rows, keep
 
 
-def reached_by_cells(
+def value_cells(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, grid: VoxelGrid, wanted: Any, seed: int
 ) -> tuple[F32, F32]:
     """(places (C, 3) that a ray through each cell lights, worth (C,) of that light).
@@ -100,7 +102,7 @@ def reached_by_cells(
     key = stream_key(dr.opaque(mi.UInt32, _CELLS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     cell = dr.arange(mi.UInt32, plane.n_cells)
     sampler = SobolSampler(key, cell)
-    rays = sun_rays(scene, sun, plane, cell, sampler)
+    rays = trace_sun_rays(scene, sun, plane, cell, sampler)
     worth = _worth_of(scene, grid, wanted, rays.si, sampler, mi.Bool(rays.lit))
     by_coat = rays.irradiance * rays.si.bsdf.f0 * (rays.cos_sun * dr.inv_pi)
     reflected = luminance(rays.light + dr.select(rays.si.bsdf.alpha > 0, by_coat, 0))

@@ -24,9 +24,9 @@ from pbrs_farm.transport.kernels.sun_rays import ALPHA, COS_SUN, PLANE_PDF, POIN
 from pbrs_farm.transport.kernels.sunlit_tables import (
     SunlitTables,
     UsedCells,
+    find_used_cells,
     no_points,
-    traced_points,
-    used_cells,
+    trace_points,
 )
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
@@ -79,7 +79,7 @@ class SunlitPoints:
         """Find once for a view which cells of the sun's plane its points come from."""
         vertices = self._vertices
         if self._used is None and sun.shines and vertices is not None and vertices.any():
-            self._used = used_cells(scene, sun, self._grid, vertices)
+            self._used = find_used_cells(scene, sun, self._grid, vertices)
 
     def trace(self, scene: DeviceScene, sun: SunDisc, n_samples: int, seed: int) -> None:
         """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points."""
@@ -91,7 +91,7 @@ class SunlitPoints:
         elif vertices is not before[0] or (n_samples, seed) != before[1:]:
             self.choose_cells(scene, sun)
             assert self._used is not None
-            self._set_points(traced_points(scene, sun, self._used, n_samples, seed))
+            self._set_points(trace_points(scene, sun, self._used, n_samples, seed))
 
     def chances(self, p: Any, active: Any) -> list[Any]:
         """The chance of each group at p, a list entry each; all 0 where there are none."""

@@ -30,8 +30,8 @@ from pbrs_farm.transport.kernels.sun_rays import (
     PLANE_PDF,
     POINT_FLOATS,
     RADIANCE,
-    lit_points,
-    reached_by_cells,
+    trace_lit_points,
+    value_cells,
 )
 from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
@@ -72,14 +72,14 @@ def no_points() -> SunlitTables:
     return _tables_of_points(plane, rows, none, cells)
 
 
-def used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64) -> UsedCells:
+def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64) -> UsedCells:
     """The cells whose light matters. vertices: (voxels,) of a view's paths, not all 0."""
     # Cover the voxels that paths have been to, as the sun sees them.
     centres = grid.centres()[vertices > 0]
     corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * grid.edge_m
     plane = SunPlane(sun.direction, (centres[:, None] + corners).reshape(-1, 3))
     wanted = device_array(mi.Float, (vertices / vertices.sum()).astype(np.float32))
-    places, worth = reached_by_cells(scene, sun, plane, grid, wanted, _CELL_SEED)
+    places, worth = value_cells(scene, sun, plane, grid, wanted, _CELL_SEED)
     # Let a cell count for its neighbours, too: one ray a cell is a noisy estimate.
     picture = worth.astype(np.float64).reshape(plane.shape)
     smooth = np.asarray(uniform_filter(picture, _SMOOTH, mode="constant"), np.float64).ravel()
@@ -96,7 +96,7 @@ def used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64)
     return UsedCells(plane, groups, shares / shares.sum())
 
 
-def traced_points(
+def trace_points(
     scene: DeviceScene, sun: SunDisc, used: UsedCells, n_samples: int, seed: int
 ) -> SunlitTables:
     """The points that rays through the cells light, other ones for each seed.
@@ -120,7 +120,7 @@ def traced_points(
     pdfs = np.zeros(used.plane.n_cells)
     pdfs[is_used] = rays[is_used] / sent[used.groups[is_used]] / area
     on_device = device_array(mi.Float, pdfs.astype(np.float32))
-    rows, numbers = lit_points(scene, sun, used.plane, cells, on_device, seed)
+    rows, numbers = trace_lit_points(scene, sun, used.plane, cells, on_device, seed)
 
     # Of a group's rays only some light a point; each of those is drawn more often for it. Of too
     # few the share is not known.

@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from pbrs_farm.core.lighting import Group
-from pbrs_farm.transport.light_result import LightResult, joined_result, result_from_sums
+from pbrs_farm.transport.light_result import LightResult, join_results, result_from_sums
 from pbrs_farm.transport.metropolis.film import ROUND_STEPS
 from pbrs_farm.transport.metropolis.integrator import MIN_STEPS, ChainRun, Estimate, chain_run
 from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
@@ -110,7 +110,7 @@ def _noise_left(view: SampledView, direct: LightResult, runs: Runs, n_steps: int
         return np.inf
     halves = {g: _estimate(view, runs, g).halves for g in Group}
     base = direct if view.fields.direct_spp > 0 else None
-    return joined_result(base, direct, halves, 0, {}).noise["sum"] / view.fields.noise
+    return join_results(base, direct, halves, 0, {}).noise["sum"] / view.fields.noise
 
 
 def _estimate(view: SampledView, runs: Runs, group: Group) -> Estimate:

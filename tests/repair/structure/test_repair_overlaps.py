@@ -11,7 +11,7 @@ from pbrs_farm.core.house import Enclosure, House, Item, ItemKind
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair import RepairReport, repair, summary_of_report
 from pbrs_farm.repair.structure import plan_geometry, watertight
-from pbrs_farm.repair.structure.booleans import reduced
+from pbrs_farm.repair.structure.booleans import subtract
 from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import coinciding_share, seen_from, unpaired_edges
@@ -101,7 +101,7 @@ def test_a_wall_that_is_lost_is_told_in_report_note_and_words(
             others = [a for i, a in areas.items() if i != w.room_id]
             planes = level_plane(-0.05), level_plane(2.55)
             cutters = solid_prisms(others, *planes, (w.tag("hidden"),) * 3, table)
-            found.append(replace(w, solid=reduced(w.solid, cutters)))
+            found.append(replace(w, solid=subtract(w.solid, cutters)))
         return found
 
     monkeypatch.setattr(watertight, "with_own_sides_visible", whole_outline)

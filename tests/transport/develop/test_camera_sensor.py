@@ -11,13 +11,13 @@ from pbrs_farm.core.recipe import SensorFields, ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.camera_sensor import (
     Exposure,
     _electrons_read,
-    chosen_exposure,
-    demosaiced,
-    jpeg_loss,
-    lagged_exposure,
+    apply_lens,
+    choose_exposure,
+    compress_as_jpeg,
+    demosaic,
+    lag_exposure,
     mosaic,
-    sensed,
-    through_lens,
+    take_by_sensor,
 )
 
 PLAIN = SensorFields(is_on=True)
@@ -31,20 +31,22 @@ def grey(level: float, size: int = 64) -> np.ndarray:
 def test_a_mosaic_of_a_grey_ramp_comes_back_as_it_was() -> None:
     ramp = np.repeat(np.linspace(0.1, 0.9, 32)[None, :, None], 32, axis=0)
     rgb = np.repeat(ramp, 3, axis=2)
-    found = demosaiced(mosaic(rgb))
+    found = demosaic(mosaic(rgb))
     assert np.abs(found - rgb)[4:-4, 4:-4].max() < 1e-9
 
 
 def test_a_flat_colour_survives_the_mosaic() -> None:
     rgb = np.broadcast_to([0.7, 0.4, 0.1], (16, 16, 3))
-    assert np.abs(demosaiced(mosaic(rgb)) - rgb)[3:-3, 3:-3].max() < 0.02
+    assert np.abs(demosaic(mosaic(rgb)) - rgb)[3:-3, 3:-3].max() < 0.02
 
 
 @pytest.mark.parametrize("iso", [100.0, 1600.0])
 def test_noise_is_that_of_the_electrons(iso: float) -> None:
     # Without a mosaic and at many bits the values are electrons over the well.
     fields = PLAIN.model_copy(update={"mosaic": False, "bits": 16, "headroom": 1.0})
-    picture = sensed(grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, ToneFields(), seed=1)
+    picture = take_by_sensor(
+        grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, ToneFields(), seed=1
+    )
     back = (picture / 255.0).astype(float)
     well = fields.full_well_e * 100 / iso
     electrons = 0.25 * well
@@ -52,7 +54,7 @@ def test_noise_is_that_of_the_electrons(iso: float) -> None:
     # sRGB and the curve's end stretch differences: compare with a small known step.
     step = 0.02
     low, high = (
-        sensed(grey(v, 256), ONES, Exposure(0.01, 1.0, 1.0),
+        take_by_sensor(grey(v, 256), ONES, Exposure(0.01, 1.0, 1.0),
                fields.model_copy(update={"full_well_e": 1e7, "read_noise_e": 0.0}), ToneFields(), seed=1)
         for v in (0.25 - step, 0.25 + step)
     )  # fmt: skip
@@ -61,7 +63,7 @@ def test_noise_is_that_of_the_electrons(iso: float) -> None:
 
 
 def test_the_shutter_opens_first_and_then_the_speed_rises_up_to_its_limit() -> None:
-    bright, dim, dark = (chosen_exposure(w, PLAIN) for w in (0.02, 30.0, 1e6))
+    bright, dim, dark = (choose_exposure(w, PLAIN) for w in (0.02, 30.0, 1e6))
     assert bright.iso == PLAIN.iso_min
     assert bright.shutter_s < PLAIN.shutter_max_s
     assert dim.shutter_s == PLAIN.shutter_max_s
@@ -74,28 +76,30 @@ def test_the_shutter_opens_first_and_then_the_speed_rises_up_to_its_limit() -> N
 
 def test_a_stop_more_doubles_the_exposure_and_a_smaller_pupil_asks_for_more_time() -> None:
     more = PLAIN.model_copy(update={"compensation_ev": 1.0})
-    assert chosen_exposure(0.05, more).factor == pytest.approx(0.1)
+    assert choose_exposure(0.05, more).factor == pytest.approx(0.1)
     narrow = PLAIN.model_copy(update={"f_number": 4.0})
-    wide = chosen_exposure(0.05, PLAIN)
-    assert chosen_exposure(0.05, narrow).shutter_s == pytest.approx(4 * wide.shutter_s)
+    wide = choose_exposure(0.05, PLAIN)
+    assert choose_exposure(0.05, narrow).shutter_s == pytest.approx(4 * wide.shutter_s)
 
 
 def test_automatic_exposure_makes_up_63_percent_of_a_step_after_its_lag() -> None:
     times = np.linspace(0, 0.5, 51)
     wanted = [1.0, *[math.e] * 50]
-    assert math.log(lagged_exposure(wanted, times.tolist(), 0.5)) == pytest.approx(1 - 1 / math.e)
-    assert lagged_exposure(wanted, times.tolist(), 0.0) == math.e
-    assert lagged_exposure([2.0], [0.0], 0.5) == pytest.approx(2.0)
+    assert math.log(lag_exposure(wanted, times.tolist(), 0.5)) == pytest.approx(1 - 1 / math.e)
+    assert lag_exposure(wanted, times.tolist(), 0.0) == math.e
+    assert lag_exposure([2.0], [0.0], 0.5) == pytest.approx(2.0)
 
 
 def test_saturated_light_is_white_whatever_the_gains() -> None:
     gains = np.array([0.7, 1.0, 1.8], np.float32)
-    picture = sensed(grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, ToneFields(), seed=3)
+    picture = take_by_sensor(
+        grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, ToneFields(), seed=3
+    )
     assert (picture[4:-4, 4:-4] >= 254).all()
 
 
 def test_corners_are_darker_by_the_vignetting_and_the_middle_is_not() -> None:
-    found = through_lens(np.ones((101, 101, 3)), PLAIN.model_copy(update={"vignetting": 0.4}))
+    found = apply_lens(np.ones((101, 101, 3)), PLAIN.model_copy(update={"vignetting": 0.4}))
     assert found[50, 50, 0] == pytest.approx(1, abs=1e-3)
     assert found[0, 0, 0] == pytest.approx(0.6, abs=0.01)
 
@@ -103,7 +107,7 @@ def test_corners_are_darker_by_the_vignetting_and_the_middle_is_not() -> None:
 def test_aberration_parts_red_from_blue_at_the_edge_and_not_in_the_middle() -> None:
     light = np.zeros((65, 640, 3))
     light[:, 320:328] = light[:, 600:608] = 1.0
-    found = through_lens(light, PLAIN.model_copy(update={"aberration_px": 2.0}))
+    found = apply_lens(light, PLAIN.model_copy(update={"aberration_px": 2.0}))
     columns = np.arange(640)
 
     def centre(channel: int, at: slice) -> float:
@@ -118,14 +122,16 @@ def test_aberration_parts_red_from_blue_at_the_edge_and_not_in_the_middle() -> N
 def test_equal_seeds_give_equal_bits_and_other_seeds_other_noise() -> None:
     shot = Exposure(0.02, 800, 1.0)
     fields = SensorFields(preset="phone")
-    a, b, c = (sensed(grey(0.2), ONES, shot, fields, ToneFields(), seed=s) for s in (5, 5, 6))
+    a, b, c = (
+        take_by_sensor(grey(0.2), ONES, shot, fields, ToneFields(), seed=s) for s in (5, 5, 6)
+    )
     assert (a == b).all()
     assert (a != c).any()
 
 
 def test_jpeg_loses_more_at_lower_quality() -> None:
     noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3)).astype(np.uint8)
-    errors = [np.abs(jpeg_loss(noise, q).astype(int) - noise).mean() for q in (95, 30)]
+    errors = [np.abs(compress_as_jpeg(noise, q).astype(int) - noise).mean() for q in (95, 30)]
     assert errors[0] < errors[1]
 
 

@@ -4,13 +4,13 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import ToneFields, recipe_from_name
-from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoised, wanted_exposures
+from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs, wanted_exposures
 from pbrs_farm.transport.develop.tone_mapping import (
-    encoded,
+    add_glare,
+    encode_tone,
     exposure_of,
-    rolled_off,
+    roll_off,
     tone,
-    with_glare,
 )
 
 
@@ -45,9 +45,9 @@ def test_tone_rises_with_radiance_and_never_wraps() -> None:
 def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -> None:
     rng = np.random.default_rng(0)
     dim = rng.uniform(0, 0.6, (16, 16, 3))
-    np.testing.assert_array_equal(rolled_off(dim, 64.0), dim)
+    np.testing.assert_array_equal(roll_off(dim, 64.0), dim)
     colour = np.array([1.0, 0.5, 0.25])
-    below, above = (rolled_off((level * colour)[None, None], 64.0) for level in (0.6, 0.6 + 1e-6))
+    below, above = (roll_off((level * colour)[None, None], 64.0) for level in (0.6, 0.6 + 1e-6))
     np.testing.assert_allclose(above, below, atol=2e-6)
 
 
@@ -63,7 +63,7 @@ def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
 def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
     ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
     linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
-    values = encoded(linear, ToneFields(contrast=2.0))[0, :, 0].astype(int)
+    values = encode_tone(linear, ToneFields(contrast=2.0))[0, :, 0].astype(int)
     assert (values[0], values[255]) == (0, 255)
     assert abs(values[128] - 128) <= 1
     assert abs((values[144] - values[112]) / 32 - 2.0) < 0.05
@@ -73,7 +73,7 @@ def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
 def test_what_is_below_the_black_level_is_black_and_white_stays() -> None:
     ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
     linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
-    values = encoded(linear, ToneFields(black=0.2))[0, :, 0]
+    values = encode_tone(linear, ToneFields(black=0.2))[0, :, 0]
     assert (values[:51] == 0).all()
     assert values[53] > 0
     assert values[255] == 255
@@ -81,7 +81,9 @@ def test_what_is_below_the_black_level_is_black_and_white_stays() -> None:
 
 def test_contrast_keeps_the_hue_and_saturates_no_shadow() -> None:
     dim = np.array([[[0.15, 0.075, 0.0375]]])
-    before, after = (encoded(dim, ToneFields(contrast=c))[0, 0].astype(float) for c in (1.0, 2.0))
+    before, after = (
+        encode_tone(dim, ToneFields(contrast=c))[0, 0].astype(float) for c in (1.0, 2.0)
+    )
     assert after.max() < before.max()
     np.testing.assert_allclose(after / after.max(), before / before.max(), atol=0.05)
 
@@ -107,12 +109,12 @@ def test_frames_of_a_clip_and_both_eyes_have_one_tone() -> None:
 def test_glare_spreads_light_and_neither_adds_nor_takes_any() -> None:
     dark = grey(0.0)
     dark[16, 16] = 100.0
-    spread = with_glare(dark, 0.1)
+    spread = add_glare(dark, 0.1)
     assert spread[16, 16, 0] < 95
     assert spread[16, 19, 0] > spread[16, 24, 0] > 0
     np.testing.assert_allclose(spread.sum(), dark.sum(), rtol=1e-3)
-    np.testing.assert_allclose(with_glare(grey(2.0), 0.1), 2.0, rtol=1e-5)
-    assert with_glare(dark, 0.0) is dark
+    np.testing.assert_allclose(add_glare(grey(2.0), 0.1), 2.0, rtol=1e-5)
+    assert add_glare(dark, 0.0) is dark
 
 
 def test_black_stays_black_and_bad_numbers_count_as_black() -> None:
@@ -146,7 +148,7 @@ def test_a_panorama_denoises_alike_wherever_it_is_cut() -> None:
 
     def cleaned(shift: int, *, wraps: bool) -> np.ndarray:
         rolled = np.roll(noisy, shift, axis=1)
-        found = denoised(LinearAovs(rolled, rolled * 0, white, normal), wraps=wraps)
+        found = denoise_aovs(LinearAovs(rolled, rolled * 0, white, normal), wraps=wraps)
         return np.roll(found.outdoor, -shift, axis=1)
 
     def seam(wraps: bool) -> float:

@@ -154,15 +154,15 @@ def points_seen(emitters: object, p: np.ndarray, n: int) -> np.ndarray:
 
 def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
     from pbrs_farm.transport.kernels.sun_rays import COS_SUN, PLANE_PDF, RADIANCE
-    from pbrs_farm.transport.kernels.sunlit_tables import traced_points, used_cells
+    from pbrs_farm.transport.kernels.sunlit_tables import find_used_cells, trace_points
 
     house, camera = bare_room()
     scene = sunny(house)
     emitters, weights = scene.emitters(camera, FIELDS, 1)
     grid, device = emitters.outdoor_choice._grid, scene.device_scene
-    used = used_cells(device, emitters.sun, grid, weights.vertices)
+    used = find_used_cells(device, emitters.sun, grid, weights.vertices)
     assert used.shares.sum() == pytest.approx(1)
-    tables = traced_points(device, emitters.sun, used, 1 << 20, 3)
+    tables = trace_points(device, emitters.sun, used, 1 << 20, 3)
     rows = tables.rows
     assert len(rows) > 1000
     assert tables.first[-1] == len(rows)
@@ -189,12 +189,12 @@ def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> Non
     scene = sunny(house)
     emitters, weights = scene.emitters(camera, FIELDS, 1)
     from pbrs_farm.transport.kernels.sun_rays import PLANE_PDF
-    from pbrs_farm.transport.kernels.sunlit_tables import traced_points, used_cells
+    from pbrs_farm.transport.kernels.sunlit_tables import find_used_cells, trace_points
 
     device, grid = scene.device_scene, emitters.outdoor_choice._grid
-    used = used_cells(device, emitters.sun, grid, weights.vertices)
+    used = find_used_cells(device, emitters.sun, grid, weights.vertices)
     for n_samples in (1, 1 << 22):
-        tables = traced_points(device, emitters.sun, used, n_samples, 3)
+        tables = trace_points(device, emitters.sun, used, n_samples, 3)
         # What a group's points stand for is the part of its cells that is lit, each cell once.
         for group, (first, last) in enumerate(zip(tables.first, tables.first[1:], strict=False)):
             cells = (tables.cells[:, 0] > 0) & (tables.cells[:, 1] == group)
