@@ -51,7 +51,7 @@ def of_plan(seed: int) -> dict[str, Any]:
 def of_house(seed: int) -> dict[str, Any]:
     """The home as the ordinary reader and repair see it: leaks, contacts of meshes, bits of its file."""
     from benchmarks.dress.contacts import blocked_doors, penetrations, things_of
-    from pbrs_farm.generate.made import made
+    from pbrs_farm.generate.generated_home import generate_home
     from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
     from pbrs_farm.prepare.finished_house import repaired_house
     from pbrs_farm.prepare.read_source import read_house
@@ -59,7 +59,7 @@ def of_house(seed: int) -> dict[str, Any]:
 
     recipe = recipe_from_name("fast")
     source = resolve(MadeHome(seed).word)
-    data = made(MadeHome(seed), catalogue_of_words("")).data
+    data = generate_home(MadeHome(seed), catalogue_of_words("")).data
     house = read_house(source, recipe.read)
     _repaired, report = repaired_house(source, recipe)
     # All furniture counts as new; walls, doors and windows came with the home.

@@ -123,7 +123,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.generate.plans.plan_files import plan_from_file
     from pbrs_farm.generate.plans.plan_format import Part
     from pbrs_farm.prepare.formats import PLAN, format_of_file
-    from pbrs_farm.prepare.plan_house import made_of_file
+    from pbrs_farm.prepare.plan_house import furnish_plan_file
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
@@ -142,7 +142,7 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     for seed in range(args.seed, args.seed + args.count):
         name = args.plan.stem if args.count == 1 else f"{args.plan.stem}-{seed}"
         style = args.style or ""
-        home = made_of_file(own, catalogue, seed=seed, style=style, name=name)
+        home = furnish_plan_file(own, catalogue, seed=seed, style=style, name=name)
         write_home(args.out / f"{name}.sh3d", home)
         echo(str(args.out / f"{name}.sh3d"))
     return 0

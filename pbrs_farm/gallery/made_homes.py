@@ -18,7 +18,7 @@ from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.gallery.html_page import page
 from pbrs_farm.gallery.plan_svg import plan_svg
-from pbrs_farm.generate.made import Made, made, origin
+from pbrs_farm.generate.generated_home import GeneratedHome, generate_home, origin_of_home
 from pbrs_farm.generate.programme import Programme
 from pbrs_farm.prepare.dress_catalogue import GENERATED, catalogue_of_words
 
@@ -56,15 +56,15 @@ def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
     catalogue = catalogue_of_words("" if home.furniture else GENERATED)
     try:
         if path.exists() and path.with_suffix(".svg").exists():
-            _check_same(path, origin(home, catalogue, programme))
+            _check_same(path, origin_of_home(home, catalogue, programme))
             return Done(home, is_new=False)
-        write_home(path, made(home, catalogue, programme))
+        write_home(path, generate_home(home, catalogue, programme))
     except PbrsError as error:
         return Done(home, is_new=False, fault=str(error))
     return Done(home, is_new=True)
 
 
-def write_home(path: Path, home: Made) -> None:
+def write_home(path: Path, home: GeneratedHome) -> None:
     """Write a home's file and the picture of its plan. Raises BadInput where another home lies."""
     if path.exists():
         _check_same(path, home.origin)

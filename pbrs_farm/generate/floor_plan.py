@@ -7,8 +7,8 @@ draws its plans.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from pbrs_farm.core.catalogue import Piece
@@ -217,3 +217,33 @@ def ground(piece: PlacedPiece) -> Rect:
     """The rectangle around a piece's corners."""
     xs, zs = [p[0] for p in piece.corners], [p[1] for p in piece.corners]
     return min(xs), min(zs), max(xs), max(zs)
+
+
+def turned_upright(plan: Plan) -> Plan:
+    """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright."""
+    return turned_by(plan, upright_angle(plan.rooms))
+
+
+def upright_angle(rooms: Sequence[PlanRoom]) -> float:
+    """Radians by which rooms are turned about the origin so that most of their walls are upright."""
+    ways: dict[float, float] = {}
+    for (x0, z0), (x1, z1) in (edge for room in rooms for edge in room.edges):
+        angle = math.degrees(math.atan2(z1 - z0, x1 - x0)) % 90
+        tenth = round(angle, 1) % 90
+        ways[tenth] = ways.get(tenth, 0.0) + math.hypot(x1 - x0, z1 - z0)
+    main = max(ways, key=lambda angle: (ways[angle], -angle))
+    return math.radians(-main if main < 45 else 90 - main)
+
+
+def turned_by(plan: Plan, angle_rad: float) -> Plan:
+    """The plan turned about its origin."""
+    if angle_rad == 0:
+        return plan
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+
+    def moved(p: Point) -> Point:
+        return round(p[0] * cos - p[1] * sin, 3), round(p[0] * sin + p[1] * cos, 3)
+
+    walls = tuple(replace(w, start=moved(w.start), end=moved(w.end)) for w in plan.walls)
+    rooms = tuple(replace(r, polygon=tuple(map(moved, r.polygon))) for r in plan.rooms)
+    return replace(plan, walls=walls, rooms=rooms)

@@ -32,9 +32,10 @@ from pbrs_farm.generate.floor_plan import (
     PlanWall,
     Rect,
     RoomType,
+    turned_by,
+    upright_angle,
 )
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.made import turned_by, upright_angle
 from pbrs_farm.generate.plan_walls import corners
 from pbrs_farm.home.room_use import RoomKind
 

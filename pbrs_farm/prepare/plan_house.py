@@ -16,8 +16,8 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House, Item, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
+from pbrs_farm.generate.generated_home import GeneratedHome, furnish_storeys
 from pbrs_farm.generate.home_file import home_file
-from pbrs_farm.generate.made import Made, made_of_storeys
 from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import part_of
 from pbrs_farm.prepare.formats import PLAN
@@ -79,15 +79,15 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
 # A plan as a furnished home of its own file.
 
 
-def made_of_file(
+def furnish_plan_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
-) -> Made:
+) -> GeneratedHome:
     """A plan as a home's file: its things where the plan has them, other rooms furnished by a seed."""
     plans = [s.plan for s in file.storeys]
     key = repr(plans[0]) if len(plans) == 1 else repr(plans)
     file = upright(file)
     pieces_of_storeys = _pieces_of_things(file, catalogue)
-    return made_of_storeys(
+    return furnish_storeys(
         [s.plan for s in file.storeys],
         pieces_of_storeys,
         catalogue,

@@ -13,7 +13,7 @@ from pbrs_farm.core.made_home import MadeHome, made_homes
 from pbrs_farm.gallery.made_homes import make_homes
 from pbrs_farm.gallery.plan_svg import plan_svg
 from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, RoomType, Storey
-from pbrs_farm.generate.made import made
+from pbrs_farm.generate.generated_home import generate_home
 
 HOMES = made_homes("made:1..2,furniture=none")
 
@@ -54,7 +54,7 @@ def test_two_processes_write_what_one_does(tmp_path: Path) -> None:
 
 
 def test_a_plan_shows_every_room_and_escapes_its_name() -> None:
-    plan = made(of_seed(1), EMPTY).storeys[0].plan
+    plan = generate_home(of_seed(1), EMPTY).storeys[0].plan
     rooms = tuple(PlanRoom(r.type, "<b>&", r.polygon) for r in plan.rooms)
     text = plan_svg([Storey(replace(plan, rooms=rooms), ())], "a<b")
     root = ET.fromstring(text)

@@ -14,8 +14,15 @@ from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
-from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanRoom, PlanWall, RoomType
-from pbrs_farm.generate.made import made_of_plan, turned
+from pbrs_farm.generate.floor_plan import (
+    OpeningKind,
+    Plan,
+    PlanRoom,
+    PlanWall,
+    RoomType,
+    turned_upright,
+)
+from pbrs_farm.generate.generated_home import furnish_plan
 from pbrs_farm.generate.plans.plan_files import plan_from_file
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
@@ -63,7 +70,7 @@ def plan(folder: Path, value: object) -> Plan:
 
 @pytest.mark.parametrize("value", [TOUCHING, APART, SKEWED], ids=["touching", "apart", "skewed"])
 def test_the_home_of_a_plan_is_closed(tmp_path: Path, value: object) -> None:
-    home = made_of_plan(plan(tmp_path, value), EMPTY, seed=1)
+    home = furnish_plan(plan(tmp_path, value), EMPTY, seed=1)
     house = read_home(home.data, "home.sh3d")
     assert len(house.openings) == 5
     repaired, report = repair(
@@ -115,7 +122,7 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
 
     walls = tuple(PlanWall(at(w.start), at(w.end), w.thickness) for w in upright.walls)
     rooms = tuple(PlanRoom(r.type, r.name, tuple(map(at, r.polygon))) for r in upright.rooms)
-    back = turned(Plan(rooms, walls, upright.openings, 2.5))
+    back = turned_upright(Plan(rooms, walls, upright.openings, 2.5))
     for one, other in zip(back.walls, upright.walls, strict=True):
         np.testing.assert_allclose(one.start, other.start, atol=0.02)
 

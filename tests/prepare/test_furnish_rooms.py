@@ -14,7 +14,7 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Shape
 from pbrs_farm.core.house import House, Material, Surface
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.generate.made import made
+from pbrs_farm.generate.generated_home import generate_home
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.furnish_rooms import furnish_rooms
 from pbrs_farm.prepare.passes import step_depends, uses_catalogue
@@ -38,7 +38,7 @@ def boxes() -> Catalogue:
 
 
 def empty_house() -> House:
-    return read_home(made(HOME, EMPTY).data, "home.sh3d")
+    return read_home(generate_home(HOME, EMPTY).data, "home.sh3d")
 
 
 def turned(house: House, angle: float) -> House:

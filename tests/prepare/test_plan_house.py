@@ -11,7 +11,7 @@ from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Enclosure, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.generate.plans.plan_files import plan_from_file
-from pbrs_farm.prepare.plan_house import made_of_file
+from pbrs_farm.prepare.plan_house import furnish_plan_file
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, home_id, resolve
 from pbrs_farm.prepare.stand_ins import STAND_IN, with_stand_ins
@@ -118,7 +118,7 @@ def test_a_house_with_its_table_of_sizes_beside_stays_in_place(tmp_path: Path) -
 
 def test_a_plan_as_a_homes_file_has_what_is_told_and_furniture_elsewhere(tmp_path: Path) -> None:
     file = plan_from_file(WRITERS["cubicasa"](tmp_path))
-    (storey,) = made_of_file(file, boxes(), seed=1).storeys
+    (storey,) = furnish_plan_file(file, boxes(), seed=1).storeys
     by_room = {r.type.value: {p.piece.group for p in storey.pieces if p.room == k}
                for k, r in enumerate(storey.plan.rooms)}  # fmt: skip
     assert {"toilet", "bathtub"} == by_room["bathroom"]

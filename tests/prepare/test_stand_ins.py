@@ -12,7 +12,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material
 from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
-from pbrs_farm.generate.made import made_of_plan
+from pbrs_farm.generate.generated_home import furnish_plan
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
@@ -53,7 +53,7 @@ def empty_room() -> House:
     )
     inner = ((0.01, 0.01), (4.99, 0.01), (4.99, 3.99), (0.01, 3.99))
     plan = Plan((PlanRoom(RoomType.BEDROOM, "Room", inner),), walls, (), 2.5)
-    return read_home(made_of_plan(plan, EMPTY, seed=1).data, "room.sh3d")
+    return read_home(furnish_plan(plan, EMPTY, seed=1).data, "room.sh3d")
 
 
 def told(

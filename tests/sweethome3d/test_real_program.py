@@ -17,7 +17,7 @@ from PIL import Image, ImageGrab
 
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import MadeHome
-from pbrs_farm.generate.made import made
+from pbrs_farm.generate.generated_home import generate_home
 from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, has_furniture
 from pbrs_farm.read.sweethome3d.home import read_home
 
@@ -41,7 +41,7 @@ def homes(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     paths = []
     for name, home in HOMES.items():
         path = folder / f"{name}.sh3d"
-        path.write_bytes(made(home, catalogue_of_words("")).data)
+        path.write_bytes(generate_home(home, catalogue_of_words("")).data)
         paths.append(path)
     return paths
 

@@ -29,8 +29,7 @@ from pydantic import BaseModel, Field
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate import plans
-from pbrs_farm.generate.floor_plan import OpeningKind, Plan
-from pbrs_farm.generate.made import turned_by, upright_angle
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, turned_by, upright_angle
 from pbrs_farm.generate.plans.parsed_plan import MAX_THINGS, ParsedPlan, Thing
 from pbrs_farm.generate.plans.plan_format import Part, PlanFormat
 from pbrs_farm.generate.plans.plan_value import plan_of_value
