@@ -30,7 +30,10 @@ APT_TIMEOUT_S: Final = 600  # of one download
 
 
 def cache_folder() -> Path:
-    """$PBRS_CACHE, else ~/.cache/pbrs_farm."""
+    """Where downloads and what was read of them are kept: $PBRS_CACHE, else ~/.cache/pbrs_farm.
+
+    It may not exist yet. Everything in it can be deleted and is fetched or made again.
+    """
     given = os.environ.get("PBRS_CACHE", "")
     return Path(given) if given else Path.home() / ".cache" / "pbrs_farm"
 
@@ -157,7 +160,11 @@ def _download(package: str, scratch: Path) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file of the cache so that it is there whole or not at all."""
+    """Write a file of the cache so that it is there whole or not at all.
+
+    It is written beside its place and renamed: a process that dies leaves the former file, or none, and
+    two that write at once leave one of theirs.
+    """
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as scratch:
         scratch.write(data)
     Path(scratch.name).replace(path)

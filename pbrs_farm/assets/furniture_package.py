@@ -29,7 +29,10 @@ class FurniturePackage:
 
 
 def cached(cache: Path | None = None) -> FurniturePackage | None:
-    """The package if it was fetched before, else None; touches no network."""
+    """The package of furniture if it was fetched before, else None.
+
+    Touches no network: use `fetch` where the home cannot do without.
+    """
     deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
     return _unpacked(deb) if deb else None
 

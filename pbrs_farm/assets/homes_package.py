@@ -103,7 +103,10 @@ class JarResources:
 
 
 def cached(cache: Path | None = None) -> Package | None:
-    """The package if it was fetched before, else None; touches no network."""
+    """The package of example homes and models if it was fetched before, else None.
+
+    Touches no network: use `fetch` where the home cannot do without.
+    """
     deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
     return _unpacked(deb) if deb else None
 

@@ -82,7 +82,10 @@ class PlanRoom:
         return min(xs), min(zs), max(xs), max(zs)
 
     def contains(self, point: Point) -> bool:
-        """Whether a point lies inside: a ray to the right crosses an odd number of sides."""
+        """Whether a point (x, z), metres, lies inside the room's polygon.
+
+        A ray to the right crosses an odd number of sides. A point on a side may be either.
+        """
         x, z = point
         crossed = [
             (za > z) != (zb > z) and x < xa + (z - za) / (zb - za) * (xb - xa)

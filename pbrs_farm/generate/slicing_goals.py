@@ -75,7 +75,11 @@ class Rules:
         ]
 
     def judge(self, rects: list[IntRect]) -> tuple[float, int]:
-        """(cost, hard rules that are broken) of one rectangle for each leaf."""
+        """How far one rectangle for each leaf is from the brief: (cost, number of hard rules broken).
+
+        rects: in steps of STEP_M on the walls' middle lines, in the order of the brief's leaves. The cost
+        is smooth, so that annealing finds its way: a rule that is nearly kept costs less.
+        """
         total, unmet = 0.0, 0
         for leaf, (min_width, max_aspect, has_place), rect in zip(
             self._brief.leaves, self._limits, rects, strict=True

@@ -29,9 +29,11 @@ def furnished(
     plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = "", *,
     rooms: Collection[int] | None = None, standing: Mapping[int, Sequence[Rect]] | None = None,
 ) -> tuple[PlacedPiece, ...]:  # fmt: skip
-    """The furniture of every room, or of some; what the catalogue lacks is left out.
+    """The furniture of every room of a plan, or of some of them, by seed.
 
-    standing: what stands in a room already, nothing comes there. Raises BadInput for a style.
+    rooms: their numbers, None = all. standing: room -> rectangles of what stands there already: nothing
+    is put on them, and one must be able to walk around them. What the catalogue lacks is left out.
+    Raises BadInput for a style that is none. gates.py says whether the result holds what it must.
     """
     shelf = Shelf(catalogue, rng, style_of(style, rng))
     seeds = rng.integers(2**63, size=len(plan.rooms))

@@ -70,7 +70,12 @@ class Shelf:
         depth: tuple[float, float] = (0.0, 9.0), height: tuple[float, float] = (0.0, 9.0),
         without: str = "",
     ) -> list[Piece]:  # fmt: skip
-        """Pieces of those groups and sizes, the preferred one first; without: words they lack."""
+        """Pieces of the catalogue of some groups and sizes, the preferred one first.
+
+        groups: of the catalogue, `bed`, `wardrobe`. width, depth, height: (least, most) metres, both
+        included. without: words with blanks between that neither id nor name may hold. Two calls with equal
+        arguments give equal lists: a home has one order of preference.
+        """
         ranges = width, depth, height
         aside = set(without.split())
         found = [
@@ -115,7 +120,11 @@ def slot(
     piece: Piece, u: float, v: float, *, turns: int = 0, elevation: float = 0.0,
     size: tuple[float, float, float] | None = None,
 ) -> PieceSlot:  # fmt: skip
-    """A piece with the middle of its ground at (u, v); size: another than its own."""
+    """A piece in the frame of a template, with the middle of its ground at (u, v).
+
+    u: along the wall to the right, v: away from it, metres; turns: quarter turns of the piece to the
+    left; elevation: of its lower edge; size: (width, depth, height) where it is another than its own.
+    """
     w, d, h = size or piece.size
     return PieceSlot(piece, u, v, w, d, h, elevation, turns)
 
@@ -124,7 +133,10 @@ def backed(
     piece: Piece, u: float = 0.0, *, gap: float = 0.02, elevation: float = 0.0,
     size: tuple[float, float, float] | None = None,
 ) -> PieceSlot:  # fmt: skip
-    """A piece with its back at the wall."""
+    """A piece with its back at the wall of a template.
+
+    u: of its middle along the wall; gap: between its back and the wall, metres; the rest as in slot.
+    """
     depth = (size or piece.size)[1]
     return slot(piece, u, gap + depth / 2, elevation=elevation, size=size)
 
@@ -134,7 +146,12 @@ def single(
     daylight: float = 0.0, size: tuple[float, float, float] | None = None, gap: float = 0.02,
     elevation: float = 0.0, beside: float = 0.0,
 ) -> Template:  # fmt: skip
-    """One piece with its back at a wall and `before` metres free in front."""
+    """A template of one piece with its back at a wall and `before` metres free in front.
+
+    before: 0 = nothing need be free; from 0.4 on somebody must be able to walk there. corner, daylight:
+    how much it likes a corner, and a window, -1 to 1. rank: added to the score of each of its places.
+    beside: metres that stay free at either side. gap, elevation, size: as in backed.
+    """
     w, d, _ = size or piece.size
     half, front = w / 2 + beside, d + gap
     clear = ((-half, gap if beside else front, half, front + before),) if before else ()

@@ -87,7 +87,10 @@ class Places:
 
 
 def overlap(rects: F64, others: F64) -> Bools:
-    """(N, B) whether each of rects (N, B, 4) overlaps any of others (M, 4) by more than 2 mm."""
+    """Whether rectangles overlap others by more than 2 mm.
+
+    rects: (N, B, 4) x0, z0, x1, z1, B rectangles of each of N places; others: (M, 4). Gives (N, B).
+    """
     if not len(others) or not rects.size:
         return np.zeros(rects.shape[:2], bool)
     a, b, e = rects[:, :, None, :], others[None, None], _TOUCH_M
@@ -99,7 +102,11 @@ def overlap(rects: F64, others: F64) -> Bools:
 
 
 def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) -> Places:
-    """Every place of every template of a group that walls, doors and windows allow."""
+    """Every place of every template of a group that walls, doors and windows allow, best first.
+
+    Scores are those of `Liking` plus a little noise from rng, so that equal places differ by home.
+    Other furniture is not looked at: place_search.py takes places that do not overlap.
+    """
     versions = [v for template in group.templates for v in _versions(template)]
     frames, scores, template_of = [], [], []
     for number, template in enumerate(versions):

@@ -64,7 +64,11 @@ class LeftOut:
     first: dict[str, str] = field(default_factory=dict)
 
     def add(self, what: str, place: str = "") -> None:
-        """Remember one; what: a sentence that holds for all of its kind."""
+        """Remember something that is left out.
+
+        what: a sentence that holds for all of its kind; those of one sentence become one line with their
+        number. place: where in the file, kept of the first.
+        """
         self.counts[what] = self.counts.get(what, 0) + 1
         self.first.setdefault(what, place)
 
@@ -88,7 +92,11 @@ class Footprint(NamedTuple):
 
 
 def footprint(shape: Polygon) -> Footprint:
-    """The least rectangle around a shape, its width the longer side."""
+    """The least rectangle around a shape, its width the longer side.
+
+    Gives its middle, sizes in metres, and the angle about +y at which its right side points along
+    the width; sizes of 0 for a shape without area.
+    """
     corners = shapely.get_coordinates(shape.minimum_rotated_rectangle)
     if len(corners) < 4:
         x, z = shape.centroid.coords[0]
@@ -158,7 +166,11 @@ def value_of(
     rooms: Sequence[dict[str, Any]], openings: Iterable[dict[str, Any]], height: float,
     walls: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:  # fmt: skip
-    """A storey's value of rooms and openings of any kind."""
+    """A storey as the JSON of a plan of one's own has it (plan_files.py).
+
+    rooms, walls: rows of it. openings: rows of any kind, sorted here into doors and windows. height:
+    from floor to ceiling, drawn into 2 to 6 m; 2.6 m where it is no number.
+    """
     rows = list(openings)
     glazed = ("window", "french_window")
     return {

@@ -62,7 +62,10 @@ class LibraryNotes:
     found: dict[Note, None] = field(default_factory=dict)
 
     def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault; the rest goes on."""
+        """Remember a fault of a library; the rest of it is read on.
+
+        Unlike Notes it raises nothing: a library is the user's own, and one bad model costs itself alone.
+        """
         self.found[Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))] = None
 
 

@@ -102,7 +102,11 @@ def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes)
 
 
 def turned(piece: PlanPiece, turn_deg: float) -> PlanPiece:
-    """The piece with its model turned about the vertical in its box, by a multiple of 90 degrees."""
+    """The piece with its model turned about the vertical within its box, by a multiple of 90 degrees.
+
+    Width and depth change places with a quarter turn, and its lamps go round with it. Other angles are
+    rounded to the nearest multiple.
+    """
     n = round(turn_deg / 90) % 4
     if not n:
         return piece

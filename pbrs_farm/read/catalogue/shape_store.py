@@ -42,7 +42,11 @@ class ShapeStore:
         self._folder = folder
 
     def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
-        """The shape stored under key, else what make gives, which is stored; None is, too."""
+        """The shape that is stored under a key, else the one that `make` gives, which is then stored.
+
+        key: all that the shape follows from, versions included; equal keys are never made again. A model
+        that cannot be read is None and stored as such. A store that cannot be written costs time alone.
+        """
         path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
             return _read_shape(path)

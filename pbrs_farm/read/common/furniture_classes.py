@@ -237,7 +237,10 @@ def class_of_piece(
 
 
 def nyu40_of(catalogue_id: str, name: str, group: str = "") -> int | None:
-    """NYU40 id of a piece whose size is not known (class_of_piece); None = no class."""
+    """NYU40 id of a piece whose size is not known; None where nothing says one.
+
+    As class_of_piece, which also says by which rule and checks the class against the size.
+    """
     return class_of_piece(catalogue_id, name, group).nyu40
 
 

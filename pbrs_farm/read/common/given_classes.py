@@ -36,7 +36,11 @@ class GivenClass(NamedTuple):
 
 
 def given_class(source: str, name: str) -> GivenClass | None:
-    """The row of a source's name, whatever its case; None where the table has none."""
+    """The class that a data set's own name means (given_classes.csv); None where the table has no row.
+
+    source: the vocabulary, such as `3dfuture`, `hssd`, `ifc`. name: in any case. A class of -1 says that
+    the words of the thing's name decide.
+    """
     return _classes_by_name().get((source, _key_of_name(name)))
 
 

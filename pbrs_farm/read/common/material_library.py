@@ -107,7 +107,10 @@ class MaterialLibrary:
         return {t.id: t for t in found if t.id in used}
 
     def index(self, material: Material) -> int:
-        """The material's index, the same for equal materials."""
+        """The material's index in the house, the same for equal materials.
+
+        Only materials that are indexed become part of the house, and with them their textures.
+        """
         return self._materials.setdefault(material, len(self._materials))
 
     def adopted(self, other: MaterialLibrary) -> tuple[int, ...]:
@@ -120,8 +123,11 @@ class MaterialLibrary:
     def texture(
         self, key: str, *, name: str, place: str, load: Callable[[], bytes | None]
     ) -> LoadedTexture | None:
-        """The texture of the picture key; None, with a note, where load gives nothing or what it
-        gives cannot be decoded."""
+        """The texture of a picture; None, with a note, where there is none or it cannot be decoded.
+
+        key: what tells pictures apart, such as a path; each is loaded once. name: of the texture. place: for
+        notes. load: gives the file's bytes, None for a missing file.
+        """
         if key not in self._loaded:
             self._loaded[key] = self._load(key, name, place, load)
         return self._loaded[key]

@@ -43,7 +43,11 @@ class ModelCache:
         self._known: dict[tuple[str, str], ParsedModel | None] = {}
 
     def model(self, obj_name: str, mtl_name: str) -> ParsedModel | None:
-        """The model of an OBJ below the root; None if there is no such OBJ."""
+        """The meshes and materials of an OBJ below the root, parsed once; None if there is no such OBJ.
+
+        obj_name, mtl_name: below the root, with "/". Raises DamagedModel for an OBJ that cannot be read, and
+        BadHouse for one beyond read.max_model_triangles. A missing MTL is a note, its model grey.
+        """
         key = (obj_name, mtl_name)
         if key not in self._known:
             self._known[key] = self._parse(obj_name, mtl_name)

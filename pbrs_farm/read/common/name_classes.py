@@ -40,7 +40,11 @@ class NodeClass:
 
 
 def class_of_node_name(name: str) -> NodeClass | None:
-    """What the words of a node's or a material's name say, if anything."""
+    """What the words of a node's, a product's or a material's name say that it is; None where they say nothing.
+
+    The words of pieces go before those of structure, so that a wall lamp is a lamp; names are in the
+    languages of words.csv.
+    """
     piece = class_of_piece("", name)
     nyu40 = piece.nyu40
     if nyu40 is None or nyu40 == OTHERSTRUCTURE:

@@ -36,7 +36,11 @@ class Notes:
         self._notes: dict[Note, None] = {}  # in the order they first came up
 
     def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault; raise it when reading is strict and its kind is not HARMLESS."""
+        """Remember a fault of the source, at most once; raise it as BadHouse when reading is strict.
+
+        kind: a word of docs/houses.md; what is in HARMLESS is never raised. place: where in the file, as
+        a reader finds it there: `nodes[3] (Sofa)`, `line 12`. text: what was left out or guessed.
+        """
         if self._strict and kind not in HARMLESS:
             raise BadHouse(self.file, place, f"{text} ({kind})", hint="read without --strict")
         note = Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))
@@ -47,5 +51,8 @@ class Notes:
         return tuple(self._notes)
 
     def count(self, kind: str) -> int:
-        """How many notes are of a kind."""
+        """How many notes are of a kind.
+
+        A note that came up twice at one place counts once.
+        """
         return sum(note.kind == kind for note in self._notes)

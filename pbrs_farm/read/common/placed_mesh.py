@@ -53,7 +53,11 @@ def _normals(normals: F64, world_from_model: F64) -> F32 | None:
 
 
 def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
-    """The model's own axis-aligned box in the world; None where the transform shears."""
+    """The model's own axis-aligned box, placed in the world; None where the transform shears.
+
+    meshes: of the model, in its own frame. world_from_model: (4, 4). The axes are the model's columns x,
+    y, z made right-handed, so that a mirrored model has a box of the same place and size.
+    """
     low = np.min([m.positions.min(0) for m in meshes], 0)
     high = np.max([m.positions.max(0) for m in meshes], 0)
     # Part the transform into scale and axes; a shear has no such parts.

@@ -63,7 +63,10 @@ class ZipResources:
             raise BadHouse(self._file, place, text)
 
     def read(self, name: str) -> bytes | None:
-        """The entry's bytes, or None if there is none; BadHouse if it is damaged."""
+        """The entry's bytes, or None if there is none of that name.
+
+        Raises BadHouse for a damaged entry, and for one that unpacks to more than it claims.
+        """
         entry = self._entries.get(name)
         if entry is None:
             return None

@@ -118,7 +118,11 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
 
 
 def components(corners: F64) -> I64:
-    """(F,) number of the connected mesh each face belongs to, corners at one place joined."""
+    """(F,) number of the connected mesh that each face belongs to, from 0.
+
+    corners: (F, 3, 3) of the faces, metres. Faces are connected where two corners lie at one place to
+    within _WELD_M, whether or not they share a vertex.
+    """
     keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
     _, place = np.unique(keys, axis=0, return_inverse=True)
     faces = place.reshape(-1, 3)

@@ -82,7 +82,12 @@ def _room_of_row(row: _GivenRoom, file: str, place: str, items: Sequence[Item]) 
 
 
 def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
-    """A room for every piece of floor that walls part from the others."""
+    """A room for every piece of floor that walls part from the others.
+
+    items: of the whole scene. Walls count where they stand 1 m above the floor; pieces below 1 m2 or
+    0.5 m wide are gaps under doors and walls. The rooms have no id, name or level yet: levels_of gives
+    them.
+    """
     walls = _surfaces_of_kind(items, ItemKind.WALL)
     found: list[Room] = []
     for item in items:
@@ -182,7 +187,10 @@ def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...
 
 
 def level_of(levels: Sequence[Level], y: float) -> str:
-    """The highest level at or below a height, half a metre of slack; else the lowest."""
+    """The id of the highest level at or below a height, with half a metre of slack; else of the lowest.
+
+    levels: from below, at least one. y: of the world, metres.
+    """
     below = [x.id for x in levels if x.elevation <= y + _SAME_LEVEL_M]
     return below[-1] if below else levels[0].id
 

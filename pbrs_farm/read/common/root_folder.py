@@ -23,7 +23,10 @@ class RootFolder:
         self._read: dict[str, str] = {}  # name -> sha256
 
     def name_from(self, folder: str, reference: str) -> str:
-        """The name below root that a reference inside folder means; BadHouse if it leads out."""
+        """The name below root that a reference inside a folder means, with "/" between folders.
+
+        Backslashes count as "/". Raises BadHouse where it leads out of root.
+        """
         joined = posixpath.normpath(posixpath.join(folder, reference.replace("\\", "/")))
         if joined.startswith(("/", "../")) or joined == ".." or "\0" in joined:
             raise BadHouse(self.root, folder, f"{reference[:80]!r} leads out of the folder")
@@ -48,14 +51,21 @@ class RootFolder:
         return (self.root / self.name_from("", name)).is_dir()
 
     def names(self, folder: str, suffixes: tuple[str, ...]) -> list[str]:
-        """Names of the files directly in a folder below root, by suffix; [] without the folder."""
+        """Names of the files directly in a folder below root whose suffix is one of some.
+
+        They begin with the folder, as `read` takes them; [] where the folder is not there.
+        """
         below = self.root / self.name_from("", folder)
         if not below.is_dir():
             return []
         return [f"{folder}/{p.name}" for p in below.iterdir() if p.suffix in suffixes]
 
     def read(self, name: str, *, max_bytes: int, limit: str = "") -> bytes | None:
-        """The file's bytes, or None if there is none. limit: the field that sets max_bytes."""
+        """The bytes of a file below the folder, or None if there is none; its digest is remembered.
+
+        max_bytes: of a file that is read. limit: the recipe field that sets max_bytes, for the message.
+        Raises BadHouse for a larger file, and for a name or a link that leads out of the folder.
+        """
         path = self.path(name)
         if path is None:
             return None

@@ -59,14 +59,21 @@ class SourceFiles:
         self._pictures: dict[tuple[Path, str], tuple[str, ...]] = {}  # of material libraries
 
     def file_digest(self, path: Path) -> str:
-        """SHA-256 of a file; raises OSError where it cannot be read."""
+        """SHA-256 of a file, taken once, however many houses read it.
+
+        Raises OSError where it cannot be read.
+        """
         key = (path, "")
         if key not in self._digests:
             self._digests[key] = digest_of_regular(path)
         return self._digests[key]
 
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:
-        """Digest over the names and bytes of those files that exist; "" where none does."""
+        """Digest over the names and bytes of those files that exist below a folder; "" where none does.
+
+        A file that appears, changes or goes gives another digest, so that a step sees it. Files that are
+        damaged or lie outside the folder count as absent: the reader says what is wrong with them.
+        """
         found = {name: self._digest(folder, name) for name in names}
         lines = [f"{digest}  {name}\n" for name, digest in sorted(found.items()) if digest]
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""

@@ -212,7 +212,10 @@ def _parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
 
 
 def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
-    """(n,) finite numbers; BadHouse otherwise."""
+    """(n,) float64 of a JSON list of n finite numbers.
+
+    place: for messages, such as `materials[2]: colour`. Raises BadHouse for anything else.
+    """
     fits = isinstance(value, list) and len(value) == n
     if not fits or not all(type(v) in (int, float) and abs(v) < 1e12 for v in value):
         raise BadHouse(gltf.file, place, f"expected {n} finite numbers")
@@ -220,7 +223,10 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
 
 
 def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    """The JSON object under a key, {} where there is none: what is optional may be missing or odd."""
+    """The JSON object under a key of another, {} where there is none.
+
+    What is optional in glTF may be missing, null or of another type; all of these read as absent.
+    """
     value = holder.get(key)
     return value if isinstance(value, dict) else {}
 

@@ -34,7 +34,11 @@ class HomeMaterials:
         )
 
     def painted(self, paint: Paint, name: str, place: str) -> int:
-        """Index of the material that the paint of a wall or a room makes."""
+        """Index of the material that the paint of a wall or a room makes.
+
+        A picture that can be used goes before the colour; without either the surface is white and marked
+        as default, so that repair and dressing may paint it. place: for a note on a missing picture.
+        """
         # A picture that can be used goes before the colour.
         loaded = None
         if paint.picture is not None:

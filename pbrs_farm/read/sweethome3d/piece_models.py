@@ -106,7 +106,10 @@ class PieceModels:
     def get(
         self, name: str, place: str, transformations: Transformations = ()
     ) -> PieceModel | None:
-        """The model, its parts moved, or None (with a note) if it is missing or cannot be read."""
+        """The model of a piece, its parts moved as the home keeps them, parsed once.
+
+        None, with a note, if it is missing or cannot be read. A model that several pieces name is parsed once.
+        """
         if name not in self._parsed:
             self._parsed[name] = self._load(name, place)
         parsed = self._parsed[name]

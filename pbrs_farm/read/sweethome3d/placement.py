@@ -40,7 +40,11 @@ class PieceFrame:
 
 
 def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None) -> PieceFrame:
-    """Where a piece stands. local_height: (N, 3) its local points, to measure a tilted height."""
+    """Where a piece stands: its centre and axes in the world, its size.
+
+    local_height: (N, 3) the points of its model in its own frame; a tilted piece stands as high as they
+    reach once tilted. Angles of the file run clockwise seen from above; pitch goes before roll.
+    """
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
     # Pitch, then roll, then turn about the vertical; the program's angles run clockwise.

@@ -22,7 +22,10 @@ class Attributes:
     max_extent_m: float  # bound of lengths and coordinates
 
     def fail(self, message: str) -> BadHouse:
-        """The error that names this element."""
+        """The error that names the file and this element.
+
+        To be raised by the caller: `raise a.fail("has no points")`.
+        """
         return BadHouse(self.file, self.place, message)
 
     def text(self, name: str, default: str = "") -> str:
@@ -56,7 +59,11 @@ class Attributes:
         return min(max(self.number(name, default), low), high)
 
     def metres(self, name: str, default_m: float | None = None) -> float:
-        """A length or coordinate given in centimetres, in metres, within the largest extent."""
+        """A length or coordinate given in centimetres, in metres.
+
+        default: in metres, None = the attribute must be there. Raises BadHouse, naming the element, for
+        what is no number and for what lies beyond read.max_extent_m.
+        """
         value = self.optional_metres(name)
         if value is not None:
             return value
