@@ -20,7 +20,11 @@ _PROGRAMMES: Final = 6  # that are tried before a wish is refused
 def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
-    """A plan for a programme, or for one drawn by seed as wished. Raises BadInput if none fits."""
+    """A floor plan by seed: for a programme, or for one that is drawn as wished.
+
+    wishes: bedrooms, area, family; programme: the rooms by name, where a user wrote them, of which none
+    may be left out. Raises BadInput if no plan fits; a drawn programme is drawn anew some times before.
+    """
     if programme:
         plans = (wishes and wishes.plans) or programme.plans
         where = layout(replace(programme, plans=plans), rng, is_fixed=True)
@@ -35,7 +39,10 @@ def drawn_height(where: Layout, rng: np.random.Generator) -> float:
 
 
 def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Plan:
-    """Walls and rooms on rectangles, with doors and windows."""
+    """Walls and rooms on the rectangles of a layout, with doors and windows drawn by seed.
+
+    height: from floor to ceiling, metres. A balcony is a room and walls more than the layout has.
+    """
     runs = runs_of(where)
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)

@@ -77,7 +77,12 @@ def cut_guests(
     brief: Brief,
     notch: IntRect | None,
 ) -> set[int]:
-    """Cut each small room from its host, in place; those where that breaks a rule of either."""
+    """Cut each small room from the rectangle of its host, in place; gives those where that breaks a rule.
+
+    parts: the rectangles of each room, of which a host's shrinks or becomes an L. hosts: small room ->
+    its host. notch: a part of the outline that is no floor. Of the cuts that break no rule the one that
+    leaves most daylight and the best shapes is taken.
+    """
     uncut: set[int] = set()
     for guest, host in hosts.items():
         wish = programme.rooms[guest]

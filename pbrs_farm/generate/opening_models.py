@@ -75,7 +75,11 @@ def drawn_design(
 
 
 def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) -> Shape:
-    """The door or window of an opening in a wall of that thickness."""
+    """The door or window of an opening as a shape: frame, leaf or sashes, handles, panes.
+
+    wall_m: the wall's thickness; the frame is 2 cm deeper, so that it shows on both sides. design: the
+    paint, leaves and sashes of the whole home.
+    """
     paint = Material("joinery", diffuse=design.colour, specular=(0.3, 0.3, 0.3), shininess=40.0)
     metal = Material("handle", diffuse=(0.2, 0.2, 0.2), specular=(0.7, 0.7, 0.7), shininess=60.0)
     glass = Material("pane", kind=MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2)

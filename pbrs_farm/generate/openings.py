@@ -80,7 +80,12 @@ def openings_of(
     rooms: tuple[PlanRoom, ...],
     rng: np.random.Generator,
 ) -> tuple[tuple[PlanRoom, ...], tuple[PlanWall, ...], tuple[PlanOpening, ...]]:
-    """Rooms and walls with the balcony's added, and every door and window."""
+    """Rooms and walls with the balcony's added, and every door and window of a plan.
+
+    runs: stretches of wall between two rooms, or a room and outdoors, of which openings are drawn. Every
+    room gets a way to the entrance, and those that people live in daylight; raises BadInput where one
+    cannot.
+    """
     drawing = WallDrawing(layout, runs, list(walls), list(rooms), rng)
     if not layout.programme.is_upper:
         _add_entrance(drawing)

@@ -59,7 +59,11 @@ class Stair:
 def stair_between(
     lower: Plan, upper: Plan, front: Point, slab_m: float, *, foot_is_right: bool
 ) -> Stair:
-    """The staircase in the stairwell of two plans that lie above each other."""
+    """The staircase in the stairwell of two plans that lie above each other.
+
+    slab_m: thickness of the floor between, metres. front, foot_is_right: as in Stair. Both plans must
+    have a room of the type STAIRS.
+    """
     wells = [next(r for r in p.rooms if r.type is RoomType.STAIRS) for p in (lower, upper)]
     free = Polygon(wells[0].polygon).intersection(Polygon(wells[1].polygon))
     assert isinstance(free, Polygon)

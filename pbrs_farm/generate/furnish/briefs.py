@@ -89,7 +89,11 @@ _BRIEFS: Final = read_toml(
 
 
 def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Generator) -> RoomBrief:
-    """The brief of a room, by its type and what else the home has."""
+    """What a room must have, may have and is filled with, by its type and what else the home has.
+
+    shelf: the pieces of which templates are made; where it has none of a group nobody misses it. rng:
+    draws what comes by chance, and whether a bedroom is a child's.
+    """
     type_ = plan.rooms[space.number].type
     name: str = RoomType.LIVING if type_ is RoomType.STUDIO else type_
     if type_ is RoomType.BEDROOM and _is_childs(plan, space, rng):

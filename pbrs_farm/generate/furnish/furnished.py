@@ -65,7 +65,11 @@ def _rank(type_: RoomType) -> int:
 def arrangement_of(
     brief: RoomBrief, space: FurnishSpace, others: list[Rect], rng: np.random.Generator
 ) -> Arrangement:
-    """What stands in a room: all that must, what may, then fillers; others: of the open rooms."""
+    """What stands in a room: all that must, then what may, then fillers up to its density.
+
+    others: rectangles of what stands in rooms that are open to it. Where what must stand does not fit in
+    the brief's order, other orders are tried.
+    """
     walk = WalkMap(space, others)
     groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
     places = [

@@ -47,7 +47,10 @@ class FurnishReport:
 def furnish_report(
     plan: Plan, pieces: tuple[PlacedPiece, ...], catalogue: Catalogue
 ) -> FurnishReport:
-    """The gates of a furnished plan. What the catalogue has nothing for is not asked of a room."""
+    """The gates of a furnished plan: what is missing, blocked or overlaps, room by room, and measures.
+
+    A room is not asked for what the catalogue has nothing for.
+    """
     broken, walked, area = [], 0.0, 0.0
     grounds = [_ground_rect(p) for p in pieces]
     for number, room in enumerate(plan.rooms):

@@ -91,7 +91,7 @@ def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
     strip = wall.frame.rect((0.0, 0.0, wall.length, DEPTH_M + 0.02))
     low_windows = [w.zone for w in space.windows if w.sill < 0.8]
     for rect in [*(tuple(r) for r in space.doors.tolist()), *low_windows]:
-        along = free_span_beside(rect, strip, wall)
+        along = _span_along_wall(rect, strip, wall)
         if along is not None:
             taken.append(along)
     # Sweep along the wall; a unit needs 0.6 m.
@@ -105,7 +105,11 @@ def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
     return found
 
 
-def free_span_beside(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
+def _span_along_wall(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
+    """The part of a wall, from and to along it in metres, that a rectangle in a strip along it takes.
+
+    None where the rectangle does not reach into the strip.
+    """
     if min(rect[2], strip[2]) - max(rect[0], strip[0]) < 0.01:
         return None
     if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:

@@ -102,7 +102,12 @@ def arranged(
     start: Arrangement | None = None, roots: int = _ROOTS, nodes: int = _NODES_A_ROOT,
     least_share: float = 0.0,
 ) -> Arrangement:  # fmt: skip
-    """The best arrangement found of groups in this order, added to what stands already."""
+    """The best arrangement found of groups, in this order, added to what stands already.
+
+    Depth first: at each group the best places that overlap nothing and leave a way to all that must be
+    reached. roots: places of the first group that are tried; nodes: bound on
+    what is looked at for each of them. least_share: of the floor that must stay walkable. A group that is not required may be left out.
+    """
     before = start or Arrangement(score=0.0)
     alive = [np.ones(p.n, bool) for p in places]
     for place in before.standing:

@@ -156,7 +156,10 @@ def frames_array(frames: Sequence[WallFrame]) -> F64:
 
 
 def allowed(template: Template, frames: F64, space: FurnishSpace) -> Bools:
-    """(N,) which frames keep a template inside the room, off doors and below window sills."""
+    """(N,) which frames keep a template inside the room, off doors and below window sills.
+
+    frames: (N, 4) x, z of the origin, and the unit vector along the wall. Two millimetres are given.
+    """
     bodies = _rects_in_frames(np.array([s.rect for s in template.bodies]), frames)
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
     if template.clear:

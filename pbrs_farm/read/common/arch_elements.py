@@ -113,7 +113,11 @@ class _Slab(_Common):
 
 
 def element_of(file: str, raw: Any, place: str, defaults: Any) -> Element | None:
-    """The element that an entry says, in the file's own axes; None for an unknown type."""
+    """A wall, floor, ceiling or ground of an arch.json, in the file's own axes and units of metres.
+
+    raw: the entry. place: for messages. defaults: the file's, by kind, for what the entry lacks. None for a
+    kind that is not known. Raises BadHouse naming the value that is wrong.
+    """
     raw = checked(dict, raw, file, place, error=BadHouse)
     kind = raw.get("type")
     if not isinstance(kind, str) or kind not in KIND_OF_ELEMENT:
@@ -164,7 +168,10 @@ def _surfaces_with_area(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surfac
 
 
 def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
-    """A closed slab from the element's height upwards."""
+    """A floor or ceiling as a closed slab, from its points upwards by its depth.
+
+    Surfaces top, bottom and, where it has a depth, side; in the world. Those without area are not there.
+    """
     material = _material(materials, e, 0)
     # Turn the outline counter-clockwise and its holes the other way.
     low = float(e.points[0][:, 1].min())
@@ -220,7 +227,10 @@ def wall_frame(e: Element, outline: F64 | None) -> WallFrame | None:
 def wall_surfaces(
     arch: Arch, e: Element, frame: WallFrame, materials: ModelMaterials
 ) -> tuple[Surface, ...]:
-    """The wall's closed box, without its holes."""
+    """A wall as a closed box, without its holes: repair cuts them.
+
+    Surfaces inside, outside and edge, each with the material that the element gives that side.
+    """
     # Turn a left-handed frame round: the box's faces must look outward.
     half = np.array([frame.length, e.height_m, e.depth_m]) / 2
     right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]

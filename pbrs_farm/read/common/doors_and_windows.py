@@ -60,7 +60,10 @@ class Hole:
 
 
 def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
-    """The opening that repair cuts, through all walls within the hole's depth."""
+    """The opening that repair cuts for a hole, through all walls within the hole's depth.
+
+    is_cut: whether the walls have the hole already. Its quad lies in the wall's middle plane.
+    """
     half = np.array(hole.size) / 2
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
     return Opening(
@@ -78,7 +81,10 @@ def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
 def fill_hole(
     hole: Hole, library: MaterialLibrary, level_id: str, room_id: str | None
 ) -> Item | None:
-    """The door or window of a hole; None for one that stays open."""
+    """The door or window that stands in a hole, built to its size; None for one that stays open.
+
+    library: where its materials go. The item is tagged `made`, as nobody drew it.
+    """
     if hole.kind == "open":
         return None
     is_window = hole.kind == "window"

@@ -150,5 +150,8 @@ def _hole(points: F64, low: F64, high: F64) -> tuple[F64, F64] | None:
 
 
 def box_between(low: F64, high: F64, axes: F64) -> Surface:
-    """A closed box; low, high: (3,) along axes, the (3, 3) unit columns along, up, across."""
+    """A closed box between two corners.
+
+    low, high: (3,) in the frame of axes, (3, 3) unit columns along the wall, up and across it.
+    """
     return box("cutter", axes @ ((low + high) / 2), (high - low) / 2, 0, axes=axes)

@@ -42,7 +42,11 @@ _LOW_M, _HIGH_M = 1.0, 40.0  # a room's height
 
 
 def check_unit(rooms: Sequence[Room], file: str, place: str, hint: str) -> None:
-    """Raise BadHouse for rooms of no size that a home has: their lengths are in another unit."""
+    """Raise BadHouse for rooms of no size that a home has: the file's lengths are in another unit.
+
+    The rooms together must be 0.6 to 500 m wide, and 1 to 40 m high in the middle. place, hint: for the
+    message, where the file says its unit.
+    """
     plan = np.concatenate([room.polygon for room in rooms])
     wide = float(np.ptp(plan, axis=0).max())
     high = float(np.median([room.ceiling_y - room.floor_y for room in rooms]))

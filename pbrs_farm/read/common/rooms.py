@@ -47,7 +47,11 @@ def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]
 
 
 def rooms_from_value(value: Any, file: str, items: Sequence[Item]) -> list[Room]:
-    """The rooms of the JSON value of a polygon file, or of a scene's extras; as rooms_from_json."""
+    """The rooms of the JSON value of a polygon file, or of a scene's extras.
+
+    items: of the scene; heights that a row leaves out are those of the floors and ceilings over its
+    polygon. Raises BadHouse naming the room that is wrong, as rooms_from_json.
+    """
     hint = '{"rooms": [{"polygon": [[x, z], ...]}, ...]}'
     rows = checked(_RoomFile, value, file, error=BadHouse, hint=hint).rooms
     check_number(len(rows), file)

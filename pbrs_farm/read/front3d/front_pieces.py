@@ -184,7 +184,11 @@ def light_items(
     lights: Sequence[FrontLight], items: Sequence[Item], areas: dict[str, float],
     ceilings: dict[str, float],
 ) -> list[Item]:  # fmt: skip
-    """A lamp without a shape for every listed light where no lamp stands; a room's share its flux."""
+    """A lamp without a shape for every listed light where no lamp stands.
+
+    areas, ceilings: square metres and height by room. The lights of a room share the flux that gives its
+    floor 150 lx; one within the ceiling hangs below it, and one listed twice shines once.
+    """
     lamps = [
         i.oriented_box.centre for i in items if i.kind is ItemKind.LAMP and (i.surfaces or i.box)
     ]

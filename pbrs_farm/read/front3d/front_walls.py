@@ -236,7 +236,11 @@ def _stretches(
 def solid_of(
     piece: WallPiece, pieces: Sequence[WallPiece], materials: tuple[int, int, int]
 ) -> tuple[Surface, ...]:
-    """The piece as a closed solid without its holes. materials: towards the room, behind, the rest."""
+    """A piece of wall as a closed solid without its holes.
+
+    pieces: all of them, as ends that meet are mitred. materials: indices of the side towards the room, of
+    the side behind, of the rest.
+    """
     sheet = piece.sheet
     _, y0, _, y1 = sheet.bounds
     front = [sheet.point(s, 0.0)[[0, 2]] for s in (piece.s0, piece.s1)]

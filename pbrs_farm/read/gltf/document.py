@@ -143,7 +143,11 @@ def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
 
 
 def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
-    """The encoded picture of images[index]."""
+    """The encoded picture of images[index], from its buffer view, its data URI or its file.
+
+    fetch: gives files beside the scene. Raises MissingFile where its file is not there, BadHouse where the
+    document is wrong.
+    """
     image = entry(gltf, "images", index)
     if "bufferView" in image:
         return view_bytes(gltf, image["bufferView"])

@@ -65,7 +65,10 @@ def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
 
 
 def class_of_node(name: str, extras: Any, mapping: Mapping) -> NodeClass | None:
-    """extras' `nyu40` or `class` (and `kind`), else the mapping's row, else the name's words."""
+    """What a node is: by its extras, else by the user's mapping, else by the words of its name.
+
+    extras: `nyu40` or `class`, and `kind`. None where none of them says anything.
+    """
     tagged = _tagged(extras) if isinstance(extras, dict) else None
     return tagged or mapping.of(name) or class_of_node_name(name)
 

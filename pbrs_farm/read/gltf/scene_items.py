@@ -59,7 +59,11 @@ class _Thing:
 def items_of_scene(
     gltf: Gltf, mapping: Mapping, materials: SceneMaterials, notes: Notes, fields: ReadFields
 ) -> Iterator[Item]:
-    """The items of the scene, not yet on a level."""
+    """The items of the scene in the world, not yet on a level or in a room.
+
+    A node with all below it is one item, unless it only groups others or shows a whole room, which is
+    parted. Raises BadHouse for more triangles or items than are read, and for what lies too far away.
+    """
     known: dict[Any, list[tuple[int | None, Mesh]]] = {}  # mesh number -> what is in it
     taken: set[str] = set()  # ids
     n_faces = n_items = 0

@@ -21,7 +21,11 @@ from pbrs_farm.read.gltf.materials import Emission
 def punctual_light(
     gltf: Gltf, node: dict[str, Any], world_from_node: F64, place: str
 ) -> LightPart | None:
-    """The point or spot light of a node; None if it has none, or a directional one (the sun)."""
+    """The point or spot light of a node; None if it has none, or a directional one, which is the sun.
+
+    world_from_node: (4, 4); a light looks along its -z. place: for messages. Candela times the solid
+    angle of the cone are its lumens.
+    """
     # A node names its light by number; the lights stand at the file's top.
     number = object_at(object_at(node, "extensions"), "KHR_lights_punctual").get("light")
     lights = object_at(object_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")

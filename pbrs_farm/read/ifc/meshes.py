@@ -51,7 +51,11 @@ class ProductMesh:
 def meshes_of_products(
     model: Any, products: Sequence[Any], file: str, fields: ReadFields
 ) -> dict[int, ProductMesh]:
-    """The mesh of each product, by its row's number; what the library fails on is not there."""
+    """The mesh of each product by its row's number; one that the library fails on is not there.
+
+    model, products: of ifcopenshell. Openings are cut by the library. Raises BadHouse for more triangles
+    than read.max_triangles.
+    """
     import ifcopenshell.geom
 
     settings = ifcopenshell.geom.settings()

@@ -239,7 +239,11 @@ def ground_item(context: ReaderContext, node: Node) -> Item | None:
 def room_surfaces(
     context: ReaderContext, node: Node, part: str, *, default_walls: bool
 ) -> list[tuple[str, Surface]]:
-    """(group name, surface) of a room's part f, c or w; empty (with a note) if it is missing."""
+    """(group name, surface) of a room's part: f its floor, c its ceiling, w its walls.
+
+    Empty, with a note, if the part's OBJ is missing or has no faces. default_walls: its
+    materials are those of walls, white and marked as default where nobody chose one.
+    """
     base = f"room/{context.house}/{node.model_id}{part}"
     model = context.models.model(f"{base}.obj", f"{base}.mtl")
     if model is None:

@@ -63,7 +63,10 @@ def arch_file(house_id: str) -> str:
 
 
 def suncg_companions(folder: RootFolder, house_id: str, files: SourceFiles) -> Iterator[str]:
-    """Names of all files beside house.json that reading the house may open; some may not exist."""
+    """Names below the root of all files beside house.json that reading the house may open.
+
+    Some may not exist. Never raises: what is wrong with a file the reader says.
+    """
     for table in (*CLASS_TABLES, VARIANT_TABLE, LAMP_TABLE, LIGHT_TABLE):
         yield from table_places(table)
     yield arch_file(house_id)

@@ -45,7 +45,11 @@ class ReadRoom:
 def read_rooms(
     plan: HomePlan, materials: HomeMaterials, house_level: dict[str, str]
 ) -> list[ReadRoom]:
-    """The rooms of visible levels, numbered within their level in the file's order."""
+    """The rooms of visible levels, numbered within their level in the file's order.
+
+    house_level: the home's level id -> the house's. An outline that crosses itself is a note, its largest
+    part the room; one without area is left out with a note.
+    """
     rooms: list[ReadRoom] = []
     counts: dict[str, int] = {}
     for room in plan.rooms:
@@ -162,7 +166,11 @@ def plane_items(
     floor_cuts: dict[str, shapely.Geometry],
     ceiling_cuts: dict[str, shapely.Geometry],
 ) -> list[Item]:
-    """Floor and ceiling items. *_cuts: by level id, what staircases take."""
+    """Floor and ceiling of each room as an item, level planes or, below a roof, sloped ones.
+
+    Where rooms overlap the later one has the floor. floor_cuts, ceiling_cuts: by level id, what staircases
+    take of them.
+    """
     items = []
     for k, room in enumerate(rooms):
         later = _later(rooms, k)

@@ -131,7 +131,11 @@ def piece_opening(
     materials: HomeMaterials,
     material: int,
 ) -> Opening | None:
-    """What a door or window cuts out of walls."""
+    """What a door or window cuts out of the walls that it touches; None for a piece that cuts nothing.
+
+    walls: those of its level, with their plans and heights. material: index for the cutter, which nobody
+    sees. One that touches no wall cuts nothing, with a note.
+    """
     if piece.frame is None:
         return None
     kinds = {materials.library.materials[s.material].kind for s in item.surfaces}

@@ -28,7 +28,11 @@ class PieceMaterial:
 def piece_material(
     piece: PlanPiece, mesh: Mesh, model: PieceModel, materials: HomeMaterials
 ) -> PieceMaterial | None:
-    """The material of one mesh, or None if the home makes it invisible."""
+    """The material of one mesh of a piece, and how its texture lies; None if the home makes it invisible.
+
+    The home's material of the same name goes before the piece's colour or texture, and both before the
+    model's. What lets light through is a pane in doors and windows, glass elsewhere.
+    """
     base = model.materials.get(mesh.material) or ObjMaterial(mesh.material or "default")
     role = mesh.group
     paint = dict(piece.materials).get(mesh.material, Paint())

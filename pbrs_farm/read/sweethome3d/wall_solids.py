@@ -31,7 +31,11 @@ def wall_items(
     materials: HomeMaterials,
     house_level: dict[str, str],
 ) -> list[Item]:
-    """An item for each wall of a visible level, each followed by its baseboards."""
+    """An item for each wall of a visible level, each followed by its baseboards.
+
+    Solids are closed, mitred with their neighbours and without holes. outlines: by wall id; house_level:
+    the home's level id -> the house's.
+    """
     items: list[Item] = []
     widened = outlines_of(tuple(_with_baseboards(w) for w in plan.walls))
     for wall in plan.walls:

@@ -10,7 +10,11 @@ FULL_CUT_OUT = "M0,0 v1 h1 v-1 z"  # the unit square: the whole opening
 
 
 def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
-    """One piece; level: of the piece or of the group that holds it, group: that group's name."""
+    """One piece of furniture, door, window, light or shelf unit, by its XML element.
+
+    level: id of its level, or of the group's that holds it. group: the group's name, "" for none. Raises
+    BadHouse naming the element.
+    """
     element = a.element
     return PlanPiece(
         tag=element.tag,

@@ -28,7 +28,11 @@ FALLBACK_HEIGHT_M = 2.5  # of walls and levels that tell none
 
 
 def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
-    """Read every element the pipeline uses; BadHouse names the element that is wrong."""
+    """Every element of a home's XML that the pipeline uses, as values in metres and radians.
+
+    max_extent_m: the largest coordinate that is taken (read.max_extent_m). Raises BadHouse naming the
+    element that is wrong.
+    """
     home = Attributes(file, "home", root, max_extent_m)
     # Bound the work before any element is read.
     for tag, most in (
