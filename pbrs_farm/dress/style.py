@@ -73,7 +73,10 @@ class Metal:
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """One home's taste. Surfaces, furniture, textiles and pictures draw their colours from it."""
+    """One home's taste: what surfaces, furniture, textiles and pictures draw their colours from.
+
+    Colours are sRGB-encoded, 0..1. Draw one by style_for; room_style may give a room another one.
+    """
 
     name: str
     palette: Palette  # wall, second wall, accent wall, large, small things

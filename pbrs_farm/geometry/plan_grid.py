@@ -20,7 +20,14 @@ Ints = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanGrid:
-    """Square cells over a piece of plan; rows run along its own +z (the front), columns along +x."""
+    """Square cells over a piece of plan; rows run along its own +z (the front), columns along +x.
+
+    Cell (row, column) covers the plan from (column, row) * cell_m to the next, in the grid's own axes,
+    which are the world's x and z turned by turn_rad about +y. Only plan: heights are the world's.
+
+        grid = PlanGrid.around(points, turn_rad=0.0, cell_m=0.01, border_m=0.05)
+        heights = top_heights(grid, corners)  # (rows, columns) metres, -inf = nothing there
+    """
 
     origin: F64  # (2,) world (x, z) of the corner of cell (0, 0)
     turn_rad: float  # of its axes about +y

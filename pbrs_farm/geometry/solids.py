@@ -34,7 +34,11 @@ def boxes_surface(name: str, boxes: Sequence[tuple[Triple, Triple]], material: i
 
 
 def quads_surface(name: str, quads: F64, material: int) -> Surface:
-    """A surface of (N, 4, 3) planar quads, corners counter-clockwise, uv in metres from corner 0."""
+    """A surface of planar quads, two triangles each.
+
+    quads: (N, 4, 3) metres, corners counter-clockwise seen from outside. uv: metres from corner 0, u along
+    the first edge. Vertices are not shared between quads.
+    """
     quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
     # Lay u along the first edge, v at right angles to it in the quad's plane.
     u = quads[:, 1] - quads[:, 0]
@@ -72,7 +76,11 @@ def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:
 
 
 def box(name: str, centre: F64, half: F64, material: int, *, axes: F64 | None = None) -> Surface:
-    """A closed oriented box; centre, half extents (3,) in metres."""
+    """A closed oriented box as a surface of 24 vertices, so that edges are sharp.
+
+    centre, half: (3,) middle and half extents in metres. axes: (3, 3), columns are the box's unit,
+    right-handed axes; the world's by default. uv in metres on each side.
+    """
     return quads_surface(name, box_quads(centre, half, axes), material)
 
 
@@ -114,7 +122,10 @@ def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -
 
 
 def sphere(name: str, centre: F64, radius: float, material: int, *, n: int = 16) -> Surface:
-    """A closed sphere of n segments around, radius in metres."""
+    """A closed sphere with smooth normals, n segments around; radius in metres.
+
+    Flat sides lie within the sphere: its volume is a little less than a true one's.
+    """
     angles = np.linspace(-np.pi / 2, np.pi / 2, n // 2 + 1)
     profile = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
     profile[[0, -1], 0] = 0.0

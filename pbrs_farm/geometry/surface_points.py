@@ -21,7 +21,10 @@ _SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 
 
 def item_triangles(item: Item) -> F64:
-    """(F, 3, 3) corners of all triangles of an item that are finite, metres."""
+    """(F, 3, 3) float64 corners of an item's triangles in the world, metres; empty for none.
+
+    Triangles with a corner that is not finite are left out.
+    """
     parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
     return finite_triangles(np.concatenate([np.zeros((0, 3, 3)), *parts]))
 

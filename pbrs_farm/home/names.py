@@ -33,5 +33,8 @@ def words_of(name: str) -> frozenset[str]:
 
 
 def words_of_item(item: Item) -> frozenset[str]:
-    """Words of what an item is called and of its class in the source: "Woven basket" has no oven."""
+    """Words of what an item is called and of its class in the source, folded, with singulars.
+
+    Whole words: "Woven basket" has no oven.
+    """
     return words_of(f"{item.name} {item.source_class}")

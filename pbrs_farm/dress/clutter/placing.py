@@ -1,4 +1,4 @@
-"""What small things stand on and come from, and how they get there; effects: changes the house."""
+"""Puts small things into a room, on worktops or at given places. Effects: changes the house."""
 
 from __future__ import annotations
 
@@ -62,7 +62,11 @@ def _connected_part_of_vertices(surface: Surface) -> NDArray[np.int64]:
 
 @dataclass(slots=True)
 class Placing:
-    """What is needed to put things into one room."""
+    """A room while small things are put into it, and what they are drawn from; state: what was put.
+
+    `drop` and `drop_near` find a free place on a worktop, `put` takes a place that the caller knows to
+    be free. All draw from `rng`, so their order is part of the result.
+    """
 
     house: MutableHouse
     stock: Stock
@@ -78,7 +82,7 @@ class Placing:
     )  # triangles of what fell here: cloth lies on cloth
 
     def put(self, made: Made, at: F64, turn_rad: float) -> None:
-        """Add the thing with the middle of its base at (3,), turned about +y."""
+        """Add the thing with the middle of its base at (3,) world metres, turned about +y; unchecked."""
         piece, shape = made
         low, high = shape.bounds
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])

@@ -57,9 +57,12 @@ class _Memory:
 def keep_gates(
     house: MutableHouse, pieces: Mapping[str, Piece], names: Sequence[str] = _NAMES
 ) -> tuple[Gate, ...]:
-    """Take out of the house what breaks a gate, until nothing does. pieces: by id; names: of gates.
+    """Take out of the house what breaks a gate, until nothing does; the gates with what they counted.
 
-    What an earlier call measured of items that are still the same is not measured again.
+    Only what dressing added or replaced is taken out: added things go, replaced things of the source
+    come back. Each removal may unhold others, so all are measured again, 12 rounds at most. pieces: the
+    catalogue's and generated ones by id, which say how a thing is held. names: of the gates to keep.
+    What an earlier call measured of items that are still the same objects is not measured again.
     """
     memory = house.kept.get("gates")
     if not isinstance(memory, _Memory):

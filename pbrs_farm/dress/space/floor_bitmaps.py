@@ -40,7 +40,11 @@ class FloorBitmap:
 def floor_bitmap(
     space: HouseSpace, room: RoomSpace, *, without: Collection[int] = ()
 ) -> FloorBitmap:
-    """The room's floor; without: numbers of items that are not counted."""
+    """The room's floor in cells of 5 cm: what is inside, what is occupied, which ways are left.
+
+    A cell is occupied where a thing has a point between 8 cm and 1.8 m above the floor; ways are where
+    someone 0.6 m wide can walk. without: numbers of items that are not counted.
+    """
     x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
     grid = FloorGrid.over(x0, z0, x1, z1)
     xx, zz = grid.middles
@@ -67,7 +71,10 @@ def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> Floo
 
 
 def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
-    """Whether one way leads to every door of the room; True with fewer than two doors."""
+    """Whether one way leads to every door of the room; True with fewer than two doors.
+
+    Ask before and after a thing is put (`with_body`): only a way that was there can be closed.
+    """
     common: set[int] | None = None
     doors = [(d, s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
     if len(doors) < 2:

@@ -37,7 +37,7 @@ _STRUCTURE = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomSpace:
-    """A room, what is in it and round it."""
+    """A room, what is in it and round it, in world metres; numbers are places in MutableHouse.items."""
 
     room: Room
     kind: RoomKind
@@ -56,7 +56,11 @@ class RoomSpace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HouseSpace:
-    """The home's rooms in its order, its doors and windows, and points on every item's surface."""
+    """The home's rooms in its order, its doors and windows, and points on every item's surface.
+
+    `points` stand for surfaces: no place of a surface is farther than about 2 cm from one. A value: it
+    does not follow later changes of the house.
+    """
 
     rooms: tuple[RoomSpace, ...]
     passages: tuple[Passage, ...]
@@ -109,7 +113,16 @@ class _KeptSpaces:
 
 
 def house_space(house: MutableHouse) -> HouseSpace:
-    """The space of the house as it is now; what did not change since the last call is kept."""
+    """The rooms of a house as they are now: wall faces, doors, windows, what stands in them.
+
+    Call it again after each change of house.items: it compares items by identity, and computes anew
+    only what concerns those that changed. Never keep its value over a change. Where wall faces are not
+    needed, floor_space costs less.
+
+        space = house_space(house)
+        room = space.room("0_1")
+        is_free = space.is_free(low, high)  # a box (3,), (3,) of the world, metres
+    """
     kept = house.kept.get("space")
     if not isinstance(kept, _KeptSpaces):
         kept = house.kept["space"] = _empty_house(house)

@@ -114,7 +114,16 @@ def size_of(pattern: Pattern) -> tuple[float, float]:
 
 
 def pattern_material(house: MutableHouse, pattern: Pattern) -> PatternMaterial:
-    """The pattern as a material of the house, made once and painted by a thread meanwhile."""
+    """The pattern as a material of the house; equal patterns give the same number.
+
+    A thread paints it meanwhile: reading `mean_rgb` waits for it. Map surfaces in repeats of `size_m`.
+
+        veneer = pattern_material(house, Pattern("grain", seed=7, wood=WOODS["oak"]))
+        mapped = box_mapped(surface, axes, veneer.size_m)
+        surface = replace(mapped, material=veneer.number)
+
+    KeyError for an unknown family.
+    """
     key = f"pattern {pattern!r}"
     kept = house.kept.get(key)
     if isinstance(kept, PatternMaterial):
@@ -136,7 +145,10 @@ def _paint_pattern(pattern: Pattern) -> Painted:
 
 
 def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:
-    """The pattern, or a picture of the catalogue in its place, by its family and seed."""
+    """The pattern, or a photograph of the catalogue in its place, drawn by its family and seed.
+
+    With n photographs that fit, one is shown with probability n / (n + 12).
+    """
     found = photograph_for(house, catalogue, pattern.family, pattern.seed)
     return replace(pattern, photograph=found) if found else pattern
 

@@ -55,7 +55,11 @@ IN_FRONT_M = 0.35  # free depth before a picture, so that it is seen
 
 @dataclass
 class Hanging:
-    """A room's wall faces, with what this part has hung taken out of them."""
+    """A room's wall faces, without what was hung there; state: the faces, and the house gets the items.
+
+    part: the pass that hangs, for ids and the report. Faces are cut where leaves of doors swing and
+    over stairs. `WallFace.starts` of a face says where a thing of a size fits; `hang` puts it there.
+    """
 
     house: MutableHouse
     room: RoomSpace
@@ -80,7 +84,11 @@ class Hanging:
         self, piece: Piece, shape: Shape, face: int, s: float, low_y: float, *,
         tags: tuple[str, ...] = (), margin_m: float = 0.05,
     ) -> Item:  # fmt: skip
-        """Hang a piece with the middle of its lower edge at s on faces[face], and take its place."""
+        """Hang a piece on faces[face] and take its place; the item.
+
+        s: metres along the face, of the middle of its lower edge. low_y: world y of that edge. margin_m:
+        around it, that nothing else may hang in. Nothing is checked: ask `WallFace.starts` before.
+        """
         wall = self.faces[face]
         low, high = shape.bounds
         out = GAP_M - wall.recess_m(s + float(low[0]), s + float(high[0]))
@@ -134,7 +142,7 @@ def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]])
 
 
 def next_id(house: MutableHouse, part: str) -> str:
-    """A new id `dress-<part>-<n>`."""
+    """A new id `dress-<pass>-<n>`."""
     n = house.kept.get(f"number of {part}", 0)
     assert isinstance(n, int)
     house.kept[f"number of {part}"] = n + 1
