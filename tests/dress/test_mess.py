@@ -15,7 +15,15 @@ from pbrs_farm.core.mesh import edges_are_paired, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.clutter.cloths import drop_clothes
-from pbrs_farm.dress.clutter.drapes import CELL_M, Folds, Ground, fallen, flat_net, folded, sheet_of
+from pbrs_farm.dress.clutter.drapes import (
+    CELL_M,
+    Folds,
+    Ground,
+    add_folds,
+    drop_net,
+    flat_net,
+    sheet_of,
+)
 from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import Stock
 from pbrs_farm.dress.gates import keep_gates
@@ -142,8 +150,8 @@ def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters
     ground = Ground.of(grid, corners, 0.0, 1.0, thick)
     net, threads = flat_net((1.2, 1.0), 0.06, (0.6, 0.6, 1.5), 0.1)
     made = [
-        folded(
-            fallen(net, threads, ground, thick),
+        add_folds(
+            drop_net(net, threads, ground, thick),
             ground,
             thick,
             Folds(9, 0.03, 0.04, (0.2, 0.6)),

@@ -16,9 +16,9 @@ from pbrs_farm.dress.clutter.drapes import (
     TOUCH_M,
     Folds,
     Ground,
-    fallen,
+    add_folds,
+    drop_net,
     flat_net,
-    folded,
     sheet_of,
 )
 from pbrs_farm.dress.clutter.placing import Placing
@@ -69,7 +69,7 @@ def lay_duvet(
         size, _THREADS_M["duvet"], middle, float(rng.normal(0, 0.015 + 0.05 * mess))
     )
     folds = Folds(int(6 + 26 * mess), 0.018 + 0.03 * mess, 0.05, (0.3, 1.0))
-    net = folded(fallen(net, threads, ground, _DUVET_M), ground, _DUVET_M, folds, rng)
+    net = add_folds(drop_net(net, threads, ground, _DUVET_M), ground, _DUVET_M, folds, rng)
     tint = mix(
         _LINEN, placing.style.textiles[int(rng.integers(4))], float(rng.choice([0.0, 0.25, 0.6]))
     )
@@ -90,7 +90,7 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
     size = (min(1.3, 0.8 * across), min(0.9, 0.6 * across))
     net, threads = flat_net(size, _THREADS_M["throw"], (x, float(high[1]) + 0.05, z), 0.0)
     folds = Folds(10, 0.03, 0.03, (0.2, 0.7))
-    net = folded(fallen(net, threads, ground, 0.008), ground, 0.008, folds, rng)
+    net = add_folds(drop_net(net, threads, ground, 0.008), ground, 0.008, folds, rng)
     tint = style.textiles[int(rng.integers(len(style.textiles)))]
     _put_cloth(placing, "throw", net, ground, 0.008, plain("throw", tint, 1.0), OTHERPROP)
 
@@ -125,7 +125,7 @@ def drop_clothes(
         placing.refuse("clothes would hang on what rises beside them")
         return
     folds = Folds(16, 0.05 * factor, 0.028 * factor, (0.12 * factor, 0.4 * factor))
-    net = folded(fallen(net, threads, ground, 0.006), ground, 0.006, folds, rng)
+    net = add_folds(drop_net(net, threads, ground, 0.006), ground, 0.006, folds, rng)
     r, g, b = (float(c) for c in rng.random(3))
     tint = mix((r, g, b), style.textiles[int(rng.integers(4))], 0.5)
     tint = mix(tint, _LINEN, 0.7 if napkin else 0.0)

@@ -81,7 +81,7 @@ class Folds:
     length_m: tuple[float, float]
 
 
-def fallen(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: float) -> F64:
+def drop_net(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: float) -> F64:
     """The net (R, C, 3) of vertices after it fell, with twice the resolution (2 R - 1, 2 C - 1, 3).
 
     net: metres in the ground's frame. thread_m: rest lengths along rows and columns. Verlet steps with
@@ -173,7 +173,9 @@ def _pull_slants(at: F64, length: float) -> None:
             second[:n] -= step
 
 
-def folded(net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator) -> F64:
+def add_folds(
+    net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator
+) -> F64:
     """The net with random ridges, as of cloth that nobody smoothed; no vertex sinks into the ground."""
     size = np.array([_length(net, 0), _length(net, 1)])
     v, u = np.meshgrid(

@@ -151,7 +151,7 @@ def _depth_of_walls(
     most = float(lengths.max())
     if most < _LEAST_COVERED * (s1 - s0):
         return None
-    runs = _stretches(lengths >= _COVERED * most, round(_SAME_WALL_M / _STEP_M))
+    runs = _runs_of_true(lengths >= _COVERED * most, round(_SAME_WALL_M / _STEP_M))
     first, last = max(runs, key=lambda r: float(lengths[r[0] : r[1]].sum()))
     # The wall's faces themselves, not the lines that met it.
     low, high = float(offsets[first]) - _STEP_M, float(offsets[last - 1]) + _STEP_M
@@ -160,7 +160,7 @@ def _depth_of_walls(
     return float(depths.min()), float(depths.max())
 
 
-def _stretches(found: Bools, gap: int) -> list[tuple[int, int]]:
+def _runs_of_true(found: Bools, gap: int) -> list[tuple[int, int]]:
     """(first, end) of each stretch of True, those with at most so many False between joined."""
     runs: list[tuple[int, int]] = []
     for k in np.flatnonzero(found).tolist():
@@ -231,7 +231,7 @@ def _hole_between(
     solid = shapely.contains_xy(walls, places[..., 0], places[..., 1])
     gaps: dict[tuple[int, int], list[int]] = {}
     for row in range(len(tt)):
-        for first, end in _stretches(~solid[row], 0):
+        for first, end in _runs_of_true(~solid[row], 0):
             # It lies between two jambs, and the box reaches into it.
             is_closed = first > 0 and end < len(ss)
             is_met = ss[first] < s[1] and ss[end - 1] > s[0]

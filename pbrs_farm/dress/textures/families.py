@@ -28,7 +28,7 @@ from pbrs_farm.dress.textures.laid_tiles import (
     tile_grid,
     tile_maps,
 )
-from pbrs_farm.dress.textures.maps import SurfaceMaps, encoded
+from pbrs_farm.dress.textures.maps import SurfaceMaps, encode_maps
 from pbrs_farm.dress.textures.noise import Shape2
 from pbrs_farm.dress.textures.photographs import photograph_for, photograph_material
 from pbrs_farm.dress.textures.plain_surfaces import (
@@ -155,7 +155,7 @@ def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) ->
 
 def material_from_maps(maps: SurfaceMaps, name: str) -> tuple[Material, tuple[Texture, ...]]:
     """A material that shows the maps, and the textures it names."""
-    colour, rough, normal = encoded(maps, name)
+    colour, rough, normal = encode_maps(maps, name)
     # Keep the Phong lobe that matches, for who reads no roughness.
     alpha = max(maps.mean_roughness, 0.1) ** 2
     gloss = maps.gloss

@@ -99,7 +99,7 @@ def texture_from_pixels(name: str, pixels: Srgb8Image, quality: int) -> Texture:
     return Texture(hashlib.sha256(data).hexdigest()[:16], name, "image/jpeg", data)
 
 
-def encoded(maps: SurfaceMaps, name: str) -> tuple[Texture, Texture | None, Texture | None]:
+def encode_maps(maps: SurfaceMaps, name: str) -> tuple[Texture, Texture | None, Texture | None]:
     """Colour, roughness and normal map as textures; the last two None where there is none."""
     colour = texture_from_pixels(f"{name}.jpg", maps.colour, _COLOUR_QUALITY)
     rough = normal = None
