@@ -82,8 +82,8 @@ fi
 # The driver first: without it everything below would run on the CPU and say nothing.
 nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader ||
   fail 1 "no NVIDIA driver here (nvidia-smi fails)"
-for library in libnvoptix.so.1 libEGL.so.1 libEGL_nvidia.so.0; do
-  ldconfig -p | grep -q "$library" || echo "gpu_check: no $library here: light needs OptiX, OpenGL needs EGL" >&2
+for library in libnvoptix.so.1 libGL.so.1 libEGL.so.1 libEGL_nvidia.so.0; do
+  ldconfig -p | grep -q "$library" || echo "gpu_check: no $library here: light needs libnvoptix, OpenGL the others (Debian: libgl1 libegl1)" >&2
 done
 
 if [ -n "${1:-}" ]; then
