@@ -71,7 +71,11 @@ def png_from_array(
 
 
 def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
-    """JPEG bytes of (H, W) or (H, W, 3) uint8 sRGB; quality 1..100."""
+    """JPEG bytes of (H, W) or (H, W, 3) uint8 sRGB; quality 1..100.
+
+    For pictures people look at: it loses a little, so never for labels. Equal arrays give equal
+    bytes on one machine. Raises ValueError for another shape or type.
+    """
     channels = _channels(array, (1, 3))
     if array.dtype != np.uint8:
         raise ValueError(f"a JPEG holds uint8, got {array.dtype}")
@@ -83,7 +87,10 @@ def jpeg_from_array(array: NDArray[np.uint8], quality: int = 85) -> bytes:
 def thumbnail(
     array: NDArray[np.uint8], *, max_edge_px: int, nearest: bool = False
 ) -> NDArray[np.uint8]:
-    """array, (H, W) or (H, W, C) uint8, with its longer edge at most max_edge_px; same form."""
+    """array, (H, W) or (H, W, C) uint8, with its longer edge at most max_edge_px; same form.
+
+    Never enlarges. nearest: keep values instead of averaging them, for labels and their colours.
+    """
     height, width = array.shape[:2]
     scale = min(1.0, max_edge_px / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
@@ -93,7 +100,11 @@ def thumbnail(
 def resized(
     array: NDArray[np.uint8], width_px: int, height_px: int, *, nearest: bool = False
 ) -> NDArray[np.uint8]:
-    """array, (H, W) or (H, W, C) uint8, on another grid: a box filter, or the nearest pixel."""
+    """array, (H, W) or (H, W, C) uint8, on a grid of width_px x height_px.
+
+    By a box filter: averages when it shrinks, repeats when it enlarges. nearest: the pixel whose
+    centre is nearest, so that labels keep their values. Sides may change their ratio.
+    """
     height, width = array.shape[:2]
     if (height, width) == (height_px, width_px):
         return array
@@ -139,7 +150,11 @@ def exr_from_layers(
 
 
 def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
-    """Channel name -> (H, W) float32 of an OpenEXR file; BadInput if it cannot be read."""
+    """Channel name -> (H, W) float32 of an OpenEXR file.
+
+    Half floats become float32. Channels are found by name ("outdoor.R"); OpenEXR sorts them, so
+    never go by their place. Raises BadInput naming the file for anything else, or a damaged one.
+    """
     if _kind(data, name) != ".exr":
         raise BadInput(name, "", "not an OpenEXR file")
     pixels, spec = _decoded(data, name, ".exr", "float")
@@ -151,7 +166,12 @@ def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
 def array_from_png(
     data: bytes, name: str = "picture.png"
 ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-    """(H, W) or (H, W, C) uint8 or uint16 as the PNG stores it; BadInput if it cannot be read."""
+    """The pixels as the PNG stores them: (H, W) or (H, W, C), uint8 or uint16.
+
+    16 bits stay 16, no colour space is converted and alpha is not multiplied in: this reads labels.
+    For pictures that are to be looked at or used as textures take decode_photo or decode_texture.
+    name: for messages. Raises BadInput for what is no PNG, is damaged or is above MAX_FILE_PIXELS.
+    """
     if _kind(data, name) != ".png":
         raise BadInput(name, "", "not a PNG file")
     pixels, _spec = _decoded(data, name, ".png", "unknown")
@@ -161,7 +181,10 @@ def array_from_png(
 
 
 def decode_photo(data: bytes, name: str) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8 sRGB of a PNG, JPEG, GIF, BMP or TGA; alpha is dropped. Raises BadInput."""
+    """(H, W, 3) uint8 sRGB of a PNG, JPEG, GIF, BMP or TGA; alpha is dropped.
+
+    As decode_texture reads it: 16 bits become 8, grey is repeated. Raises BadInput naming name.
+    """
     return decode_texture(data, name)[..., :3]
 
 

@@ -65,7 +65,13 @@ def judge(
     columns: NDArray[np.int64],
     scene: tuple[Triangles, Rays],
 ) -> PixelChecks:
-    """Compare labels at pixels (rows, columns) with rays through the scene."""
+    """Compare labels at pixels (rows, columns) with rays through the scene.
+
+    labels: layer -> (N,) or (N, 3) stored values, of RAY_LAYERS. rows, columns: (N,). Where the ray
+    through a centre does not explain what is stored, eight rays beside it and coincident surfaces
+    are tried; the result says which checks hold by the triangle that explains most, and where that
+    was a tie.
+    """
     # Explain what is stored by the triangle that the centre's ray hits.
     _, rays = scene
     origin, directions = view.rays(rows, columns)

@@ -19,7 +19,11 @@ class BadFile(ValueError):
 
 
 def stored_bytes(file: Path) -> bytes:
-    """The file's bytes; raises BadFile."""
+    """The file's bytes.
+
+    Raises BadFile, whose text says why, for what is missing, no regular file, or above MAX_BYTES: a
+    stranger may have put it there.
+    """
     try:
         return read_regular(file, MAX_BYTES)
     except OSError as error:

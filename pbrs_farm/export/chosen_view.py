@@ -189,14 +189,20 @@ class ChosenView:
 
 
 def intrinsics_of(facts: dict[str, Any]) -> Intrinsics:
-    """Size, K and lens of a view's camera."""
+    """Size, K and lens of a view's camera, from view.json.
+
+    Its `directions` gives the rays of pixels through any lens.
+    """
     (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
     lens = lens_from_table(facts["lens"]) if "lens" in facts else PINHOLE
     return Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy, lens)
 
 
 def require_lens(view: ChosenView, form: str, *models: str) -> None:
-    """BadInput for a view through a lens that the form has no words for; models: those it has."""
+    """Raise BadInput for a view through a lens that a form has no words for.
+
+    form: its name, for the message. models: lens models it knows beside "pinhole".
+    """
     model = view.facts.get("lens", {}).get("model", "pinhole")
     if model not in ("pinhole", *models):
         what = f"lens.model {model}: this form knows {', '.join(('pinhole', *models))}"

@@ -158,7 +158,12 @@ class ExportedHome:
 
 
 def exported_home(house: House) -> ExportedHome:
-    """The home in the frames of its items, without what lies before its windows."""
+    """The home in the frames of its items, without what lies before its windows.
+
+    Each item becomes a piece: its meshes in a frame of its own, a name that is unique and that files
+    can have, lamps in lumen, and whether it stands still. Collision parts, masses and the walkable
+    floor are computed when they are asked for.
+    """
     house = replace(house, items=tuple(item for item in house.items if not item.is_outside))
     names = _unique_names(house.items)
     bounds = np.array([item.bounds for item in house.items]).reshape(-1, 2, 3)

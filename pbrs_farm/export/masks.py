@@ -21,7 +21,11 @@ def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
 
 
 def compressed_runs(mask: NDArray[np.bool_]) -> dict[str, list[int] | str]:
-    """COCO's compressed run lengths: counts as text, as pycocotools and every reader take them."""
+    """COCO's compressed run lengths of mask (H, W) bool: counts as text, as pycocotools reads them.
+
+    Of run_lengths, each count from the fourth on is its difference from the last but one, in digits
+    of 5 bits (maskApi.c).
+    """
     runs = run_lengths(mask)
     counts, text = runs["counts"], []
     for k, count in enumerate(counts):

@@ -58,7 +58,11 @@ def plural(noun: str) -> str:
 
 
 def counted(n: int, noun: str) -> str:
-    """ "a chair", "an armchair", "three chairs"."""
+    """A number and a noun in words.
+
+    >>> [counted(n, "armchair") for n in (1, 3)]
+    ['an armchair', 'three armchairs']
+    """
     if n == 1:
         return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
     return f"{_NUMBERS[n] if n < len(_NUMBERS) else n} {plural(noun)}"

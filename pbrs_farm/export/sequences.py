@@ -27,7 +27,10 @@ class SequenceFrame:
 
 
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
-    """House id -> its frames by number, then the views that are none by id; right views by their left."""
+    """House id -> its moments: frames by number, then views that are no frames by id.
+
+    Right views of stereo pairs are put beside their left; a right view alone is left out.
+    """
     rights = {(v.house.id, v.facts["left"]): v for v in views if v.facts.get("left")}
     frames: dict[str, list[SequenceFrame]] = {}
     for view in views:
@@ -42,7 +45,10 @@ def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame
 
 
 def pose_opencv(view: ChosenView) -> F64:
-    """(4, 4) world from camera, axes x right, y down, z forward."""
+    """(4, 4) float64 world_from_camera, camera axes x right, y down, z forward.
+
+    Metres, world y up: p_world = pose @ p_camera.
+    """
     return np.array(view.facts["world_from_camera_opencv"], np.float64)
 
 

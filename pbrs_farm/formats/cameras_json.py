@@ -73,7 +73,10 @@ def _view_from_json(row: dict[str, Any]) -> View:
 
 
 def views_from_json(data: bytes, key: str) -> dict[str, View]:
-    """View id -> view of a cameras.json, in its order; BadInput names the key."""
+    """View id -> view of a cameras.json, in its order.
+
+    Raises BadInput, naming the key, for a file that is damaged or that another version wrote.
+    """
     try:
         return {v["id"]: _view_from_json(v) for v in json.loads(data)["views"]}
     except (KeyError, TypeError, ValueError) as error:

@@ -121,7 +121,11 @@ def _little(array: NDArray[Any], dtype: str) -> bytes:
 
 
 def gltf_from_glb(data: bytes, file: str) -> Gltf:
-    """Document and binary chunk of a GLB; BadHouse if it is damaged or no glTF 2.0."""
+    """Document and binary chunk of a GLB.
+
+    Accessors are not looked at yet: Gltf reads them when asked. file: for messages. Raises BadHouse
+    where it is damaged, cut short or no glTF 2.0.
+    """
     # Header: magic, version, length of the file.
     if len(data) < 20 or data[:4] != _MAGIC:
         raise BadHouse(file, "", "is no GLB file")

@@ -15,7 +15,11 @@ from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, p
 
 
 def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
-    """The file of layer name: (H, W) or (H, W, 3). attribution: the file's copyright."""
+    """The file of a layer: PNG or EXR, as its row in core/layers.py says.
+
+    array: (H, W) or (H, W, C) in the row's type. attribution: the file's copyright. Equal arrays
+    give equal bytes.
+    """
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return png_from_array(array, attribution=attribution)
@@ -28,7 +32,10 @@ def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
 
 
 def layer_from_bytes(name: str, data: bytes, place: str) -> NDArray[Any]:
-    """The array that layer_bytes wrote; BadInput names place when data is no such file."""
+    """The array that layer_bytes wrote: (H, W) or (H, W, C), in the type of the layer's row.
+
+    Half floats come as float32. place: for messages. Raises BadInput where data is no such file.
+    """
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return array_from_png(data, place)

@@ -45,7 +45,11 @@ class Marker(Record):
 
 
 def read_marker(store: Store, key: str) -> Marker | None:
-    """The marker at key, None if there is none. Raises StoreFailed when it is damaged."""
+    """The marker at key, None if there is none: the step is not done.
+
+    The marker says which files a step wrote, with digests. Raises StoreFailed when it is damaged,
+    which is not the same as absent.
+    """
     data = get_or_none(store, key)
     try:
         return None if data is None else Marker.model_validate_json(data)

@@ -50,7 +50,11 @@ def _list_from_array(value: Any) -> Any:
 
 
 def json_bytes(value: Any) -> bytes:
-    """Readable JSON, keys sorted: equal values give equal bytes. value: a model or JSON values."""
+    """Readable JSON, keys sorted, a newline at the end: equal values give equal bytes.
+
+    value: a pydantic model, or JSON values (dicts, lists, numbers, text). Floats are written so that
+    they read back to the same bits. For digests take keys.canonical_json, which has no spaces.
+    """
     if isinstance(value, BaseModel):
         value = value.model_dump(mode="json")
     return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode(

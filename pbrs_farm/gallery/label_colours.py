@@ -50,7 +50,10 @@ def depth_colours(
 
 
 def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) colours of NYU40 ids; an id above 40 is shown as none."""
+    """(H, W, 3) uint8 colours of NYU40 ids (H, W); an id above 40 is shown as none.
+
+    NYU40_COLOURS of core/classes.py, which dataset.json and COCO's categories have, too.
+    """
     return NYU40_COLOURS[np.where(nyu40 > 40, 0, nyu40)]
 
 

@@ -38,7 +38,12 @@ class Done:
 def make_homes(
     homes: Sequence[MadeHome], folder: Path, programme: Programme | None = None, *, n_jobs: int = 1
 ) -> Iterator[Done]:
-    """Write <name>.sh3d and <name>.svg of each home, and plans.html at the end; tells of each."""
+    """Write <name>.sh3d and <name>.svg of each home into folder, and plans.html at the end.
+
+    homes: seeds and families. programme: what a home must have, None for the family's own. n_jobs:
+    processes. Yields what became of each home: written, there already, or `fault`, why it could not
+    be made; one that fails does not stop the others.
+    """
     one = partial(_make, folder, programme)
     # The page of plans is written even where a run is cut short.
     try:

@@ -90,7 +90,11 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
 
 
 def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generic]:
-    """(..., n_bins) sums of neighbouring depth bins; ValueError if n_bins does not divide them."""
+    """(..., n_bins) sums of neighbouring depth bins of counts (..., bins).
+
+    Exact: a coarser histogram is what counting at the coarser bins gives. Raises ValueError where
+    n_bins does not divide the number of bins.
+    """
     if counts.shape[-1] % n_bins:
         raise ValueError(f"{counts.shape[-1]} depth bins cannot be summed to {n_bins}")
     if n_bins == counts.shape[-1]:
@@ -100,7 +104,10 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
 
 
 def normalised(counts: NDArray[np.generic]) -> F32:
-    """(..., bins) float32 shares that sum to 1; all zero where nothing was counted."""
+    """(..., bins) float32 shares of counts, that sum to 1 over the last axis.
+
+    All zero where nothing was counted, so that an empty histogram resembles none.
+    """
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
     total[total == 0] = 1.0  # nothing counted: shares of 0
     return np.asarray(np.divide(counts, total, dtype=np.float32, casting="same_kind"))

@@ -112,7 +112,10 @@ def reference_from_histograms(
 
 
 def bytes_from_reference(reference: Reference) -> bytes:
-    """The reference file: equal references give equal bytes."""
+    """The reference file: a zip of .npy and JSON; equal references give equal bytes.
+
+    Read by reference_from_bytes. It has no clock and no paths of the machine that made it.
+    """
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         _add(archive, "reference.json", reference.facts.model_dump_json(indent=1).encode() + b"\n")

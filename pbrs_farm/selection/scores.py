@@ -130,7 +130,12 @@ class Scorer:
 def score(
     packs: Iterable[HistogramPack], reference: Reference, *, library: str | None = None
 ) -> Any:
-    """One score table (SCORES) of the packs, sorted by house and view; see Scorer."""
+    """One score table (SCORES) of the packs, sorted by house and view.
+
+    packs: histograms of houses, read one by one. reference: what photographs look like. library:
+    "faiss" or "numpy" for the search, None for faiss where it is installed; scores are the same.
+    Tables of parts may be computed apart and merged (Scorer).
+    """
     return merged(*Scorer(reference, library=library).score_all(packs))
 
 

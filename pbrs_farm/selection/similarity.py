@@ -20,7 +20,14 @@ _CACHE_BYTES: Final = 512 * 1024  # references that are searched at once
 
 
 def intersection(a: NDArray[np.floating], b: NDArray[np.floating]) -> F64:
-    """(...) sum over the last axis of bin-wise minima (paper section 3.3), in double precision."""
+    """Histogram intersection (paper section 3.3): the sum over bins of the smaller share.
+
+    a, b: (..., bins), broadcast against each other; of shares that sum to 1 it is 1 for equal
+    histograms and 0 for disjoint ones. The result (...) is in double precision.
+
+        >>> intersection(np.array([0.5, 0.5]), np.array([1.0, 0.0]))
+        array(0.5)
+    """
     return np.asarray(np.minimum(a, b).sum(axis=-1, dtype=np.float64))
 
 

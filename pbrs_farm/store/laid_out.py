@@ -513,7 +513,11 @@ def _is_packed(data: bytes) -> bool:
 
 @contextmanager
 def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
-    """The store for the time of one task (LaidOutStore.task); any other as it is."""
+    """The store for the time of one task, whose writes are packed together (LaidOutStore.task).
+
+    reads_whole: the task needs labels and pictures of its view anyway, so packs are fetched whole.
+    Any other kind of store is given back as it is. Use as a context manager.
+    """
     if not isinstance(store, LaidOutStore):
         yield store
         return

@@ -77,7 +77,11 @@ class Store(Protocol):
 
 
 def get_or_none(store: Store, key: str) -> bytes | None:
-    """The object's bytes, None if there is none: one question, not two. Raises as get otherwise."""
+    """The object's bytes, None if there is none: one request, not two.
+
+    Prefer it to `head` and `get`: between the two another process may remove the object. Raises
+    StoreFailed as `get` for everything but a missing object.
+    """
     try:
         return store.get(key)
     except ObjectMissing:
@@ -104,7 +108,11 @@ def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) 
 
 
 def check_key(key: str) -> str:
-    """key itself; raises StoreFailed when it could name anything outside the store."""
+    """key itself; raises StoreFailed when it could name anything outside the store.
+
+    Refused: empty segments, `..`, a leading dot or slash, characters that a shell or a URL takes
+    amiss, and lengths that S3 or a file system does not hold.
+    """
     segments = key.split("/")
     # Refuse empty segments, "." and "..", as well as names too long for S3 or a disk.
     if not key or len(key) > _MAX_KEY or any(not _is_segment(s) for s in segments):
@@ -122,7 +130,10 @@ def check_prefix(prefix: str) -> str:
 
 
 def content_type(key: str) -> str:
-    """The content type by the key's ending."""
+    """The MIME type by the key's ending; application/octet-stream for one that is unknown.
+
+    Browsers and S3 consoles show an object by it.
+    """
     return CONTENT_TYPES.get(key.rpartition(".")[2], "application/octet-stream")
 
 

@@ -98,7 +98,11 @@ def house_folder(house: str) -> str:
 
 
 def pack_key(house: str, view: str, group: str) -> str:
-    """The object that holds what a group of steps, or a step, made of a view."""
+    """The object that holds what a group of steps, or a step, made of a view.
+
+    group: a key of GROUPS ("labels", "light", "pictures"), or the name of a step that is written
+    alone.
+    """
     return f"{house_folder(house)}packs/{group}.{view}.tar"
 
 

@@ -187,7 +187,13 @@ PLAN_NAMES: Final = tuple(dict.fromkeys(name for name, _ in PLANS))
 
 
 def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> TrainingPlan:
-    """The plan by name for a task, with fields set from text. Raises BadInput."""
+    """The plan by name for a task, with fields set from text as --set gives them.
+
+        >>> plan_of("normals", "tiny", {"steps": "10"}).steps
+        10
+
+    Raises BadInput for an unknown task, plan or field, and for a value that its field cannot hold.
+    """
     if task not in TASKS:
         raise BadInput("train", task, "no such task", hint=f"of {', '.join(TASKS)}")
     plan = PLANS.get((name, task))

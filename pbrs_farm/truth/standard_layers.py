@@ -94,18 +94,29 @@ def check_instances(house: House) -> None:
 
 
 def semantic_label(item: ItemBuffer, house: House) -> NDArray[np.uint8]:
-    """(H, W) uint8 NYU40 id of the item seen, 0 = nothing or an item without a class."""
+    """(H, W) uint8 NYU40 id of the item seen; 0 = nothing, or an item without a class.
+
+    item: (H, W) instance ids, which count house.items from 1.
+    """
     return nyu40_of_instance(house)[item]
 
 
 def instance_label(item: ItemBuffer, house: House) -> NDArray[np.uint16]:
-    """(H, W) uint16 instance id, 0 = nothing; raises BadHouse beyond 65,535 items."""
+    """(H, W) uint16 instance id, 0 = nothing.
+
+    An id is the item's place in house.items, from 1: the same in every view of the house. Raises
+    BadHouse beyond 65,535 items.
+    """
     check_instances(house)
     return item.astype(np.uint16)
 
 
 def layers_from_hit(hit: HitRecord, house: House, camera: Camera) -> dict[str, NDArray[Any]]:
-    """The layers of every view by name: depth, normal, valid, semantic, instance, boundary."""
+    """The layers that every view has, by name: depth, normal, valid, semantic, instance, boundary.
+
+    hit: one ray through each pixel's centre; all layers come from it, so that they agree in every
+    pixel. Arrays are (H, W) or (H, W, 3) as core/layers.py says. Optional layers: optional_layers.
+    """
     instance = instance_label(hit.item, house)
     return {
         "depth": depth_mm(hit.depth_z),

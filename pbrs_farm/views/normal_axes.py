@@ -27,7 +27,13 @@ def axes_from_published(axes: str) -> NDArray[np.float32]:
 
 
 def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
-    """(3, 3) matrix: n in the axes `to` = matrix @ n in the axes `of`."""
+    """(3, 3) matrix that turns directions: n in the axes `to` = matrix @ n in the axes `of`.
+
+    Names are those of AXES: "opencv", "opengl", "published".
+
+        >>> axes_from_axes("opengl", "opencv").diagonal().tolist()
+        [1.0, -1.0, -1.0]
+    """
     return axes_from_published(to) @ axes_from_published(of).T
 
 

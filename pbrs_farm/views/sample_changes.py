@@ -15,7 +15,11 @@ from pbrs_farm.views.view_sample import Sample
 
 
 def flipped(sample: Sample) -> Sample:
-    """The view in a mirror: left and right change places, normals turn x round, K's cx moves."""
+    """The view in a mirror: left and right change places in every array.
+
+    Normals turn their x round and K's cx moves, so that the sample is what a camera would see of
+    the mirrored room.
+    """
     width = sample.size[0]
     arrays: dict[str, Any] = {n: a[:, ::-1] for n, a in sample.arrays().items()}
     if sample.normal is not None:
@@ -69,7 +73,10 @@ def k_resized(
 
 
 def with_axes(sample: Sample, axes: str) -> Sample:
-    """The sample with its normals in the axes of that name."""
+    """The sample with its normals in the axes of that name; itself where they are already.
+
+    axes: "opencv", "opengl" or "published". Values are moved and negated, never rounded.
+    """
     if sample.normal is None or sample.axes == axes:
         return replace(sample, axes=axes)
     matrix = axes_from_axes(axes, sample.axes)

@@ -43,7 +43,11 @@ class HouseRow:
 
 
 def read_house(reader: RootReader, house: str) -> HouseRow:
-    """The house and its views; what is damaged is left out, the rest stands."""
+    """The house and its views, from the store.
+
+    What is damaged is left out and the rest stays, since a run may still be writing: the board
+    shows what there is.
+    """
     facts = reader.json_object(keys.house_key(house, "house.json"))
     source = facts.get("source")
     credit = source.get("attribution") if isinstance(source, dict) else ""

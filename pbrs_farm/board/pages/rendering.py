@@ -42,7 +42,10 @@ def environment(found: Mapping[str, Asset]) -> Environment:
 
 
 def page(request: Request, template: str, status: int = 200, **values: Any) -> HTMLResponse:
-    """The template filled with values and what every page shows."""
+    """The template filled with values and what every page shows (root, user, form word).
+
+    template: of board/templates; every value is escaped. status: of HTTP.
+    """
     board = request.app.state.board
     session = request.scope.get("session", "")
     common = {

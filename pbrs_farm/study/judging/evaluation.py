@@ -159,7 +159,11 @@ def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
 
 
 def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
-    """Judge the network and what needs no training."""
+    """Judge the network and what needs no training on the same views.
+
+    Beside the network stand the baseline (what the training views are on average) and, for
+    boundaries where its weights are installed, HED untouched. Figures are those of task.figures.
+    """
     rows = {"network": _judged(predictions_of(run, views), run, views)}
     still = (resized_nearest(run.baseline, width, height) for height, width in views.sizes)
     rows[run.figures["baseline_name"]] = _judged(still, run, views)
@@ -230,7 +234,11 @@ def _paper(run: Trained) -> PaperRow | None:
 
 
 def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
-    """What must be said with the table: underfit, and which truth and mask."""
+    """What must be said with the table, a line each.
+
+    Underfit networks, timing of both arithmetics, which truth and mask were used, thresholds, means
+    over homes with their interval, and that the paper's numbers are of other pictures.
+    """
     said = []
     stored = run.figures
     train, still = (run.task.error(stored[name]["train"]) for name in ("network", "baseline"))
@@ -269,7 +277,11 @@ def _said_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
 
 
 def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
-    """Everything of the table and more, as JSON."""
+    """Everything of the table and more, as JSON values: evaluation.json.
+
+    run, trained (figures at the end of training), evaluations (figures, groups and every view's
+    error), the paper's row and the notes.
+    """
     paper = _paper(run)
     return {
         "run": run.record,

@@ -58,7 +58,10 @@ def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:
-    """The nearest intrinsics file from a folder up to top and its parent; BadInput where there is none."""
+    """The camera of photographs in a folder: the nearest intrinsics file from it up to top's parent.
+
+    folder: where the pictures lie. Raises BadInput where there is none, or one that cannot be read.
+    """
     above = [folder, *folder.parents]
     last = above.index(top) if top in above else 0
     for place in above[: last + 1]:

@@ -35,7 +35,10 @@ _IMAGENET: Final = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
 
 
 def network_of(name: str, n_out: int) -> nn.Module:
-    """The network by name, weights drawn from torch's generator. Raises BadInput."""
+    """The network by name with n_out output channels, its weights drawn from torch's generator.
+
+    Seed torch first where weights must repeat. Raises BadInput, naming those there are.
+    """
     if name not in _NETWORKS:
         raise BadInput("network", name, "no such network", hint=f"of {', '.join(_NETWORKS)}")
     return _NETWORKS[name](n_out)
@@ -47,7 +50,10 @@ def n_weights(network: nn.Module) -> int:
 
 
 def encoded(colour: Tensor, encoding: str) -> Tensor:
-    """(B, 3, H, W) as the network wants it, of RGB 0..1 in the same form."""
+    """Colour as a network's pre-training expects it, of RGB 0..1 (B, 3, H, W); the same shape.
+
+    encoding: how the weights it starts from were trained, as TrainingPlan.encoding names it.
+    """
     if encoding == "centred":
         return colour - 128 / 255
     if encoding == "caffe":

@@ -43,7 +43,11 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
 
 
 def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
-    """(bottleneck features of x, skip connections from fine to coarse)."""
+    """Bottleneck features of x, and the skip connections from fine to coarse.
+
+    x: (B, C, H, W). Each stage sees its input averaged over 2x2 pixels (rounded up at an odd edge);
+    what it was given is kept at its own size for `decode`.
+    """
     skips: list[Tensor] = []
     for stage in stages:
         skips.append(x)
@@ -52,7 +56,11 @@ def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
 
 
 def decode(stages: nn.ModuleList, x: Tensor, skips: list[Tensor]) -> Tensor:
-    """Features at full size: each stage takes the one below, upsampled, and its skip connection."""
+    """Features at full size, of bottleneck features and the skip connections of `encode`.
+
+    Each stage takes the features below it, upsampled bilinearly to the size of its skip connection,
+    and that connection beside them.
+    """
     for stage, skip in zip(stages, reversed(skips), strict=True):
         size = skip.shape[-2:]
         x = functional.interpolate(x, size, mode="bilinear", align_corners=False)

@@ -98,7 +98,11 @@ def load_checkpoint(
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
-    """All tensors of a file, on the CPU, and the position it holds."""
+    """All tensors of a safetensors file, on the CPU, and the position it holds.
+
+    Raises BadInput where the file is missing, damaged or no checkpoint of ours. Nothing is executed:
+    safetensors holds no code.
+    """
     try:
         tensors, words = read_tensor_file(path)
         return tensors, Position(**json.loads(words["position"]))

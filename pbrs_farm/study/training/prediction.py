@@ -44,7 +44,10 @@ def device_of(plan: TrainingPlan) -> torch.device:
 
 
 def placed(network: nn.Module, plan: TrainingPlan) -> nn.Module:
-    """The network on the plan's device, in its memory format."""
+    """The network on the plan's device, in channels-last memory format.
+
+    The module itself is moved (as `nn.Module.to`) and returned.
+    """
     network = network.to(device_of(plan))
     return network.to(memory_format=torch.channels_last) if plan.channels_last else network
 
