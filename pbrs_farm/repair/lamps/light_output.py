@@ -154,7 +154,7 @@ def light_output_of_source(
         stopped = ~(out | bounced | through)
         np.add.at(blocked, part[stopped], weight[stopped])
         # Bounce diffusely what meets the front of structure at the lamp; what meets a back is in it.
-        directions[bounced] = _scatter(normals[bounced], rng)
+        directions[bounced] = _cosine_directions(normals[bounced], rng)
         weight = weight * np.where(bounced, _BOUNCE, transmission)
         going = through | bounced
         directions, weight = directions[going], weight[going]
@@ -181,12 +181,12 @@ def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) 
     u, v = np.sqrt(rng.random(n)), rng.random(n)
     weights = np.stack([1 - u, u * (1 - v), u * v], 1)
     points = np.einsum("nk,nki->ni", weights, corners[chosen])
-    directions = _scatter(normals[chosen], rng)
+    directions = _cosine_directions(normals[chosen], rng)
     step = min(1e-4, 0.01 * float(np.sqrt(areas.sum())))  # off the bulb
     return points + step * normals[chosen], directions
 
 
-def _scatter(normals: F64, rng: np.random.Generator) -> F64:
+def _cosine_directions(normals: F64, rng: np.random.Generator) -> F64:
     """Unit directions about normals (N, 3) by the cosine: points of a unit sphere on the face."""
     sphere = rng.normal(size=normals.shape)
     sphere /= np.maximum(np.linalg.norm(sphere, axis=1, keepdims=True), 1e-12)
