@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Final
 
 import pytest
 
 from pbrs_farm.commands.arguments import home_arguments
-from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.errors import BadHouse, MachineFailed
+from pbrs_farm.core.plugins import Plugin
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare import formats as table
 from pbrs_farm.prepare.finished_house import repaired_house
-from pbrs_farm.prepare.formats import PLAN, format_of_file, format_of_kind, formats, summary
+from pbrs_farm.prepare.formats import (
+    PLAN,
+    format_of_file,
+    format_of_kind,
+    format_of_plugin,
+    formats,
+    missing_library,
+    summary,
+)
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
 from pbrs_farm.store import MemoryStore
@@ -129,6 +140,24 @@ def test_kinds_without_files_have_no_format() -> None:
     plan = format_of_kind(PLAN)
     assert plan is not None
     assert plan.tells_boxes
+
+
+def test_a_format_that_lacks_its_library_stays_in_the_table_with_what_to_type() -> None:
+    usd = format_of_kind("usd")
+    assert usd is not None
+    lacking = replace(usd, library="no_such_module")
+    assert "usd" in missing_library(lacking)
+    assert missing_library(replace(usd, library="")) == ""
+
+
+def test_a_plugin_that_brings_no_format_is_the_machines_fault(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    entry = EntryPoint("old", "json:dumps", "pbrs_farm.readers")
+    old = Plugin("readers", "old", "package", "1.0", entry)
+    monkeypatch.setattr(table, "plugin", lambda _group, _name: old)
+    with pytest.raises(MachineFailed, match=r"plugin old of package .* brings no Format"):
+        format_of_plugin("old")
 
 
 _LIDAR = '''"""A .lidar file: the width and depth of a room, metres."""
