@@ -18,7 +18,7 @@ from pbrs_farm.generate.staircase import Stair
 from pbrs_farm.generate.two_storeys import drawn_storeys
 
 _TRIES: Final = 4
-_FURNISHINGS: Final = 2  # of one plan
+_FURNISHINGS: Final = 2  # times that one plan is furnished before another plan is drawn
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from pbrs_farm.generate.openings import openings_of
 from pbrs_farm.generate.plan_walls import rooms_of, runs_of, walls_of
 from pbrs_farm.generate.programme import Programme, Wishes, drawn_programme, with_family
 
-_PROGRAMMES: Final = 6  # that are tried before a wish is refused
+_PROGRAMMES: Final = 6  # programmes drawn and tried before the wish is refused
 
 
 def drawn_plan(

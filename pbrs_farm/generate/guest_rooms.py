@@ -21,7 +21,7 @@ MAX_ASPECT: Final = {
     RoomType.WARDROBE: 1.8, RoomType.STAIRS: math.inf,
 }  # fmt: skip
 DOOR_WALL_M: Final = 1.2  # a door of 0.9 m, 10 cm from the corner, and the walls' thickness
-DAYLIGHT_M: Final = 2.0  # of outer wall, at least
+DAYLIGHT_M: Final = 2.0  # least length of outer wall for a room with a window
 _FLOOR_A_GLASS_M: Final = 8 * 2.1 / 1.05  # m2 that a metre of French window lights: 8 of its glass
 _BESIDE_GLASS_M: Final = 0.96  # the outer walls' halves at its ends, and 35 cm beside it
 WALL_M: Final = 0.14  # mean thickness of walls
@@ -33,7 +33,7 @@ _CUT_FROM: Final = {
     RoomType.BATHROOM: (RoomType.BEDROOM,),  # the second one
 }  # what a small room is cut from, the preferred type first
 _WC_BELOW: Final = (RoomType.LIVING,)  # where the bathrooms are on another storey
-_STRIP_ASPECT: Final = 2.15  # of a small room along the whole side of another
+_STRIP_ASPECT: Final = 2.15  # largest length by width of a room along a whole side of its host
 _CORNER_ASPECTS: Final = (1.3, 1.6, 1.0)
 _ARM_M: Final = 1.0  # the narrowest part of a host that its guest leaves
 

@@ -27,7 +27,7 @@ from pbrs_farm.generate.programme import Programme, RoomWish
 from pbrs_farm.generate.slicing import N_MOVES, N_TRIES, solved
 from pbrs_farm.generate.slicing_goals import STEP_M, Contact, IntRect, SliceLeaf
 
-_BESIDE_M: Final = 0.8  # of wall that rooms which lie beside each other share
+_BESIDE_M: Final = 0.8  # least length of wall that adjacent rooms share
 _FIXED_TRIES: Final = 4  # times as many for what a user wrote
 _STOREY_MOVES: Final = 300
 _PATIENCE: Final = 3  # plans that meet the rules but for a small room

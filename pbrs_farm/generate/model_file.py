@@ -13,7 +13,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas
 
-_DECIMALS: Final = 5  # of metres
+_DECIMALS: Final = 5  # of coordinates in metres
 _ENDINGS: Final = {"image/png": "png", "image/jpeg": "jpg"}
 # What Sweet Home 3D makes of a group by its name.
 _GROUPS: Final = {

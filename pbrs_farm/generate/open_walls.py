@@ -13,7 +13,7 @@ from pbrs_farm.generate.plan_families import PlanFamily
 from pbrs_farm.generate.plan_walls import OUTER_M, PARAPET_M, WallRun
 from pbrs_farm.generate.slicing_goals import STEP_M
 
-_LEAVES_M: Final = 0.1  # that the squares of two leaves may share
+_LEAVES_M: Final = 0.1  # overlap allowed between the squares that two door leaves sweep
 
 
 @dataclass(slots=True)

@@ -26,7 +26,7 @@ _TOLERANCE: Final = 0.97  # sizes of windows are whole centimetres
 _OPEN_M: Final = 0.7  # the least width of an open side that one walks through
 _PASSAGES_M: Final = (1.5, 1.2)  # the wider one where it fits
 _DOOR_M, _WET_DOOR_M, _ENTRANCE_M = 0.9, 0.8, 0.95
-_FROM_CORNER_M: Final = 0.10  # of a door's frame
+_FROM_CORNER_M: Final = 0.10  # least distance from a door's frame to the corner of the room
 _LEAST_CORNER_M: Final = 0.03
 _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 

@@ -40,7 +40,10 @@ AREA_RANGE: Final = {
 }
 """Smallest and largest, square metres."""
 
-_SPREAD: Final = {RoomType.BEDROOM: 0.16, RoomType.LIVING: 0.20}  # of the logarithm; others .18
+_SPREAD: Final = {
+    RoomType.BEDROOM: 0.16,
+    RoomType.LIVING: 0.20,
+}  # standard deviation of the logarithm of the area; 0.18 for other rooms
 _LIVING: Final = (RoomType.LIVING, RoomType.STUDIO)
 
 

@@ -16,7 +16,7 @@ from pbrs_farm.generate.programme import AREA_RANGE, MEDIAN_AREA, Programme, Roo
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_given
 
 MAX_ROOMS: Final = 14
-_ASKED_HALL_SHARE: Final = 0.135  # of the other rooms, where the file names no hall
+_ASKED_HALL_SHARE: Final = 0.135  # area of an unnamed hall by that of the other rooms
 _FORM: Final = '{"rooms": [{"type": "bedroom"}, ...]}'
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Final
 
 STEP_M: Final = 0.05
-_WALL_STEPS: Final = 3  # what walls take from a room's width, about
-_AREA_SHARES: Final = (0.72, 1.4)  # of its wished area that a leaf has at least and at most
-_ARM_STEPS: Final = 50  # of the outline beside a court, at least
+_WALL_STEPS: Final = 3  # steps that walls take from a room's width, about
+_AREA_SHARES: Final = (0.72, 1.4)  # least and largest area of a leaf by its wished area
+_ARM_STEPS: Final = 50  # least steps of an arm of the outline beside a court
 _UNMET: Final = 1.5  # cost of a hard rule that is not met, beside how far it is from it
 
 IntRect = tuple[int, int, int, int]  # x0, z0, x1, z1 in steps

@@ -30,8 +30,8 @@ _STAIRS: Final = (44, 58)  # across its front and from front to back, steps, wal
 _LANDING: Final = 22  # before it, steps
 _BESIDE: Final = 56  # between stairs and a corner they do not lie in: a room's width, steps
 _WALLS: Final = 1.13  # floor with the walls it needs, by floor alone
-_CORES: Final = 1000  # that are tried
-_STOREY_TRIES: Final = (2, 6)  # of each storey, a core
+_CORES: Final = 1000  # stair cores tried before the wish is refused
+_STOREY_TRIES: Final = (2, 6)  # layouts tried of the lower and of the upper storey, for each core
 _BEDROOMS: Final = (2, 3, 4)
 _BEDROOM_SHARES: Final = (0.25, 0.5, 0.25)
 

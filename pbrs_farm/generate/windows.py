@@ -14,7 +14,7 @@ _WIDEST_M: Final = 2.4
 _FRENCH_SILL_M: Final = 0.1
 _BALCONY_M: Final = 4.5
 _CLEAR_M: Final = 0.35  # between a window and a corner or another window
-GLASS_SHARE: Final = 1 / 8  # of the floor of a room to live in
+GLASS_SHARE: Final = 1 / 8  # least area of windows by floor area, in rooms to live in
 
 
 def is_lit(run: WallRun, layout: Layout) -> bool:

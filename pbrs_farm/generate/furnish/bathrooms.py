@@ -8,7 +8,7 @@ from pbrs_farm.core.catalogue import Piece, Place
 from pbrs_farm.generate.furnish.pieces import MAX_CHOICES, Shelf, backed, single
 from pbrs_farm.generate.furnish.template import Liking, Stand, Template
 
-_RIM_M: Final = 0.85  # of a washbasin that hangs
+_RIM_M: Final = 0.85  # height of the rim of a hanging washbasin
 _BESIDE_TOILET_M: Final = 0.18
 _GAP: Final = 0.01
 _HUNG_GAP: Final = 0.001

@@ -15,7 +15,7 @@ from pbrs_farm.generate.plan_walls import largest_rectangle
 _HEAD_M: Final = 1.95  # the lowest point of a lamp
 _LARGE_M2: Final = 22.0  # rooms above have two
 _LONG: Final = 2.6  # and halls of this aspect
-_SHORTEST: Final = 0.35  # of its own size that a lamp may be made
+_SHORTEST: Final = 0.35  # smallest scale of a lamp, as a share of its own size
 _STEPS: Final = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9)
 
 

@@ -22,7 +22,7 @@ from pbrs_farm.generate.furnish.room_space import FurnishSpace
 from pbrs_farm.generate.furnish.template import PieceSlot, Standing, Template
 
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
-_BUILT_IN: Final = 0.6  # of kitchens
+_BUILT_IN: Final = 0.6  # share of homes that have the oven built into the units
 _FRONT_M: Final = 0.8  # free before the run
 _GAP: Final = 0.005  # behind the units
 _HUNG_GAP: Final = 0.001  # and behind what touches the wall that it hangs on

@@ -9,8 +9,8 @@ from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Stand, Templa
 
 _TO_TABLE_M = 0.45  # from a sofa to its table
 _BEHIND_CHAIR_M = 0.75  # from the table's edge
-_SEAT_M = 0.6  # of table edge
-_UNDER_TABLE_M = 0.2  # of a chair
+_SEAT_M = 0.6  # length of table edge that a seat takes
+_UNDER_TABLE_M = 0.2  # depth of a chair that is pushed under the table
 _VIEWING_M = (2.0, 2.25, 2.5, 2.8)  # from the screen to the sofa
 
 

@@ -24,7 +24,7 @@ STYLES: Final = {
 }
 """Style -> words of pieces that such a home likes."""
 
-_LIKED: Final = 0.6  # of the whole order that a word moves a piece forward
+_LIKED: Final = 0.6  # how far up the order of preference (0 to 1) a word of the style moves a piece
 
 _UNFIT: Final = frozenset(
     [
@@ -40,7 +40,7 @@ _UNFIT: Final = frozenset(
     ]
 )
 """Pieces that templates cannot use, each looked at."""
-MAX_CHOICES = 6  # of a kind, the preferred ones: each is tried at every place
+MAX_CHOICES = 6  # pieces of a kind that are tried at every place, the preferred ones
 
 
 def style_of(name: str, rng: np.random.Generator) -> str:

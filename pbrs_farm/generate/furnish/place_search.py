@@ -16,7 +16,7 @@ from pbrs_farm.generate.furnish.walk_bitmap import WalkMap
 
 _ROOTS: Final = 5  # places of the first group that are compared
 _NODES_A_ROOT: Final = 14
-_MISSING: Final = 100.0  # what a group that must stand and does not is worth
+_MISSING: Final = 100.0  # penalty for a required group that finds no place
 _MISSED: Final = 2.0  # and one that need not
 
 

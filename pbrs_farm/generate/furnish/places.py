@@ -29,7 +29,7 @@ _TOUCH_M: Final = 0.002
 _ABOVE_SILL_M: Final = 0.08
 _DEAD_GAP_M: Final = 0.35  # a gap that nobody can use
 _BESIDE_M: Final = 0.01  # between furniture and the wall at its end
-_APART_M: Final = 0.4  # of two places of one template that are both worth a try
+_APART_M: Final = 0.4  # least distance between two places of one template that are both tried
 _NOISE: Final = 0.25
 _BEST: Final = 20
 

@@ -19,8 +19,8 @@ from shapely.geometry import MultiPolygon, Polygon
 from pbrs_farm.generate.plan_walls import largest_rectangle
 
 MAX_THINGS: Final = 3_000
-_FILLED: Final = 0.85  # of its rectangle: a shape that fills less is made of several boxes
-_MOST_CORNERS: Final = 12  # of a shape that is parted into boxes
+_FILLED: Final = 0.85  # a shape that fills less of its rectangle is made of several boxes
+_MOST_CORNERS: Final = 12  # most corners of a shape that is cut into boxes
 _LEAST_BOX_M2: Final = 0.08
 
 

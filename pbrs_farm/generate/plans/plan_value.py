@@ -33,8 +33,8 @@ from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.walled_rooms import DrawnRoom, walled
 
 MAX_ROOMS: Final = 60
-MAX_CORNERS: Final = 20_000  # of an outline as it is drawn
-_MOST_SIDES: Final = 120  # of an outline that walls stand on
+MAX_CORNERS: Final = 20_000  # most corners of an outline as it is drawn
+_MOST_SIDES: Final = 120  # most sides of an outline after simplification
 _TOLERANCES_M: Final = (1e-3, 0.01, 0.02, 0.05, 0.1)  # by which a curve is made of straight walls
 _FAR_M: Final = 200.0
 _LEAST_M2: Final = 0.5
@@ -44,7 +44,7 @@ _SIZES: Final = {
     OpeningKind.PASSAGE: (0.9, 2.1, 0.0),
     OpeningKind.WINDOW: (1.3, 1.3, 0.9), OpeningKind.FRENCH_WINDOW: (1.6, 2.1, 0.1),
 }  # fmt: skip
-_USUAL_SIDE_M: Final = (0.7, 30.0)  # of a room, the root of its area
+_USUAL_SIDE_M: Final = (0.7, 30.0)  # root of a room's area; beyond, the file is in another unit
 
 
 def _in_plan(value: object) -> object:

@@ -20,7 +20,7 @@ from pbrs_farm.generate.floor_plan import PlanRoom, PlanWall, Point, RoomType
 from pbrs_farm.generate.plan_walls import INNER_M, OUTER_M, PARAPET_HEIGHT_M, PARAPET_M, corners
 
 _TOUCH_M: Final = 0.02  # rooms nearer than this share a side
-_THICKEST_M: Final = 0.6  # of a wall between rooms
+_THICKEST_M: Final = 0.6  # thickest wall between two rooms
 _PARALLEL: Final = 0.999  # cosine between two sides that face each other
 
 

@@ -23,7 +23,7 @@ from pbrs_farm.regular_files import digest_of_regular, fault_of
 FURNITURE: Final = "PluginFurnitureCatalog.properties"
 JAR_FURNITURE: Final = "com/eteks/sweethome3d/io/DefaultFurnitureCatalog.properties"
 _MAX_M: Final = 50.0  # no piece is larger
-_POWER: Final = 0.5  # of every lamp that the program places
+_POWER: Final = 0.5  # power of every lamp, as the program places it
 _WHOLE: Final = DoorFrame(FULL_CUT_OUT, 1.0, 0.0, 1.0, 0.0, False)
 _KNOWN_LICENCES: Final = (
     (r"public domain|\bcc.?0\b|cc-zero", "CC0"),

@@ -33,13 +33,13 @@ from pbrs_farm.read.sweethome3d.placement import (
     placed_surface,
 )
 
-MAX_TRIANGLES: Final = 200_000  # of a model that is read
+MAX_TRIANGLES: Final = 200_000  # a model of more is left out unread
 SMALL: Final = (3_000, 1 / 48)  # triangles of what stands on furniture, and how coarse it may get
 MEDIUM: Final = (5_000, 1 / 100)  # of chairs, which come in sixes
 LARGE: Final = (10_000, 1 / 110)
 MEDIUM_M: Final = 1.15  # the longest side of what is medium
-TOO_MANY: Final = 30_000  # what cannot be made lighter than this stays out
-MAX_TEXTURE_PX: Final = 512  # of a piece's picture: more shows in no view of a room
+TOO_MANY: Final = 30_000  # a model that stays heavier than this is left out
+MAX_TEXTURE_PX: Final = 512  # edge of a piece's picture; more would show in no view of a room
 _JPEG_QUALITY: Final = 92
 
 

@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 
-FINEST: Final = 1 / 500  # of the longest side: the first cell that is tried
+FINEST: Final = 1 / 500  # first cell that is tried, as a share of the longest side
 _STEP: Final = 1.3
 _NORMAL_STEPS: Final = 2.0  # normals that round to the same multiple of 1/2 are one
 _UV_STEPS: Final = 16.0

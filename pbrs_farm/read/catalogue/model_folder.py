@@ -38,7 +38,7 @@ INDEX_VERSION: Final = 1  # raised when another piece is made of the same files
 _FIELDS: Final = ReadFields(max_model_triangles=MAX_TRIANGLES)
 _UNITS: Final = {0.01: "centimetres", 0.001: "millimetres", 0.0254: "inches"}
 _MAX_JSON_BYTES: Final = 64_000_000
-_MOST_NODES: Final = 20_000  # of a model whose bounds are asked
+_MOST_NODES: Final = 20_000  # nodes of a model that are looked at for its bounds
 _FAULTS: Final = (
     PbrsError, OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError,
 )  # fmt: skip

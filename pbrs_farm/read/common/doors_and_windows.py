@@ -19,8 +19,8 @@ from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
 
 Style = Literal["swing", "double", "sliding", "folding"]
 
-_REACH_M: Final = 0.02  # that a cutter stands out of either face of the wall
-_LINING_M: Final = 0.008  # that a frame stands out of either face of the wall
+_REACH_M: Final = 0.02  # how far a cutter reaches out of either face of the wall
+_LINING_M: Final = 0.008  # how far a frame reaches out of either face of the wall
 _FRAME_M: Final = 0.05  # width of a frame's posts
 _LEAF_M: Final = 0.04  # thickness
 _RAIL_M: Final = 0.1  # width of the wood around a door's glass

@@ -19,7 +19,7 @@ MAX_TEXTURE_PIXELS: Final = 64_000_000
 _KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
 _TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
 _HOLE_BELOW: Final = 128
-PANE_OPACITY: Final = 0.2  # of panes and glass whose source says opaque
+PANE_OPACITY: Final = 0.2  # opacity of panes and glass that the source calls opaque
 # Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
 GLASS_WORDS: Final = frozenset(
     ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",

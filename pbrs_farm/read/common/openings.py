@@ -17,15 +17,15 @@ from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface, corners_
 from pbrs_farm.core.mesh import area_vectors, face_areas
 from pbrs_farm.geometry.solids import box
 
-CUTTER_REACH_M: Final = 0.02  # that a cutter stands out of either side of a wall without a hole
-_OVERLAP_M: Final = 0.002  # of a plug and the wall around it
+CUTTER_REACH_M: Final = 0.02  # how far a cutter reaches out of either face of a wall without a hole
+_OVERLAP_M: Final = 0.002  # overlap of a plug with the wall around it
 _HOLE_MARGIN_M: Final = 0.10  # a hole's rim lies no farther from the door's outline
 _RIM_M: Final = 0.02  # from a hole's rim to the wall's end, and the least size of a hole
 LEAST_HOLE_M: Final = 0.05  # width and height; a smaller one is a flaw of the mesh
 _BESIDE_M: Final = 0.15  # a wall's faces lie no farther from the door's own plane
 _PLANAR_M: Final = 0.01  # a wall that is thinner has one face
-_THICKER_M: Final = 0.15  # what such a wall's cutter reaches to either side
-_LEAST_SHARE: Final = 0.02  # of a wall's upright area, that faces of one direction have
+_THICKER_M: Final = 0.15  # how far the cutter of a planar wall reaches to either side
+_LEAST_SHARE: Final = 0.02  # a direction that has less of the wall's upright area is no face of it
 _UP: Final = np.array([0.0, 1.0, 0.0])
 
 

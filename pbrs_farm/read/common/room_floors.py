@@ -19,11 +19,11 @@ from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 # A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
 
-_SAME_HEIGHT_M: Final = 0.02  # of faces that are one floor
+_SAME_HEIGHT_M: Final = 0.02  # faces that differ less in height are one floor
 _CRACK_M: Final = 1e-4  # between triangles that should touch
-_SLACK_M: Final = 0.002  # of an outline's corners
+_SLACK_M: Final = 0.002  # tolerance of an outline's corners
 _UPRIGHT_UP: Final = 0.3  # |y| of a wall's normal, at most
-_LEVEL_UP: Final = 0.7  # of a floor's or a ceiling's, at least
+_LEVEL_UP: Final = 0.7  # least |y| of the normal of a floor or ceiling
 _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 

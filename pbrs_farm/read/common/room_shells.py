@@ -23,7 +23,7 @@ from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, sig
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
 _WELD_M: Final = 1e-4  # corners this near are one
-_LEAST_HEIGHT_M: Final = 1.8  # of a room
+_LEAST_HEIGHT_M: Final = 1.8  # least height of a room
 _LEAST_SIDE_M, _LARGEST_SIDE_M = 0.6, 200.0  # of a room in plan; a larger box is a sky
 _LEVEL_UP, _UPRIGHT_UP = 0.98, 0.1  # |y| of the normal: above is level, below is upright
 _LEAST_BOXY: Final = 0.7  # share of a room's area that is level or upright

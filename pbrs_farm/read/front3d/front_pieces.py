@@ -34,7 +34,7 @@ from pbrs_farm.read.mesh.obj import Mesh
 _MAX_INFO_BYTES: Final = 64_000_000
 _BESIDE: Final = ("3D-FUTURE-model", "../3D-FUTURE-model", "../../3D-FUTURE-model", ".")
 INFO: Final = "model_info.json"
-_LUX: Final = 150.0  # what the listed lights of a room give its floor together
+_LUX: Final = 150.0  # illuminance that the listed lights of a room give its floor together
 _LEAST_LM, _MOST_LM = 50.0, 3_000.0
 _BELOW_M: Final = 0.08  # a light listed inside the ceiling shines below it
 _FLAT_M: Final = 0.002

@@ -28,11 +28,9 @@ _WELD_M: Final = 1e-4  # corners this near are one
 _NARROW_M: Final = 0.12  # a part whose second side is shorter is a strip
 _THIN_M: Final = (1e-3, 0.3)  # least side of a closed part that is a board or a frame
 _LARGEST_M: Final = 2.5  # longest side of such a part
-_MOST_CLOSED: Final = (
-    300  # of the parts that are asked whether they are closed; the largest go first
-)
+_MOST_CLOSED: Final = 300  # parts tested for being closed, the largest first
 _BESIDE_M: Final = 0.06  # fittings nearer than this are one thing
-_MOST_PARTS: Final = 3_000  # of more, those nearest each other are not looked for
+_MOST_PARTS: Final = 3_000  # in a mesh of more parts, neighbours are not searched
 
 # Words of names of materials, accents folded.
 _WINDOW_WORDS: Final = frozenset(

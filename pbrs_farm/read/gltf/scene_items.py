@@ -34,7 +34,9 @@ from pbrs_farm.read.gltf.scene_lights import emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
 from pbrs_farm.read.mesh.obj import Mesh
 
-_UNMAPPED: Final = NodeClass(OTHERPROP, ItemKind.OBJECT, is_tagged=False)  # what no name tells
+_UNMAPPED: Final = NodeClass(
+    OTHERPROP, ItemKind.OBJECT, is_tagged=False
+)  # class of a thing whose name says nothing
 
 
 def _place_in_file(gltf: Gltf, thing: _Thing) -> str:

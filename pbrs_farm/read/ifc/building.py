@@ -51,8 +51,8 @@ Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1
 """(x, y, z) with z up -> (x, z, -y) with y up."""
 _FAR_M: Final = 1000.0  # from the origin: coordinates of a national grid
 _CLEAR: Final = 0.3  # transparency of glass in a window
-_LEAST_HEIGHT_M: Final = 1.8  # of an attic that is a room
-_LEAST_ROOM_M: Final = 1.0  # of any other space
+_LEAST_HEIGHT_M: Final = 1.8  # least height of an attic that counts as a room
+_LEAST_ROOM_M: Final = 1.0  # least height of any other room
 _LEAST_ROOM_M2: Final = 0.3
 _COVERED: Final = 0.5  # share of a room that a slab covers to be its floor or ceiling
 _NEAR_M: Final = 0.35  # from a room's floor or ceiling to the slab that is it

@@ -18,7 +18,7 @@ from pbrs_farm.read.mesh.shading_normals import crease_normals
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
-_MANY_FACES = 50_000  # of a part, above which repeated faces are looked for
+_MANY_FACES = 50_000  # repeated faces are searched in parts of more faces
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,7 +57,7 @@ _AS_IT_STANDS: Final = Arch(np.eye(4), {})
 _STOREY_M: Final = 2.7
 _ON_FLOOR_M: Final = 0.02  # an object whose origin is so near to a height stands at it
 _LEAST_SILL_M: Final = 0.2  # a hole of no type that begins lower is a door's
-_AREA_M2: Final = 0.05  # of a floor that is one
+_AREA_M2: Final = 0.05  # least area of a floor
 
 
 def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:

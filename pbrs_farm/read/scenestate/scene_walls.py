@@ -21,8 +21,8 @@ from pbrs_farm.read.scenestate.scene_document import SceneElement
 
 _BESIDE_M: Final = 0.06  # from a wall's line to the floor beside it
 _SAME_M: Final = 0.02  # lines and ends nearer than this are one
-_TURN: Final = 0.0175  # of two lines that are one, radians
-_OFF_GRID: Final = 0.0037  # so that round numbers do not lie between two cells
+_TURN: Final = 0.0175  # lines that differ less in direction are one, radians
+_OFF_GRID: Final = 0.0037  # keeps round numbers away from the borders of cells
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,8 +12,8 @@ from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.read.common.model_cache import ParsedModel
 
 _REFLECTANCE: Final = 0.9
-_FLAT_COS: Final = 0.98  # of the angle to the glass's normal, within which a face lies flat
-_FLAT_SHARE: Final = 0.45  # of a material's area: a pane with a back and edges has half
+_FLAT_COS: Final = 0.98  # a face within this cosine of the glass's normal lies flat
+_FLAT_SHARE: Final = 0.45  # least flat share of a material; a pane with back and edges has half
 _NAMES: Final = ("mirror", "spiegel", "glass")  # an MTL's names are material_0, material_1 mostly
 
 

@@ -18,10 +18,10 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.placement import PieceFrame
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
-MARGIN_M = 0.005  # that a cutter reaches out of the outermost faces of its walls
+MARGIN_M = 0.005  # how far a cutter reaches out of the outermost faces of its walls
 WALL_REACH_M = 1.0  # before and behind a piece: walls farther off are not cut
 MIN_HALF_M = 5e-4  # half a width or height; a smaller piece cuts nothing
-PARALLEL_SINE = math.sin(math.radians(20.0))  # of a wall's angle with the piece, at most
+PARALLEL_SINE = math.sin(math.radians(20.0))  # largest angle between a wall and the piece it holds
 
 
 @dataclass(frozen=True, slots=True, eq=False)

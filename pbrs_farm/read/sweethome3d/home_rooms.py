@@ -24,11 +24,11 @@ from pbrs_farm.read.sweethome3d.wall_outlines import Outline
 from pbrs_farm.read.sweethome3d.wall_solids import picture_uvs
 
 MIN_AREA_M2 = 0.01  # smaller rooms are left out
-LEAST_ROOM_M2 = 1.0  # of what walls enclose: smaller is a shaft
+LEAST_ROOM_M2 = 1.0  # a smaller area between walls is a shaft
 LEAST_WALL_M = 1.8  # lower walls enclose no room
 GAP_M = 0.1  # between walls that were meant to meet
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
-MAX_CORNERS = 300  # of a room: what is more is a curve drawn too finely, and costs its square
+MAX_CORNERS = 300  # an outline of more corners is simplified: cost grows with their square
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,8 +30,8 @@ ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest that nothing stands in the 
 _SHUT: Final = 2.5  # times as wide as it reaches out of the wall, handles included
 _SIDE_M: Final = 0.5  # from a door's middle, where its rooms have begun
 _OFF_MIDDLE_M: Final = np.array([0.011, 0.017])
-_IN_WALL: Final = 0.15  # of a leaf's plan, that may lie in walls: in its own, beside the hinge
-_IN_THING: Final = 0.01  # of a leaf's plan, that may lie in a piece: they touch
+_IN_WALL: Final = 0.15  # share of a leaf's plan that may lie in walls: beside the hinge it does
+_IN_THING: Final = 0.01  # share of a leaf's plan that may lie in a piece it touches
 _SHEET_M2: Final = 1e-4  # a leaf whose plan is smaller is drawn as a sheet,
 _SHEET_M: Final = 0.005  # which counts as so far on either side of it
 

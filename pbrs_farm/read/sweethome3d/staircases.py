@@ -10,7 +10,7 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, frame_of
 from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 
-TOLERANCE_M = 0.01  # of heights that meet
+TOLERANCE_M = 0.01  # heights that differ less are equal
 
 Cuts = dict[str, shapely.Geometry]
 

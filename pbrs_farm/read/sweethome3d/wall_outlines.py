@@ -11,9 +11,9 @@ import shapely
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.read.sweethome3d.home_file.home_xml import HomeWall
 
-ARC_STEP_RAD = math.radians(5.0)  # of the straight pieces of an arc
-MITRE_LIMIT = 2.0  # of the corner from the bare one, in thicknesses
-MIN_LENGTH_M = 1e-4  # of a wall, and of its thickness
+ARC_STEP_RAD = math.radians(5.0)  # angle of each straight piece of an arc
+MITRE_LIMIT = 2.0  # farthest a mitred corner may move, in wall thicknesses
+MIN_LENGTH_M = 1e-4  # least length and thickness of a wall
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,7 +25,9 @@ from pbrs_farm.regular_files import MAX_SCENE_BYTES, real_path
 LAYERS: Final = (".usd", ".usda", ".usdc", ".usdz")
 MOST_PRIMS: Final = 500_000  # of a composed stage
 _MOST_LAYERS: Final = 20_000
-_MISSING_SHARE: Final = 1 / 3  # of references; more is another machine's package
+_MISSING_SHARE: Final = (
+    1 / 3
+)  # with more references missing, the stage names another machine's files
 _SAID: Final = re.compile(r": '(.*?)'\s*$", re.DOTALL | re.MULTILINE)
 _UNOPENED: Final = re.compile(r"In <([^>]*)>: Could not open asset @(.*?)@")
 _PICTURE_BYTES: Final = 256 * 2**20

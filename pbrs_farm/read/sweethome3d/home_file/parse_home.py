@@ -24,7 +24,7 @@ MAX_WALL_ELEMENTS = 10_000
 MAX_ROOM_ELEMENTS = 5_000
 MAX_ROOM_POINTS = 100_000
 _PIECES = frozenset({"pieceOfFurniture", "doorOrWindow", "light", "shelfUnit"})
-FALLBACK_HEIGHT_M = 2.5  # of walls and levels that tell none
+FALLBACK_HEIGHT_M = 2.5  # of walls and levels without a height
 
 
 def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
