@@ -56,7 +56,10 @@ _OF_STRANGERS: Final = (
 
 
 def command() -> int:
-    """Run the command of this process' words, in a child where it reads files of others."""
+    """Run the command of this process' words, in a child where it reads files of others; the exit code.
+
+    A library that dies over a stranger's file ends the child alone: the parent says so in a line.
+    """
     words = _verb_first(sys.argv[1:])
     if _module_of(words) not in _OF_STRANGERS:
         return main(words)
@@ -80,7 +83,11 @@ def _verb_first(words: Sequence[str]) -> list[str]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command in this process; the exit code. Without words: those of this process."""
+    """Run one command in this process; the exit code. Without words: those of this process.
+
+    main(["run", "builtin", "--out", "out/x"]) is what tests call. Prints; raises nothing but what is
+    a fault of ours, and SystemExit for words that are wrong.
+    """
     if argv is None:
         return command()
     words = _verb_first(argv)
@@ -95,7 +102,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if verb == "demo":
             _start_early(words)
-        return _parsed(words, verb, module)
+        return _run_parsed(words, verb, module)
     except KeyboardInterrupt:
         warn("interrupted; the same command goes on where it stopped")
         return 130  # 128 + SIGINT, as shells have it
@@ -104,7 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _end_untaken()
 
 
-def _parsed(words: Sequence[str], verb: str, module: str | None) -> int:
+def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
     """Read the options of a verb and run it."""
     parser = build_parser(module)
     args, unknown = parser.parse_known_args(words)
@@ -159,7 +166,11 @@ def _handled(args: argparse.Namespace) -> int:
 
 
 def build_parser(module: str | None = None) -> Parser:
-    """The verbs of one module, or all of them; the farm's where celery and redis are installed."""
+    """The parser with the verbs of one module of pbrs_farm.commands, or with all.
+
+    module: a name of MODULES. One module is imported for one verb, so that a command starts fast; the
+    farm's verbs are left out where celery or redis is not installed.
+    """
     # Every verb takes --debug, before or after its own options.
     common = Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")

@@ -48,7 +48,11 @@ class Finding:
 
 
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
-    """Every part, in the order a house meets it."""
+    """Every part of the machine, in the order in which a house meets it.
+
+    store_url, redis_url: what to try beside the machine; "" tries none. Each part that could crash
+    is tried in a process of its own, so that this takes some ten seconds and never ends ours.
+    """
     # What to install where a library is missing.
     again = install_command()
     return [
@@ -65,7 +69,10 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
 
 
 def can_run(findings: list[Finding]) -> bool:
-    """The main job (run, demo) can run."""
+    """Whether the main job (run, demo) can run: nothing that it needs is missing.
+
+    What is degraded slows it or takes a part of it, such as the OpenGL modes.
+    """
     return not any(f.needed and f.state == "missing" for f in findings)
 
 

@@ -64,7 +64,11 @@ _WHAT: Final = {
 
 
 def install_command(*extras: str) -> str:
-    """The pip command that adds extras to this installation; without any, that repairs it."""
+    """The pip command that adds extras to this installation; without any, that repairs it.
+
+    extras: names of pyproject.toml; "" is ignored. In a checkout the command installs the checkout,
+    since no index has it; a wheel takes its extras by name. For hints of errors: nothing is run.
+    """
     wanted = [name for name in extras if name]
     names = f"[{','.join(wanted)}]" if wanted else ""
     checkout = checkout_folder()
@@ -81,18 +85,28 @@ def pip_command() -> str:
 
 
 def checkout_folder(package: Path | None = None) -> Path | None:
-    """The checkout that this program runs from, None where it was installed from a wheel."""
+    """The checkout that this program runs from, None where it was installed from a wheel.
+
+    package: the folder pbrs_farm, this one where it is left out.
+    """
     folder = (package or Path(__file__).parent).parent
     return folder if (folder / "pyproject.toml").is_file() else None
 
 
 def system_command(what: str, system: str = "") -> str:
-    """The command that installs "llvm", "atomic", "gl" or "redis" on this system (or the one named)."""
+    """The command that installs "llvm", "atomic", "gl" or "redis" on this system (or the one named).
+
+    On a system that we know no command of, a sentence that says what to install.
+    """
     return _COMMANDS.get(system or this_system(), _WHAT).get(what, _WHAT[what])
 
 
 def mitsuba_command() -> str:
-    """The command that repairs a Mitsuba that cannot be imported: its library, else itself."""
+    """The command that repairs a Mitsuba that cannot be imported.
+
+    Its wheel needs libatomic on Linux: where that is missing, the command that installs it, else the
+    one that installs the package again.
+    """
     if sys.platform == "linux":
         try:
             ctypes.CDLL("libatomic.so.1")
@@ -102,7 +116,10 @@ def mitsuba_command() -> str:
 
 
 def this_system(os_release: Path = Path("/etc/os-release")) -> str:
-    """debian, ubuntu, fedora, arch, macos, or "" for one we know no command of."""
+    """debian, ubuntu, fedora, arch, macos, or "" for one we know no command of.
+
+    A system that is none of these is the first of them that os-release says it is like.
+    """
     if sys.platform == "darwin":
         return "macos"
     try:
@@ -117,12 +134,18 @@ def this_system(os_release: Path = Path("/etc/os-release")) -> str:
 
 
 def is_installed(module: str) -> bool:
-    """Whether a module could be imported; nothing is."""
+    """Whether a module could be imported, as far as its files tell; nothing is imported.
+
+    A package that is there and broken counts as installed.
+    """
     return find_spec(module) is not None
 
 
 def need(*modules: str) -> None:
-    """Raises MachineFailed, naming the extras to install, where one of the modules is missing."""
+    """Raise MachineFailed, naming what is missing and the command that adds it, unless all modules are there.
+
+    need("moderngl") at the start of a verb says at once what each step would say later.
+    """
     missing = [name for name in modules if not is_installed(name)]
     if missing:
         extras = sorted({EXTRA_OF[name] for name in missing})

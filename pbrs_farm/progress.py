@@ -52,7 +52,13 @@ class ProgressReporter(ABC):
 
 
 def progress_reporter(n_homes: int, *, as_json: bool) -> ProgressReporter:
-    """The reporter that fits standard error: bars where that is a terminal."""
+    """The reporter that fits: JSON lines where asked for, bars where standard error is a terminal, else lines.
+
+    n_homes: how many will be made, for the time left. It is a context manager, called with each event:
+
+        with progress_reporter(3, as_json=False) as report:
+            run_local(run, report)
+    """
     if as_json:
         return _JsonLines()
     return _Bars(n_homes) if sys.stderr.isatty() else _PlainLines(n_homes)
@@ -87,7 +93,10 @@ class TimeLeft:
         self._shares: dict[str, float] = {}  # view under way -> share of its long step, light
 
     def hear(self, event: Event, now_s: float) -> None:
-        """Take an event into account."""
+        """Take an event into account.
+
+        now_s: when it came, on a clock that only grows (time.monotonic).
+        """
         if event.kind == "planned":
             self._n_planned += 1
             self._n_views += len(event.facts["views"])
@@ -117,12 +126,18 @@ class TimeLeft:
 
     @property
     def views_text(self) -> str:
-        """ "3 of 12"; "3 of about 40" while homes are still unread."""
+        """How many views have ended, of how many.
+
+        "3 of 12"; "3 of about 40" while homes are still unread.
+        """
         about = "about " if self._n_homes > self._n_planned else ""
         return f"{self._n_ended} of {about}{self._expected_views()}"
 
     def seconds(self, now_s: float) -> float | None:
-        """Seconds to the end; None while no view was made, not even a part of one."""
+        """Seconds to the end at now_s.
+
+        None while no view was made, not even a part of one: nothing is known of how long one takes.
+        """
         part = sum(self._shares.values())
         n_made = self._n_made + part
         if self._began_s is None or not n_made > 0:
@@ -147,7 +162,10 @@ class TimeLeft:
 
 
 def seconds_text(seconds: float) -> str:
-    """ "40 s", "12 min", "3 h 20 min", "2 d 4 h"."""
+    """A time for people, in its two largest units.
+
+    "40 s", "12 min", "3 h 20 min", "2 d 4 h".
+    """
     if seconds < 90:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)

@@ -35,27 +35,43 @@ VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
-    """Write a line to standard error."""
+    """Write a line to standard error, after the program's name.
+
+    What a stranger's file put into the text cannot forge a second line; a text of more than 1,500
+    characters is cut. For what a user must see while standard output goes to a file.
+    """
     sys.stderr.write(f"pbrs-farm: {shown(text, _MAX_LINE)}\n")
 
 
 def echo(text: str = "") -> None:
-    """Write a line, or several, to standard output."""
+    """Write a line, or several, to standard output: what a verb was asked for.
+
+    Characters that a terminal would obey are shown as escapes. Messages go through `warn`.
+    """
     sys.stdout.write(printable(text) + "\n")
 
 
 def echo_json(value: Any) -> None:
-    """Write a value as JSON to standard output."""
+    """Write a value as JSON to standard output, for --json: one document, keys sorted, indented by one.
+
+    value: what json.dumps takes. A verb that prints a line per event writes its own.
+    """
     echo(escaped(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False)))
 
 
 def counted(n: int, noun: str) -> str:
-    """ "1 house", "2 houses"."""
+    """ "1 house", "2 houses".
+
+    noun: in the singular, with a plural in -s.
+    """
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
 def dress_seeds(text: str | None) -> tuple[int, ...]:
-    """The seeds of --dress, each once; none where it is not given. Raises BadInput."""
+    """The seeds of --dress, each once, in the order in which they are named; none where it is not given.
+
+    text: 3, 1..20 or 1,4,7. Raises BadInput for anything else, and for more seeds than a command may have.
+    """
     if text is None:
         return ()
     try:
@@ -65,13 +81,19 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
 
 
 def at_least(name: str, value: float, least: int) -> None:
-    """Raise BadInput, naming the option, where its value is below the least that makes sense."""
+    """Raise BadInput, naming the option, where its value is below the least that makes sense.
+
+    at_least("--jobs", args.jobs, 1)
+    """
     if value < least:
         raise BadInput(name, str(value), f"expected {least} or more")
 
 
 def add_home(p: argparse.ArgumentParser) -> None:
-    """The home that a verb looks at."""
+    """Add the home that a verb looks at, and where the models lie that its file names.
+
+    `args.home` is a word of `prepare.source.resolve`, `args.models` a folder or "".
+    """
     from pbrs_farm.run.request import ModelsOption
 
     p.add_argument("home", help=HOME)
@@ -79,7 +101,10 @@ def add_home(p: argparse.ArgumentParser) -> None:
 
 
 def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
-    """--set, repeatable: fields of the recipe."""
+    """Add --set, repeatable: fields of the recipe, or of what metavar says.
+
+    `args.set` is a list of "path=value"; `fields_set` takes it apart.
+    """
     group_of(p, "recipe").add_argument(
         "--set", action="append", default=[], metavar=metavar, help=text
     )
@@ -102,7 +127,11 @@ def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
 def fields_set(
     pairs: Sequence[str], expected: str, prefixes: tuple[str, ...] = ("",)
 ) -> dict[str, str]:
-    """The arguments of --set as path -> text; raises BadInput for one without "=" or prefix."""
+    """The arguments of --set as path -> text, the last of a path where it comes twice.
+
+    expected: what a message says of a wrong one. prefixes: those that a path may begin with. Raises
+    BadInput for an argument without "=" or with another prefix.
+    """
     overrides = {}
     for pair in pairs:
         path, equals, text = pair.partition("=")
@@ -113,7 +142,10 @@ def fields_set(
 
 
 def size_of(text: str | None) -> tuple[int, int] | None:
-    """(width, height) of WxH, None of None; BadInput for anything else."""
+    """(width, height) in pixels of WxH, None of None.
+
+    Raises BadInput for anything else, a size of 0 or above 16,384 included.
+    """
     if text is None:
         return None
     width, _, height = text.partition("x")
@@ -123,7 +155,11 @@ def size_of(text: str | None) -> tuple[int, int] | None:
 
 
 def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
-    """The recipe that a command's options, or a request, name; raises BadRecipe."""
+    """The recipe that a command's options, or a request, name.
+
+    Short forms such as --noise and --size win over --set, and --set over the recipe's own fields.
+    Raises BadRecipe for a recipe or a field that there is not, BadInput for a file that is none.
+    """
     from pbrs_farm.core.recipe import recipe_from_name
     from pbrs_farm.formats.recipe_toml import ENDING, recipe_from_toml
     from pbrs_farm.run.request import SHORT_FORMS
@@ -156,14 +192,21 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
 
 
 def add_farm(p: argparse.ArgumentParser) -> None:
-    """The options that every verb of the farm takes; submit has them of workers/job.py."""
+    """Add the options that every verb of the farm takes: --store and --json.
+
+    submit has its own from workers/job.py.
+    """
     # Written out: the small verbs import no models.
     p.add_argument("--store", default="", metavar="URL", help="default: $PBRS_STORE")
     p.add_argument("--json", action="store_true", help="for machines")
 
 
 def farm_of(args: argparse.Namespace) -> Farm:
-    """The farm the environment and --store name; raises BadInput, touches nothing yet."""
+    """The farm that the environment and --store name; neither Redis nor the store is asked yet.
+
+    Reads PBRS_REDIS_URL, PBRS_STORE and their like (workers/config.py). Raises BadInput where one is
+    missing or wrong.
+    """
     from workers.client.farm_client import Farm
     from workers.config import config_from_environment
 

@@ -30,7 +30,10 @@ class Parser(argparse.ArgumentParser):
     """An ArgumentParser whose help lists verbs in groups."""
 
     def verbs(self) -> dict[str, argparse.ArgumentParser]:
-        """Verb -> its parser."""
+        """Verb -> its parser, in the order in which they were added.
+
+        Empty for the parser of a verb itself.
+        """
         found = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
         return dict(found[0].choices) if found else {}
 
@@ -57,7 +60,11 @@ class Parser(argparse.ArgumentParser):
 
 
 def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
-    """What is wrong with words that a verb's parser does not take."""
+    """What is wrong with words that a verb's parser does not take, as its error message.
+
+    An option that there is not comes with the nearest that there is; without options the first word
+    is one too many.
+    """
     options = [word for word in words if word.startswith("-")]
     if not options:
         return f"unexpected word {words[0]!r}: name all of a kind in one place"

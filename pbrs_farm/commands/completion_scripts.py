@@ -30,7 +30,10 @@ complete -o default -F _pbrs_farm pbrs-farm"""
 
 
 def completion_script(shell: str, verbs: Mapping[str, argparse.ArgumentParser]) -> str:
-    """What the shell reads to complete the command's words; verbs: each with its parser."""
+    """What the shell reads to complete the command's words: verbs, options, their choices, example homes.
+
+    shell: one of SHELLS; zsh reads bash's script. verbs: each with its parser.
+    """
     if shell == "fish":
         return "\n".join(_fish_lines(verbs))
     script = _bash_script(verbs)

@@ -28,7 +28,11 @@ _TABLES = ("render", "select", "pack")
 
 
 def job_file(words: list[str]) -> dict[str, Any] | None:
-    """The job that a command's one word names, None where it names homes. Raises BadInput."""
+    """The job that a command's one word names, None where it names homes.
+
+    A job is a .toml file with a list `homes`; another TOML file is a home's programme. Raises
+    BadInput for a file that is no TOML, or has tables that a job does not have.
+    """
     if len(words) != 1 or not words[0].endswith(".toml") or not Path(words[0]).is_file():
         return None
     job = _tables(words[0])
@@ -37,7 +41,10 @@ def job_file(words: list[str]) -> dict[str, Any] | None:
 
 
 def job_like(file: str, homes: list[str]) -> dict[str, Any]:
-    """The job of a template, a job's file whose own homes do not count, with these. Raises BadInput."""
+    """The job of a template with these homes: a job's file whose own homes, if any, do not count.
+
+    Raises BadInput as job_file does.
+    """
     return _checked({**_tables(file), "homes": homes}, file)
 
 
@@ -77,7 +84,11 @@ def submit_arguments(
 
 
 def option_words(table: Mapping[str, Any], file: str) -> list[str]:
-    """A table's entries as words of a command: true is a flag, a list is many words. Raises BadInput."""
+    """A table's entries as words of a command.
+
+    {"split": True, "layers": ["depth"]} -> ["--split", "--layers", "depth"]: true is a flag, false
+    nothing, a list many words. Raises BadInput for a table in the table.
+    """
     words: list[str] = []
     for name, value in table.items():
         if isinstance(value, dict):

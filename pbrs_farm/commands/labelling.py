@@ -32,7 +32,7 @@ def add_verbs(verb: Verb) -> None:
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=500, metavar="N", help="views a tar (webdataset)")
 
-    p = verb("pack", _pack, "finished views as shards to train from, or as Parquet")
+    p = verb("pack", _pack_views, "finished views as shards to train from, or as Parquet")
     add = p.add_argument
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
@@ -47,7 +47,7 @@ def add_verbs(verb: Verb) -> None:
     add("--colour", default="png", metavar="FORM", help=text)
     add("--seed", type=int, default=0, help="of the order of views (default 0)")
 
-    p = verb("classes", _classes, "how often each class is seen, and by which rule")
+    p = verb("classes", _count_classes, "how often each class is seen, and by which rule")
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
     add_options(p, ModelsOption)
     p.add_argument("--json", action="store_true", help="as JSON")
@@ -107,14 +107,17 @@ def _export_homes(args: argparse.Namespace) -> int:
 
 
 def add_modes_and_size(p: argparse.ArgumentParser) -> None:
-    """Which lighting modes, and at which size."""
+    """Add --modes and --size: which lighting modes are taken, and the size they are resized to.
+
+    `args.modes` is a list or None for all there are, `args.size` WxH or None.
+    """
     add = p.add_argument
     modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
     add("--modes", nargs="+", metavar="MODE", help=modes)
     add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
 
 
-def _pack(args: argparse.Namespace) -> int:
+def _pack_views(args: argparse.Namespace) -> int:
     from pbrs_farm.core.house_split import shares_from_text
     from pbrs_farm.study.packing.pack_shards import pack
     from pbrs_farm.study.packing.packing_plan import Packing
@@ -147,7 +150,7 @@ def _pack(args: argparse.Namespace) -> int:
     return 0
 
 
-def _classes(args: argparse.Namespace) -> int:
+def _count_classes(args: argparse.Namespace) -> int:
     from pbrs_farm.gallery.class_statistics import class_statistics
 
     if not (Path(args.folder) / "houses").is_dir() and _is_home(args.folder):

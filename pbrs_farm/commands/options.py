@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 
 def flag(name: str) -> str:
-    """The option of a name: "time_budget" -> "--time-budget"."""
+    """The option of a field's name.
+
+    >>> flag("time_budget")
+    '--time-budget'
+    """
     return f"--{name.replace('_', '-')}"
 
 
@@ -47,7 +51,10 @@ def add_options(p: argparse.ArgumentParser, model: type[Record], **defaults: Any
 
 
 def group_of(p: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
-    """The parser's group of options of that title, in its help."""
+    """The parser's group of options of that title in its help, a new one where there is none.
+
+    Options of one subject stand together, whichever function adds them.
+    """
     for group in p._action_groups:
         if group.title == title:
             return group

@@ -213,7 +213,7 @@ def _stop_on(name: str, known: list[str], plan: TrainingPlan) -> str:
     return f"on_{name}"
 
 
-def _pack(out: Path) -> None:
+def _pack_run(out: Path) -> None:
     from pbrs_farm.study.judging.packed_weights import pack_weights
 
     packed = pack_weights(out, out / "packed")
@@ -229,7 +229,7 @@ def _export(out: Path) -> None:
     echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
 
 
-_EXPORTS = {"onnx": _export, "weights": _pack}
+_EXPORTS = {"onnx": _export, "weights": _pack_run}
 
 
 def _print_run(out: Path) -> None:

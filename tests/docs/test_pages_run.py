@@ -32,6 +32,7 @@ from tests.scene.homes import SMALL
 pytestmark = pytest.mark.slow
 
 AS_THEY_STAND = ("researcher", "python")  # test_tutorials.py runs these
+ONE_SESSION = ("data",)  # a block of Python takes names of those before it
 WITH_RECIPE = ("run", "scatter", "dress", "cameras", "repair")
 WITH_HERE = ("run", "small", *(["needs study"] if find_spec("torch") else []))
 SHRUNK = (
@@ -75,9 +76,11 @@ def test_a_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
         train = "pbrs-farm train normals out/homes --out out/runs/normals --set steps=2"
         _command(train, tmp_path, small=True)
     variables: dict[str, str] = {}
+    session = ""
     for block in blocks_of(page):
         if block.language == "python" and block.how() in WITH_HERE:
-            _python(block.text, tmp_path)
+            _python(session + block.text, tmp_path)
+            session += block.text if page.stem in ONE_SESSION else ""
         for line in block.lines if block.language == "sh" else ():
             if block.how(line) not in WITH_HERE:
                 continue
