@@ -63,7 +63,10 @@ def box_mapped(
 
 
 def connected_parts(surface: Surface, axes: F64) -> Int:
-    """(V,) number of the connected part of each vertex of a surface; equal places are one."""
+    """(V,) number of the connected part of each vertex of a surface, from 0.
+
+    Vertices within 0.1 mm are one. axes: (3, 3), columns are the axes along which places are compared.
+    """
     return _parts_of(surface.positions.astype(np.float64) @ axes, surface.faces)
 
 

@@ -40,7 +40,10 @@ class FinishScheme:
 
 
 def finish_scheme(house: MutableHouse, style: Style) -> FinishScheme:
-    """The home's scheme, from streams of its own: equal for every part that asks."""
+    """The home's scheme of finishes, drawn by the house's seed and the style.
+
+    It draws from a stream of its own, so that every pass that asks gets the same.
+    """
     rng = house.rng("joinery")
     trim = _trim_finish(rng, style)
     leaf = _leaf_finish(rng, style, trim)

@@ -63,5 +63,8 @@ def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
 
 
 def is_lit_alike(piece_has_lights: bool, items: Sequence[Item]) -> bool:
-    """Whether a piece can carry the lights of the items: a lamp that is on needs a light source."""
+    """Whether a piece can carry the lights of the items it would replace.
+
+    A lamp with a light needs a piece with a light source; for things without light any piece will do.
+    """
     return piece_has_lights or not any(item.lights for item in items)

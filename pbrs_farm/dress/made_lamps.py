@@ -107,7 +107,10 @@ def _lamp_of(
 
 
 def with_flux(shape: Shape, flux_lm: float) -> Shape:
-    """The shape with its lights giving that luminous flux together."""
+    """The shape with its lights giving that luminous flux (lm) together, in equal shares.
+
+    A shape without lights is returned as it is.
+    """
     n = max(len(shape.lights), 1)
     lights = tuple(
         replace(light, power=round(flux_lm, 1), unit=PowerUnit.LUMEN, share=1.0 / n)

@@ -161,7 +161,10 @@ def _placed_box(shape: Shape, turn: F64, factor: F64, at: F64) -> Box | None:
 
 
 def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None = None) -> Item:
-    """The item turned by (3, 3) about a point (3,) of the world, then moved by step (3,) metres."""
+    """The item turned by (3, 3) about a point of the world, then moved by step; a new item.
+
+    step, about: (3,) metres; about is the origin by default. Normals, box and lights go along.
+    """
     turn = np.eye(3) if turn is None else turn
     pivot = np.zeros(3) if about is None else about
 

@@ -27,7 +27,10 @@ Cubes = NDArray[np.int64]
 
 
 class Neighbours:
-    """The items of a house, as they are when they are asked for."""
+    """The items of a house with their bounds and triangles, found anew when an item is another object.
+
+    items: the list itself, which may change between calls; items are named by their place in it.
+    """
 
     def __init__(self, items: Sequence[Item]) -> None:
         self.items = items
@@ -48,13 +51,20 @@ class Neighbours:
         return self._triangles[id(item)][1]
 
     def near(self, low: F64, high: F64) -> list[int]:
-        """Places of the items that are no structure and whose bounds meet the box low..high (3,)."""
+        """Places of the items whose bounds meet the box low..high (3,), metres; no walls, floors, ceilings.
+
+        A first, cheap test: bounds that meet say nothing of surfaces.
+        """
         bounds = self.bounds()
         meets = ((bounds[:, 1] >= low) & (bounds[:, 0] <= high)).all(1)
         return [int(k) for k in np.flatnonzero(meets) if not self.items[int(k)].kind.is_structure]
 
     def n_shared(self, item: Item, without: Collection[int]) -> int:
-        """Cubes of 2 cm that an item's surface shares with others'; without: places left out."""
+        """In how many 2 cm cubes an item's surface lies together with other items' surfaces.
+
+        The item need not be in the house yet. without: places of items left out, such as its own. Compare it
+        with what the old item shared: things that touch share some cubes.
+        """
         low, high = item.bounds
         own = _cubes(self.triangles(item))
         count = 0
@@ -124,7 +134,11 @@ ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
 
 
 def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> Place:
-    """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling."""
+    """What holds items[index]: the floor, another piece (SURFACE), a wall or the ceiling.
+
+    group: of the catalogue; ceiling lamps hang whatever stands below. What nothing holds from below is
+    taken to hang on a wall.
+    """
     if HELD.get(group) is HeldBy.TOP:
         return Place.CEILING
     item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
@@ -144,14 +158,20 @@ def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> 
 
 
 def height_above_floor(house: MutableHouse, item: Item, low_y: float) -> float:
-    """How far a height lies above the floor of the item's room, or of its storey."""
+    """Metres from the floor of the item's room, else of its storey, to a world height low_y.
+
+    0 where neither is known.
+    """
     floors = [room.floor_y for room in house.source.rooms if room.id == item.room_id]
     floors += [lv.elevation for lv in house.source.levels if lv.id == item.level_id]
     return low_y - floors[0] if floors else 0.0
 
 
 def lowest_points(item: Item) -> F64:
-    """(N, 3) vertices within 5 cm of the item's bottom; every few of them where they are many."""
+    """(N, 3) vertices within 5 cm of the item's bottom: what can touch what it stands on.
+
+    About 600 at most, evenly left out.
+    """
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
     points = points[points[:, 1] <= points[:, 1].min() + _LOW_PART_M]
     return np.asarray(points[:: max(1, len(points) // 600)])

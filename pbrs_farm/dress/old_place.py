@@ -29,7 +29,10 @@ _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
 
 class HeldBy(Enum):
-    """What of a piece keeps its place when it gets another model."""
+    """What of a piece keeps its place when it gets another model: its back, its middle or its top.
+
+    Both BACK and CENTRE keep the bottom's height.
+    """
 
     BACK = "back"
     CENTRE = "centre"

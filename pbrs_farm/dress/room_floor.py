@@ -30,7 +30,10 @@ _FRENCH_M = 0.4  # a window whose sill is lower is walked through
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorSpot:
-    """A place at a wall."""
+    """A place at a wall for a thing, with the plan area it takes and the one before it.
+
+    From spot_at; RoomFloor says whether it is allowed.
+    """
 
     face: WallFace
     s: float  # of the thing's middle, along the face
@@ -40,7 +43,11 @@ class FloorSpot:
 
 
 def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: float) -> FloorSpot:
-    """The place of a thing (width, depth) at s on a face, with before_m of free floor."""
+    """The place of a thing with its back at a wall face.
+
+    s: metres along the face, of the thing's middle. width, depth: of the thing. before_m: free floor that
+    it needs in front of it. Its back keeps OUT_M from the wall, for the skirting board.
+    """
 
     def area(z0: float, z1: float) -> BaseGeometry:
         ends = [(s - width / 2, z0), (s + width / 2, z0), (s + width / 2, z1), (s - width / 2, z1)]
@@ -52,7 +59,13 @@ def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: floa
 
 @dataclass(slots=True)
 class RoomFloor:
-    """What is left of a room's floor and walls."""
+    """What is left of a room's floor and walls while furniture is put there; state: what was put.
+
+    floor = RoomFloor.of(house, house_space(house), room)
+    spot = spot_at(room.faces[0], 1.2, 0.8, 0.4, before_m=0.6)
+    if floor is not None and floor.allows(spot.body, spot.front):
+        floor.take(spot.body, spot.front)
+    """
 
     space: HouseSpace
     room: RoomSpace
@@ -68,7 +81,10 @@ class RoomFloor:
 
     @classmethod
     def of(cls, house: MutableHouse, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
-        """The room as it is; None where it has no floor or no walls."""
+        """The room as it is now; None where it has no floor or no walls.
+
+        space: of the same state of the house.
+        """
         bitmap = floor_bitmap(space, room)
         if not bitmap.inside.any() or not room.faces:
             return None
@@ -92,7 +108,10 @@ class RoomFloor:
         )  # fmt: skip
 
     def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
-        """Whether a thing may stand there, with the floor before it free."""
+        """Whether a thing may stand there: on free floor, off doors, and every way stays open.
+
+        body, front: plan areas (x, z) of the thing and of the floor that it needs before it.
+        """
         is_there = shapely.contains(self.free, body) and not shapely.intersects(self.kept, body)
         if not is_there or any(shapely.intersects(body, area) for area in self.fronts):
             return False
@@ -104,13 +123,19 @@ class RoomFloor:
         return self._keeps_ways(self._cells(body))
 
     def take(self, body: BaseGeometry, front: BaseGeometry) -> None:
-        """A thing stands there now."""
+        """Count a thing as standing there; allows is not asked again.
+
+        body, front: as of allows.
+        """
         self.bodies.append(body)
         self.fronts.append(front)
         self.bitmap = with_body(self.bitmap, self._cells(body))
 
     def is_too_full(self, area_m2: float) -> bool:
-        """Whether furniture would cover more of the floor than people let it with so much more."""
+        """Whether area_m2 more of furniture would cover more than 58 % of the room's floor.
+
+        Ask it before a place is looked for, which costs more.
+        """
         inside, covered = self.bitmap.inside, self.bitmap.occupied & self.bitmap.inside
         covered_m2 = float(covered.sum()) * CELL_M**2 + area_m2
         return covered_m2 > _MOST_COVERED * float(inside.sum()) * CELL_M**2

@@ -175,7 +175,10 @@ def room_style(style: Style, rng: np.random.Generator) -> Style:
 
 
 def shade(colour: Rgb, factor: float) -> Rgb:
-    """The colour darker (factor < 1) or lighter (> 1, towards white), sRGB-encoded."""
+    """The colour darker (factor < 1: times factor) or lighter (> 1: towards white), sRGB-encoded.
+
+    factor 2 goes half the way to white.
+    """
     if factor <= 1.0:
         r, g, b = (max(c * factor, 0.0) for c in colour)
     else:

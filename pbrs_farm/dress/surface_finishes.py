@@ -17,7 +17,10 @@ from pbrs_farm.dress.textures.families import pattern_material
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """What a part is painted with or made of; the first of wood, metal and paint that is there."""
+    """What a part is painted with or made of: wood if it is given, else metal, else paint.
+
+    paint: sRGB-encoded, 0..1. roughness: of paint; wood and metal have their own.
+    """
 
     name: str
     paint: Rgb = (0.93, 0.925, 0.91)
@@ -59,7 +62,10 @@ def item_with_finish(house: MutableHouse, item: Item, finish: Finish) -> Item:
 
 
 def has_plain(house: MutableHouse, item: Item) -> bool:
-    """Whether a finish would cover any of its surfaces."""
+    """Whether a finish would cover any of the item's surfaces.
+
+    Glass, mirrors, bulbs and what has a picture stay as they are.
+    """
     return any(is_plain(house.materials[s.material]) for s in item.surfaces)
 
 
@@ -83,7 +89,10 @@ def part_of_surface(surface: Surface, faces: Bools) -> Surface:
 
 
 def number_of_finish(house: MutableHouse, finish: Finish) -> int:
-    """The number of the material of a finish without a picture; wood counts as its mean colour."""
+    """The number in house.materials of a finish as a plain material; it is added where it is new.
+
+    Wood counts as its mean colour: for grain use with_finish.
+    """
     return house.material(material_of_finish(finish))
 
 

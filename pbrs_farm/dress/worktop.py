@@ -18,7 +18,10 @@ LIFT_M = 0.0001  # above the support, so that no faces coincide
 
 @dataclass(frozen=True, slots=True)
 class TopSpot:
-    """A place for a thing: cells of a worktop."""
+    """A place for a thing on a worktop: its first row and column, and how many of each.
+
+    From Worktop.spots.
+    """
 
     row: int
     column: int
@@ -91,7 +94,10 @@ class Worktop:
         return rows.astype(np.int32), columns.astype(np.int32), n
 
     def take(self, spot: TopSpot) -> None:
-        """Nothing else can stand there."""
+        """Mark a spot as occupied up to the ceiling: nothing else can stand there.
+
+        spot: of this worktop; whether it is free is not checked.
+        """
         ahead = slice(spot.row, spot.row + spot.n_rows)
         self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
 
@@ -120,7 +126,10 @@ class Worktop:
         return float(self.clear[near].min(initial=np.inf))
 
     def keep_free(self, zone: BaseGeometry) -> None:
-        """Nothing can stand over a plan area."""
+        """Let nothing stand over a plan area (x, z), such as where a door swings.
+
+        zone: may be empty, or lie elsewhere.
+        """
         plan = self.grid.centres()
         corners = plan[[0, 0, -1, -1], [0, -1, 0, -1]]
         if not zone.is_empty and shapely.box(*corners.min(0), *corners.max(0)).intersects(zone):

@@ -98,7 +98,11 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
 def drop_clothes(
     placing: Placing, scene: SceneTriangles, at: F64, level: float, *, napkin: bool = False
 ) -> None:
-    """Let a garment, or a napkin, fall in a heap on what is at a place (2,) and about a height."""
+    """Let a garment, or a napkin, fall in a heap on what lies below a plan place.
+
+    at: (2,) world (x, z), metres. level: world y of the support there, about. Refused, and counted, where
+    it would hang on what rises beside it. Cloth that fell before in this room is met.
+    """
     rng, style = placing.rng, placing.style
     near = np.array([[at[0] - 0.3, level, at[1] - 0.3], [at[0] + 0.3, level, at[1] + 0.3]])
     grid, sides, rows = _over(near[0], near[1], float(rng.uniform(-np.pi, np.pi)))

@@ -91,7 +91,10 @@ def bodies_of(
 
 
 def piece_id(item: Item) -> str:
-    """The id of the piece that an added item was made from; "" for an item of the source."""
+    """The id of the catalogue's piece that an added or swapped item was made from.
+
+    "" for an item of the source, read from its tags.
+    """
     return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
 
 

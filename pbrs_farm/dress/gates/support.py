@@ -44,7 +44,11 @@ class Held:
 
 
 def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
-    """By what each of some bodies is held. plumb: of all bodies."""
+    """What holds each of some bodies, by its number: what it stands on, else the wall it hangs on.
+
+    numbers: of the bodies asked for. plumb: of all bodies. A body that is held by nothing gets the
+    smallest gap that was found; ask `is_good`.
+    """
     low, high = boxes_of(bodies)
     found = _find_what_holds(bodies, numbers, plumb)
     for number in numbers:

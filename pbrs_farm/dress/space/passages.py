@@ -63,7 +63,10 @@ class Passage:
         return np.asarray(self.centre + self.inward(side) * self.half_wall[side])
 
     def before(self, side: int, depth_m: float = BEFORE_DOOR_M) -> BaseGeometry:
-        """The plan rectangle in front of the hole on that side, as wide as the hole."""
+        """The plan rectangle (x, z) in front of the hole on a side, as wide as the hole.
+
+        side: 0 or 1, of side_of. depth_m: how far it reaches into the room.
+        """
         face, out = self.face_point(side)[[0, 2]], self.inward(side)[[0, 2]] * depth_m
         half = self.along[[0, 2]] * self.width / 2
         return shapely.Polygon([face - half, face + half, face + half + out, face - half + out])
@@ -74,7 +77,10 @@ class Passage:
         return max(BEFORE_DOOR_M, min(self.width, 1.0))
 
     def swing(self, side: int) -> BaseGeometry:
-        """The plan area a leaf of the hole's width sweeps, hung on either end (which is unknown)."""
+        """The plan area that a leaf as wide as the hole sweeps on a side.
+
+        Which end it is hung on is unknown, so both are counted.
+        """
         middle, half = self.face_point(side)[[0, 2]], self.along[[0, 2]] * self.width / 2
         discs = [shapely.Point(middle + s * half).buffer(self.width) for s in (-1, 1)]
         return shapely.intersection(shapely.union_all(discs), self.before(side, self.width))

@@ -88,7 +88,11 @@ class WallFace:
         return float(part.min()) if part.size else 0.0
 
     def starts(self, width_m: float, y0: float, y1: float, depth_m: float) -> F64:
-        """(K,) every s, one a cell, at which a thing so wide between y0 and y1 has depth_m free."""
+        """(K,) every s, in steps of a cell, at which a thing fits that begins there.
+
+        width_m: of the thing along the face. y0, y1: world heights of its lower and upper edge. depth_m: free
+        space it needs before the face. Empty where it fits nowhere.
+        """
         rows, columns = self._window(0.0, width_m, y0, y1)
         if rows[0] < 0 or rows[1] > self.clear.shape[0] or rows[1] <= rows[0]:
             return np.zeros(0)
@@ -101,11 +105,17 @@ class WallFace:
         return np.asarray(np.flatnonzero(count[n:] - count[:-n] == n) * CELL_M, np.float64)
 
     def taken(self, s0: float, s1: float, y0: float, y1: float) -> WallFace:
-        """The face with the rectangle no longer free."""
+        """The face with the rectangle s0..s1, y0..y1 (world heights) no longer free; a new value.
+
+        What lies beyond the face's edges is ignored.
+        """
         return self.limited(s0, s1, y0, y1, 0.0)
 
     def limited(self, s0: float, s1: float, y0: float, y1: float, free_m: float) -> WallFace:
-        """The face with no more than free_m free before the rectangle."""
+        """The face with at most free_m metres free before the rectangle s0..s1, y0..y1; a new value.
+
+        For what stands before a wall and lets flat things hang behind it.
+        """
         rows, columns = self._window(s0, s1, y0, y1)
         clear = self.clear.copy()
         part = clear[max(rows[0], 0) : max(rows[1], 0), max(columns[0], 0) : max(columns[1], 0)]
