@@ -19,7 +19,10 @@ _RETURNED: Final = (
     "pbrs_farm.views.views:Views",
 )  # fmt: skip
 _MEMBERS: Final = (property, functools.cached_property, staticmethod, classmethod)
-_OF_NO_HOME: Final = ("Camera", "Recipe")
+_OF_NO_HOME: Final = (
+    "BadHouse", "BadInput", "BadRecipe", "Camera", "MachineFailed", "PbrsError", "Recipe", "RenderFailed",
+    "StoreFailed",
+)  # fmt: skip
 
 
 def public_names() -> dict[str, Any]:

@@ -13,4 +13,4 @@ for seed in range(2):
     scene = home.scatter([can], n=4, on="table", seed=seed)
     views = scene.cameras_around(n=2, size=(320, 240), seed=seed)
     pf.render(scene, views, modes=["opengl_dl"]).save("out/bop/views")
-print(pf.export("out/bop/views", "out/bop/bop", "bop"))
+print(pf.export_views("out/bop/views", "out/bop/bop", "bop"))

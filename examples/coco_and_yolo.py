@@ -7,4 +7,4 @@ import pbrs_farm as pf
 home = pf.load(*sys.argv[1:2] or ["Studio"], recipe="preview")
 pf.render(home, home.cameras(n=2), modes=["opengl_dl"]).save("out/detect/views")
 for form in ("coco", "yolo"):
-    print(form, pf.export("out/detect/views", f"out/detect/{form}", form))
+    print(form, pf.export_views("out/detect/views", f"out/detect/{form}", form))

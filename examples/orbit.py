@@ -10,4 +10,4 @@ x, y, z = home.items.named("table")[0].bounds.mean(0)
 ring = [(x + cos(k * pi / 4), y + 0.9, z + sin(k * pi / 4)) for k in range(8)]
 cameras = [pf.Camera.look_at(eye, (x, y, z), size=(320, 240)) for eye in ring]
 pf.render(home, cameras, modes=["opengl_dl"]).save("out/orbit/views")
-pf.export("out/orbit/views", "out/orbit/nerfstudio", "nerfstudio")
+pf.export_views("out/orbit/views", "out/orbit/nerfstudio", "nerfstudio")

@@ -18,8 +18,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from pbrs_farm.core.camera import Camera as Camera
+    from pbrs_farm.core.errors import BadHouse as BadHouse
+    from pbrs_farm.core.errors import BadInput as BadInput
+    from pbrs_farm.core.errors import BadRecipe as BadRecipe
+    from pbrs_farm.core.errors import MachineFailed as MachineFailed
+    from pbrs_farm.core.errors import PbrsError as PbrsError
+    from pbrs_farm.core.errors import RenderFailed as RenderFailed
+    from pbrs_farm.core.errors import StoreFailed as StoreFailed
     from pbrs_farm.core.recipe import Recipe as Recipe
-    from pbrs_farm.export.export_views import export as export
+    from pbrs_farm.export.export_views import export as export_views
     from pbrs_farm.scene.home import Home as Home
     from pbrs_farm.scene.home import load as load
     from pbrs_farm.scene.home import make as make
@@ -38,6 +45,13 @@ if TYPE_CHECKING:
 
 # Public name -> where it is defined.
 _PUBLIC: Final = {
+    "BadHouse": "pbrs_farm.core.errors:BadHouse",
+    "BadInput": "pbrs_farm.core.errors:BadInput",
+    "BadRecipe": "pbrs_farm.core.errors:BadRecipe",
+    "MachineFailed": "pbrs_farm.core.errors:MachineFailed",
+    "PbrsError": "pbrs_farm.core.errors:PbrsError",
+    "RenderFailed": "pbrs_farm.core.errors:RenderFailed",
+    "StoreFailed": "pbrs_farm.core.errors:StoreFailed",
     "Camera": "pbrs_farm.core.camera:Camera",
     "Frame": "pbrs_farm.views.views:Frame",
     "Home": "pbrs_farm.scene.home:Home",
@@ -45,7 +59,7 @@ _PUBLIC: Final = {
     "Packing": "pbrs_farm.study.packing.packing_plan:Packing",
     "Recipe": "pbrs_farm.core.recipe:Recipe",
     "SampleRequest": "pbrs_farm.views.view_sample:SampleRequest",
-    "export": "pbrs_farm.export.export_views:export",
+    "export_views": "pbrs_farm.export.export_views:export",
     "load": "pbrs_farm.scene.home:load",
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
@@ -57,15 +71,22 @@ _PUBLIC: Final = {
 }
 
 __all__ = [
+    "BadHouse",
+    "BadInput",
+    "BadRecipe",
     "Camera",
     "Frame",
     "Home",
+    "MachineFailed",
     "Model",
     "Packing",
+    "PbrsError",
     "Recipe",
+    "RenderFailed",
     "SampleRequest",
+    "StoreFailed",
     "__version__",
-    "export",
+    "export_views",
     "load",
     "make",
     "model",

@@ -23,6 +23,12 @@ class PbrsError(Exception):
     """An error whose text says what, where, and what to do next, in one line that can be printed.
 
     hint: what to do next, or "".
+
+        >>> try:
+        ...     pf.load("nowhere.sh3d")
+        ... except pf.PbrsError as error:
+        ...     type(error).__name__
+        'BadHouse'
     """
 
     def __init__(self, message: str, *, hint: str = "") -> None:
@@ -54,6 +60,9 @@ class BadInput(PbrsError):
     """A file or an argument given by the user is wrong.
 
     file: the file's path or name.  place: where inside it ("wall w3", "line 12"), or "".
+
+        >>> str(pf.BadInput("flat.sh3d", "wall w3", "has no length", hint="draw it anew"))
+        'flat.sh3d: wall w3: has no length (draw it anew)'
     """
 
     def __init__(self, file: object, place: str, message: str, *, hint: str = "") -> None:
@@ -65,15 +74,30 @@ class BadInput(PbrsError):
 
 
 class BadHouse(BadInput):
-    """A house's source cannot be read or repaired; names the file and the place inside it."""
+    """A house's source cannot be read or repaired; names the file and the place inside it.
+
+    >>> issubclass(pf.BadHouse, pf.BadInput)
+    True
+    """
 
 
 class BadRecipe(PbrsError):
-    """A recipe, a preset's name or an override is not valid."""
+    """A recipe, a preset's name or an override is not valid.
+
+    >>> try:
+    ...     recipe_from_name("fats")
+    ... except pf.BadRecipe as error:
+    ...     error.message
+    "no recipe 'fats'"
+    """
 
 
 class RenderFailed(PbrsError):
-    """A picture could not be made; view, mode and seed reproduce it."""
+    """A picture could not be made; view, mode and seed reproduce it.
+
+    >>> pf.RenderFailed("no light", view="0_0_s1", mode="light", seed=7).seed
+    7
+    """
 
     def __init__(self, message: str, *, view: str, mode: str, seed: int, hint: str = "") -> None:
         super().__init__(f"{message} (view {view}, mode {mode}, seed {seed})", hint=hint)
@@ -83,7 +107,11 @@ class RenderFailed(PbrsError):
 
 
 class StoreFailed(PbrsError):
-    """An object could not be read from or written to the store; names its key."""
+    """An object could not be read from or written to the store; names its key.
+
+    >>> pf.StoreFailed("houses/a/house.glb", "no space is left").key
+    'houses/a/house.glb'
+    """
 
     def __init__(self, key: str, message: str, *, hint: str = "") -> None:
         super().__init__(f"{key}: {message}", hint=hint)
@@ -103,4 +131,8 @@ class StoreUnavailable(StoreFailed, Transient):
 
 
 class MachineFailed(PbrsError):
-    """This machine lacks something a step needs; the hint says how to get it."""
+    """This machine lacks something a step needs; the hint says how to get it.
+
+    >>> pf.MachineFailed("no LLVM", hint="apt-get install libllvm19").hint
+    'apt-get install libllvm19'
+    """

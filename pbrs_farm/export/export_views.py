@@ -37,7 +37,7 @@ def export(
     something.
 
     >>> frame.save("out/detect")
-    >>> n_views, n_files = pf.export("out/detect", "out/coco", "coco")
+    >>> n_views, n_files = pf.export_views("out/detect", "out/coco", "coco")
     >>> n_views
     1
     """
