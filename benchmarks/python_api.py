@@ -28,7 +28,8 @@ import pbrs_farm as pf
 from benchmarks.figures import write_report
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.formats.marker import Marker
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.scene import physics
 

@@ -24,7 +24,8 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.area_emitters import area_emitters_of_house

@@ -26,7 +26,8 @@ from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.truth.surface_layers import albedo_label
 

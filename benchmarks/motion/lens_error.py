@@ -16,7 +16,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.recipe_fields import LensFields
+from pbrs_farm.core.optics_fields import LensFields
 
 N_POINTS: Final = 10_000
 PINHOLE: Final = Intrinsics.from_hfov(640, 480)

@@ -12,12 +12,13 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.run.chosen_cameras import pilot_of_view
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.steps import camera_seed
+from pbrs_farm.run.view_light import pilot_of_view
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene

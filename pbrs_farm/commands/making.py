@@ -31,7 +31,7 @@ from pbrs_farm.installation import need, system_command
 if TYPE_CHECKING:
     from pbrs_farm.prepare.source import SourceRef
     from pbrs_farm.read.objects.model_folders import ObjectModel
-    from pbrs_farm.run.local import Observer, Run
+    from pbrs_farm.run.local_run import Observer, Run
     from pbrs_farm.run.processes.render_task import Event
 
 
@@ -147,7 +147,7 @@ def _run_homes(
 
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
     """The run that the options describe; BadInput before anything is stored."""
-    from pbrs_farm.run.local import Run
+    from pbrs_farm.run.local_run import Run
     from pbrs_farm.run.request import RunRequest, wanted_of
     from pbrs_farm.settings import settings_from_environment
 

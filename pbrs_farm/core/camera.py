@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
-from pbrs_farm.core.lenses import PINHOLE, Lens, PinholeFaces, faces_of_directions
+from pbrs_farm.core.lenses import PINHOLE, Lens
+from pbrs_farm.core.pinhole_faces import PinholeFaces, faces_of_directions
 
 # Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534

@@ -25,8 +25,6 @@ Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 _MOST_SHOWN: Final = 40  # characters of a value that does not fit
 _MOST_NAMES: Final = 12  # names of fields that a hint lists
 
-# Text that is JSON.
-
 
 def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHouse) -> Any:
     """The JSON value in data; an error for text that is no JSON, NaN, or absurdly deep nesting."""
@@ -53,9 +51,6 @@ class _NoNumberError(ValueError):
 
 def _refuse_constant(name: str) -> float:
     raise _NoNumberError(f"{name} is not a number")
-
-
-# Values that are what a reader expects.
 
 
 def checked(

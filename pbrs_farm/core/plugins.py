@@ -105,9 +105,6 @@ def checked_names(group: str, names: str) -> str:
     return names
 
 
-# Homes of a plugin: words, each a seed.
-
-
 @dataclass(frozen=True, slots=True)
 class PluginHome:
     """A home that a plugin makes from a seed."""

@@ -17,22 +17,20 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.checked_json import place_in, sentence
 from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.optics_fields import BlurFields, LensFields, SensorFields
 from pbrs_farm.core.recipe_fields import (
-    BlurFields,
     CameraFields,
     DressFields,
     EmissionFields,
     FieldGroup,
     HistogramFields,
     ImageFields,
-    LensFields,
     LightFields,
     MaterialFields,
     RasterFields,
     ReadFields,
     RepairFields,
     SelectionFields,
-    SensorFields,
     SkyFields,
     SurroundingFields,
     ToneFields,

@@ -72,9 +72,6 @@ def _escape(c: str) -> str:
     return "".join(f"\\u{units[i : i + 2].hex()}" for i in range(0, len(units), 2))
 
 
-# What a mistyped word may have meant; pure.
-
-
 _LEAST_LIKENESS: Final = 0.6  # difflib's ratio of letters that two words share
 _MOST: Final = 2  # names that are offered
 _AS_LIKELY: Final = 0.05  # of likeness: a second name is offered where it is nearly as near

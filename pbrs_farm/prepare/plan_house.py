@@ -76,9 +76,6 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
     return tuple(found)
 
 
-# A plan as a furnished home of its own file.
-
-
 def furnish_plan_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
 ) -> GeneratedHome:

@@ -243,9 +243,6 @@ def _fit(piece: Piece, told: Box) -> _Fit | None:
     return _Fit(piece, scale, float(np.ptp(logs) + 0.3 * np.abs(logs.mean())))
 
 
-# Where it stands and which way it looks.
-
-
 def _between(told: Box, room: Room) -> Box:
     """The box between its room's floor and ceiling: what is told to begin a little off the floor stands."""
     low, high = (float(told.centre[1] + side * told.half[1]) for side in (-1, 1))
@@ -317,9 +314,6 @@ def _front_cost(told: Box, group: str, place: _Place | None, scene: _Scene) -> f
     centre = np.array(place.outline.representative_point().coords[0]) - middle
     looks = float(centre @ front) / max(float(np.linalg.norm(centre)), 1e-6)
     return 0.5 + 0.25 * (1 - looks) + blocked
-
-
-# The item that stands there.
 
 
 def _placed(

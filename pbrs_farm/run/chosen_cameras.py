@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
-from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.camera import Camera, CameraBlur, View
+from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
 from pbrs_farm.core.plugins import plugins
-from pbrs_farm.core.recipe import BlurFields, CameraFields, LensFields
+from pbrs_farm.core.recipe import CameraFields, LensFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.camera_file import cameras_from_file_text
@@ -24,7 +17,6 @@ from pbrs_farm.sample.house_sampler import Sampling, add_right_views, sample_cam
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
-from pbrs_farm.transport.light_scene import Pilot
 
 
 def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:
@@ -88,90 +80,3 @@ def _report_of_file(fields: CameraFields, views: tuple[View, ...]) -> CameraRepo
         preset=fields.preset, source=fields.source, n_views=len(views),
         n_candidates=len(views), refused={}, rooms=(),
     )  # fmt: skip
-
-
-# The blur of a view's light from the recipe, a walk's poses and what its middle shows of its own.
-
-
-_FARTHEST_M = 100.0  # of the focus where the middle shows nothing
-
-
-def blurred(
-    camera: Camera, view: View, views: Mapping[str, View], fields: BlurFields, caster: Caster
-) -> Camera:
-    """The camera with an aperture and a shutter; of a walk's frame, moving as between its neighbours.
-
-    views: those of the house, by id. caster: for what the middle of the picture shows.
-    """
-    velocity, turn = _speed_on_walk(view, views) or _speed_of_fields(camera, fields)
-    focus = fields.focus_m
-    if fields.aperture_mm > 0 and focus == 0:
-        t, _face = caster.first_hit(camera.eye[None], camera.towards[None])
-        focus = float(t[0]) if np.isfinite(t[0]) else _FARTHEST_M
-    whole_s = fields.shutter_s + fields.rolling_s
-    rolling_share = fields.rolling_s / whole_s if fields.rolling_s > 0 else 0.0
-    blur = CameraBlur(
-        aperture_radius_m=fields.aperture_mm / 2000,
-        focus_m=focus or 1.0,
-        velocity_m=triple(velocity * whole_s),
-        turn_rad=triple(turn * whole_s),
-        open_share=1.0 - rolling_share,
-        rolling_share=rolling_share,
-    )
-    return replace(camera, blur=blur)
-
-
-def _speed_of_fields(camera: Camera, fields: BlurFields) -> tuple[F64, F64]:
-    """(3,) m/s and (3,) rad/s in the world."""
-    axes = camera.world_from_camera[:3, :3]
-    velocity = axes @ np.array([fields.right_mps, fields.up_mps, -fields.forward_mps])
-    # Panning to the right turns about -y, tilting up about x, rolling clockwise about -z.
-    turn = axes @ np.radians([fields.tilt_dps, -fields.pan_dps, -fields.roll_dps])
-    return np.asarray(velocity), np.asarray(turn)
-
-
-def _speed_on_walk(view: View, views: Mapping[str, View]) -> tuple[F64, F64] | None:
-    """(3,) m/s and (3,) rad/s in the world between the frames around a view; None off a walk."""
-    if view.frame is None:
-        return None
-    # Of the same eye of a stereo pair, the frames before and after, as far as there are any.
-    frames = {v.frame: v for v in views.values() if bool(v.left_id) == bool(view.left_id)}
-    before, after = frames.get(view.frame - 1, view), frames.get(view.frame + 1, view)
-    time_s = (after.time_s or 0.0) - (before.time_s or 0.0)
-    if time_s <= 0:
-        return np.zeros(3), np.zeros(3)
-    a, b = (v.camera.world_from_camera[:3, :3] for v in (before, after))
-    turn = Rotation.from_matrix(b @ a.T).as_rotvec()
-    return (after.camera.eye - before.camera.eye) / time_s, np.asarray(turn) / time_s
-
-
-# Whose pilot the light of a frame takes: neighbours in time see nearly the same lamps.
-
-
-FRAMES_A_PILOT: Final = 10
-
-
-def pilot_view(view: View, views: Mapping[str, View]) -> View:
-    """The first of each ten frames for all of them, left and right apart; a view that is none itself.
-
-    views: of the house, by id. Which frame is rendered first changes no picture.
-    """
-    if view.frame is None:
-        return view
-    left = keys.frame_id(view.frame - view.frame % FRAMES_A_PILOT)
-    return views.get(keys.right_id(left) if view.left_id else left, view)
-
-
-def pilot_of_view(
-    view: View, views: Mapping[str, View], camera: Camera, house_id: str, digest: str
-) -> Pilot | None:
-    """The pilot that the light of a view takes over, None for its own.
-
-    camera: the view's, at the picture's size. digest: of the recipe's groups that light uses.
-    """
-    lead = pilot_view(view, views)
-    if lead is view:
-        return None
-    size = camera.intrinsics.width_px, camera.intrinsics.height_px
-    seed = keys.seed(house_id, lead.id, "light", digest)
-    return Pilot(lead.camera.with_size(*size), seed)

@@ -126,9 +126,6 @@ def _glance(work: Work, house: CachedHouse, view: View) -> LinearAovs:
     return LinearAovs(light.outdoor, light.indoor, light.albedo, light.normal)
 
 
-# The view step's histogram.json, from the pictures that the view has. Effects: reads the store.
-
-
 _MISSING_TEXTURE: Final = frozenset({"missing-texture", "unreadable-texture"})
 
 

@@ -167,9 +167,6 @@ class HouseCache:
             self._held = None
 
 
-# The panorama of a house: a file of the recipe's folder, by the house's id. Effects: reads files.
-
-
 SUFFIXES = (".exr", ".hdr")
 
 

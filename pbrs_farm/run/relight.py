@@ -138,9 +138,6 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
     return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))
 
 
-# A view of any store as a folder, for as long as it is used. Effects: network, temporary files.
-
-
 _VIEW: Final = re.compile(
     r"(?P<root>[^:]+://.+)/(?:houses|objects)/(?P<house>[^/]+)/views/(?P<view>[^/]+)/?"
 )

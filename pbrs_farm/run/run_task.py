@@ -131,15 +131,15 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     return False
 
 
-def _told(step: str, facts: dict[str, Any]) -> dict[str, Any]:
-    """What of a marker's facts the run is told: all of a house's steps, the darkness of a view."""
+def _facts_for_run(step: str, facts: dict[str, Any]) -> dict[str, Any]:
+    """What of a marker's facts the run needs: all of a house's steps, the darkness of a view."""
     if not plan.STEPS[step].per_view:
         return facts
     return {"dark": facts["dark"]} if facts.get("dark") else {}
 
 
 def _event_of_outcome(work: Work, name: str, outcome: Outcome, seconds: float) -> Event:
-    facts = _told(name, outcome.marker.facts)
+    facts = _facts_for_run(name, outcome.marker.facts)
     kind: Literal["kept", "done"] = "kept" if outcome.was_done else "done"
     return Event(kind, work.house_id, work.view_id, name, seconds, "", facts, peak_mb())
 

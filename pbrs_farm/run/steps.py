@@ -37,14 +37,8 @@ from pbrs_farm.prepare.finished_house import finished_house
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.house_cache import CachedHouse
-from pbrs_farm.run.step_cache import (
-    LightCheckpoint,
-    Outcome,
-    StepOutput,
-    Work,
-    required_source,
-    run_unless_done,
-)
+from pbrs_farm.run.light_checkpoint import LightCheckpoint
+from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 if TYPE_CHECKING:
@@ -224,7 +218,7 @@ def _missed(cached: CachedHouse, camera: Camera) -> Bools:
 
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
-    from pbrs_farm.run.chosen_cameras import blurred, pilot_of_view
+    from pbrs_farm.run.view_light import blurred, pilot_of_view
     from pbrs_farm.transport.lamp_layers import layer_name
 
     # Render; the seed knows all that changes the picture and nothing else.

@@ -14,7 +14,8 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
 from pbrs_farm.progress import progress_reporter
-from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.sample.stored_cameras import OUTSIDE
@@ -79,13 +80,13 @@ def render(
             )
     recipe = _recipe_of_view(home, found, size)
     want = _wanted(modes, layers)
-    with _told(home, found, observe, progress) as tell:
+    with _progress_of(home, found, observe, progress) as tell:
         frames = home.renderer.frames(home.source, recipe, found, want, tell)
     return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
 
 
 @contextmanager
-def _told(
+def _progress_of(
     home: Home,
     viewpoints: Sequence[Viewpoint],
     observe: Callable[[str], None] | None,

@@ -13,7 +13,8 @@ import pytest
 from pbrs_farm.check import verify
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from tests.check.roots import house_of, sign
 

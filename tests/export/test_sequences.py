@@ -15,7 +15,8 @@ from pbrs_farm.export.export_views import export
 from pbrs_farm.export.forms.colmap import _camera_line as colmap_camera
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.images import array_from_png
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum
 from tests.check.roots import make_root

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.lenses import PINHOLE
-from pbrs_farm.core.recipe_fields import LensFields
+from pbrs_farm.core.optics_fields import LensFields
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 
 PLAIN = Intrinsics.from_hfov(640, 480)

@@ -12,7 +12,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.recipe import BlurFields, recipe_from_name
-from pbrs_farm.run.chosen_cameras import blurred
+from pbrs_farm.run.view_light import blurred
 
 
 def frame(number: int | None, x: float, yaw: float = 0.0) -> View:

@@ -7,7 +7,8 @@ import pytest
 from pbrs_farm import cli
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.run import local
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.processes import early_start, limits
 from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of, start_early

@@ -16,8 +16,9 @@ from pbrs_farm.formats.marker import Marker
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.output_root import finish_house
-from pbrs_farm.run.step_cache import LightCheckpoint, Work
+from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
 
@@ -129,8 +130,8 @@ def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.Mon
     store.delete(keys.marker_key(work.house_id, "light", view))
 
     # Kill the render where it tells its share for the third time, each time right after a write.
-    monkeypatch.setattr("pbrs_farm.run.step_cache.KEEP_EVERY_S", 0.0)
-    monkeypatch.setattr("pbrs_farm.run.step_cache._TELL_EVERY_S", 0.0)
+    monkeypatch.setattr("pbrs_farm.run.light_checkpoint.KEEP_EVERY_S", 0.0)
+    monkeypatch.setattr("pbrs_farm.run.light_checkpoint._TELL_EVERY_S", 0.0)
     told: list[float] = []
 
     def tell(share: float) -> None:

@@ -15,7 +15,8 @@ from pbrs_farm.commands import making
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.run import local
-from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.processes import limits, pool
 from pbrs_farm.run.processes.render_task import Event, Setting

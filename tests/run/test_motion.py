@@ -17,7 +17,8 @@ from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.pairs_parquet import pairs_from_parquet, pairs_parquet
 from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
-from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 from tests.check.roots import sign
 

@@ -7,8 +7,8 @@ from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.recipe import RepairFields, recipe_from_name
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
-from pbrs_farm.run.chosen_cameras import pilot_of_view, pilot_view
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
+from pbrs_farm.run.view_light import pilot_of_view, pilot_view
 from pbrs_farm.sample.house_sampler import add_right_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene

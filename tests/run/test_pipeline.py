@@ -13,7 +13,8 @@ from pbrs_farm.check import verify
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import array_from_png, layers_from_exr
-from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 
 OPTIONAL = [x.name for x in LAYERS if x.optional and x.step == "truth" and not x.partner]

@@ -14,7 +14,8 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr
 from pbrs_farm.raycast.variant import choose_variant
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.relight import LampFactor, unlit_lamps
 

@@ -9,7 +9,8 @@ import pytest
 
 from pbrs_farm.check import verify
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.run.local import Run, Summary, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 
 HELD = ("material", "class_source", "depth_z")

@@ -13,7 +13,8 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.check import verify
 from pbrs_farm.core.errors import BadInput, BadRecipe
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from tests.scene.homes import can, small_home
 

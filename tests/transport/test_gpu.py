@@ -138,7 +138,8 @@ def test_labels_of_the_gpu_differ_from_those_of_the_cpu_in_no_more_than_edges() 
 def test_a_preview_of_a_home_is_whole(tmp_path: Path) -> None:
     from pbrs_farm.check import verify
     from pbrs_farm.core.recipe import recipe_from_name
-    from pbrs_farm.run.local import Run, run_local
+    from pbrs_farm.run.local import run_local
+    from pbrs_farm.run.local_run import Run
     from pbrs_farm.run.plan import wanted
 
     # Without the denoiser, where scripts/gpu_check.sh was given no archive of it.

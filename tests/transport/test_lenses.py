@@ -10,8 +10,8 @@ import pytest
 
 from pbrs_farm.core.camera import Camera, CameraBlur
 from pbrs_farm.core.house import geometry_from_house
+from pbrs_farm.core.optics_fields import LensFields
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
-from pbrs_farm.core.recipe_fields import LensFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult

@@ -11,7 +11,8 @@ import pbrs_farm as pf
 from pbrs_farm.assets import debian, furniture_package, homes_package
 from pbrs_farm.core.plugins import Plugin
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.run.local import Run, run_local
+from pbrs_farm.run.local import run_local
+from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.store import MemoryStore, Store
 from tests.workers.redis_server import RedisServer

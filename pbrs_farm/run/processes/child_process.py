@@ -162,9 +162,6 @@ def die_with_parent(sign: int = signal.SIGKILL) -> None:
         os.kill(os.getpid(), sign)
 
 
-# What a render process says to the process that started it; frozen values.
-
-
 # ready: it may be given a task. step: a step begins. waiting: storage does not answer.
 # share: how much of the step is done, 0..1. event: something else its parent wants to know.
 # done, fault: the end of the task.

@@ -10,7 +10,7 @@ import pytest
 from pbrs_farm.core.camera import Camera, Intrinsics, pinholes_of
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.lenses import Lens, lens_from_table
-from pbrs_farm.core.recipe_fields import LENS_PRESETS, LensFields, fold_of
+from pbrs_farm.core.optics_fields import LENS_PRESETS, LensFields, fold_of
 
 PINHOLE = Intrinsics.from_hfov(640, 480)
 MODELS = {

@@ -11,8 +11,8 @@ import pytest
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.lighting import Group
+from pbrs_farm.core.optics_fields import LensFields
 from pbrs_farm.core.recipe import LightFields, recipe_from_name
-from pbrs_farm.core.recipe_fields import LensFields
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene

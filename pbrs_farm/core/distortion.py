@@ -1,0 +1,163 @@
+"""OpenCV's two models of distortion and their inverses; arrays in, arrays out, no effects.
+
+Radial-tangential (Brown 1966, Conrady 1919), k1 k2 p1 p2 k3: with a, b the undistorted point at z = 1
+and s = a a + b b its squared radius,
+
+    radial = 1 + k1 s + k2 s^2 + k3 s^3
+    x = a radial + 2 p1 a b + p2 (s + 2 a a)
+    y = b radial + p1 (s + 2 b b) + 2 p2 a b
+
+Fisheye (Kannala and Brandt 2006), k1 k2 k3 k4: a direction at the angle t from the axis falls, on its
+own side of the axis, at the radius r = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8). With k = 0 it is the
+equidistant fisheye.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+
+Coefficients = tuple[float, ...]
+
+_GRID: Final = 1025  # radii from which Newton's method starts
+_STEPS: Final = 30
+_RESIDUAL: Final = 1e-10  # of a solution, at z = 1: a ten-millionth of a pixel
+
+
+def distorted(points: F64, coefficients: Coefficients) -> F64:
+    """(N, 2) points in the plane of undistorted points (N, 2) at z = 1."""
+    k1, k2, p1, p2, k3 = coefficients
+    a, b = points[:, 0], points[:, 1]
+    s = a * a + b * b
+    radial = 1 + s * (k1 + s * (k2 + s * k3))
+    x = a * radial + 2 * p1 * a * b + p2 * (s + 2 * a * a)
+    y = b * radial + p1 * (s + 2 * b * b) + 2 * p2 * a * b
+    return np.stack([x, y], axis=1)
+
+
+def undistorted(points: F64, coefficients: Coefficients) -> F64:
+    """(N, 2) the inverse of distorted, by Newton's method; NaN where no undistorted point is."""
+    if not len(points):
+        return points.copy()
+    # Start at the radius that the radial part alone maps to the point's.
+    radius = np.linalg.norm(points, axis=1)
+    start = _radius_before(radius, coefficients)
+    scale = np.divide(start, radius, out=np.ones_like(radius), where=radius > 0)
+    found = points * scale[:, None]
+    # Solve both components; the Jacobian is symmetric.
+    for _ in range(_STEPS):
+        error = distorted(found, coefficients) - points
+        xx, xy, yy = jacobian(found, coefficients)
+        determinant = xx * yy - xy * xy
+        inverse = np.divide(
+            1.0, determinant, out=np.zeros_like(determinant), where=np.abs(determinant) > 1e-12
+        )
+        step_x = (yy * error[:, 0] - xy * error[:, 1]) * inverse
+        step_y = (xx * error[:, 1] - xy * error[:, 0]) * inverse
+        found = found - np.stack([step_x, step_y], axis=1)
+        if max(np.abs(step_x).max(), np.abs(step_y).max()) < 1e-15:
+            break
+    # A point beyond the fold is another point's picture, turned inside out.
+    error = np.abs(distorted(found, coefficients) - points).max(1)
+    xx, xy, yy = jacobian(found, coefficients)
+    within = np.linalg.norm(found, axis=1) <= largest_radius(coefficients)
+    good = (error < _RESIDUAL) & (xx > 0) & (xx * yy > xy * xy) & within
+    return np.where(good[:, None], found, np.nan)
+
+
+def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:
+    """dx/da, dx/db = dy/da and dy/db of distorted at (N, 2) points."""
+    k1, k2, p1, p2, k3 = coefficients
+    a, b = points[:, 0], points[:, 1]
+    s = a * a + b * b
+    radial = 1 + s * (k1 + s * (k2 + s * k3))
+    slope = k1 + s * (2 * k2 + s * 3 * k3)
+    xx = radial + 2 * a * a * slope + 2 * p1 * b + 6 * p2 * a
+    xy = 2 * a * b * slope + 2 * p1 * a + 2 * p2 * b
+    yy = radial + 2 * b * b * slope + 6 * p1 * b + 2 * p2 * a
+    return xx, xy, yy
+
+
+def largest_radius(coefficients: Coefficients) -> float:
+    """The radius at z = 1 from which on the radial part runs back inwards; inf where it never does."""
+    k1, k2, _p1, _p2, k3 = coefficients
+    return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3)))
+
+
+def first_root(polynomial: tuple[float, ...]) -> float:
+    """The least positive real root of the polynomial, constant first; inf where it has none."""
+    roots = np.roots(polynomial[::-1])
+    real = roots.real[(np.abs(roots.imag) < 1e-12 * (1 + np.abs(roots))) & (roots.real > 0)]
+    return float(real.min()) if len(real) else math.inf
+
+
+def _radius_before(radius: F64, coefficients: Coefficients) -> F64:
+    """(N,) radii that the radial part maps to radius, interpolated; held to the largest."""
+    k1, k2, _p1, _p2, k3 = coefficients
+
+    def mapped(r: F64) -> F64:
+        s = r * r
+        return np.asarray(r * (1 + s * (k1 + s * (k2 + s * k3))))
+
+    # Reach as far as the farthest point needs: a strong barrel needs more than its own radius.
+    end, most = float(radius.max()), largest_radius(coefficients)
+    while end < most and mapped(np.array([end]))[0] < radius.max() and end < 1e3:
+        end = end * 1.5 + 1e-6
+    grid = np.linspace(0.0, min(end, most), _GRID)
+    return np.interp(radius, mapped(grid), grid)
+
+
+_FISHEYE_GRID: Final = 2049  # angles from which Newton's method starts
+_FISHEYE_STEPS: Final = 6
+
+
+def radius_of_angle(angle_rad: F64, coefficients: Coefficients) -> F64:
+    """The plane's radius of angles from the axis, of any shape."""
+    k1, k2, k3, k4 = coefficients
+    s = angle_rad * angle_rad
+    return np.asarray(angle_rad * (1 + s * (k1 + s * (k2 + s * (k3 + s * k4)))))
+
+
+def angle_of_fold(coefficients: Coefficients) -> float:
+    """The angle in rad from which on the radius shrinks; inf where it never does."""
+    k1, k2, k3, k4 = coefficients
+    return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3, 9 * k4)))
+
+
+def angle_of_radius(radius: F64, coefficients: Coefficients, largest_rad: float) -> F64:
+    """(N,) angles in rad of radii (N,), up to largest_rad; NaN for radii beyond its own."""
+    k1, k2, k3, k4 = coefficients
+    grid = np.linspace(0.0, largest_rad, _FISHEYE_GRID)
+    angle = np.interp(radius, radius_of_angle(grid, coefficients), grid)
+    # Newton's method from there; at the fold itself the slope is 0 and the start is kept.
+    for _ in range(_FISHEYE_STEPS):
+        s = angle * angle
+        slope = 1 + s * (3 * k1 + s * (5 * k2 + s * (7 * k3 + s * 9 * k4)))
+        error = radius_of_angle(angle, coefficients) - radius
+        step = np.divide(error, slope, out=np.zeros_like(error), where=slope > 1e-9)
+        angle = np.clip(angle - step, 0.0, largest_rad)
+    end = float(radius_of_angle(np.array(largest_rad), coefficients))
+    return np.where(radius <= end * (1 + 1e-12), angle, np.nan)
+
+
+def directions_of_fisheye(plane: F64, coefficients: Coefficients, largest_rad: float) -> F64:
+    """(N, 3) unit directions of points (N, 2) of the plane; NaN beyond largest_rad."""
+    radius = np.linalg.norm(plane, axis=1)
+    angle = angle_of_radius(radius, coefficients, largest_rad)
+    # sin(t) / r is 1 on the axis.
+    sine = np.divide(np.sin(angle), radius, out=np.ones_like(radius), where=radius > 0)
+    return np.concatenate([plane * sine[:, None], np.cos(angle)[:, None]], axis=1)
+
+
+def fisheye_of_directions(directions: F64, coefficients: Coefficients, largest_rad: float) -> F64:
+    """(N, 2) the plane's points of directions (N, 3) of any length; NaN beyond largest_rad."""
+    across = np.linalg.norm(directions[:, :2], axis=1)
+    angle = np.arctan2(across, directions[:, 2])
+    radius = radius_of_angle(angle, coefficients)
+    # r / sin(t) stays finite on the axis, where the point is the centre.
+    scale = np.divide(radius, across, out=np.zeros_like(radius), where=across > 0)
+    return np.where((angle <= largest_rad)[:, None], directions[:, :2] * scale[:, None], np.nan)

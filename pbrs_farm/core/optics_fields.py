@@ -1,0 +1,257 @@
+"""The recipe's groups of the camera itself: blur, lens and sensor, with their presets; no effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.distortion import radius_of_angle
+from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel
+from pbrs_farm.core.recipe_fields import FieldGroup, Share
+
+
+class BlurFields(FieldGroup):
+    """Depth of field, motion blur and rolling shutter of light (docs/lenses.md); labels are sharp, at mid-shutter."""
+
+    aperture_mm: float = Field(
+        0.0, ge=0, le=1000, description="diameter of the entrance pupil; 0 = everything is sharp"
+    )
+    focus_m: float = Field(0.0, ge=0, le=1e4, description="depth; 0 = what the middle shows")
+    shutter_s: float = Field(
+        0.0, ge=0, le=60, description="open that long; 0 = nothing moves. Of a walk: along it"
+    )
+    rolling_s: float = Field(
+        0.0,
+        ge=0,
+        le=60,
+        description="from the top row's light to the bottom one's; 0 = all at once",
+    )
+    right_mps: float = Field(0.0, ge=-1e3, le=1e3, description="motion without a walk, camera axes")
+    up_mps: float = Field(0.0, ge=-1e3, le=1e3)
+    forward_mps: float = Field(0.0, ge=-1e3, le=1e3)
+    pan_dps: float = Field(0.0, ge=-1e4, le=1e4, description="to the right, degrees a second")
+    tilt_dps: float = Field(0.0, ge=-1e4, le=1e4, description="upwards")
+    roll_dps: float = Field(0.0, ge=-1e4, le=1e4, description="clockwise, of the camera")
+
+    @property
+    def is_on(self) -> bool:
+        """Anything is blurred or sheared."""
+        return self.aperture_mm > 0 or self.shutter_s > 0 or self.rolling_s > 0
+
+
+_EQUIRECT_PX: Final = (1024, 512)  # of panoramas in cameras.json; pictures are scaled from it
+_CUBEMAP_PX: Final = (1536, 256)
+_BORDER_POINTS: Final = 65  # of each side of a picture, where a fold is looked for
+_ASPECT_ERROR: Final = 0.01  # of a picture's width, against the lens's own picture
+
+Pixels = Annotated[float, Field(ge=0, le=1e6)]
+Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
+
+LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "none": {},
+    # The colour camera of NYUv2's Kinect: camera_params.m of its toolbox, Silberman et al. 2012.
+    "kinect1": {
+        "model": "radtan", "width_px": 640, "height_px": 480,
+        "fx": 518.85790, "fy": 519.46961, "cx": 325.58245, "cy": 253.73617,
+        "k1": 0.20796615, "k2": -0.58613825, "p1": 7.2231363e-4, "p2": 1.04796272e-3,
+        "k3": 0.49856987,
+    },
+    # Camera 0 of TUM VI at 512 x 512, a lens of 195 degrees: Schubert et al. 2018. Kalibr counts from
+    # the middle of the first pixel, these from its corner: half a pixel more.
+    "tum_vi": {
+        "model": "fisheye", "width_px": 512, "height_px": 512,
+        "fx": 190.978477, "fy": 190.973307, "cx": 255.431706, "cy": 257.397443,
+        "k1": 0.0034823894, "k2": 0.00071503485, "k3": -0.0020532361, "k4": 0.00020293674,
+        "max_angle_deg": 97.5,
+    },
+    # Half of all directions in a circle that touches the picture's edges, equidistant.
+    "fisheye180": {
+        "model": "fisheye", "width_px": 512, "height_px": 512, "hfov_deg": 180.0,
+        "max_angle_deg": 90.0,
+    },
+}  # fmt: skip
+"""Fields that a preset sets where the user does not."""
+
+
+class LensFields(FieldGroup):
+    """The lens of every view: what bends straight lines (docs/lenses.md)."""
+
+    preset: Literal["none", "kinect1", "tum_vi", "fisheye180"] = Field(
+        "none", description="of a known camera; other fields override it"
+    )
+    model: LensModel = Field("pinhole", description="how directions fall on the picture")
+    width_px: int = Field(640, gt=0, le=16384, description="of the picture that fx to cy are of")
+    height_px: int = Field(480, gt=0, le=16384, description="scaled to image's")
+    fx: Pixels = Field(0.0, description="px; 0 = by cameras.hfov_rad, of a fisheye by hfov_deg")
+    fy: Pixels = Field(0.0, description="0 = fx")
+    cx: Pixels = Field(0.0, description="px from the top left corner; 0 = the middle")
+    cy: Pixels = 0.0
+    hfov_deg: float = Field(0.0, ge=0, le=360, description="fisheye without fx: of the width")
+    k1: Coefficient = Field(0.0, description="radtan and fisheye, as OpenCV has them")
+    k2: Coefficient = 0.0
+    k3: Coefficient = 0.0
+    k4: Coefficient = Field(0.0, description="fisheye")
+    p1: Coefficient = Field(0.0, description="radtan, tangential")
+    p2: Coefficient = 0.0
+    max_angle_deg: float = Field(
+        180.0, gt=0, le=180, description="fisheye: of the image circle, from the axis; black beyond"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_preset(cls, given: Any) -> Any:
+        # Fill in what the preset says and the user does not; an unknown preset is judged later.
+        preset = given.get("preset", "none") if isinstance(given, dict) else "none"
+        known = LENS_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
+        return {**known, **given} if known else given
+
+    @property
+    def lens(self) -> Lens:
+        """The model with its coefficients."""
+        coefficients = tuple(getattr(self, name) for name in COEFFICIENTS[self.model])
+        limit = math.radians(self.max_angle_deg) if self.model == "fisheye" else math.pi
+        return Lens(self.model, coefficients, limit)
+
+    def intrinsics(self, pinhole: Intrinsics) -> Intrinsics:
+        """The intrinsics of a view that was sampled with a pin-hole's; itself where no lens is set.
+
+        Raises ValueError where the distortion folds the picture, or a fisheye lacks fx and hfov_deg.
+        """
+        found = self._unchecked(pinhole)
+        fold = None if found is pinhole else fold_of(found)
+        if fold is not None:
+            raise ValueError(fold)
+        return found
+
+    def aspect_fault(self, width_px: int, height_px: int) -> str | None:
+        """Why a picture of that size cannot be the lens's, None where it can."""
+        if self.model in ("pinhole", "radtan") and self.fx == 0:
+            return None
+        w, h = {"equirect": _EQUIRECT_PX, "cubemap": _CUBEMAP_PX}.get(
+            self.model, (self.width_px, self.height_px)
+        )
+        if abs(width_px * h / (height_px * w) - 1) <= _ASPECT_ERROR:
+            return None
+        hint = f"--set image.width_px={w} --set image.height_px={h}"
+        what = f"lens.model {self.model} is of pictures {w}:{h}"
+        return f"{what}, not {width_px}x{height_px}: add {hint}"
+
+    def _unchecked(self, pinhole: Intrinsics) -> Intrinsics:
+        lens = self.lens
+        if self.model == "equirect":
+            w, h = _EQUIRECT_PX
+            return Intrinsics(w, h, w / (2 * math.pi), h / math.pi, w / 2, h / 2, lens)
+        if self.model == "cubemap":
+            w, h = _CUBEMAP_PX
+            return Intrinsics(w, h, w / 12, h / 2, w / 12, h / 2, lens)
+        # Without a focal length the view keeps its own, but a fisheye is told by its field of view.
+        if self.fx == 0 and self.model != "fisheye":
+            return pinhole if lens.is_pinhole else replace(pinhole, lens=lens)
+        fx = self.fx or self._focal_length_of_field()
+        cx, cy = self.cx or self.width_px / 2, self.cy or self.height_px / 2
+        return Intrinsics(self.width_px, self.height_px, fx, self.fy or fx, cx, cy, lens)
+
+    def _focal_length_of_field(self) -> float:
+        if self.hfov_deg == 0:
+            raise ValueError("a fisheye needs lens.fx (px) or lens.hfov_deg")
+        half = np.array(math.radians(self.hfov_deg) / 2)
+        radius = float(radius_of_angle(half, self.lens.coefficients))
+        if not radius > 0:
+            raise ValueError(f"the distortion folds the picture within {self.hfov_deg:g} degrees")
+        return self.width_px / 2 / radius
+
+
+def fold_of(i: Intrinsics) -> str | None:
+    """Where the distortion folds the picture inside its frame, in words; None where it does not."""
+    if i.lens.model not in ("radtan", "fisheye"):
+        return None
+    # Look along the border: a fold moves inwards from there.
+    side = np.linspace(0.0, 1.0, _BORDER_POINTS)
+    zero, one = np.zeros_like(side), np.ones_like(side)
+    x, y = np.concatenate([side, side, zero, one]), np.concatenate([zero, one, side, side])
+    border = np.stack([x * i.width_px, y * i.height_px], axis=1)
+    lost = ~i.directions(border).any(1)
+    # Beyond a fisheye's image circle nothing is lost that the lens had.
+    angle = i.lens.largest_angle_rad
+    is_circle = i.lens.model == "fisheye" and angle == i.lens.max_angle_rad
+    if is_circle or not lost.any():
+        return None
+    u, v = border[lost][0]
+    names = " ".join(COEFFICIENTS[i.lens.model])
+    where = f"no ray falls on its point ({u:.0f}, {v:.0f}) of {i.width_px}x{i.height_px}"
+    more = "" if i.lens.model == "radtan" else ", or lens.max_angle_deg below it"
+    hint = f"give other {names}, a larger lens.fx{more}"
+    return f"the distortion folds the picture at {math.degrees(angle):.1f} degrees: {where}; {hint}"
+
+
+SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "none": {},
+    # The colour camera of a first Kinect: a 1/4 inch CMOS of 2.8 um at 640 x 480, no JPEG.
+    "kinect1": {
+        "is_on": True, "f_number": 2.4, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 800,
+        "full_well_e": 7_000, "read_noise_e": 6.0, "bits": 10, "vignetting": 0.15,
+        "aberration_px": 0.7, "headroom": 2.0,
+    },
+    # A telephone of about 2020: pixels of 1.4 um, JPEG of high quality.
+    "phone": {
+        "is_on": True, "f_number": 1.8, "shutter_max_s": 1 / 25, "iso_min": 25, "iso_max": 3200,
+        "full_well_e": 6_000, "read_noise_e": 1.8, "bits": 10, "vignetting": 0.1,
+        "aberration_px": 0.3, "jpeg_quality": 92, "headroom": 2.0,
+    },
+    # A cheap webcam: small pixels, a plastic lens, strong JPEG.
+    "webcam": {
+        "is_on": True, "f_number": 2.8, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 1600,
+        "full_well_e": 4_000, "read_noise_e": 5.0, "bits": 8, "vignetting": 0.35,
+        "aberration_px": 1.2, "jpeg_quality": 60, "headroom": 1.6,
+    },
+}  # fmt: skip
+"""Typical numbers of each kind of camera, none a product's measured ones but Kinect's size and rate."""
+
+
+class SensorFields(FieldGroup):
+    """What a camera's sensor makes of the light modes (docs/lenses.md); labels do not change."""
+
+    preset: Literal["none", "kinect1", "phone", "webcam"] = Field(
+        "none", description="a kind of camera; other fields override it"
+    )
+    is_on: bool = Field(False, description="off: pictures are as the light alone makes them")
+    f_number: float = Field(2.0, ge=0.5, le=64)
+    shutter_s: float = Field(0.0, ge=0, le=60, description="0 = automatic, up to shutter_max_s")
+    shutter_min_s: float = Field(1e-4, gt=0, le=60, description="the shortest automatic one")
+    shutter_max_s: float = Field(1 / 30, gt=0, le=60, description="the longest automatic one")
+    iso_min: float = Field(100.0, ge=1, le=1e6, description="the base; full_well_e is of it")
+    iso_max: float = Field(1600.0, ge=1, le=1e6, description="what automatic exposure goes up to")
+    compensation_ev: float = Field(0.0, ge=-10, le=10, description="stops above what is automatic")
+    lag_s: float = Field(
+        0.0, ge=0, le=10, description="automatic exposure follows a walk's light with this delay"
+    )
+    full_well_e: float = Field(6000.0, ge=10, le=1e7, description="electrons that saturate a pixel")
+    read_noise_e: float = Field(3.0, ge=0, le=1e4, description="electrons, standard deviation")
+    bits: int = Field(10, ge=1, le=16, description="of the raw values")
+    black_level: float = Field(
+        1 / 16,
+        ge=0,
+        le=0.5,
+        description="of the raw range, at which no light stands: noise has room",
+    )
+    mosaic: bool = Field(True, description="a Bayer mosaic (RGGB), demosaiced again")
+    vignetting: Share = Field(0.0, description="light lost in the corners")
+    aberration_px: float = Field(
+        0.0, ge=0, le=50, description="lateral: red against blue in the corners, px of 640 across"
+    )
+    headroom: float = Field(4.0, ge=1, le=100, description="saturation over the white of the tone")
+    jpeg_quality: int = Field(0, ge=0, le=100, description="0 = no JPEG")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_preset(cls, given: Any) -> Any:
+        # Fill in what the preset says and the user does not; an unknown preset is judged later.
+        preset = given.get("preset", "none") if isinstance(given, dict) else "none"
+        known = SENSOR_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
+        return {**known, **given} if known else given
