@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from pbrs_farm.core.recipe import CameraFields as CameraFields
     from pbrs_farm.core.recipe import ReadFields as ReadFields
     from pbrs_farm.core.recipe import ToneFields as ToneFields
-    from pbrs_farm.dress.draft import Draft as Draft
+    from pbrs_farm.dress.mutable_house import MutableHouse as MutableHouse
     from pbrs_farm.dress.style import Style as Style
     from pbrs_farm.dress.things.bodies import bevelled as bevelled
     from pbrs_farm.dress.things.bodies import board as board
@@ -106,7 +106,7 @@ _MODULES: Final = {
     "core.layers": ("Layer", "optional_layer"),
     "core.lighting": ("LightForm", "PowerUnit"),
     "core.recipe": ("CameraFields", "ReadFields", "ToneFields"),
-    "dress.draft": ("Draft",),
+    "dress.mutable_house": ("MutableHouse",),
     "dress.style": ("Style",),
     "dress.things.bodies": (
         "bevelled", "board", "cylinder", "disc", "frustum", "loft", "rounded", "slab", "tube", "turned",
