@@ -32,7 +32,7 @@ from pbrs_farm.selection.binning import BINNINGS
 from pbrs_farm.selection.histogram_pack import HistogramPack, bytes_from_pack, pack_from_bytes
 from pbrs_farm.selection.histograms import normalised
 from pbrs_farm.selection.reference_set import Reference, ReferenceFacts
-from pbrs_farm.selection.scores import Scorer, merged
+from pbrs_farm.selection.scores import Scorer, merge_tables
 from pbrs_farm.selection.similarity import best_match
 from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store import MemoryStore
@@ -111,7 +111,7 @@ def score_folder(folder: Path) -> dict[str, float]:
     tables = list(scorer.score_all(packs()))
     scoring = time.perf_counter() - started - reading
     started = time.perf_counter()
-    judged = verdicts(merged(*tables), SelectionFields())
+    judged = verdicts(merge_tables(*tables), SelectionFields())
     judging = time.perf_counter() - started
     cpu = time.process_time() - started_cpu - reading_cpu
     started = time.perf_counter()

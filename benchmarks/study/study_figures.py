@@ -152,7 +152,7 @@ def _edges(folder: Path) -> Figures:
     from pbrs_farm.study.networks.initial_weights import has_hed, start_from
     from pbrs_farm.study.networks.network_choice import network_of
     from pbrs_farm.study.tasks.tasks import task_of
-    from pbrs_farm.study.training.prediction import judged
+    from pbrs_farm.study.training.prediction import judge_views
     from pbrs_farm.study.training.view_sources import held_out_views
     from pbrs_farm.study.training_plan import plan_of
 
@@ -169,7 +169,7 @@ def _edges(folder: Path) -> Figures:
         start_from(network, "hed")
         views = held_out_views(_source(), plan)
         assert views is not None
-        found = judged(network, views.some(plan.final_views), task_of("boundaries"), plan)
+        found = judge_views(network, views.some(plan.final_views), task_of("boundaries"), plan)
         untouched.append(found.figures["ods"])
     return {
         "study.edges_ods": tuned["network"]["held_out"]["ods"] - max(untouched),

@@ -76,7 +76,7 @@ def _check_mode(
     place = f"{view.place}/{mode}.png"
     tone, sensor = _tone_of(view, recipe), recipe.sensor
     total = sum((light[g] for g in _GROUPS[mode]), np.zeros_like(light["outdoor"]))
-    total = _glared(total, tone.glare)
+    total = _add_glare(total, tone.glare)
     gains = _white_balance(total, light["albedo"], tone.white_balance)
     balanced = np.maximum(np.nan_to_num((total * gains).astype(np.float64), posinf=0.0), 0)
     exposure = _exposure(balanced, tone)
@@ -88,7 +88,7 @@ def _check_mode(
         off = max(off, float(np.abs(np.array(stated.get("gains", gains)) - gains).max()))
         what = f"view.json tells other factors, by {off:.4f}"
         tally.expect("light developed", place, off <= _FACTOR, what)
-    expected = _toned(balanced, exposure, tone, sensor)
+    expected = _tone(balanced, exposure, tone, sensor)
     if sensor.is_on:
         _compare_tiles(place, stored, expected, tally)
         return
@@ -170,7 +170,7 @@ def _pyoidn() -> Any:
     return pyoidn
 
 
-def _glared(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
+def _add_glare(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
     if share == 0:
         return total
     finite = np.nan_to_num(total, posinf=0.0)
@@ -228,7 +228,7 @@ def _exposure(balanced: Floats, tone: ToneFields) -> float:
     return float(tone.key / average * 2**tone.exposure_ev)
 
 
-def _toned(
+def _tone(
     balanced: Floats, exposure: float, tone: ToneFields, sensor: SensorFields
 ) -> NDArray[np.uint8]:
     """8 bits by Reinhard's operator (`released`), else by a line and a logarithm that ends at white."""
@@ -246,13 +246,13 @@ def _toned(
                 np.minimum(light * _vignette(light, sensor), sensor.headroom),
                 sensor.headroom,
             )
-        linear = _rolled(light, white)
+        linear = _roll_off(light, white)
     linear = np.clip(linear, 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * _curved(srgb, tone)), np.uint8)
+    return np.asarray(np.rint(255 * _apply_curve(srgb, tone)), np.uint8)
 
 
-def _curved(srgb: Floats, tone: ToneFields) -> Floats:
+def _apply_curve(srgb: Floats, tone: ToneFields) -> Floats:
     """Luma by an S whose odds go to a power, then by the line that begins at the black level."""
     if tone.preset == "released" or (tone.contrast == 1 and tone.black == 0):
         return srgb
@@ -274,7 +274,7 @@ def _vignette(light: Floats, sensor: SensorFields) -> Floats:
     return np.asarray(1 - sensor.vignetting * squared)[..., None]
 
 
-def _rolled(light: Floats, white: float) -> Floats:
+def _roll_off(light: Floats, white: float) -> Floats:
     """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; beyond 2 it pales."""
     # The sum rises with k, so that halving its logarithm finds it.
     low, high = -9.3, 9.3

@@ -76,7 +76,7 @@ def other_view(view: StoredView, relation: str) -> OtherView | None:
     return OtherView(np.array(row["K"], np.float64), pose, view.size, view.lens)
 
 
-def followed(
+def follow_points(
     view: StoredView,
     other: OtherView,
     rows: NDArray[np.int64],
@@ -165,10 +165,10 @@ def check_motion(
             there = [name for name in names if name in arrays]
             tally.expect("motion", view.place, not there, f"{there} without a {relation} view")
             continue
-        found = followed(view, other, rows, columns, z, rays)
+        found = follow_points(view, other, rows, columns, z, rays)
         stored = {n: arrays[n][rows, columns].astype(np.float64) for n in names if n in arrays}
         for name, values in stored.items():
-            right, may_tie = _judged(name, values, found)
+            right, may_tie = _judge_motion(name, values, found)
             # Look again at what is wrong.
             ties = np.nonzero(~right & may_tie)[0]
             ties = ties[near_edge(view, other, rows[ties], columns[ties], z[ties], rays)]
@@ -178,7 +178,7 @@ def check_motion(
                 tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
 
 
-def _judged(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:
+def _judge_motion(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:
     """(N,) what a layer stores is right; (N,) where it is not, an edge may be the reason."""
     in_front = np.isfinite(found.motion).all(axis=1)
     motion = np.nan_to_num(found.motion)

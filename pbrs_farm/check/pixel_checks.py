@@ -77,7 +77,7 @@ def judge(
     origin, directions = view.rays(rows, columns)
     first = rays.first(origin, directions)
     face = first.copy()
-    right = _explained(view, labels, face, directions, scene)
+    right = _explain(view, labels, face, directions, scene)
     tied = np.zeros(len(rows), bool)
 
     # Try other triangles where the first one does not explain everything.
@@ -92,7 +92,7 @@ def judge(
     # Take over a candidate where it leaves fewer checks wrong.
     best = np.sum([~right[name][open_] for name in right], axis=0)
     for other in candidates:
-        trial = _explained(view, labels_at(labels, open_), other, directions[open_], scene)
+        trial = _explain(view, labels_at(labels, open_), other, directions[open_], scene)
         wrong = np.sum([~ok for ok in trial.values()], axis=0)
         better = wrong < best
         best = np.where(better, wrong, best)
@@ -120,14 +120,14 @@ def _fill_one_place(
     for k in np.nonzero(both)[0]:
         pair, ray = np.array([first[k], other[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
-        t = _pierced(triangles, pair, origin, ray)
+        t = _distances_pierced(triangles, pair, origin, ray)
         # One place: parallel, and closer along the normal than a tie may be.
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
             found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
     return found
 
 
-def _explained(
+def _explain(
     view: StoredView, labels: Labels, face: Faces, directions: Floats, scene: tuple[Triangles, Rays]
 ) -> dict[str, Bools]:
     """Per layer whether hitting these faces explains what is stored."""
@@ -276,14 +276,16 @@ def _coincident(
         # Look for a triangle of that instance at the depth of the first hit.
         own = np.nonzero(triangles.instance == instance)[0]
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
-            t = _pierced(triangles, own, origin, directions[pixel])
+            t = _distances_pierced(triangles, own, origin, directions[pixel])
             gap = np.abs(t - first[pixel]) * across[pixel]
             if len(own) and gap.min() <= TIE_DEPTH_M:
                 found[pixel] = own[gap.argmin()]
     return found
 
 
-def _pierced(triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats) -> Floats:
+def _distances_pierced(
+    triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats
+) -> Floats:
     """(F,) distance at which one ray pierces each of the triangles own; inf = misses it."""
     a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
     # Moeller and Trumbore 1997, one ray and many triangles.

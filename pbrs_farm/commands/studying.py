@@ -140,7 +140,7 @@ def _need_torch() -> None:
 
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
-    from pbrs_farm.study.judging.judged_places import judge_of_places, judged_place
+    from pbrs_farm.study.judging.judged_places import judge_of_places, open_judged_place
     from pbrs_farm.study.networks.initial_weights import credits_of_init
     from pbrs_farm.study.training.loggers import check_installed, loggers
     from pbrs_farm.study.training.prediction import device_of
@@ -170,7 +170,7 @@ def _train(args: argparse.Namespace) -> int:
     trained_on = frozenset(views.homes)
     held = frozenset(held_out.homes) if held_out else None
     judged_on = [
-        judged_place(
+        open_judged_place(
             word, plan, mode=source.modes[0], trained_on=trained_on, known_held_out=held,
             most=plan.final_views,
         )
@@ -242,7 +242,7 @@ def _print_run(out: Path) -> None:
 def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, figures_table, notes, open_run, report
-    from pbrs_farm.study.judging.judged_places import judged_place
+    from pbrs_farm.study.judging.judged_places import open_judged_place
     from pbrs_farm.study.judging.others_predictions import others_predictions
     from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT
@@ -258,7 +258,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     light = run.record["mode"].split("+")[0]
     mode = "mlt_il_ol" if light == NYU_LIGHT else light
     evaluations = [
-        evaluate(run, judged_place(
+        evaluate(run, open_judged_place(
             word, run.plan, mode=mode, trained_on=trained_on,
             most=args.views, known_held_out=held,
         ))
@@ -333,7 +333,7 @@ def _ablation(args: argparse.Namespace) -> int:
         training_sets,
     )
     from pbrs_farm.study.judging.evaluation import check_exact
-    from pbrs_farm.study.judging.judged_places import homes_that_train, judged_place
+    from pbrs_farm.study.judging.judged_places import homes_that_train, open_judged_place
     from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import TrainingSource
 
@@ -351,7 +351,9 @@ def _ablation(args: argparse.Namespace) -> int:
     # No row may be judged on homes that any of the rows trains on.
     trained_on = homes_that_train([each.source for each in sets])
     judged_on = [
-        judged_place(word, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out)
+        open_judged_place(
+            word, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out
+        )
         for word in args.on
     ]
     comparison = Comparison(sets, plan, args.out, args.seeds, exact=args.exact)

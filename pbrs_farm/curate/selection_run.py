@@ -31,7 +31,7 @@ from pbrs_farm.selection.histogram_pack import (
     pack_source,
 )
 from pbrs_farm.selection.reference_set import Reference, check_comparable
-from pbrs_farm.selection.scores import SCORES, Scorer, merged
+from pbrs_farm.selection.scores import SCORES, Scorer, merge_tables
 from pbrs_farm.selection.verdicts import verdicts
 from pbrs_farm.store.laid_out import LaidOutStore
 from pbrs_farm.store.object_store import Store, get_or_none
@@ -72,7 +72,7 @@ def select(
             if progress is not None:
                 progress(done + 1, len(todo))
 
-    scores = merged(old, *Scorer(reference).score_all(packs()))
+    scores = merge_tables(old, *Scorer(reference).score_all(packs()))
     return _write_run(store, run, scores, fields, facts, reference, n_scored_houses=len(todo))
 
 

@@ -169,7 +169,7 @@ class ChosenView:
             return self.choice.classes.label(self.array("instance"), self.facts["instances"])
         file = self.entry.folder / LAYER[name].file
         array = layer_from_bytes(name, _view_file(file), str(file))
-        return array if self.choice.size is None else resized_layer(name, array, *self.choice.size)
+        return array if self.choice.size is None else resize_layer(name, array, *self.choice.size)
 
     def _resized_facts(self) -> dict[str, Any]:
         facts = self.entry.facts
@@ -221,7 +221,7 @@ def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
     return {name: facts[name] for name in names if name in facts}
 
 
-def resized_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
+def resize_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
     """A layer on another grid: as the table of layers says (Layer.resized)."""
     layer = LAYER[name]
     if layer.resized == "area":

@@ -15,11 +15,11 @@ def page(package: str, template: str, **values: Any) -> str:
 
     Raises jinja2.UndefinedError for a name the template uses and values lacks.
     """
-    return compiled(package, template).render(values)
+    return compile_template(package, template).render(values)
 
 
 @functools.cache
-def compiled(package: str, template: str) -> Template:
+def compile_template(package: str, template: str) -> Template:
     """The template file of a package, ready to be filled; each is compiled once a process."""
     environment = Environment(
         loader=PackageLoader(package, ""),

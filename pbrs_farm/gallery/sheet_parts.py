@@ -56,9 +56,9 @@ def _part_sizes(view: ViewEntry) -> _Parts:
     # The thread loads what it needs: whoever starts a run waits for none of it.
     from pbrs_farm.gallery.contact_sheet import TILE_PX
     from pbrs_farm.gallery.gallery_page import TEMPLATE, THUMBNAIL_PX, card_tiles
-    from pbrs_farm.gallery.html_page import compiled
+    from pbrs_farm.gallery.html_page import compile_template
     from pbrs_farm.gallery.view_tiles import tiles_of_sizes
 
-    compiled(*TEMPLATE)
+    compile_template(*TEMPLATE)
     tiles, small = tiles_of_sizes(view, TILE_PX, THUMBNAIL_PX)
     return tiles, card_tiles(small)

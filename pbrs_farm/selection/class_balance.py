@@ -25,7 +25,7 @@ def class_shares(texts: Sequence[str]) -> F32:
     return shares
 
 
-def balanced(shares: F32, n_views: int) -> Bools:
+def balance_classes(shares: F32, n_views: int) -> Bools:
     """(n,) bool: n_views rows of shares (n, classes) that cover all classes well.
 
     Greedy for the sum over classes of the logarithm of the share gathered: what a class gains

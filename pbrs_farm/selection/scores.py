@@ -136,10 +136,10 @@ def score(
     "faiss" or "numpy" for the search, None for faiss where it is installed; scores are the same.
     Tables of parts may be computed apart and merged (Scorer).
     """
-    return merged(*Scorer(reference, library=library).score_all(packs))
+    return merge_tables(*Scorer(reference, library=library).score_all(packs))
 
 
-def merged(*tables: Any) -> Any:
+def merge_tables(*tables: Any) -> Any:
     """One score table of several, sorted by house and view; a row in two of them is kept once.
 
     Associative, commutative, and merging a table with itself gives that table. Raises ValueError

@@ -16,7 +16,7 @@ import pyarrow.compute as pc
 from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import SelectionFields
-from pbrs_farm.selection.class_balance import balanced, class_shares
+from pbrs_farm.selection.class_balance import balance_classes, class_shares
 from pbrs_farm.selection.histogram_pack import BLACK
 
 # Why a view is rejected, in the order in which the first is named.
@@ -131,7 +131,7 @@ def _surplus(scores: Any, kept: Bools, fields: SelectionFields) -> Bools:
     # Go by the order of ids, so that ties do not depend on the order of rows.
     order = rows[np.lexsort((_ranks(scores["view"])[rows], _ranks(scores["house"])[rows]))]
     shares = class_shares(scores["classes"].take(pa.array(order)).to_pylist())
-    taken = balanced(shares, round(fields.balance_share * len(order)))
+    taken = balance_classes(shares, round(fields.balance_share * len(order)))
     surplus[order[~taken]] = True
     return surplus
 

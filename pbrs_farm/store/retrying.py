@@ -15,7 +15,7 @@ T = TypeVar("T")  # what the call gives
 _FIRST_PAUSE_S = 0.2  # at most; each further pause is twice as long
 
 
-def retried(
+def retry(
     call: Callable[[int], T],
     timeout_s: float,
     *,
@@ -83,6 +83,6 @@ class RetryingStore:
 
     def _call(self, act: Callable[[], T]) -> T:
         # Never pause for less than half: many renderers wait for the same store.
-        return retried(
+        return retry(
             lambda _n: act(), self._timeout_s, jitter=(0.5, 1.0), max_pause_s=10.0, on_wait=self._on_wait
         )  # fmt: skip

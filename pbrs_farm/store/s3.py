@@ -21,7 +21,7 @@ from pbrs_farm.core.errors import (
 )
 from pbrs_farm.installation import install_command
 from pbrs_farm.store.object_store import Head, check_key, check_prefix, content_type
-from pbrs_farm.store.retrying import retried
+from pbrs_farm.store.retrying import retry
 from pbrs_farm.store.secret import Secret
 
 T = TypeVar("T")
@@ -174,7 +174,7 @@ class S3Store:
             except (self._obstore.exceptions.BaseError, OSError) as error:
                 raise self._failure(key, error) from error
 
-        return retried(once, self._retry_timeout_s)
+        return retry(once, self._retry_timeout_s)
 
     def _failure(self, key: str, error: Exception) -> StoreFailed:
         # Sort obstore's errors by what a caller can do about them.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_nearest
 from pbrs_farm.curate.photographs import NyuMat, Photo
-from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, framed, photo_truth
+from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training.training_views import ViewArrays
@@ -59,7 +59,7 @@ def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[NyuPict
         for photo in mat.photos(chosen):
             n_found += 1
             truth = _truth(path, int(photo.id) - 1, photo, plan, classes)
-            colour, rows, columns = framed(photo.rgb[_CROP], plan)
+            colour, rows, columns = crop_to_plan(photo.rgb[_CROP], plan)
             cut = {key: array[_CROP][rows, columns] for key, array in truth.items()}
             yield NyuPicture(photo.id, colour, cut)
     if not n_found:

@@ -30,7 +30,9 @@ def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
     return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid}
 
 
-def framed(rgb: NDArray[np.uint8], plan: TrainingPlan) -> tuple[NDArray[np.uint8], slice, slice]:
+def crop_to_plan(
+    rgb: NDArray[np.uint8], plan: TrainingPlan
+) -> tuple[NDArray[np.uint8], slice, slice]:
     """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
     height, width = rgb.shape[:2]
     share = plan.width_px / plan.height_px

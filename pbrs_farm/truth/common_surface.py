@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, FirstHit
 from pbrs_farm.core.camera import View
-from pbrs_farm.truth.optical_flow import inside_picture, projected, reaches
+from pbrs_farm.truth.optical_flow import inside_picture, project_points, reaches
 
 POINTS_SIZE: Final = (32, 24)
 """Width and height of the grid of rays whose ends stand for what a view shows."""
@@ -59,7 +59,7 @@ def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
         points, faces = origin + t[hit, None].astype(np.float64) * flat[hit], face[hit]
         for b, other in enumerate(small):
             if a != b and len(points):
-                px, z = projected(points, other)
+                px, z = project_points(points, other)
                 inside = inside_picture(px, z, other)
                 seen = reaches(points[inside], faces[inside], other, first_hit)
                 shares[a, b] = seen.sum() / len(points)

@@ -51,7 +51,7 @@ def correspondence(
     points = np.empty((3, len(pixels))).T  # each axis lies together: half of the time
     for axis in range(3):
         points[:, axis] = origin[axis] + depth * rays[:, axis]
-    there, z = projected(points, other)
+    there, z = project_points(points, other)
     # Subtract the pixel's own centre.
     rows, columns = np.divmod(pixels, shape[1])
     front = z > _NEAREST_M
@@ -69,7 +69,7 @@ def correspondence(
     return Correspondence(np.moveaxis(flow.reshape(2, *shape), 0, -1), states, in_front)
 
 
-def projected(points: F64, camera: Camera) -> tuple[F64, F64]:
+def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:
     """(N, 2) px of world points (N, 3), x right and y down, and (N,) their depth_z.
 
     Through another lens than a pin-hole's a point that it does not see has px NaN and depth 0.

@@ -46,7 +46,7 @@ def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArr
     """
     # Turn world normals into the published camera frame.
     published_from_world = PUBLISHED_FROM_OPENGL @ world_from_camera[:3, :3].T
-    normal = _cleaned(normal_world) @ published_from_world.T.astype(np.float32)
+    normal = _clean(normal_world) @ published_from_world.T.astype(np.float32)
     return encoded_normal(normal)
 
 
@@ -56,7 +56,7 @@ def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
     return np.asarray(np.clip(np.rint(scaled), 0, 65535), np.uint16)
 
 
-def _cleaned(normal: UnitVectors) -> UnitVectors:
+def _clean(normal: UnitVectors) -> UnitVectors:
     # Replace whatever is not of unit length by zero.
     is_unit = unit_mask(normal)
     return normal if is_unit.all() else np.where(is_unit[..., None], normal, np.float32(0))

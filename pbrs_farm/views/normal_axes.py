@@ -37,7 +37,7 @@ def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
     return axes_from_published(to) @ axes_from_published(of).T
 
 
-def decoded_normal(
+def decode_normal(
     stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.float32]:
     """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
@@ -52,7 +52,7 @@ def decoded_normal(
     return normal
 
 
-def encoded_as_stored(
+def encode_normal(
     normal: NDArray[np.float32], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.uint16]:
     """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid."""

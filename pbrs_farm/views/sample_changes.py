@@ -14,7 +14,7 @@ from pbrs_farm.views.normal_axes import axes_from_axes
 from pbrs_farm.views.view_sample import Sample
 
 
-def flipped(sample: Sample) -> Sample:
+def flip(sample: Sample) -> Sample:
     """The view in a mirror: left and right change places in every array.
 
     Normals turn their x round and K's cx moves, so that the sample is what a camera would see of
@@ -30,7 +30,7 @@ def flipped(sample: Sample) -> Sample:
     return replace(sample, K=k, **_contiguous(arrays))
 
 
-def cropped(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
+def crop(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
     """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput."""
     full_width, full_height = sample.size
     fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height
@@ -43,7 +43,7 @@ def cropped(sample: Sample, left: int, top: int, width: int, height: int) -> Sam
     return replace(sample, K=k, **_contiguous({n: a[part] for n, a in sample.arrays().items()}))
 
 
-def resized(sample: Sample, width: int, height: int) -> Sample:
+def resize(sample: Sample, width: int, height: int) -> Sample:
     """The sample on another grid: colour by area, boundaries where any is, all other labels nearest.
 
     K is scaled, also where the sides' ratio changes.
@@ -60,11 +60,11 @@ def resized(sample: Sample, width: int, height: int) -> Sample:
         else:
             arrays[name] = resized_nearest(array, width, height)
     return replace(
-        sample, K=k_resized(sample.K, (full_width, full_height), (width, height)), **arrays
+        sample, K=resize_k(sample.K, (full_width, full_height), (width, height)), **arrays
     )
 
 
-def k_resized(
+def resize_k(
     k: NDArray[np.float32], of: tuple[int, int], to: tuple[int, int]
 ) -> NDArray[np.float32]:
     """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`."""

@@ -23,7 +23,7 @@ from pbrs_farm.views.stored_layers import (
     Stored,
     ViewFacts,
     array_names,
-    checked_array,
+    check_array,
     facts_from_json,
     sample_of_stored,
 )
@@ -152,7 +152,7 @@ class ShardSet:
     ) -> Stored:
         place = f"{opened.place}: {facts.id}.{part}"
         arrays = arrays_of_part(names, part, opened.bytes_of(view, part), place)
-        return {name: checked_array(name, arrays[name], facts.size, place) for name in names}
+        return {name: check_array(name, arrays[name], facts.size, place) for name in names}
 
     def _facts_at(self, opened: OpenShard, view: int) -> ViewFacts:
         return facts_from_json(self._table_at(opened, view), f"{opened.place}: view {view}")

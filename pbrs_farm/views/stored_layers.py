@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
-from pbrs_farm.views.normal_axes import decoded_normal
+from pbrs_farm.views.normal_axes import decode_normal
 from pbrs_farm.views.view_sample import Sample, SampleRequest, Size
 
 Stored = dict[str, NDArray[Any]]  # array name -> (H, W) or (H, W, 3)
@@ -90,7 +90,7 @@ def array_names(layers: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def checked_array(name: str, array: NDArray[Any], size: Size, place: str) -> NDArray[Any]:
+def check_array(name: str, array: NDArray[Any], size: Size, place: str) -> NDArray[Any]:
     """array itself, where it has the type and size it must have; BadInput, naming place, if not.
 
     What was stored in 16 bits and comes in 8, or as 8 bits spread over 16, was ruined by a program
@@ -117,7 +117,7 @@ def _were_8_bits(array: NDArray[np.uint16]) -> bool:
     return bool((array % 257 == 0).all() and len(np.unique(some)) > 3)
 
 
-def resized_stored(stored: Stored, size: Size) -> Stored:
+def resize_stored(stored: Stored, size: Size) -> Stored:
     """The arrays on another grid: colour by area, boundaries where any is, all others nearest."""
     return {name: _resized(name, array, *size) for name, array in stored.items()}
 
@@ -133,7 +133,7 @@ def _resized(name: str, array: NDArray[Any], width: int, height: int) -> NDArray
 def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -> Sample:
     """The Sample of a view's stored arrays, at the size asked for."""
     size = request.size or facts.size
-    stored = resized_stored(stored, size)
+    stored = resize_stored(stored, size)
     arrays: dict[str, Any] = {
         n: stored[n] for n in ("colour", "class40", "instance") if n in stored
     }
@@ -144,6 +144,6 @@ def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -
         arrays["boundary"] = stored["boundary"] > 0
     if "normal" in stored:
         valid = stored["valid"] > 0
-        arrays |= {"normal": decoded_normal(stored["normal"], valid, request.axes), "valid": valid}
+        arrays |= {"normal": decode_normal(stored["normal"], valid, request.axes), "valid": valid}
     k = facts.k_at(size).astype(np.float32)
     return Sample(facts.id, facts.house, facts.room, request.mode, k, request.axes, **arrays)

@@ -28,7 +28,7 @@ from pbrs_farm.views.stored_layers import (
     STORED,
     ViewFacts,
     array_names,
-    checked_array,
+    check_array,
     facts_from_json,
     sample_of_stored,
 )
@@ -99,7 +99,7 @@ class StoredRoot:
             data = self._get(key)
             array = array_of_rows(data, place)
             array = array_from_png(data, place) if array is None else array
-            arrays[name] = checked_array(name, array, size, place)
+            arrays[name] = check_array(name, array, size, place)
         return arrays
 
     def layers(self, ref: ViewRef) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import pytest
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resized_layer
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resize_layer
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.forms.colmap import _camera_line as colmap_camera
 from pbrs_farm.formats.output_folder import views_of
@@ -148,15 +148,15 @@ def test_views_that_belong_to_no_sequence_are_refused(
 
 def test_flow_and_disparity_are_measured_in_the_pixels_of_the_new_size() -> None:
     flow = np.full((4, 8, 2), 6.0, np.float32)
-    np.testing.assert_array_equal(resized_layer("flow_forward", flow, 4, 4)[0, 0], [3.0, 6.0])
+    np.testing.assert_array_equal(resize_layer("flow_forward", flow, 4, 4)[0, 0], [3.0, 6.0])
     kitti = np.full((4, 8, 3), 2**15 + 64, np.uint16)
     kitti[..., 2] = 1
-    assert resized_layer("flow_forward_kitti", kitti, 4, 4)[0, 0].tolist() == [
+    assert resize_layer("flow_forward_kitti", kitti, 4, 4)[0, 0].tolist() == [
         2**15 + 32,
         2**15 + 64,
         1,
     ]
-    assert resized_layer("disparity", np.full((4, 8), 512, np.uint16), 4, 4)[0, 0] == 256
+    assert resize_layer("disparity", np.full((4, 8), 512, np.uint16), 4, 4)[0, 0] == 256
 
 
 def test_forms_name_the_lens_or_refuse_it() -> None:

@@ -17,7 +17,7 @@ from pbrs_farm.selection.histogram_pack import (
     pack_source,
 )
 from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, normalised
-from pbrs_farm.selection.scores import SCORES, Scorer, merged, score
+from pbrs_farm.selection.scores import SCORES, Scorer, merge_tables, score
 from pbrs_farm.selection.similarity import best_match, intersection
 from tests.selection.histogram_sets import FIELDS, pack, record, reference
 
@@ -109,24 +109,24 @@ def test_bins_that_no_reference_has_change_nothing_but_the_mass() -> None:
 def test_batches_do_not_change_scores() -> None:
     ref, packs = reference(), [pack(name, 5) for name in "abcd"]
     whole = Scorer(ref).score(packs)
-    assert merged(*Scorer(ref).score_all(packs, batch_views=6)).equals(merged(whole))
+    assert merge_tables(*Scorer(ref).score_all(packs, batch_views=6)).equals(merge_tables(whole))
 
 
 def test_merging_is_associative_commutative_and_idempotent() -> None:
     a, b, c = (score([pack(name, n)], reference()) for name, n in (("a", 4), ("b", 3), ("c", 5)))
-    whole = merged(a, b, c)
-    assert merged(merged(a, b), c).equals(whole)
-    assert merged(a, merged(b, c)).equals(whole)
-    assert merged(c, b, a).equals(whole)
-    assert merged(whole, whole, b).equals(whole)
-    assert merged(whole).equals(whole)
-    assert merged().equals(SCORES.empty_table())
+    whole = merge_tables(a, b, c)
+    assert merge_tables(merge_tables(a, b), c).equals(whole)
+    assert merge_tables(a, merge_tables(b, c)).equals(whole)
+    assert merge_tables(c, b, a).equals(whole)
+    assert merge_tables(whole, whole, b).equals(whole)
+    assert merge_tables(whole).equals(whole)
+    assert merge_tables().equals(SCORES.empty_table())
 
 
 def test_two_different_scores_of_one_view_are_rejected() -> None:
     a, b = score([pack("a", 2)], reference(seed=0)), score([pack("a", 2)], reference(seed=1))
     with pytest.raises(ValueError, match="two different values"):
-        merged(a, b)
+        merge_tables(a, b)
 
 
 def test_a_view_without_the_mode_is_scored_on_another_only_when_told() -> None:

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pytest
 
 from pbrs_farm.core.recipe import SelectionFields
-from pbrs_farm.selection.class_balance import balanced, class_shares
-from pbrs_farm.selection.scores import SCORES, merged, score
+from pbrs_farm.selection.class_balance import balance_classes, class_shares
+from pbrs_farm.selection.scores import SCORES, merge_tables, score
 from pbrs_farm.selection.verdicts import REASONS, verdicts
 from tests.selection.histogram_sets import pack, reference
 
@@ -121,7 +121,7 @@ def test_verdicts_of_merged_houses_are_the_merged_verdicts() -> None:
     fields = SelectionFields(per_room_cap=1, min_colour=0.3, min_depth=0.3)
     a, b = (score([pack(name, 7)], reference()) for name in "ab")
     apart = [verdicts(t, fields) for t in (a, b)]
-    assert verdicts(merged(b, a), fields).equals(pa.concat_tables(apart).combine_chunks())
+    assert verdicts(merge_tables(b, a), fields).equals(pa.concat_tables(apart).combine_chunks())
 
 
 def test_no_views_no_verdicts() -> None:
@@ -143,8 +143,8 @@ def test_lazy_balance_takes_what_plain_greedy_takes() -> None:
     rng = np.random.default_rng(0)
     shares = rng.dirichlet(np.full(41, 0.1), 60).astype(np.float32)
     for n_views in (0, 1, 7, 30, 60):
-        assert np.array_equal(balanced(shares, n_views), slow_balance(shares, n_views))
-    assert balanced(shares, 99).all()
+        assert np.array_equal(balance_classes(shares, n_views), slow_balance(shares, n_views))
+    assert balance_classes(shares, 99).all()
 
 
 def test_balance_keeps_the_rare_classes() -> None:

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.folder import FolderStore
-from pbrs_farm.study.judging.judged_places import judged_place
+from pbrs_farm.study.judging.judged_places import open_judged_place
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from tests.study.training.made_views import TINY, small_plan
@@ -41,7 +41,7 @@ def mat(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries", "depth"])
 def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -> None:
     plan = small_plan(task, width_px="160", height_px="120")
-    views = judged_place(str(mat), plan, mode="mlt_il_ol")
+    views = open_judged_place(str(mat), plan, mode="mlt_il_ol")
     assert views.ids == ("0001", "0003")
     assert "2 test pictures" in views.truth
     # The crop is 561x427: wider than 4:3 by a few pixels of height.
@@ -117,7 +117,7 @@ def test_what_training_on_it_needs_is_said(mat: Path) -> None:
         training_views(TrainingSource((str(mat),)), plan)
     mat.write_bytes(b"no matrix at all")
     with pytest.raises(BadInput, match="not a MATLAB"):
-        judged_place(str(mat), plan, mode="mlt_il_ol")
+        open_judged_place(str(mat), plan, mode="mlt_il_ol")
     assert main(["ablation", str(mat), "--out", str(mat.parent / "a")]) == 1
 
 
@@ -126,4 +126,4 @@ def test_a_mat_that_lacks_a_table_names_it(lacking: str, mat: Path) -> None:
     with h5py.File(mat, "a") as file:
         del file[lacking]
     with pytest.raises(BadInput, match=lacking):
-        judged_place(str(mat), small_plan("boundaries"), mode="mlt_il_ol")
+        open_judged_place(str(mat), small_plan("boundaries"), mode="mlt_il_ol")

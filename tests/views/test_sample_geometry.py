@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.views.normal_axes import AXES, axes_from_axes, decoded_normal, encoded_as_stored
-from pbrs_farm.views.sample_changes import cropped, flipped, resized, with_axes
+from pbrs_farm.views.normal_axes import AXES, axes_from_axes, decode_normal, encode_normal
+from pbrs_farm.views.sample_changes import crop, flip, resize, with_axes
 from pbrs_farm.views.view_sample import Sample
 
 FROM_CAMERA = np.diag([1.0, 1.0, 1.0])
@@ -55,11 +55,11 @@ def slopes(sample: Sample) -> np.ndarray:
     "change",
     [
         lambda s: s,
-        flipped,
-        lambda s: cropped(s, 5, 3, 20, 22),
-        lambda s: resized(s, 20, 15),
-        lambda s: resized(s, 20, 30),
-        lambda s: flipped(cropped(s, 1, 0, 21, 30)),
+        flip,
+        lambda s: crop(s, 5, 3, 20, 22),
+        lambda s: resize(s, 20, 15),
+        lambda s: resize(s, 20, 30),
+        lambda s: flip(crop(s, 1, 0, 21, 30)),
     ],
 )
 def test_normals_stay_those_of_the_points_that_depth_and_k_give(axes, change):
@@ -68,7 +68,7 @@ def test_normals_stay_those_of_the_points_that_depth_and_k_give(axes, change):
 
 def test_flipping_twice_gives_the_same_bits():
     sample = plane_sample("published")
-    twice = flipped(flipped(sample))
+    twice = flip(flip(sample))
     assert (twice.normal == sample.normal).all()
     assert (twice.colour == sample.colour).all()
     assert (twice.K == sample.K).all()
@@ -96,8 +96,8 @@ def test_stored_normals_decode_and_encode_to_the_same_bits(axes):
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
     valid = rng.random((9, 8)) > 0.2
     stored = np.where(valid[..., None], np.rint((n + 1) * 65535 / 2), 32768).astype(np.uint16)
-    decoded = decoded_normal(stored, valid, axes)
-    assert (encoded_as_stored(decoded, valid, axes) == stored).all()
+    decoded = decode_normal(stored, valid, axes)
+    assert (encode_normal(decoded, valid, axes) == stored).all()
     assert (decoded[~valid] == 0).all()
     assert np.abs(np.linalg.norm(decoded[valid], axis=-1) - 1).max() < 3e-5
     assert decoded[valid] @ axes_from_axes("published", axes).T == pytest.approx(n[valid], abs=2e-5)
@@ -105,10 +105,10 @@ def test_stored_normals_decode_and_encode_to_the_same_bits(axes):
 
 def test_a_crop_outside_the_picture_is_told():
     with pytest.raises(BadInput, match="lies not inside"):
-        cropped(plane_sample(), 30, 0, 20, 20)
+        crop(plane_sample(), 30, 0, 20, 20)
 
 
 def test_a_layer_that_is_not_there_stays_away():
     sample = replace(plane_sample(), normal=None, valid=None)
-    assert flipped(sample).normal is None
-    assert set(resized(sample, 10, 10).arrays()) == {"colour", "depth"}
+    assert flip(sample).normal is None
+    assert set(resize(sample, 10, 10).arrays()) == {"colour", "depth"}

@@ -122,10 +122,10 @@ def pixels(request: Request) -> Response:
                 arrays[layer] = layer_from_bytes(layer, data, key)
             except (PbrsError, HTTPException):
                 continue  # damaged: the probe says nothing of it
-    return zipped(packet(arrays))
+    return gzip_response(packet(arrays))
 
 
-def zipped(data: bytes, cache: str = FOREVER) -> Response:
+def gzip_response(data: bytes, cache: str = FOREVER) -> Response:
     """Bytes that a script reads, packed on the way."""
     headers = {"Content-Encoding": "gzip", "Cache-Control": cache}
     return Response(gzip.compress(data, 1, mtime=0), headers=headers)

@@ -23,10 +23,10 @@ def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     width, height, as shares of the picture. Views without a picture are left out, and named in
     left_out.txt.
     """
-    return write_labelled_pictures(views, out, _box_lines)
+    return write_pictures_and_labels(views, out, _box_lines)
 
 
-def write_labelled_pictures(
+def write_pictures_and_labels(
     views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
 ) -> int:
     shown = [view for view in views if view.picture is not None]

@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import ViewForm
-from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write_labelled_pictures
+from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write_pictures_and_labels
 from pbrs_farm.export.masks import mask_polygons
 
 
@@ -18,7 +18,7 @@ def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
     Every connected part of an item's visible mask is a polygon, see mask_polygons.
     """
-    return write_labelled_pictures(views, out, _polygon_lines)
+    return write_pictures_and_labels(views, out, _polygon_lines)
 
 
 def _polygon_lines(view: ChosenView) -> Iterable[str]:

@@ -26,7 +26,7 @@ from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
-from pbrs_farm.study.training.prediction import Judged, placed, predicted, scored
+from pbrs_farm.study.training.prediction import Judged, move_to_device, predict, score_predictions
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import NYU_LIGHT
@@ -138,7 +138,7 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
         baseline = np.asarray(np.load(folder.baseline, allow_pickle=False), np.float32)
     except (OSError, ValueError):
         raise BadInput(folder.baseline, "", "missing or damaged: train again") from None
-    return Trained(folder, record, plan, task, placed(network, plan), baseline)
+    return Trained(folder, record, plan, task, move_to_device(network, plan), baseline)
 
 
 def _check_sha256(path: Path, expected: str) -> None:
@@ -155,7 +155,7 @@ def check_exact(task_name: str, *, exact: bool) -> None:
 
 def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
     """A prediction of each view, of the size of its truth."""
-    return predicted(run.network, views.colour, run.task, run.plan, views.sizes)
+    return predict(run.network, views.colour, run.task, run.plan, views.sizes)
 
 
 def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
@@ -183,7 +183,7 @@ def with_others(
 
 
 def _judged(predictions: Iterable[NDArray[Any]], run: Trained, views: JudgedViews) -> Judged:
-    return scored(predictions, views.truths, run.task, run.plan)
+    return score_predictions(predictions, views.truths, run.task, run.plan)
 
 
 def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
@@ -193,7 +193,7 @@ def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
     plan = plan_of("boundaries", "tiny", fields)
     network = network_of("hed", 1)
     start_from(network, "hed")
-    return predicted(placed(network, plan), views.colour, run.task, plan, views.sizes)
+    return predict(move_to_device(network, plan), views.colour, run.task, plan, views.sizes)
 
 
 def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:

@@ -19,7 +19,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import pairs_in, photo_from_pair
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.study.judging.evaluation import JudgedViews
-from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, framed, photo_truth
+from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _FILES: Final = ("intrinsics.json", "intrinsics.txt")
@@ -48,7 +48,7 @@ def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
     for pair in pairs_in(folder):
         camera = camera_of(pair.rgb.parent, folder)
         photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=False)
-        colour, rows, columns = framed(photo.rgb, plan)
+        colour, rows, columns = crop_to_plan(photo.rgb, plan)
         truth = photo_truth(photo, camera.matrix(), plan)
         ids.append(pair.id)
         colours.append(colour)

@@ -16,7 +16,7 @@ from pbrs_farm.study.judging.evaluation import JudgedViews, judged_of_arrays
 from pbrs_farm.study.judging.judged_photographs import pair_views
 from pbrs_farm.study.nyu_pictures import NYU_HOME, NYU_TRUTHS, has_splits, nyu_pictures
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.prediction import predicted, scored
+from pbrs_farm.study.training.prediction import predict, score_predictions
 from pbrs_farm.study.training.training_loop import Judge
 from pbrs_farm.study.training.view_sources import (
     TrainingSource,
@@ -31,7 +31,7 @@ from pbrs_farm.views.open_views import open_views
 _CURVE_THRESHOLDS: Final = 9  # of lines, while a run trains
 
 
-def judged_place(
+def open_judged_place(
     word: str, plan: TrainingPlan, *, mode: str, trained_on: frozenset[str] = frozenset(), most: int = 0,
     hold_out: frozenset[str] | None = None, known_held_out: frozenset[str] | None = None,
 ) -> JudgedViews:  # fmt: skip
@@ -62,8 +62,8 @@ def judge_of_places(places: Sequence[JudgedViews], plan: TrainingPlan) -> Judge:
     def judge(network: nn.Module) -> dict[str, float]:
         return {
             f"on_{on.name}": task.error(
-                scored(
-                    predicted(network, on.colour, task, plan, on.sizes), on.truths, task, plan
+                score_predictions(
+                    predict(network, on.colour, task, plan, on.sizes), on.truths, task, plan
                 ).figures
             )
             for on in places

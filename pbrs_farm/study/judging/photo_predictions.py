@@ -29,7 +29,7 @@ from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import Trained
 from pbrs_farm.study.judging.others_predictions import file_kind
 from pbrs_farm.study.tasks.classes_task import class_names
-from pbrs_farm.study.training.prediction import predicted
+from pbrs_farm.study.training.prediction import predict
 from pbrs_farm.study.training.run_folder import make_folder
 
 SUFFIXES: Final = (".jpg", ".jpeg", ".png", ".bmp", ".tga", ".gif")
@@ -171,7 +171,7 @@ def _predicted(run: Trained, photographs: Sequence[Photograph]) -> Iterator[NDAr
     height, width = _size(run, photographs[0])
     small = np.stack([resized_by_area(p.colour, width, height) for p in photographs])
     sizes = [(int(p.colour.shape[0]), int(p.colour.shape[1])) for p in photographs]
-    yield from predicted(run.network, small, run.task, run.plan, sizes)
+    yield from predict(run.network, small, run.task, run.plan, sizes)
 
 
 def _written(

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import maximum_flow
 from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64, Mask
-from pbrs_farm.study.metrics.edge_thinning import non_maxima_suppressed, thinned
+from pbrs_farm.study.metrics.edge_thinning import suppress_non_maxima, thin_edges
 
 N_THRESHOLDS: Final = 33  # a third of the benchmark's, which is EXACT_THRESHOLDS
 EXACT_THRESHOLDS: Final = 99
@@ -92,7 +92,7 @@ def edge_counts(
     Maxima of strength are cut at n_thresholds equal steps inside 0..1 and thinned; max_distance is
     a share of the picture's diagonal.
     """
-    maxima = non_maxima_suppressed(strength)
+    maxima = suppress_non_maxima(strength)
     reach_px = max_distance * float(np.hypot(*truth.shape))
     matched, predicted = np.zeros((2, n_thresholds), np.int64)
     before: Mask | None = None
@@ -102,7 +102,7 @@ def edge_counts(
         if before is not None and np.array_equal(cut, before):
             matched[k], predicted[k] = matched[k - 1], predicted[k - 1]
             continue
-        before, lines = cut, thinned(cut)
+        before, lines = cut, thin_edges(cut)
         matched[k], predicted[k] = n_matched(lines, truth, reach_px), lines.sum()
     return EdgeCounts(matched, predicted, int(truth.sum()))
 

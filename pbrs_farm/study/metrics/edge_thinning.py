@@ -19,7 +19,7 @@ _DIM_BORDER_PX: Final = 5  # edges this near to the border fade: convolutions in
 _AROUND: Final = ((0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0), (1, 1))
 
 
-def non_maxima_suppressed(strength: NDArray[Any], dim_border_px: int = _DIM_BORDER_PX) -> F32:
+def suppress_non_maxima(strength: NDArray[Any], dim_border_px: int = _DIM_BORDER_PX) -> F32:
     """(H, W) float32: strength where it is a maximum across its edge, else 0.
 
     strength: (H, W), 0..1. Across is the direction in which the smoothed map bends most, an
@@ -63,7 +63,7 @@ def _fading(shape: tuple[int, ...], border_px: int) -> F64:
     return np.asarray(np.minimum(ramps[0][:, None], ramps[1]))
 
 
-def thinned(edges: Mask) -> Mask:
+def thin_edges(edges: Mask) -> Mask:
     """(H, W) bool: edges peeled to lines one pixel wide, connected as before; lines keep their length.
 
     Two passes in turn take pixels off opposite sides until none can go (Guo and Hall 1989; Lam,

@@ -49,7 +49,7 @@ def n_weights(network: nn.Module) -> int:
     return sum(p.numel() for p in network.parameters() if p.requires_grad)
 
 
-def encoded(colour: Tensor, encoding: str) -> Tensor:
+def encode_colour(colour: Tensor, encoding: str) -> Tensor:
     """Colour as a network's pre-training expects it, of RGB 0..1 (B, 3, H, W); the same shape.
 
     encoding: how the weights it starts from were trained, as TrainingPlan.encoding names it.

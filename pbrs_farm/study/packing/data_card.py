@@ -77,7 +77,7 @@ def root_facts(views: Views, root: StoredRoot) -> RootFacts:
     )  # fmt: skip
 
 
-def described(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:
+def dataset_description(packing: Packing, credits: Sequence[str]) -> dict[str, Any]:
     """The fields of dataset.json that readers of other makers need."""
     colours = [bytes(row).hex() for row in NYU40_COLOURS.tolist()]
     arrays = {

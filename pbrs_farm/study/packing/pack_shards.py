@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import new_folder
 from pbrs_farm.regular_files import digest_of_regular
 from pbrs_farm.study.packing.croissant import croissant_json
-from pbrs_farm.study.packing.data_card import described, root_facts
+from pbrs_farm.study.packing.data_card import dataset_description, root_facts
 from pbrs_farm.study.packing.packed_view import packed_view
 from pbrs_farm.study.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans
 from pbrs_farm.study.packing.parquet_files import croissant_kind, write_parquet
@@ -87,7 +87,9 @@ def _write_shards(
         tuple(shards), packing.shares, NYU40_NAMES,
     )  # fmt: skip
     facts = root_facts(views, source)
-    (out / DATASET_JSON).write_bytes(dataset_json(dataset, described(packing, facts.credits)))
+    (out / DATASET_JSON).write_bytes(
+        dataset_json(dataset, dataset_description(packing, facts.credits))
+    )
     (out / "README.md").write_text(card(views, packing, facts, form="shards"), encoding="utf-8")
     return len(shards) + 2
 

@@ -8,7 +8,7 @@ from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.views.png_rows import png_of_rows
 from pbrs_farm.views.shard_parts import label_parts
-from pbrs_farm.views.stored_layers import Stored, ViewFacts, resized_stored
+from pbrs_farm.views.stored_layers import Stored, ViewFacts, resize_stored
 from pbrs_farm.views.stored_root import StoredRoot
 from pbrs_farm.views.view_sample import Size
 from pbrs_farm.views.views import ViewRef
@@ -29,12 +29,12 @@ def stored_parts(
     pictures = {}
     wanted, *of_colour = packing.requests()
     for request in of_colour:
-        colour = resized_stored(root.arrays(ref, request), size)["colour"]
+        colour = resize_stored(root.arrays(ref, request), size)["colour"]
         if packing.colour == "jpeg":
             pictures[f"{request.mode}.jpg"] = jpeg_from_array(colour, packing.quality)
         else:
             pictures[f"{request.mode}.png"] = png_of_rows(colour)
-    return resized_stored(root.arrays(ref, wanted), size), pictures
+    return resize_stored(root.arrays(ref, wanted), size), pictures
 
 
 def facts_json(facts: ViewFacts, size: Size) -> bytes:

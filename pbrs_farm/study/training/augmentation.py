@@ -12,7 +12,7 @@ from pbrs_farm.study.tasks.study_task import Batch, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
 
 
-def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
+def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
     """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw."""
     n, device = len(batch["colour"]), batch["colour"].device
 
@@ -26,11 +26,11 @@ def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gen
         batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
     if plan.turn_deg > 0:
         angles = torch.randn((n, 2), generator=dice).to(device).clamp(-2, 2)
-        batch = turned(batch, task, angles * (plan.turn_deg * pi / 180), plan.hfov_deg)
+        batch = rotate_cameras(batch, task, angles * (plan.turn_deg * pi / 180), plan.hfov_deg)
     if plan.zoom > 1:
-        batch = _enlarged(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
+        batch = _enlarge(batch, 1 / (1 + drawn() * (plan.zoom - 1)), 2 * drawn(2) - 1)
     if plan.hue > 0:
-        batch["colour"] = turned_hue(batch["colour"], plan.hue * pi * (2 * drawn() - 1))
+        batch["colour"] = rotate_hue(batch["colour"], plan.hue * pi * (2 * drawn() - 1))
     batch["colour"] = _relit(batch["colour"], plan, drawn)
     if plan.noise > 0:
         noise = torch.randn(batch["colour"].shape, generator=dice).to(device)
@@ -38,7 +38,7 @@ def augmented(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gen
     return batch
 
 
-def turned_hue(colour: Tensor, angles: Tensor) -> Tensor:
+def rotate_hue(colour: Tensor, angles: Tensor) -> Tensor:
     """Colours (B, 3, H, W) turned about the grey axis by angles (B,), radians: other paint, same light."""
     cos, sin = torch.cos(angles), torch.sin(angles)
     # Rodrigues' formula about (1, 1, 1) / sqrt(3): three numbers that go round.
@@ -60,7 +60,7 @@ def _relit(colour: Tensor, plan: TrainingPlan, drawn: object) -> Tensor:
     return (colour.clamp(min=1e-4) ** gamma * gain * tint).clamp(0, 1)
 
 
-def _enlarged(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
+def _enlarge(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
     """A part of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
 
     Directions stay, as if seen by a longer lens.
@@ -69,12 +69,12 @@ def _enlarged(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
     theta = torch.zeros((n, 2, 3), device=shares.device)
     theta[:, 0, 0] = theta[:, 1, 1] = shares
     theta[:, :, 2] = shifts * (1 - shares)[:, None]
-    return _sampled(
+    return _sample_at(
         batch, functional.affine_grid(theta, [n, 1, height, width], align_corners=False)
     )
 
 
-def turned(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
+def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
     """The views as cameras would see them that are pitched up and rolled clockwise by angles (B, 2).
 
     A turned camera's picture is a homography of the old one, whatever the depth; normals turn with
@@ -98,7 +98,7 @@ def turned(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Ba
     old = torch.einsum("bji,hwj->bhwi", rotation, rays)  # by the inverse of what turns directions
     plane = old[..., :2] / old[..., 2:].clamp(min=1e-3) / half
     grid = plane * plane.new_tensor([1.0, width / height])
-    return task.turned(_sampled(batch, grid), rotation)
+    return task.turned(_sample_at(batch, grid), rotation)
 
 
 def _rotations(angles: Tensor) -> Tensor:
@@ -113,7 +113,7 @@ def _rotations(angles: Tensor) -> Tensor:
     return rolled @ pitched
 
 
-def _sampled(batch: Batch, grid: Tensor) -> Batch:
+def _sample_at(batch: Batch, grid: Tensor) -> Batch:
     """The batch at places of its pictures: grid (B, H, W, 2), -1..1 from edge to edge.
 
     Colour is interpolated, labels are the nearest pixel's, 0 outside.

@@ -18,7 +18,7 @@ from torch.nn import functional
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.installation import install_command
-from pbrs_farm.study.networks.network_choice import encoded
+from pbrs_farm.study.networks.network_choice import encode_colour
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -43,7 +43,7 @@ def device_of(plan: TrainingPlan) -> torch.device:
     return torch.device("cuda" if has_gpu and plan.device != "cpu" else "cpu")
 
 
-def placed(network: nn.Module, plan: TrainingPlan) -> nn.Module:
+def move_to_device(network: nn.Module, plan: TrainingPlan) -> nn.Module:
     """The network on the plan's device, in channels-last memory format.
 
     The module itself is moved (as `nn.Module.to`) and returned.
@@ -52,7 +52,7 @@ def placed(network: nn.Module, plan: TrainingPlan) -> nn.Module:
     return network.to(memory_format=torch.channels_last) if plan.channels_last else network
 
 
-def predicted(
+def predict(
     network: nn.Module, colour: NDArray[np.uint8], task: StudyTask, plan: TrainingPlan,
     sizes: Sequence[tuple[int, int]] = (),
 ) -> Iterator[NDArray[Any]]:  # fmt: skip
@@ -85,7 +85,7 @@ def predicted(
 def network_output(network: nn.Module, colour: torch.Tensor, plan: TrainingPlan) -> torch.Tensor:
     """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says."""
     size = colour.shape[-2:]
-    colour = encoded(colour, plan.encoding)
+    colour = encode_colour(colour, plan.encoding)
     if plan.enlarge == 1:
         return network(colour)
     large = functional.interpolate(
@@ -132,21 +132,21 @@ def as_colour(pictures: torch.Tensor) -> torch.Tensor:
     return pictures.permute(0, 3, 1, 2).float() / 255
 
 
-def judged(network: nn.Module, views: ViewArrays, task: StudyTask, plan: TrainingPlan) -> Judged:
-    """How good the network is on views."""
-    predictions = predicted(network, views.colour, task, plan)
-    return scored(predictions, (views.target(k) for k in range(len(views))), task, plan)
-
-
-def baseline_judged(
-    baseline: F32, views: ViewArrays, task: StudyTask, plan: TrainingPlan
+def judge_views(
+    network: nn.Module, views: ViewArrays, task: StudyTask, plan: TrainingPlan
 ) -> Judged:
+    """How good the network is on views."""
+    predictions = predict(network, views.colour, task, plan)
+    return score_predictions(predictions, (views.target(k) for k in range(len(views))), task, plan)
+
+
+def judge_baseline(baseline: F32, views: ViewArrays, task: StudyTask, plan: TrainingPlan) -> Judged:
     """How good the same prediction for every view is."""
     targets = (views.target(k) for k in range(len(views)))
-    return scored((baseline for _ in views.ids), targets, task, plan)
+    return score_predictions((baseline for _ in views.ids), targets, task, plan)
 
 
-def scored(
+def score_predictions(
     predictions: Iterable[NDArray[Any]],
     truths: Iterable[Arrays],
     task: StudyTask,

@@ -42,7 +42,7 @@ def _panel(svg: Element, title: str, curves: Mapping[str, Points]) -> None:
         element(svg, "text", name, x=x, y=22, fill=colour)
 
 
-def smoothed(points: Points, share: float = 0.05) -> list[tuple[float, float]]:
+def smooth_curve(points: Points, share: float = 0.05) -> list[tuple[float, float]]:
     """Each value averaged with those before it, over a share of all: losses of single steps jump."""
     n = max(1, math.ceil(len(points) * share))
     values = [value for _, value in points]

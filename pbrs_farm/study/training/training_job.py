@@ -15,9 +15,9 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import n_weights, network_of
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.prediction import baseline_judged, device_of, judged
+from pbrs_farm.study.training.prediction import device_of, judge_baseline, judge_views
 from pbrs_farm.study.training.run_folder import FAILED, FINISHED, RunFolder
-from pbrs_farm.study.training.training_curves import curves_svg, smoothed
+from pbrs_farm.study.training.training_curves import curves_svg, smooth_curve
 from pbrs_farm.study.training.training_loop import (
     Judge,
     Observer,
@@ -152,7 +152,7 @@ def _judge_of_curve(
             if held_out:
                 parts["held_out_error"] = held_out.some(plan.judge_views)
         own = {
-            name: task.error(judged(network, part, task, plan).figures)
+            name: task.error(judge_views(network, part, task, plan).figures)
             for name, part in parts.items()
         }
         return own | also(network)
@@ -177,9 +177,11 @@ def _judge(
     return {
         "baseline_name": name,
         "views": {at: len(part) for at, part in parts.items()},
-        "network": {at: judged(network, part, task, plan).figures for at, part in parts.items()},
+        "network": {
+            at: judge_views(network, part, task, plan).figures for at, part in parts.items()
+        },
         "baseline": {
-            at: baseline_judged(baseline, part, task, plan).figures for at, part in parts.items()
+            at: judge_baseline(baseline, part, task, plan).figures for at, part in parts.items()
         },
     }
 
@@ -194,7 +196,7 @@ def _curves(folder: RunFolder, plan: TrainingPlan) -> str:
     errors = {"training": points("train_error"), "held out": points("held_out_error")}
     names = dict.fromkeys(name for row in rows for name in row)
     errors |= {name[3:]: points(name) for name in names if name.startswith("on_")}
-    panels = {f"{title}: loss": {"loss": smoothed(points("loss"))}}
+    panels = {f"{title}: loss": {"loss": smooth_curve(points("loss"))}}
     if any(errors.values()):
         panels[f"{title}: {task_of(plan.task).error_name}"] = errors
     return curves_svg(panels)

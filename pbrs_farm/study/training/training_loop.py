@@ -19,7 +19,7 @@ from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.study.tasks.study_task import Batch, StudyTask
-from pbrs_farm.study.training.augmentation import augmented
+from pbrs_farm.study.training.augmentation import augment
 from pbrs_farm.study.training.checkpoint import (
     Position,
     load_checkpoint,
@@ -27,7 +27,7 @@ from pbrs_farm.study.training.checkpoint import (
     save_weights,
 )
 from pbrs_farm.study.training.optimisers import optimiser_of, running_mean, set_rate
-from pbrs_farm.study.training.prediction import as_colour, device_of, network_output, placed
+from pbrs_farm.study.training.prediction import as_colour, device_of, move_to_device, network_output
 from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
 from pbrs_farm.study.training.training_views import BatchRead, TrainingViews
 from pbrs_farm.study.training_plan import TrainingPlan, rate_at
@@ -81,7 +81,7 @@ def train_network(
     """
     if plan.batch % share.of:
         raise BadInput("batch", str(plan.batch), f"cannot be shared by {share.of} processes")
-    network = placed(network, plan)
+    network = move_to_device(network, plan)
     optimiser = optimiser_of(network, plan)
     # What a checkpoint must agree with to be gone on from.
     where = Position(0, task.name, plan_digest(plan), views.digest(), seed)
@@ -140,7 +140,7 @@ def seconds_a_step(
     read = next(iter(views.batches(range(1), plan, 0, slice(None))))
     seconds = {}
     for name, bf16 in (("float32", False), ("bfloat16", True)):
-        model = placed(copy.deepcopy(network), plan)
+        model = move_to_device(copy.deepcopy(network), plan)
         each = replace(plan, bf16=bf16)
         loop = _Loop(model, optimiser_of(model, each), task, each, 0, Share())
         times = []
@@ -203,7 +203,7 @@ class _Loop:
             for name, array in arrays.items()
         }
         batch["colour"] = as_colour(batch["colour"])
-        batch = augmented(batch, self.task, plan, torch.Generator().manual_seed(chance))
+        batch = augment(batch, self.task, plan, torch.Generator().manual_seed(chance))
 
         with torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
             output = network_output(self.model, batch["colour"], plan)

@@ -16,12 +16,12 @@ from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, tra
 from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
 from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text
 from pbrs_farm.study.judging.judged_photographs import camera_of
-from pbrs_farm.study.judging.judged_places import judged_place
+from pbrs_farm.study.judging.judged_places import open_judged_place
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
-from pbrs_farm.study.photographs import framed
+from pbrs_farm.study.photographs import crop_to_plan
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
@@ -130,14 +130,14 @@ def test_photographs_of_rooms_are_told_by_room_with_an_interval(run: Path, pairs
             data = (pairs / f"wall_{kind}.png").read_bytes()
             (pairs / room / f"1_{kind}.png").write_bytes(data)
     trained = open_run(run)
-    evaluation = evaluate(trained, judged_place(str(pairs), trained.plan, mode="mlt_il_ol"))
+    evaluation = evaluate(trained, open_judged_place(str(pairs), trained.plan, mode="mlt_il_ol"))
     assert set(evaluation.groups) == {"", "bath", "hall", "kitchen"}
     assert any("over its 4 homes or folders" in line for line in notes(trained, [evaluation]))
     assert evaluation.as_json()["groups"] == evaluation.groups
 
 
 def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:
-    views = judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    views = open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
     # The middle of 90x60 in the form 40:32.
     assert views.sizes == [(60, 75)]
     assert views.colour.shape == (1, 32, 40, 3)
@@ -152,7 +152,7 @@ def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:
 def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
     (pairs / "intrinsics.json").unlink()
     with pytest.raises(BadInput, match="photographs without intrinsics"):
-        judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+        open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
     (pairs / "intrinsics.txt").write_text("80 0 45\n0 81 30\n0 0 1\n")
     assert camera_of(pairs, pairs).K == (80, 81, 45, 30)
     (pairs / "intrinsics.txt").write_text("80 zero")
@@ -162,7 +162,7 @@ def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
 
 def test_depth_says_nothing_of_classes(pairs: Path) -> None:
     with pytest.raises(BadInput, match="normals and depth alone"):
-        judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
+        open_judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
 
 
 def test_all_99_thresholds_are_used_where_they_are_asked_for(
@@ -183,9 +183,11 @@ def test_a_home_that_trained_may_not_judge(root: Path) -> None:
     plan = small_plan()
     trained = frozenset(HOMES)
     with pytest.raises(BadInput, match=r"has trained|all its homes trained"):
-        judged_place(str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset())
+        open_judged_place(
+            str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset()
+        )
     with pytest.raises(BadInput, match="home home-2 has trained"):
-        judged_place(
+        open_judged_place(
             str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset({"home-2"})
         )
 
@@ -260,7 +262,7 @@ def test_a_table_of_what_the_paper_does_not_know_has_no_number_of_it(
 
 
 def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
-    colour, rows, columns = framed(np.zeros((100, 300, 3), np.uint8), small_plan())
+    colour, rows, columns = crop_to_plan(np.zeros((100, 300, 3), np.uint8), small_plan())
     assert colour.shape == (32, 40, 3)
     assert (rows, columns) == (slice(0, 100), slice(87, 212))
 
@@ -297,7 +299,7 @@ def test_predictions_of_others_are_judged_beside_the_runs_own(
     axes = np.broadcast_to([0.0, -1.0, 0.0], (60, 90, 3))
     stored = np.rint((axes + 1) * 65535 / 2).astype(np.uint16)
     (said / "wall_normal.png").write_bytes(png_from_array(stored))
-    views = judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    views = open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
     found = predictions_in(OthersPredictions("theirs", said), views, small_plan())
     assert found is not None
     (normal,) = found

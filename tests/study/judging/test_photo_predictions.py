@@ -159,14 +159,14 @@ def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(
 ) -> None:
     from pbrs_farm.study.judging.evaluation import open_run
     from pbrs_farm.study.judging.packed_weights import pack_weights
-    from pbrs_farm.study.training.prediction import predicted
+    from pbrs_farm.study.training.prediction import predict
 
     packed = pack_weights(run, tmp_path / "packed")
     whole, half = open_run(run), open_run(packed.root)
     assert packed.weights.stat().st_size < 0.6 * whole.folder.weights.stat().st_size
     size = whole.plan.height_px, whole.plan.width_px
     colour = np.random.default_rng(0).integers(0, 256, (1, *size, 3)).astype(np.uint8)
-    a, b = (next(predicted(r.network, colour, r.task, r.plan)) for r in (whole, half))
+    a, b = (next(predict(r.network, colour, r.task, r.plan)) for r in (whole, half))
     assert (a * b).sum(-1).min() > np.cos(np.radians(1))
     card = (packed.root / "README.md").read_text()
     assert half.record["weights_sha256"] in card

@@ -8,7 +8,7 @@ from scipy import ndimage
 from scipy.optimize import linear_sum_assignment
 
 from pbrs_farm.study.metrics.edge_scores import EdgeCounts, EdgeScores, edge_counts, n_matched
-from pbrs_farm.study.metrics.edge_thinning import non_maxima_suppressed, thinned
+from pbrs_farm.study.metrics.edge_thinning import suppress_non_maxima, thin_edges
 
 
 def _assigned(predicted: np.ndarray, truth: np.ndarray, reach_px: float) -> int:
@@ -52,7 +52,7 @@ def test_nothing_matches_an_empty_map() -> None:
 def test_thinning_leaves_the_middle_line_of_a_bar() -> None:
     bar = np.zeros((15, 40), bool)
     bar[6:9, 5:35] = True
-    line = thinned(bar)
+    line = thin_edges(bar)
     assert line.sum(0).max() == 1
     assert line[7].sum() >= 27
 
@@ -60,9 +60,9 @@ def test_thinning_leaves_the_middle_line_of_a_bar() -> None:
 def test_thinning_twice_is_thinning_once_and_keeps_pieces() -> None:
     rng = np.random.default_rng(3)
     blobs = ndimage.gaussian_filter(rng.random((60, 80)), 2) > 0.51
-    lines = thinned(blobs)
+    lines = thin_edges(blobs)
     eight = np.ones((3, 3))
-    assert np.array_equal(thinned(lines), lines)
+    assert np.array_equal(thin_edges(lines), lines)
     assert not (lines & ~blobs).any()
     assert ndimage.label(lines, eight)[1] == ndimage.label(blobs, eight)[1]
 
@@ -72,7 +72,7 @@ def test_maxima_of_a_soft_line_lie_on_the_line(degrees: float) -> None:
     rows, columns = np.indices((60, 60)) - 29.5
     angle = np.radians(degrees)
     away = rows * np.cos(angle) + columns * np.sin(angle)
-    maxima = non_maxima_suppressed(np.exp(-(away**2) / 8), dim_border_px=0) > 0.01
+    maxima = suppress_non_maxima(np.exp(-(away**2) / 8), dim_border_px=0) > 0.01
     inside = np.hypot(rows, columns) < 20
     assert np.abs(away[maxima & inside]).max() <= 0.75
     longest = 40 * max(abs(np.cos(angle)), abs(np.sin(angle)))  # pixels of a drawn line
@@ -81,7 +81,7 @@ def test_maxima_of_a_soft_line_lie_on_the_line(degrees: float) -> None:
 
 def test_edges_fade_at_the_border_where_convolutions_invent_them() -> None:
     flat = np.full((40, 40), 0.8)
-    maxima = non_maxima_suppressed(flat)
+    maxima = suppress_non_maxima(flat)
     assert maxima[0].max() == 0
     assert maxima[20, 20] == pytest.approx(0.8)
 

@@ -9,7 +9,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
 from pbrs_farm.study.networks.edge_hed import EdgeHed, edges_of_sides
 from pbrs_farm.study.networks.initial_weights import start_from
-from pbrs_farm.study.networks.network_choice import encoded, n_weights, network_of
+from pbrs_farm.study.networks.network_choice import encode_colour, n_weights, network_of
 from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
 
 pytestmark = pytest.mark.study
@@ -83,10 +83,10 @@ def test_edges_are_the_mean_of_sides_two_to_four() -> None:
 
 def test_caffes_colours_are_bgr_less_their_means() -> None:
     red = torch.tensor([1.0, 0, 0]).view(1, 3, 1, 1)
-    assert encoded(red, "caffe").flatten().tolist() == pytest.approx(
+    assert encode_colour(red, "caffe").flatten().tolist() == pytest.approx(
         [-104.007, -116.669, 255 - 122.679], abs=1e-3
     )
-    assert encoded(red, "centred").flatten().tolist() == pytest.approx(
+    assert encode_colour(red, "centred").flatten().tolist() == pytest.approx(
         [127 / 255, -128 / 255, -128 / 255]
     )
 

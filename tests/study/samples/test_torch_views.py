@@ -13,7 +13,7 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.views.open_views import open_views
-from pbrs_farm.views.sample_changes import flipped
+from pbrs_farm.views.sample_changes import flip
 from pbrs_farm.views.view_sample import LAYERS, SampleRequest
 from tests.views.small_roots import MODES, fill
 
@@ -147,7 +147,7 @@ def test_transforms_follow_from_seed_epoch_and_view(places):
     from pbrs_farm.study.samples.sharded_views import ShardedViews
 
     def by_chance(sample, rng):
-        return flipped(sample) if rng.random() < 0.5 else replace(sample)
+        return flip(sample) if rng.random() < 0.5 else replace(sample)
 
     def colours(n_parts, epoch):
         views = {}

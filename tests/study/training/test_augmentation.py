@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.augmentation import augmented, turned, turned_hue
+from pbrs_farm.study.training.augmentation import augment, rotate_cameras, rotate_hue
 from tests.study.training.made_views import small_plan
 
 pytestmark = pytest.mark.study
@@ -22,18 +22,18 @@ def _pixel(*rgb: float) -> torch.Tensor:
 def test_grey_stays_grey_whatever_the_turn() -> None:
     angles = torch.linspace(-pi, pi, 9)
     grey = torch.full((9, 3, 2, 2), 0.4)
-    assert torch.allclose(turned_hue(grey, angles), grey, atol=1e-6)
+    assert torch.allclose(rotate_hue(grey, angles), grey, atol=1e-6)
 
 
 def test_a_third_of_a_turn_makes_red_paint_green() -> None:
-    turned = turned_hue(_pixel(0.7, 0.2, 0.1), torch.tensor([2 * pi / 3]))
+    turned = rotate_hue(_pixel(0.7, 0.2, 0.1), torch.tensor([2 * pi / 3]))
     assert turned.flatten().tolist() == pytest.approx([0.1, 0.7, 0.2], abs=1e-6)
 
 
 def test_other_paint_is_as_light_as_before() -> None:
     paint = _pixel(0.5, 0.4, 0.45)
     for angle in (0.3, 1.0, -2.5):
-        assert float(turned_hue(paint, torch.tensor([angle])).mean()) == pytest.approx(0.45)
+        assert float(rotate_hue(paint, torch.tensor([angle])).mean()) == pytest.approx(0.45)
 
 
 def test_hue_changes_pictures_and_no_label() -> None:
@@ -42,7 +42,7 @@ def test_hue_changes_pictures_and_no_label() -> None:
     colour = torch.from_numpy(rng.random((3, 3, 4, 4), np.float32))
     labels = {"normal": torch.ones(3, 4, 4, 3), "valid": torch.ones(3, 4, 4, dtype=torch.bool)}
     dice = torch.Generator().manual_seed(5)
-    changed = augmented({"colour": colour, **labels}, task_of("normals"), plan, dice)
+    changed = augment({"colour": colour, **labels}, task_of("normals"), plan, dice)
     assert not torch.allclose(changed["colour"], colour, atol=0.01)
     assert all(torch.equal(changed[name], label) for name, label in labels.items())
 
@@ -64,7 +64,7 @@ def sphere(height: int = 96, width: int = 128, hfov_deg: float = 60.0) -> dict[s
 @pytest.mark.parametrize(("pitch", "roll"), [(0.1, 0.0), (0.0, 0.15), (-0.08, 0.2)])
 def test_a_turned_camera_sees_the_same_sphere_from_its_middle(pitch: float, roll: float) -> None:
     old = sphere()
-    new = turned(old, task_of("normals"), torch.tensor([[pitch, roll]]), 60.0)
+    new = rotate_cameras(old, task_of("normals"), torch.tensor([[pitch, roll]]), 60.0)
     known = new["valid"][0]
     assert 0.6 < float(known.float().mean()) < 1
     # Every normal points at the camera, whichever way it looks: to a pixel, since labels are nearest.
@@ -75,10 +75,10 @@ def test_a_turned_camera_sees_the_same_sphere_from_its_middle(pitch: float, roll
 
 def test_a_camera_that_pitches_up_sees_what_is_above_and_rolls_clockwise() -> None:
     old, task = sphere(), task_of("normals")
-    up = turned(old, task, torch.tensor([[0.2, 0.0]]), 60.0)["colour"][0, :, 48, 64]
+    up = rotate_cameras(old, task, torch.tensor([[0.2, 0.0]]), 60.0)["colour"][0, :, 48, 64]
     assert float(up[1]) == pytest.approx((1 - np.sin(0.2)) / 2, abs=0.01)
     # Rolled clockwise, the camera's right points down: y grows along its rows.
-    row = turned(old, task, torch.tensor([[0.0, 0.2]]), 60.0)["colour"][0, 1, 48]
+    row = rotate_cameras(old, task, torch.tensor([[0.0, 0.2]]), 60.0)["colour"][0, 1, 48]
     assert float(row[100]) > float(row[64]) > float(row[28])
 
 
