@@ -34,7 +34,7 @@ MOST_FLOOR: Final = 0.08
 # What each object and class earns, and how many do.
 SCORE_OF_OBJECT, MOST_OBJECTS = 0.05, 8
 SCORE_OF_CLASS, MOST_CLASSES = 0.06, 8
-LEAST_CLASS_SHARE: Final = 0.005  # of the picture, that a class is seen at all
+LEAST_CLASS_SHARE: Final = 0.005  # a class that covers less of the picture does not count as seen
 # Shares from which doors and windows, one piece, one wall cost.
 MOST_OPENING, OPENING_COST = 0.10, 1.5
 MOST_OF_ONE, MOST_OF_A_WALL = 0.30, 0.50

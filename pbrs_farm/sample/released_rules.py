@@ -15,8 +15,8 @@ from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.eye_probes import ItemCounter
 
-_MASK_CELL_M = 0.05  # without a clearance
-_MAX_MASK_CELL_M = 0.1  # else half the clearance, but at most this
+_MASK_CELL_M = 0.05  # cell of the mask where the clearance is 0
+_MAX_MASK_CELL_M = 0.1  # otherwise half the clearance, at most this
 
 
 def room_grid(house: House, room: Room) -> Grid:

@@ -24,7 +24,7 @@ from pbrs_farm.core.mesh import area_vectors, distances_to_triangles
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_report import SourceRepair
 
-_CLEARANCE = 0.97  # of the free distance that a bulb fills
+_CLEARANCE = 0.97  # share of the free distance that a bulb's radius takes
 _LEAST_RADIUS_M = 0.004  # a smaller bulb is moved instead
 _N_MOVES = 400  # random places tried
 

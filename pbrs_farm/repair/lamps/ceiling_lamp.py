@@ -19,15 +19,15 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.prisms import polygons_of
 
 ADDED_LAMP = "added"  # tag of every lamp that repair adds
-_BELOW_CEILING_M = 0.2  # centre of the lamp
-_TALL_M = 0.5  # what reaches this near the ceiling takes part of it
+_BELOW_CEILING_M = 0.2  # distance of the lamp's centre from the ceiling
+_TALL_M = 0.5  # furniture that comes this near to the ceiling blocks its area for lamps
 _OWN_WALL_M = 0.2  # a room's own walls may stand so far inside its outline
 _HEAD_M = 1.9  # a lamp hangs this high above the floor where the ceiling does
 _RADIUS_M = 0.1
-_POWER = 0.5  # of a lamp in Sweet Home 3D, the default there
+_POWER = 0.5  # power of a lamp in Sweet Home 3D: its default
 _LEAST_LM, _MOST_LM = 600.0, 10_000.0  # of one lamp: a small bulb, a chandelier
 _ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
-_GRID_M = 0.25  # of places tried below a sloped ceiling
+_GRID_M = 0.25  # spacing of the places tried below a sloped ceiling
 
 
 def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0) -> Item:

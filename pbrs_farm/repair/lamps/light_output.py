@@ -25,7 +25,7 @@ _REACH_M = 14.0  # a ray that gets this far has left its lamp
 _MAX_LAYERS = 12  # of shade that one ray passes, or bounces off the structure
 # Structure this near the lamp's bounds bounces its light; what is farther off is the room's.
 _AT_LAMP_M = 0.05
-_NEAR_M = 0.5  # a bulb that sees structure from behind this near is inside of it
+_NEAR_M = 0.5  # a bulb that meets structure from behind within this distance is inside it
 _BOUNCE = 0.7  # reflectance of structure: a light paint
 _STRUCTURE = -1  # in part_of_face
 Part = tuple[int, int, int]  # a connected part of a lamp: item, surface, number of the part

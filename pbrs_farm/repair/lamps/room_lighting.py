@@ -17,12 +17,12 @@ from pbrs_farm.repair.lamps.ceiling_lamp import ADDED_LAMP, ceiling_lamp, height
 from pbrs_farm.repair.structure import plan_geometry as plan
 
 FALLBACK = "fallback"
-_DIM = 0.25  # share of the flux a room wants, up to which its own lamps are too weak
+_DIM = 0.25  # lamps with less than this share of the flux a room needs count as too dim
 _LEAST_ESCAPE = 0.01  # light output ratio below which a lamp counts as none
 _HEIGHT_SLACK_M = 0.05  # a lamp or opening may lie so far outside the room's heights
 _BY_THE_ROOM_M = 0.6  # an opening nearer than this is in a wall of the room
-_SKY_POINTS = 64  # of a room without a ceiling, looked up from
-_LEAST_SKY = 0.1  # share of them that see no structure above
+_SKY_POINTS = 64  # points of a room without a ceiling from which rays go up
+_LEAST_SKY = 0.1  # share of them with open sky from which the sky lights the room
 
 
 @dataclass(frozen=True, slots=True)

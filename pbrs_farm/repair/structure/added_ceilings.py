@@ -28,11 +28,11 @@ ADDED_CEILING: Final = "added-ceiling"
 """Tag of ceilings that repair adds."""
 
 MIN_WALL_HEIGHT_M: Final = 1.8  # a lower wall is a parapet: it bounds no room
-_BESIDE_M: Final = 0.3  # a wall farther from a room's edge is another's
-_WALLED: Final = 0.75  # share of a room's edge at which walls or other rooms stand
-_STEP_M: Final = 0.25  # between places of the edge at which walls are looked for
-_TIE_M: Final = 0.01  # walls are equally near within this
-_FLAT_M: Final = 0.05  # tops that differ by less are one height
+_BESIDE_M: Final = 0.3  # a wall farther from a room's edge does not bound it
+_WALLED: Final = 0.75  # a room is closed only where this share of its edge has walls or other rooms
+_STEP_M: Final = 0.25  # spacing of the samples of a room's edge
+_TIE_M: Final = 0.01  # distances that differ by less are equal
+_FLAT_M: Final = 0.05  # wall tops that differ by less count as one height
 _BEND_M: Final = 0.01  # smaller bends of a sloped ceiling are left out
 MIN_HOLE_M2: Final = 0.05  # a smaller hole is a gap in the drawing
 MAX_STOREY_GAP_M: Final = 0.8  # thickest floor between two storeys

@@ -15,20 +15,20 @@ from pbrs_farm.core.house import Geometry, House
 from pbrs_farm.sample.walks.walk_space import is_door_item
 
 _FIXATION_S: Final = (1.2, 2.8)  # how long one thing is looked at
-_DISTANCE_M: Final = (0.9, 5.5)  # of a thing that is looked at
-_ASIDE_RAD: Final = math.radians(80)  # from the way, at most
+_DISTANCE_M: Final = (0.9, 5.5)  # range of distances at which things are looked at
+_ASIDE_RAD: Final = math.radians(80)  # largest angle between gaze and way
 _SMOOTH_S: Final = 0.35  # standard deviation of the filter over the gaze
-_TILT_SHARE: Final = 0.5  # of a thing's own angle; the rest is the usual tilt
-_TILT_DEG: Final = (-4.0, 22.0)  # downwards, least and most
+_TILT_SHARE: Final = 0.5  # weight of the angle down to a thing; the usual tilt has the rest
+_TILT_DEG: Final = (-4.0, 22.0)  # range of tilts, positive downwards
 _USUAL_TILT_DEG: Final = 8.0  # NYUv2's median (docs/cameras.md)
 _SIZE_M: Final = (0.15, 3.0)  # diagonal of a thing that is looked at
-_SEEN_SHARE: Final = 0.9  # of the way to a thing's middle that nothing may stand in
-_OPEN_M: Final = 3.0  # as far as anything need be
+_SEEN_SHARE: Final = 0.9  # share of the line of sight to a thing that must be free
+_OPEN_M: Final = 3.0  # free sight beyond this counts no more
 _FAN_AZIMUTH: Final = np.radians([-24.0, -12.0, 0.0, 12.0, 24.0])
 _FAN_TILT: Final = np.radians([-8.0, 8.0, 24.0])
-_N_REMEMBERED: Final = 4  # things looked at last, which draw the eye less
-_REMEMBERED_WEIGHT: Final = 0.05  # of theirs
-_LEAST_OPEN: Final = 0.05  # of the share of _OPEN_M; its cube prefers far sights
+_N_REMEMBERED: Final = 4  # things looked at last; they attract the gaze less
+_REMEMBERED_WEIGHT: Final = 0.05  # factor of their weight
+_LEAST_OPEN: Final = 0.05  # least openness; its cube is the weight of a direction
 _YAW_PART, _TILT_PART = 0.95, 0.3  # of the turn that is allowed: together below 1
 
 

@@ -23,7 +23,7 @@ MAX_ROWS: Final = 100_000
 ORIGIN: Final = "trajectory"
 _UNIT: Final = 0.01  # a quaternion's length may differ from 1 by so much
 _AXES: Final = np.concatenate([np.eye(3), -np.eye(3)])
-_BACKS: Final = 4  # of six looks along the axes: so many backs of walls mean an eye inside one
+_BACKS: Final = 4  # of six rays along the axes: so many backs of walls mean an eye inside one
 
 
 @dataclass(frozen=True, slots=True, eq=False)

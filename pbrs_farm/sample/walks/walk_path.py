@@ -16,9 +16,9 @@ _CONTROL_M: Final = 0.2  # between the control points of the spline
 _DENSE_M: Final = 0.005  # between the points that speed is measured at
 _ACROSS_MPS2: Final = 0.8  # acceleration in a turn, at most
 _ALONG_MPS2: Final = 0.6  # of setting off and slowing down, at most
-_LEAST_MPS: Final = 0.05  # also at rest, so that the way ends
+_LEAST_MPS: Final = 0.05  # least speed, also at the ends, so that the walk gets to its end
 _CURVE_M: Final = 0.05  # of way before and after a place over which its curvature is measured
-_HEADING_M: Final = 0.2  # and its heading
+_HEADING_M: Final = 0.2  # the same for its heading
 
 
 @dataclass(frozen=True, slots=True, eq=False)

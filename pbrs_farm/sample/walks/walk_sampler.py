@@ -27,8 +27,8 @@ from pbrs_farm.sample.walks.way_graph import way_through_rooms
 
 ORIGIN: Final = "walk"
 _EYE_M: Final = (1.5, 1.6)  # above the floor, as the paper's cameras
-_STEP_SMOOTH_S: Final = 0.3  # over which a step between floors is spread
-_SPEED_PART: Final = 0.95  # of the speed is along the floor, the rest up and down
+_STEP_SMOOTH_S: Final = 0.3  # time over which a step in the floor's height is smoothed
+_SPEED_PART: Final = 0.95  # share of the speed limit for motion along the floor
 
 
 def sample_walk(

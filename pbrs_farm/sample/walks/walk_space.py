@@ -28,9 +28,9 @@ from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 LEAST_WAY_M2: Final = 0.05  # of places for a person's middle; less is no region to walk in
 _DOOR_DEPTH_M: Final = 0.35  # from a door's middle plane to where its rooms have begun
-_DOOR_SIDE_M: Final = 0.75  # from its middle plane, where one stands before it
+_DOOR_SIDE_M: Final = 0.75  # distance from a door's middle plane to the place in front of it
 _SPACING_M: Final = 0.03  # of points on surfaces: two fall into every cell that a surface crosses
-_LEAST_DOOR_M: Final = 1.6  # a lower hole is a hatch
+_LEAST_DOOR_M: Final = 1.6  # an opening lower than this is a hatch, not a door
 _NO_ROOM: Final = -1
 _OUTDOORS: Final = 0.01  # of a room without a ceiling
 

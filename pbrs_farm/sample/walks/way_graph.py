@@ -13,12 +13,12 @@ from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.walkable import CELL_M, WALK_M
 from pbrs_farm.sample.walks.walk_space import WalkSpace
 
-_ROOMY_M: Final = 0.7  # a way that keeps so far from everything costs its length alone
-_NARROW_COST: Final = 2.0  # and one as narrow as can be, so many times its length more
+_ROOMY_M: Final = 0.7  # a way with this clearance costs its length alone
+_NARROW_COST: Final = 2.0  # a way without clearance costs so many times its length more
 _PLACES_A_ROOM: Final = (1, 2)  # fewest and most places of one visit
 _CHOICES: Final = 3  # places that are drawn for each one; the farthest is taken
 _MOST_LEGS: Final = 400
-_LEAST_ROOM_CELLS: Final = 60  # of a room's part of the region, to be visited
+_LEAST_ROOM_CELLS: Final = 60  # a room with fewer cells is not visited
 
 
 class WayGraph:
