@@ -2,16 +2,67 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from pbrs_farm.core.edits import RemoveItems
 from pbrs_farm.core.recipe import Recipe, field_paths, with_settings
 from pbrs_farm.prepare import finished_house as finishing
+from pbrs_farm.prepare import passes as passes_module
 from pbrs_farm.prepare.finished_house import HouseBeforeEdits, finished_house
 from pbrs_farm.prepare.passes import GROUPS, PASS, PASSES, cache_key
 from pbrs_farm.prepare.source import SourceRef, resolve, variants
 from pbrs_farm.run import plan
 from workers.job import work_version
+
+# Runs passes.py with one function and one row more, before anything else imports it.
+ADDED = '''
+import sys
+from pathlib import Path
+from types import ModuleType
+
+text = Path(sys.argv[1]).read_text()
+table, end = "PASSES: Final = (", "\\n)  # fmt: skip\\n\\nPASS: Final"
+assert table in text and end in text
+function = """
+def _sign(work: Preparation) -> Preparation:
+    return replace(work, current=replace(work.house, name=f"signed {work.recipe.tone.key}"))
+
+
+"""
+row = """\\n    Pass("sign", 7, ("tone",), _sign, lambda _source, _recipe: True),"""
+module = ModuleType("pbrs_farm.prepare.passes")
+import pbrs_farm.prepare
+sys.modules[module.__name__] = pbrs_farm.prepare.passes = module
+exec(compile(text.replace(table, function + table).replace(end, row + end), sys.argv[1], "exec"), module.__dict__)
+
+from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.prepare.finished_house import finished_house
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.run import plan
+from workers.job import work_version
+
+source, recipe = resolve("builtin"), Recipe()
+other = with_settings(recipe, {"tone.key": 0.5})
+assert finished_house(source, other).house.name == "signed 0.5"
+assert module.versions_of_passes()["sign"] == 7
+assert "tone" in plan.STEPS["house"].groups
+assert module.cache_key(source, recipe) != module.cache_key(source, other)
+print(plan.STEPS["house"].version, work_version())
+'''
+
+
+@pytest.mark.kinds("pass")
+def test_a_pass_that_is_added_in_one_file_is_done_and_is_part_of_digests() -> None:
+    words = [sys.executable, "-c", ADDED, str(passes_module.__file__)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
+    version, of_workers = done.stdout.split()
+    assert int(version) == plan.STEPS["house"].version + 7
+    assert of_workers != work_version()
 
 
 def names_of(source: SourceRef, recipe: Recipe) -> list[str]:

@@ -63,6 +63,7 @@ print("everywhere")
 '''
 
 
+@pytest.mark.kinds("option")
 def test_an_option_that_is_added_in_one_place_is_everywhere() -> None:
     words = [sys.executable, "-c", ADDED, str(request_module.__file__)]
     done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[2])
