@@ -60,10 +60,10 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.things.bodies import disc as disc
     from pbrs_farm.dress.things.bodies import frustum as frustum
     from pbrs_farm.dress.things.bodies import loft as loft
+    from pbrs_farm.dress.things.bodies import revolve as revolve
     from pbrs_farm.dress.things.bodies import rounded as rounded
     from pbrs_farm.dress.things.bodies import slab as slab
     from pbrs_farm.dress.things.bodies import tube as tube
-    from pbrs_farm.dress.things.bodies import turned as turned
     from pbrs_farm.dress.things.bodies import vessel as vessel
     from pbrs_farm.dress.things.cloth import draped as draped
     from pbrs_farm.dress.things.cloth import sheet as sheet
@@ -109,7 +109,7 @@ _MODULES: Final = {
     "dress.mutable_house": ("MutableHouse",),
     "dress.style": ("Style",),
     "dress.things.bodies": (
-        "bevelled", "board", "cylinder", "disc", "frustum", "loft", "rounded", "slab", "tube", "turned",
+        "bevelled", "board", "cylinder", "disc", "frustum", "loft", "rounded", "slab", "tube", "revolve",
         "vessel",
     ),
     "dress.things.cloth": ("draped", "sheet"),

@@ -24,7 +24,7 @@ from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spo
 from pbrs_farm.dress.space import RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.things import case_goods
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.case_goods import CASE_GOODS
 from pbrs_farm.dress.walls.hanging import next_id
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
@@ -139,12 +139,12 @@ def _stand_at_wall(
 
 def _generated(
     kind: WantedKind, look: BoardLook, size: tuple[float, float, float], own: int
-) -> Made:
+) -> Model:
     rng = np.random.default_rng(own)
     return grained(CASE_GOODS[kind.model].make(rng, look.style, look.boards, size), look)
 
 
-def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Made | None:
+def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Model | None:
     """A model of about that width; None where there is none."""
     fit = [
         p
@@ -165,7 +165,7 @@ def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: i
 
 
 def _find_spot(
-    house: MutableHouse, floor: RoomFloor, kind: WantedKind, made: Made, rng: np.random.Generator
+    house: MutableHouse, floor: RoomFloor, kind: WantedKind, made: Model, rng: np.random.Generator
 ) -> FloorSpot | None:
     """A place for the thing, drawn from those that are free; None where there is none."""
     low, high = made[1].bounds
@@ -243,7 +243,7 @@ def _is_cooked_at(
     return False
 
 
-def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Made, spot: FloorSpot) -> None:
+def _put_at_spot(house: MutableHouse, floor: RoomFloor, made: Model, spot: FloorSpot) -> None:
     _piece, shape = made
     low, high = shape.bounds
     # Its back comes to the wall, the middle of its width to the spot.
@@ -284,7 +284,7 @@ def _chair_before(
 
 
 def _add_to_floor(
-    house: MutableHouse, floor: RoomFloor, made: Made, at: F64, turn_rad: float
+    house: MutableHouse, floor: RoomFloor, made: Model, at: F64, turn_rad: float
 ) -> None:
     room = floor.room.room
     item = house.placed(

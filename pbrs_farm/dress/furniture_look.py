@@ -14,7 +14,7 @@ from pbrs_farm.dress.finishes import grain_pattern
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import COLOURS, Rgb, Style, mix
 from pbrs_farm.dress.textures.families import pattern_material, photographed
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.case_goods import Boards
 from pbrs_farm.dress.things.materials import plain
 
@@ -56,7 +56,7 @@ def look_of(
     return BoardLook(style, Boards(body, front, top, cloth), {wood: grain.size_m})
 
 
-def grained(made: Made, look: BoardLook) -> Made:
+def grained(made: Model, look: BoardLook) -> Model:
     """The piece with the grain of its wood along each board."""
     piece, shape = made
     surfaces = []

@@ -17,7 +17,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.case_goods import CASE_GOODS, Boards, desk_chair
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -39,7 +39,7 @@ def _added(mutable: MutableHouse) -> list[Item]:
     return mutable.items[len(mutable.source.items) :]
 
 
-def _pieces() -> list[Made]:
+def _pieces() -> list[Model]:
     found = []
     for name, kind in KINDS.items():
         for seed in range(3):

@@ -22,7 +22,7 @@ from pbrs_farm.dress.clutter.cushions import (
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.supports import plan_turn
 from pbrs_farm.dress.things import soft
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
@@ -98,7 +98,7 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
     return n
 
 
-def _narrowed(made: Made, factor: float) -> Made:
+def _narrowed(made: Model, factor: float) -> Model:
     """The thing with its width scaled."""
     piece, shape = made
     scale = np.array([factor, 1.0, 1.0])
@@ -178,7 +178,7 @@ def _has_pillows(bed: Lying) -> bool:
     return bool((part > bed.level + 0.03).mean() > 0.15)
 
 
-def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Made) -> tuple[F64, float]:
+def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Model) -> tuple[F64, float]:
     # World (x, z) of a thing that lies so far from the head, and its turn.
     depth = made[0].size[1]
     row = bed.rows[0] + (from_head_m + depth / 2) / bed.grid.cell_m
@@ -187,7 +187,7 @@ def _place_on_bed(bed: Lying, across: float, from_head_m: float, made: Made) -> 
 
 
 def lay_down(
-    placing: Placing, scene: SceneTriangles, index: int, made: Made, plan: F64, turn_rad: float,
+    placing: Placing, scene: SceneTriangles, index: int, made: Model, plan: F64, turn_rad: float,
     level: float,
 ) -> bool:  # fmt: skip
     """Lay a soft thing down at a plan place (2,) on items[index]; False where something is there.

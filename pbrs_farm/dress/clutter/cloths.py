@@ -23,7 +23,7 @@ from pbrs_farm.dress.clutter.drapes import (
 )
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.style import Rgb, mix
-from pbrs_farm.dress.things.assembly import made
+from pbrs_farm.dress.things.assembly import standing_piece
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
@@ -195,7 +195,7 @@ def _put_cloth(
     nyu40: int,
 ) -> F64:  # fmt: skip
     surface = sheet_of(family, net, ground, thick_m)
-    thing = made(family, [(surface, material)], group="blanket", nyu40=nyu40)
+    thing = standing_piece(family, [(surface, material)], group="blanket", nyu40=nyu40)
     points = surface.positions.astype(np.float64)
     if family != "duvet":
         points[:, 1] -= _gap_under_cloth(points, ground)

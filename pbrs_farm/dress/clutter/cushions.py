@@ -13,7 +13,7 @@ from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.supports import plan_turn
 from pbrs_farm.dress.things import soft
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.bodies import smooth
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over, top_heights
@@ -52,7 +52,7 @@ def around_thing(
     return corners[owner == index], bool(meets.any())
 
 
-def put_as_it_is(placing: Placing, made: Made, surfaces: list[Surface]) -> None:
+def put_as_it_is(placing: Placing, made: Model, surfaces: list[Surface]) -> None:
     """Add a thing whose surfaces (in the order of its shape's) stand in the world already."""
     piece, shape = made
     kept = tuple(
@@ -145,7 +145,7 @@ def _seat_before_back(grid: PlanGrid, tops: F64, seat: Bools, level: float) -> S
 
 
 def _lean(
-    placing: Placing, scene: SceneTriangles, index: int, seat: Seat, made: Made, at: float
+    placing: Placing, scene: SceneTriangles, index: int, seat: Seat, made: Model, at: float
 ) -> bool:
     piece, shape = made
     half, thick = piece.size[0] / 2, piece.size[2]

@@ -24,7 +24,7 @@ from pbrs_farm.dress.space.floor_bitmaps import (
 )
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.supports import faces_around
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.worktop import LIFT_M
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
@@ -122,7 +122,7 @@ def _before_front(item: Item, floor_y: float) -> BaseGeometry:
     return shapely.Polygon([near - across, near + across, far + across, far - across])
 
 
-def _put_on_floor(placing: Placing, floor: _Floor, made: Made, *, at_wall: bool) -> bool:
+def _put_on_floor(placing: Placing, floor: _Floor, made: Model, *, at_wall: bool) -> bool:
     low, high = made[1].bounds
     reach = float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     # Its middle keeps from everything by its own radius, but not much more.

@@ -17,7 +17,7 @@ from pbrs_farm.core.house import Room, Surface
 from pbrs_farm.dress.clutter.stock import CLUTTER, Stock
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.worktop import TopSpot, Worktop, turned_size
 from pbrs_farm.home.room_use import RoomKind
 
@@ -26,7 +26,7 @@ _NEAR_M = 0.06
 _MOST_IN_ROOM = 4
 
 
-def separate_pair(made: Made, rng: np.random.Generator, mess: float) -> Made:
+def separate_pair(made: Model, rng: np.random.Generator, mess: float) -> Model:
     """A pair of things that stand side by side, each turned and moved by itself."""
     piece, shape = made
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
@@ -81,7 +81,7 @@ class Placing:
         default_factory=list
     )  # triangles of what fell here: cloth lies on cloth
 
-    def put(self, made: Made, at: F64, turn_rad: float) -> None:
+    def put(self, made: Model, at: F64, turn_rad: float) -> None:
         """Add the thing with the middle of its base at (3,) world metres, turned about +y; unchecked."""
         piece, shape = made
         low, high = shape.bounds
@@ -105,7 +105,7 @@ class Placing:
         """Count a thing that was not put down."""
         self.house.refused[f"{PASS}: {reason}"] += 1
 
-    def drop(self, top: Worktop, made: Made, *, faces_anywhere: bool, depth_pull: float) -> bool:
+    def drop(self, top: Worktop, made: Model, *, faces_anywhere: bool, depth_pull: float) -> bool:
         """Put the thing where it fits on the worktop; False where it fits nowhere.
 
         depth_pull: how strongly it is drawn to the back (> 0) or to the front (< 0), per metre.
@@ -131,7 +131,7 @@ class Placing:
         self.put(made, top.middle(spot), top.grid.turn_rad + float(turn_rad))
         return True
 
-    def drop_near(self, top: Worktop, made: Made, at: F64, *, turn_rad: float = 0.0) -> bool:
+    def drop_near(self, top: Worktop, made: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
         """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit."""
         low, high = made[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
@@ -149,7 +149,7 @@ class Placing:
         return True
 
 
-def take_for_room(placing: Placing, kind: str) -> Made | None:
+def take_for_room(placing: Placing, kind: str) -> Model | None:
     """A thing of that kind; None, with its reason counted, where the room has enough of them."""
     if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
         placing.refuse(f"enough of {kind} in the room")

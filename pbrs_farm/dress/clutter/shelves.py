@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.dress.clutter.placing import Placing, take_for_room
 from pbrs_farm.dress.clutter.stock import CLUTTER, KindShares
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.books import leaning_book, run_of_books, stack_of_books
 from pbrs_farm.dress.worktop import TopSpot, Worktop
 from pbrs_farm.home.room_use import RoomKind
@@ -90,7 +90,7 @@ def _put_books(
     return None
 
 
-def _lying(rng: np.random.Generator, placing: Placing, depth: float, tall: float) -> Made:
+def _lying(rng: np.random.Generator, placing: Placing, depth: float, tall: float) -> Model:
     # A pile as high as the shelf lets it, its spines out.
     n = int(rng.integers(2, 6))
     while True:
@@ -113,7 +113,7 @@ def _put_other(
 
 
 def _leftmost(
-    placing: Placing, top: Worktop, column: int, row: list[Made], inset_m: float
+    placing: Placing, top: Worktop, column: int, row: list[Model], inset_m: float
 ) -> int | None:
     """Put things that touch side by side as far left as they fit; the next free column, or None.
 
@@ -135,7 +135,7 @@ def _leftmost(
     return spot.column + spot.n_columns
 
 
-def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Made], sizes: F64) -> None:
+def _put_row(placing: Placing, top: Worktop, spot: TopSpot, row: list[Model], sizes: F64) -> None:
     # Line the things up from the spot's left, their fronts on its front.
     cell, turn = top.grid.cell_m, top.grid.turn_rad
     front = (spot.row + spot.n_rows) * cell - 0.5 * cell

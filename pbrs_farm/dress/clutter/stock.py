@@ -12,8 +12,9 @@ from pbrs_farm.core.catalogue import Catalogue, Place, Shape
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.record import Record, Several, read_csv, read_toml
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.things.assembly import Made
-from pbrs_farm.dress.things.books import Covers, magazines, open_book, stack_of_books
+from pbrs_farm.dress.things.assembly import Model
+from pbrs_farm.dress.things.book_covers import Covers
+from pbrs_farm.dress.things.books import magazines, open_book, stack_of_books
 from pbrs_farm.dress.things.things import THINGS
 from pbrs_farm.home.room_use import RoomKind
 
@@ -50,10 +51,10 @@ class Stock:
         self.covers = covers
         self._catalogue = catalogue
         self._seed = seed
-        self._designs: dict[str, list[Made]] = {}
+        self._designs: dict[str, list[Model]] = {}
         self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
 
-    def take(self, rng: np.random.Generator, kind: str, style: Style) -> Made | None:
+    def take(self, rng: np.random.Generator, kind: str, style: Style) -> Model | None:
         """A thing of that kind; None where there is none that can be used."""
         if kind == "book":
             # One or a pile; now and then one lies open.
@@ -74,7 +75,7 @@ class Stock:
         own = np.random.default_rng(number)
         return THINGS[found.made].make(own, style) if found.made else None
 
-    def _owned(self, kind: str) -> list[Made]:
+    def _owned(self, kind: str) -> list[Model]:
         """The designs of the catalogue that this home has; at most _DESIGNS of a kind."""
         if kind not in self._designs:
             found = _thing_kind(kind)
@@ -86,7 +87,7 @@ class Stock:
                 and p.kind in (ItemKind.OBJECT, ItemKind.LAMP)
             ]
             order = np.random.default_rng([self._seed, *kind.encode()]).permutation(len(fitting))
-            owned: list[Made] = []
+            owned: list[Model] = []
             for k in order[:_MOST_TRIES]:
                 if len(owned) == _DESIGNS:
                     break

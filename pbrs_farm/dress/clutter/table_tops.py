@@ -11,7 +11,7 @@ from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.placing import Placing, take_for_room
 from pbrs_farm.dress.clutter.receptacles import shares
 from pbrs_farm.dress.clutter.stock import CLUTTER, is_round
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.worktop import Worktop
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
@@ -79,7 +79,7 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
 
 def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
     """Put a thing of each of the kinds on the worktop, the largest first."""
-    things: list[tuple[str, Made]] = []
+    things: list[tuple[str, Model]] = []
     for kind in kinds:
         made = take_for_room(placing, kind)
         if made is not None:

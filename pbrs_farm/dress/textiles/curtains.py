@@ -17,7 +17,7 @@ from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace
 from pbrs_farm.dress.style import Style, mix, shade
 from pbrs_farm.dress.textiles.hanging_cloth import Pleats, pleated_panel, round_rail
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.things.assembly import hung
+from pbrs_farm.dress.things.assembly import hanging_piece
 from pbrs_farm.dress.things.materials import metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
 from pbrs_farm.geometry.solids import box, sphere
@@ -219,7 +219,7 @@ def _curtain_set(
         parts.append((sphere("finial", np.array([sign * half, y, rod_z]), 0.022, 0), cloth.rod))
         arm = np.array([sign * (half - 0.06), y - _ROD_M - 0.004, rod_z / 2])
         parts.append((box("bracket", arm, np.array([0.008, 0.006, rod_z / 2]), 0), cloth.rod))
-    piece, shape = hung("curtains", "curtain", CURTAIN, parts)
+    piece, shape = hanging_piece("curtains", "curtain", CURTAIN, parts)
     return piece, shape, middle
 
 
@@ -249,7 +249,7 @@ def hang_blind(
     for sign in (-1, 1):
         arm = np.array([sign * (half - 0.004), drop - 0.03, (z + 0.02) / 2])
         parts.append((box("holder", arm, np.array([0.004, 0.02, (z + 0.02) / 2]), 0), white))
-    piece, shape = hung("blind", "blinds", BLINDS, parts)
+    piece, shape = hanging_piece("blind", "blinds", BLINDS, parts)
     _add_at_window(house, room, piece, shape, seen, 0.0, top - drop)
     return True
 

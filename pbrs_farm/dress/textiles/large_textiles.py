@@ -14,7 +14,7 @@ from pbrs_farm.dress.textiles.curtains import hang_blind, hang_curtains, room_cl
 from pbrs_farm.dress.textiles.hanging_cloth import round_rail, towel_over_rail
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.textures.families import Pattern, pattern_material
-from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.assembly import Model, hanging_piece
 from pbrs_farm.dress.things.materials import metal
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.geometry.solids import box
@@ -48,7 +48,7 @@ def hang_towels(
         hanging.hang(piece, shape, spot[0], spot[1] + width / 2, low)
 
 
-def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
+def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Model | None:
     pieces = [p for p in catalogue.of("towel") if p.place is Place.WALL and p.size[0] < 0.7]
     if not pieces or rng.random() < 0.5:
         return None
@@ -57,7 +57,7 @@ def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Made | None:
     return (piece, shape) if shape is not None else None
 
 
-def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> Made:
+def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> Model:
     """A rail with a towel over it."""
     width = float(rng.uniform(0.4, 0.6))
     towel, drop, z = width * float(rng.uniform(0.6, 0.85)), float(rng.uniform(0.45, 0.7)), 0.07
@@ -72,7 +72,7 @@ def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> M
     for sign in (-1, 1):
         arm = np.array([sign * (width / 2 - 0.01), drop, z / 2])
         parts.append((box("arm", arm, np.array([0.008, 0.008, z / 2]), 0), steel))
-    return hung("towel_rail", "towel", TOWEL, parts)
+    return hanging_piece("towel_rail", "towel", TOWEL, parts)
 
 
 def _spot_near_basin(

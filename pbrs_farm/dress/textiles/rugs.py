@@ -17,7 +17,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, house_space
 from pbrs_farm.dress.style import Style, room_style
 from pbrs_farm.dress.textiles.rug_patterns import BATH_MATS, DOOR_MATS, RUGS, rug_pixels
-from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.assembly import Model, hanging_piece
 from pbrs_farm.dress.things.bodies import loft, slab
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.things.outlines import oval, rect
@@ -39,7 +39,7 @@ _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 def rug(
     rng: np.random.Generator, width: float, length: float, style: Style,
     patterns: Sequence[str] = tuple(RUGS), forms: Sequence[str] = _RUG_FORMS,
-) -> Made:  # fmt: skip
+) -> Model:  # fmt: skip
     """A rug with its length along x, lying with its back at y = 0, of one of the patterns and forms.
 
     Forms: sharp or rounded corners, fringed ends, oval (half of an oval: half).
@@ -65,7 +65,7 @@ def rug(
     if fringe:
         yarn = plain("fringe", (0.8, 0.76, 0.68), 1.0)
         parts += [(s, yarn) for s in _fringe(rng, width, length / 2, fringe)]
-    return hung("rug", "rug", FLOOR_MAT, parts, [texture], Place.FLOOR)
+    return hanging_piece("rug", "rug", FLOOR_MAT, parts, [texture], Place.FLOOR)
 
 
 def _rug_outline(length: float, width: float, form: str) -> list[tuple[float, float]]:

@@ -14,10 +14,10 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     frustum,
     loft,
+    revolve,
     rounded,
     slab,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.cups import handle
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -39,7 +39,7 @@ def kettle(m: Maker) -> None:
     r = 0.085
     side = m.metal if m.chance(0.7) else plain("enamel", m.any_colour(), 0.2)
     # A body that narrows upwards, its lid and the lid's knob.
-    m.add(turned([(0, 0), (r, 0), (r, 0.02), (r * 0.75, 0.17), (r * 0.6, 0.185), (0.012, 0.19),
+    m.add(revolve([(0, 0), (r, 0), (r, 0.02), (r * 0.75, 0.17), (r * 0.6, 0.185), (0.012, 0.19),
         (0.016, 0.21), (0, 0.213)]), of=side)  # fmt: skip
     # The spout leans forward (+x); the grip is a cup's handle, turned to the back.
     m.add(frustum((0.02, 0), (0.011, 0.07), n=8), turn=rotation_z(-0.9), at=(0.055, 0.1, 0),
@@ -63,7 +63,7 @@ def coffee_machine(m: Maker) -> None:
                 of=shell)  # fmt: skip
             m.add(bevelled((-0.09 * s, 0.2502 * s, -0.11), (0.09 * s, 0.33 * s, 0.1), 0.008),
                 of=shell)  # fmt: skip
-            m.add(turned([(0, 0.001), (0.062, 0.001), (0.07, 0.05), (0.068, 0.09), (0.05, 0.135),
+            m.add(revolve([(0, 0.001), (0.062, 0.001), (0.07, 0.05), (0.068, 0.09), (0.05, 0.135),
                 (0.052, 0.15), (0, 0.15)], n=20), at=(0, 0.0222, 0.034),
                 of=plain("jug", (0.09, 0.05, 0.03), 0.06))  # fmt: skip
             m.add(tube(bent([(0.04, 0.155, 0.06), (0.085, 0.15, 0.09), (0.09, 0.06, 0.09),
@@ -93,7 +93,7 @@ def coffee_machine(m: Maker) -> None:
                 (0.04, 0.262, 0.0)], 0.02), 0.006, n=6), of=CHROME)  # fmt: skip
         case 3:  # eight sides, narrow in the middle
             m.name = "moka_pot"
-            m.add(turned([(0, 0), (0.05 * s, 0), (0.042 * s, 0.075), (0.036 * s, 0.08),
+            m.add(revolve([(0, 0), (0.05 * s, 0), (0.042 * s, 0.075), (0.036 * s, 0.08),
                 (0.036 * s, 0.088), (0.05 * s, 0.165), (0.01, 0.178), (0.012, 0.195), (0, 0.197)],
                 n=8), of=m.pick(STEEL, CHROME, BLACK_STEEL))  # fmt: skip
             m.add(tube(bent([(0.045 * s, 0.155, 0), (0.1, 0.16, 0), (0.095, 0.09, 0)], 0.02), 0.008,

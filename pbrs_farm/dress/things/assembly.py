@@ -13,15 +13,15 @@ from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, Surface, Texture
 
 Part = tuple[Surface, Material]
-Made = tuple[Piece, Shape]
+Model = tuple[Piece, Shape]
 
 GENERATED = "generated#"  # before the family, in the id of a generated piece
 
 
-def made(
+def standing_piece(
     family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHERPROP,
     place: Place = Place.SURFACE, textures: Iterable[Texture] = (),
-) -> Made:  # fmt: skip
+) -> Model:  # fmt: skip
     """The parts as one piece, the middle of its base at the origin; one surface a material."""
     materials: list[Material] = []
     gathered: dict[tuple[int, bool], list[Surface]] = {}
@@ -30,7 +30,7 @@ def made(
             materials.append(material)
         key = (materials.index(material), surface.normals is None)
         gathered.setdefault(key, []).append(surface)
-    joined = [_joined(surfaces, number) for (number, _), surfaces in gathered.items()]
+    joined = [_one_surface(surfaces, number) for (number, _), surfaces in gathered.items()]
     # Stand the whole on its base.
     points = np.concatenate([s.positions for s in joined]).astype(np.float64)
     low, high = points.min(0), points.max(0)
@@ -44,10 +44,10 @@ def made(
     return piece, Shape(moved, tuple(materials), {t.id: t for t in textures})
 
 
-def hung(
+def hanging_piece(
     family: str, group: str, nyu40: int, parts: Sequence[Part], textures: Sequence[Texture] = (),
     place: Place = Place.WALL,
-) -> Made:  # fmt: skip
+) -> Model:  # fmt: skip
     """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
     materials = tuple(dict.fromkeys(m for _s, m in parts))
     surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
@@ -66,7 +66,7 @@ def transformed(surface: Surface, matrix: F64, offset: Sequence[float] = (0, 0, 
     return replace(surface, positions=positions.astype(np.float32), normals=normals)
 
 
-def _joined(surfaces: list[Surface], material: int) -> Surface:
+def _one_surface(surfaces: list[Surface], material: int) -> Surface:
     # Shift each part's faces by the number of points before it.
     starts = np.cumsum([0, *(len(s.positions) for s in surfaces)])
     faces = np.concatenate([s.faces + n for s, n in zip(surfaces, starts[:-1], strict=True)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import rotation_y, rotation_z
-from pbrs_farm.dress.things.bodies import bevelled, cylinder, loft, slab, turned, vessel
+from pbrs_farm.dress.things.bodies import bevelled, cylinder, loft, revolve, slab, vessel
 from pbrs_farm.dress.things.cloth import bulged
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
@@ -23,7 +23,7 @@ def toiletries(m: Maker) -> None:
         with m.moved(at=(x, 0.0, m.uniform(-0.02, 0.02))):
             match form:
                 case 0 | 1:  # the cap begins just above the bottle, so that no faces coincide
-                    m.add(turned(scaled(r, tall,
+                    m.add(revolve(scaled(r, tall,
                         [(0, 0), (1, 0), (1, 0.78), (0.5, 0.84), (0, 0.84)]), n=14), of=side)  # fmt: skip
                     m.add(cylinder(r * 0.55, tall * 0.8402, tall, n=12), of=cap)
                 case 2:  # a tube on its cap
@@ -31,9 +31,9 @@ def toiletries(m: Maker) -> None:
                     m.add(loft(rings(oval, [(2 * r, 2 * r, 0.0222), (2 * r, 1.6 * r, tall * 0.5),
                         (2 * r, 0.008, tall * 0.8), (2 * r, 0.004, tall * 0.9)], n=16)), of=side)  # fmt: skip
                 case 3:  # with a pump
-                    m.add(turned(scaled(r, tall,
+                    m.add(revolve(scaled(r, tall,
                         [(0, 0), (1, 0), (1, 0.7), (0.4, 0.78), (0, 0.78)]), n=14), of=side)  # fmt: skip
-                    m.add(turned([(0, tall * 0.7802), (r * 0.4, tall * 0.7802),
+                    m.add(revolve([(0, tall * 0.7802), (r * 0.4, tall * 0.7802),
                         (r * 0.4, tall * 0.84), (0.004, tall * 0.84), (0.004, tall * 0.95),
                         (0, tall * 0.95)], n=12), of=cap)  # fmt: skip
                     m.add(bevelled((-0.007, tall * 0.95, -0.007), (0.007, tall, 0.035), 0.002),
@@ -42,9 +42,9 @@ def toiletries(m: Maker) -> None:
                     m.add(cylinder(r, 0, 0.03, n=18), of=side)
                     m.add(cylinder(r * 1.02, 0.0302, 0.046, n=18), of=cap)
                 case 5:  # a can
-                    m.add(turned(scaled(r, tall, [(0, 0), (0.8, 0), (0.8, 0.8), (0.5, 0.86),
+                    m.add(revolve(scaled(r, tall, [(0, 0), (0.8, 0), (0.8, 0.8), (0.5, 0.86),
                         (0, 0.86)]), n=16), of=side)  # fmt: skip
-                    m.add(turned(scaled(r, tall, [(0, 0.8602), (0.72, 0.8602), (0.68, 1.04),
+                    m.add(revolve(scaled(r, tall, [(0, 0.8602), (0.72, 0.8602), (0.68, 1.04),
                         (0, 1.05)]), n=16), of=cap)  # fmt: skip
                 case 6:  # scent in square glass
                     m.add(bevelled((-r * 0.9, 0, -r * 0.6), (r * 0.9, tall * 0.5, r * 0.6), 0.004),
@@ -61,7 +61,7 @@ def soap_dispenser(m: Maker) -> None:
     r, tall = 0.034, 0.13
     pump = plain("pump", (0.75, 0.75, 0.75), 0.2)
     # The bottle, then the stem and the nose of its pump above it, 0.2 mm apart.
-    m.add(turned([(0, 0), (r, 0), (r, tall), (0.014, tall + 0.012), (0.014, tall + 0.02),
+    m.add(revolve([(0, 0), (r, 0), (r, tall), (0.014, tall + 0.012), (0.014, tall + 0.02),
         (0, tall + 0.02)]), of=m.china())  # fmt: skip
     m.add(cylinder(0.005, tall + 0.0202, tall + 0.045, n=8), of=pump)
     m.add(slab((-0.008, tall + 0.0452, -0.008), (0.008, tall + 0.055, 0.045)), of=pump)
@@ -89,7 +89,7 @@ def soap_bar(m: Maker) -> None:
     """A bar of soap on a dish."""
     soap = m.pick((0.9, 0.86, 0.74), (0.75, 0.85, 0.72), (0.88, 0.74, 0.74))
     # A shallow dish, its rim 15 mm high and its floor 5 mm thick.
-    m.add(turned([(0, 0), (0.04, 0), (0.058, 0.014), (0.055, 0.015), (0.038, 0.005), (0, 0.005)],
+    m.add(revolve([(0, 0), (0.04, 0), (0.058, 0.014), (0.055, 0.015), (0.038, 0.005), (0, 0.005)],
         n=18), of=m.china())  # fmt: skip
     m.add(bulged((0.08, 0.026, 0.052), n=6, edge=0.5, bulge=4.0), at=(0, 0.0185, 0),
         of=plain("soap", soap, 0.4))  # fmt: skip
@@ -98,7 +98,7 @@ def soap_bar(m: Maker) -> None:
 @thing(group="bath_small")
 def spray_bottle(m: Maker) -> None:
     """A spray bottle of cleaner."""
-    m.add(turned([(0, 0), (0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2), (0, 0.2)], n=14),
+    m.add(revolve([(0, 0), (0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2), (0, 0.2)], n=14),
         of=plain("bottle", m.any_colour(), 0.25))  # fmt: skip
     # Head and trigger point along +z.
     with m.of(plain("spray head", (0.9, 0.9, 0.9), 0.4)):
@@ -120,5 +120,5 @@ def toilet_rolls(m: Maker) -> None:
     """One to three rolls of paper on end."""
     # A tube of 20 mm inner radius, closed onto itself.
     for k in range(m.integers(1, 4)):
-        m.add(turned([(0.02, 0), (0.054, 0), (0.054, 0.098), (0.02, 0.098), (0.02, 0)], n=18),
+        m.add(revolve([(0.02, 0), (0.054, 0), (0.054, 0.098), (0.02, 0.098), (0.02, 0)], n=18),
             at=(0, 0.0985 * k, 0), of=plain("tissue", (0.93, 0.93, 0.92), 0.95))  # fmt: skip

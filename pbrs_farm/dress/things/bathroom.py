@@ -17,10 +17,10 @@ from pbrs_farm.dress.things.bodies import (
     frustum,
     hoop,
     loft,
+    revolve,
     rounded,
     slab,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.cloth import hanging
 from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of
@@ -262,7 +262,7 @@ def pedestal_basin(m: Maker, size: Size) -> None:
                     (0.15 * s, 0.14, 0.02, 0.06), (0.16 * s, 0.14, 0.02, 0.5),
                     (0.2 * s, 0.18, 0.02, y - 0.14)])))  # fmt: skip
             case 2:  # turned
-                m.add(turned([(0.0, 0.0), (0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07),
+                m.add(revolve([(0.0, 0.0), (0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07),
                     (0.06 * s, 0.4), (0.075 * s, 0.6), (0.1 * s, y - 0.15), (0.0, y - 0.15)], n=22))  # fmt: skip
     basin_tap(m, y - 0.003, back + 0.06, tap)
     m.add(tube([(0.0, y - 0.1, back + 0.05), (0.0, h, back + 0.05)], 0.004, n=6), of=tap)
@@ -340,7 +340,7 @@ def bathtub(m: Maker, size: Size) -> None:
                 (w * 0.55, d * 0.45, 0.2)], n=36, power=2.6)), of=colour)  # fmt: skip
             claw = m.pick(CHROME, BRASS, BLACK_STEEL, colour)
             for x, z in product((-1.0, 1.0), (-1.0, 1.0)):
-                m.add(turned([(0.0, 0.0), (0.035, 0.0), (0.04, 0.02), (0.024, 0.05), (0.035, 0.1),
+                m.add(revolve([(0.0, 0.0), (0.035, 0.0), (0.04, 0.02), (0.024, 0.05), (0.035, 0.1),
                     (0.045, 0.18), (0.0, 0.18)], n=14), at=(x * 0.3 * w, 0.0, z * 0.26 * d),
                     of=claw)  # fmt: skip
     # Its taps: on the rim at one end, or along the back.
@@ -438,12 +438,12 @@ def shower(m: Maker, size: Size) -> None:
         if m.chance(0.5):
             m.add(tube(bent([(x, 1.0, z), (x, h - 0.12, z), (x, h - 0.12, z + 0.36),
                 (x, h - 0.15, z + 0.36)], 0.05, n=4), 0.011, n=10))  # fmt: skip
-            m.add(turned([(0.0, 0.0), (0.11, 0.0), (0.11, 0.008), (0.02, 0.02), (0.0, 0.02)], n=24),
-                at=(x, h - 0.17, z + 0.36))  # fmt: skip
+            m.add(revolve([(0.0, 0.0), (0.11, 0.0), (0.11, 0.008), (0.02, 0.02), (0.0, 0.02)],
+                n=24), at=(x, h - 0.17, z + 0.36))  # fmt: skip
         else:
             m.add(tube([(x, 1.05, z), (x, h - 0.2, z)], 0.01, n=10))
             m.add(tube([(x, h - 0.28, z + 0.005), (x, h - 0.2, z + 0.09)], 0.011, n=10))
-            m.add(turned([(0.0, 0.0), (0.045, 0.004), (0.045, 0.014), (0.012, 0.03), (0.0, 0.03)],
+            m.add(revolve([(0.0, 0.0), (0.045, 0.004), (0.045, 0.014), (0.012, 0.03), (0.0, 0.03)],
                 n=18), turn=rotation_x(-0.7), at=(x, h - 0.215, z + 0.09))  # fmt: skip
             m.add(tube(bent([(x, h - 0.29, z + 0.01), (x + 0.05, 0.8, z + 0.03),
                 (x + 0.09, 0.75, z + 0.02), (x + 0.08, 1.05, z)], 0.1, n=5), 0.006, n=6))  # fmt: skip

@@ -123,7 +123,7 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
     )  # fmt: skip
 
 
-def turned(profile: Profile | F64, *, n: int = 16) -> Surface:
+def revolve(profile: Profile | F64, *, n: int = 16) -> Surface:
     """The (radius, height) profile (P, 2) turned about the vertical, n sides, smooth normals.
 
     The profile runs upwards outside; down again inside for a vessel. Where it turns by more than
@@ -178,7 +178,7 @@ def cylinder(r: float, low: float, high: float, *, n: int = 16) -> Surface:
 
 def frustum(low: tuple[float, float], high: tuple[float, float], *, n: int = 16) -> Surface:
     """A cone without its tip: (radius, height) of its lower and of its upper end."""
-    return turned([(0.0, low[1]), low, high, (0.0, high[1])], n=n)
+    return revolve([(0.0, low[1]), low, high, (0.0, high[1])], n=n)
 
 
 def vessel(outside: Profile, wall_m: float, *, n: int = 16) -> Surface:
@@ -194,7 +194,7 @@ def vessel(outside: Profile, wall_m: float, *, n: int = 16) -> Surface:
     keep[1:-1] = inner[1:-1, 0] > 0
     profile = np.concatenate([outer, inner[keep]])
     moves = np.concatenate([[True], np.linalg.norm(np.diff(profile, axis=0), axis=1) > 1e-6])
-    return turned(profile[moves], n=n)
+    return revolve(profile[moves], n=n)
 
 
 def loft(rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0) -> Surface:

@@ -2,196 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
-import io
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BOOKS, PAPER
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import Material, Surface, Texture
-from pbrs_farm.dress.style import COLOURS, Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Made, Part, made, transformed
-from pbrs_farm.dress.things.materials import any_colour
+from pbrs_farm.core.house import Surface
+from pbrs_farm.dress.things.assembly import Model, Part, standing_piece, transformed
+from pbrs_farm.dress.things.book_covers import N_CELLS, N_COVERS, Box4, Covers
 from pbrs_farm.geometry.solids import box
-
-# One picture with the spines, covers and page edges of a home's books.
-
-
-_EDGE_PX = 1024
-_COLUMNS, _ROWS = 30, 3
-_SPINE_W, _SPINE_H, _PAGES_H = 34, 180, 20
-_COVER_W, _COVER_H = 144, 208
-_COVERS_TOP = _ROWS * (_SPINE_H + _PAGES_H) + 4
-N_COVERS = 14  # cells that have a front cover; the first ones
-N_CELLS = _COLUMNS * _ROWS
-
-Box4 = tuple[float, float, float, float]  # u0, v0, u1, v1; v up
-_SYLLABLES = (
-    "an", "ar", "be", "bor", "ca", "da", "del", "den", "el", "en", "er", "es", "fa", "fin", "ga",
-    "gar", "hel", "in", "is", "jo", "ka", "la", "len", "lo", "ma", "mar", "mi", "mor", "na", "nor",
-    "o", "or", "pa", "per", "ra", "ren", "ri", "ro", "sa", "sen", "so", "ta", "ter", "ti", "tor",
-    "u", "va", "ven", "vi", "wal", "win", "ya",
-)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Covers:
-    """The picture and where in it each book's spine, page edge and front cover are."""
-
-    texture: Texture
-    material: Material
-
-    def spine(self, cell: int) -> Box4:
-        """The spine of a book, upright."""
-        x, y = _corner(cell)
-        return _box(x + 1, y + 1, x + _SPINE_W - 1, y + _SPINE_H - 1)
-
-    def pages(self, cell: int) -> Box4:
-        """Its pages between its boards, as seen from above."""
-        x, y = _corner(cell)
-        return _box(x + 1, y + _SPINE_H + 1, x + _SPINE_W - 1, y + _SPINE_H + _PAGES_H - 1)
-
-    def board(self, cell: int) -> Box4:
-        """A spot of its plain cover."""
-        x, y = _corner(cell)
-        return _box(x + 3, y + _SPINE_H - 6, x + 5, y + _SPINE_H - 4)
-
-    def paper(self, cell: int) -> Box4:
-        """The lines of its pages alone."""
-        x, y = _corner(cell)
-        return _box(x + 9, y + _SPINE_H + 3, x + _SPINE_W - 9, y + _SPINE_H + _PAGES_H - 3)
-
-    def front(self, cell: int) -> Box4:
-        """Its front cover; a plain one for cells that have none."""
-        if cell >= N_COVERS:
-            return self.board(cell)
-        x = (cell % 7) * (_COVER_W + 2)
-        y = _COVERS_TOP + (cell // 7) * _COVER_H
-        return _box(x + 1, y + 1, x + _COVER_W - 1, y + _COVER_H - 1)
-
-
-def book_covers(rng: np.random.Generator, style: Style) -> Covers:
-    """The covers of a home's library."""
-    image = Image.new("RGB", (_EDGE_PX, _EDGE_PX), (200, 200, 200))
-    draw = ImageDraw.Draw(image)
-    # Every cell has a spine; only the first N_COVERS, which may lie flat, have a front.
-    for cell in range(N_CELLS):
-        colour = _cover_colour(rng, style)
-        ink = _ink(colour, rng)
-        title = _title(rng)
-        _draw_spine(image, draw, cell, colour, ink, title, rng)
-        if cell < N_COVERS:
-            _draw_front(image, cell, colour, ink, title, rng)
-    file = io.BytesIO()
-    image.save(file, "PNG", optimize=False)
-    data = file.getvalue()
-    texture = Texture(hashlib.sha256(data).hexdigest()[:16], "book covers", "image/png", data)
-    return Covers(texture, Material("book covers", texture_id=texture.id, roughness=0.5))
-
-
-def _corner(cell: int) -> tuple[int, int]:
-    return cell % _COLUMNS * _SPINE_W, cell // _COLUMNS * (_SPINE_H + _PAGES_H)
-
-
-def _box(x0: float, y0: float, x1: float, y1: float) -> Box4:
-    return x0 / _EDGE_PX, 1 - y1 / _EDGE_PX, x1 / _EDGE_PX, 1 - y0 / _EDGE_PX
-
-
-def _cover_colour(rng: np.random.Generator, style: Style) -> Rgb:
-    # Cloth and paper of publishers: dark, cream, white or loud.
-    kind = rng.random()
-    if kind < 0.25:
-        return any_colour(rng, style)
-    if kind < 0.45:
-        grey = float(rng.uniform(0.82, 0.93))
-        return (grey, grey * 0.98, grey * float(rng.uniform(0.85, 0.97)))
-    if kind < 0.6:
-        return tuple(float(v) for v in rng.uniform(0.08, 0.25, 3))  # type: ignore[return-value]
-    loud = COLOURS["book_covers"]
-    return shade(loud[int(rng.integers(len(loud)))], float(rng.uniform(0.7, 1.3)))
-
-
-def _ink(colour: Rgb, rng: np.random.Generator) -> tuple[int, int, int]:
-    if sum(colour) > 1.6:
-        return _bytes(((0.1, 0.1, 0.12), (0.55, 0.12, 0.1), (0.1, 0.2, 0.4))[int(rng.integers(3))])
-    return _bytes(((0.95, 0.94, 0.9), (0.88, 0.74, 0.4))[int(rng.integers(2))])
-
-
-def _bytes(colour: Rgb) -> tuple[int, int, int]:
-    r, g, b = (min(max(round(255 * c), 0), 255) for c in colour)
-    return (r, g, b)
-
-
-def _title(rng: np.random.Generator) -> str:
-    # Words of no language.
-    words = []
-    for _ in range(int(rng.integers(1, 4))):
-        k = rng.integers(len(_SYLLABLES), size=int(rng.integers(1, 4)))
-        words.append("".join(_SYLLABLES[i] for i in k).capitalize())
-    return " ".join(words)
-
-
-def _draw_spine(
-    image: Image.Image, draw: ImageDraw.ImageDraw, cell: int, colour: Rgb,
-    ink: tuple[int, int, int], title: str, rng: np.random.Generator,
-) -> None:  # fmt: skip
-    x, y = _corner(cell)
-    draw.rectangle((x, y, x + _SPINE_W - 1, y + _SPINE_H - 1), _bytes(colour))
-    # Bands, a label or a publisher's mark.
-    if rng.random() < 0.4:
-        for at in (8, 14, _SPINE_H - 22):
-            draw.line((x, y + at, x + _SPINE_W - 1, y + at), ink, int(rng.integers(1, 3)))
-    if rng.random() < 0.25:
-        label = _bytes(shade(colour, float(rng.uniform(0.4, 0.7))))
-        draw.rectangle((x, y + 25, x + _SPINE_W - 1, y + 95), label)
-    # Titles run from the top down.
-    size = int(rng.integers(13, 20))
-    line = Image.new("L", (_SPINE_H - 50, _SPINE_W), 0)
-    ImageDraw.Draw(line).text(
-        ((_SPINE_H - 50) / 2, _SPINE_W / 2), title, 255, ImageFont.load_default(size), anchor="mm"
-    )
-    image.paste(ink, (x, y + 22), line.rotate(-90, expand=True))
-    # Pages between two boards.
-    top = y + _SPINE_H
-    draw.rectangle((x, top, x + _SPINE_W - 1, top + _PAGES_H - 1), _bytes(colour))
-    paper = float(rng.uniform(0.78, 0.93))
-    for column in range(3, _SPINE_W - 3):
-        tone = paper * (0.88 if column % 2 else 1.0)
-        draw.line(
-            (x + column, top, x + column, top + _PAGES_H - 1), _bytes((tone, tone, tone * 0.92))
-        )
-
-
-def _draw_front(
-    image: Image.Image, cell: int, colour: Rgb, ink: tuple[int, int, int], title: str,
-    rng: np.random.Generator,
-) -> None:  # fmt: skip
-    x, y = (cell % 7) * (_COVER_W + 2), _COVERS_TOP + (cell // 7) * _COVER_H
-    front = Image.new("RGB", (_COVER_W + 2, _COVER_H), _bytes(colour))
-    draw = ImageDraw.Draw(front)
-    # A picture of a few plain shapes.
-    for _ in range(int(rng.integers(1, 6))):
-        x0, y0 = rng.integers(0, _COVER_W - 30), rng.integers(50, _COVER_H - 40)
-        w, h = rng.integers(20, 90, 2)
-        shape = _bytes(shade(colour, float(rng.uniform(0.5, 1.9))))
-        corner = (int(x0), int(y0), int(x0 + w), int(y0 + h))
-        if rng.random() < 0.5:
-            draw.ellipse(corner, shape)
-        else:
-            draw.rectangle(corner, shape)
-    for k, word in enumerate(title.split()):
-        at = (_COVER_W / 2, 20 + 22 * k)
-        draw.text(at, word, ink, ImageFont.load_default(22), anchor="mm")
-    image.paste(front, (x, y))
-
-
-# Books and magazines.
-
 
 _BOARD_M = 0.0025
 _GAP_M = 0.0004  # between neighbours, so that no faces coincide
@@ -202,7 +24,7 @@ _LYING: F64 = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 def run_of_books(
     rng: np.random.Generator, covers: Covers, length: float, height: float, depth: float
-) -> tuple[Made, float]:
+) -> tuple[Model, float]:
     """Upright books side by side, at most length wide and height high, and the last one's height.
 
     depth: of the place; the spines stand in one line, or nearly.
@@ -231,10 +53,13 @@ def run_of_books(
         surface = _upright(covers, int(rng.integers(N_CELLS)), min(0.015, length), most * 0.9, 0.12)
         parts.append((surface, covers.material))
         last = most * 0.9
-    return (made("books", parts, group="book", nyu40=BOOKS, textures=(covers.texture,)), last)
+    return (
+        standing_piece("books", parts, group="book", nyu40=BOOKS, textures=(covers.texture,)),
+        last,
+    )
 
 
-def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth: float) -> Made:
+def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth: float) -> Model:
     """A book that leans to the left against one at least height high; it touches at its top."""
     tall = float(np.clip(rng.normal(0.2, 0.02), 0.12, height))
     thick, deep = float(rng.uniform(0.012, 0.03)), min(tall * 0.7, depth)
@@ -244,11 +69,11 @@ def leaning_book(rng: np.random.Generator, covers: Covers, height: float, depth:
     # Turn it about its lower left edge.
     lean = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
     part = transformed(transformed(surface, np.eye(3), (thick / 2, 0, 0)), lean)
-    return made("leaning_book", [(part, covers.material)], group="book", nyu40=BOOKS,
+    return standing_piece("leaning_book", [(part, covers.material)], group="book", nyu40=BOOKS,
                 textures=(covers.texture,))  # fmt: skip
 
 
-def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float = 1.0) -> Made:
+def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float = 1.0) -> Model:
     """n lying books, the larger below, each a little turned; at most `most` wide."""
     tall = sorted(
         (float(min(np.clip(rng.normal(0.23, 0.035), 0.15, 0.31), most)) for _ in range(n)),
@@ -266,11 +91,11 @@ def stack_of_books(rng: np.random.Generator, covers: Covers, n: int, most: float
             lying = transformed(surface, _LYING, (length / 2, thick / 2, 0))
             parts.append((transformed(lying, turn, (0, y, 0)), covers.material))
         y += thick + _GAP_M
-    return made("stack_of_books" if n > 1 else "book", parts, group="book", nyu40=BOOKS,
+    return standing_piece("stack_of_books" if n > 1 else "book", parts, group="book", nyu40=BOOKS,
                 textures=(covers.texture,))  # fmt: skip
 
 
-def magazines(rng: np.random.Generator, covers: Covers, n: int) -> Made:
+def magazines(rng: np.random.Generator, covers: Covers, n: int) -> Model:
     """n magazines on top of each other."""
     parts: list[Part] = []
     y = 0.0
@@ -281,10 +106,12 @@ def magazines(rng: np.random.Generator, covers: Covers, n: int) -> Made:
         turn = rotation_y(float(rng.normal(0, 0.15)))
         parts.append((transformed(lying, turn, (0, y, 0)), covers.material))
         y += thick + _GAP_M / 2
-    return made("magazines", parts, group="newspaper", nyu40=PAPER, textures=(covers.texture,))
+    return standing_piece(
+        "magazines", parts, group="newspaper", nyu40=PAPER, textures=(covers.texture,)
+    )
 
 
-def open_book(rng: np.random.Generator, covers: Covers) -> Made:
+def open_book(rng: np.random.Generator, covers: Covers) -> Model:
     """A book that lies open."""
     tall, wide = float(rng.uniform(0.19, 0.25)), float(rng.uniform(0.13, 0.17))
     cell = int(rng.integers(N_CELLS))
@@ -296,7 +123,7 @@ def open_book(rng: np.random.Generator, covers: Covers) -> Made:
         pages = box("pages", np.array([side * (wide / 2 - 0.002), 0.0085, 0]),
                     np.array([wide / 2 - 0.004, 0.006, tall / 2 - 0.004]), 0)  # fmt: skip
         parts.append((_mapped(pages, {}, covers.paper(cell)), covers.material))
-    return made("open_book", parts, group="book", nyu40=BOOKS, textures=(covers.texture,))
+    return standing_piece("open_book", parts, group="book", nyu40=BOOKS, textures=(covers.texture,))
 
 
 def _upright(covers: Covers, cell: int, thick: float, tall: float, deep: float) -> Surface:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy import cos, pi, sin
 
-from pbrs_farm.dress.things.bodies import cylinder, hoop, loft, tube, turned, vessel
+from pbrs_farm.dress.things.bodies import cylinder, hoop, loft, revolve, tube, vessel
 from pbrs_farm.dress.things.food import apple
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
@@ -101,7 +101,7 @@ def plant_pot(m: Maker) -> None:
                     (1.5 * r - 0.01, 1.5 * r - 0.01, 0.006, 0.01)], n=2)))  # fmt: skip
             case 4:  # on a saucer
                 m.add(vessel([(0, 0.0102), (r * 0.68, 0.0102), (r * 0.95, tall)], 0.006, n=20))
-                m.add(turned([(0, 0), (r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01),
+                m.add(revolve([(0, 0), (r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01),
                     (0, 0.01)], n=22))  # fmt: skip
             case 5:  # on three legs
                 m.add(vessel([(0, 0.08), (r * 0.9, 0.08), (r, 0.09), (r, 0.08 + tall)], 0.005,
@@ -125,4 +125,4 @@ def plant_pot(m: Maker) -> None:
                         (x * r * 0.93, tall * 0.7, 0.02)], 0.01, n=2), 0.003, n=5), of=m.metal)  # fmt: skip
     y, low = ((0.08 if form == 5 else 0.0) + tall * (0.6 if form == 7 else 0.82),
         0.086 if form == 5 else 0.02)  # fmt: skip
-    m.add(turned([(0, low), (0.55 * r, low), (r * 0.78, y), (0, y + 0.004)], n=18), of=soil)
+    m.add(revolve([(0, low), (0.55 * r, low), (r * 0.78, y), (0, y + 0.004)], n=18), of=soil)

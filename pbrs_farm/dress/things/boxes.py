@@ -17,10 +17,10 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     hoop,
     loft,
+    revolve,
     slab,
     sphere,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.cloth import bulged
@@ -90,7 +90,7 @@ def storage_box(m: Maker) -> None:
             m.add(bevelled((-w * 0.4, 0, -d * 0.4), (w * 0.4, h * 0.6, d * 0.4), 0.003), of=grain)
             m.add(bevelled((-w * 0.4, h * 0.6 + 0.001, -d * 0.4), (w * 0.4, h * 0.75, d * 0.4),
                 0.003), of=grain)  # fmt: skip
-            m.add(turned([(0, 0), (0.005, 0), (0.01, 0.008), (0.009, 0.016), (0, 0.018)], n=12),
+            m.add(revolve([(0, 0), (0.005, 0), (0.01, 0.008), (0.009, 0.016), (0, 0.018)], n=12),
                 turn=LYING_ALONG_Z, at=(0, h * 0.66, d * 0.4), of=m.metal)  # fmt: skip
         case 8:  # two on each other
             lidded_box(m, w, h * 0.8, d, card, card)
@@ -114,7 +114,7 @@ def storage_box(m: Maker) -> None:
                 m.add(bevelled((-w * 0.43, 0.006 + k * 0.5 * h, hd - 0.001),
                     (w * 0.43, (k + 1) * 0.5 * h - 0.006, hd + 0.006), 0.001),
                     of=plain("drawer", shade(colour, 0.92), 0.7))  # fmt: skip
-                m.add(turned([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10),
+                m.add(revolve([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10),
                     turn=LYING_ALONG_Z, at=(0, (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)  # fmt: skip
 
 
@@ -217,11 +217,11 @@ def bin(m: Maker) -> None:
                         (r * cos(0.2856 * k), tall, r * sin(0.2856 * k))], 0.0015, n=4))  # fmt: skip
         case 3 | 4:  # with a pedal
             h = tall * 1.2
-            m.add(turned([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
+            m.add(revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
                 n=26), of=material)  # fmt: skip
             m.add(cylinder(r * 1.02, 0, 0.0118, n=26),
                 of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))  # fmt: skip
-            m.add(turned(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
+            m.add(revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
                 (0, 1)]), n=26), of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
             m.add(bevelled((-0.03, 0.004, r * 0.9), (0.03, 0.018, r + 0.05), 0.003),
                 of=plain("pedal", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
@@ -298,7 +298,7 @@ def basket(m: Maker) -> None:
         case 7:  # two tones: its lower half painted
             m.add(vessel(scaled(r, tall, [(0, 0), (0.9, 0), (1, 0.45), (0.99, 0.449)]), 0.01, n=22),
                 of=plain("paint", (0.9, 0.89, 0.86), 0.8))  # fmt: skip
-            m.add(turned(scaled(r, tall, [(0.99, 0.4495), (1, 0.4495), (1.03, 1), (0.98, 1),
+            m.add(revolve(scaled(r, tall, [(0.99, 0.4495), (1, 0.4495), (1.03, 1), (0.98, 1),
                 (0.95, 0.4495), (0.99, 0.4495)]), n=22), of=weave)  # fmt: skip
 
 

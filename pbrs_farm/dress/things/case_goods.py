@@ -25,7 +25,7 @@ from pbrs_farm.core.classes import (
 from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.dress.things.bodies import frustum, slab, turned
+from pbrs_farm.dress.things.bodies import frustum, revolve, slab
 from pbrs_farm.dress.things.cloth import bulged
 from pbrs_farm.dress.things.maker import Maker, Pair, Size, Thing, thing
 from pbrs_farm.dress.things.materials import plain
@@ -314,7 +314,7 @@ def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_k
 
 def knob(m: Maker, x: float, y: float, z: float) -> None:
     """A round knob on a front at z."""
-    m.add(turned([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
+    m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
         (0.0, 0.028)], n=12), turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)  # fmt: skip
 
 

@@ -11,10 +11,10 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     frustum,
     loft,
+    revolve,
     slab,
     sphere,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import glass, plain
@@ -41,7 +41,7 @@ def clock(m: Maker) -> None:
                 clock_face(m, 0.055, material)
             with m.of(material):
                 for x in (-1.0, 1.0):
-                    m.add(turned([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14),
+                    m.add(revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14),
                         turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))  # fmt: skip
                     m.add(tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6))
                 m.add(tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0),
@@ -59,7 +59,7 @@ def clock(m: Maker) -> None:
                 clock_face(m, 0.05, m.metal)
         case 5:  # under a glass dome
             m.add(frustum((0.07, 0), (0.068, 0.015), n=24), of=grain)
-            m.add(turned([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)],
+            m.add(revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)],
                 n=22), of=glass())  # fmt: skip
             with m.moved(at=(0, 0.12, 0)):
                 clock_face(m, 0.04, m.metal)
@@ -106,7 +106,7 @@ def clock(m: Maker) -> None:
                 of=plain("grille", (0.2, 0.2, 0.21), 0.9))  # fmt: skip
             m.add(slab((0.035, 0.06, 0.05), (0.11, 0.1, 0.0506)),
                 of=plain("display", (0.05, 0.06, 0.05), 0.1))  # fmt: skip
-            m.add(turned([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], n=16),
+            m.add(revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], n=16),
                 turn=LYING_ALONG_Z, at=(0.072, 0.035, 0.0495), of=m.metal)  # fmt: skip
             for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
                 m.add(tube([(x, 0, z), (x, 0.006, z)], 0.008, n=8),
@@ -121,9 +121,9 @@ def clock(m: Maker) -> None:
 
 def clock_face(m: Maker, r: float, material: Material) -> None:
     """A case, a dial and two hands, facing +z about the origin."""
-    m.add(turned([(0, -0.02), (r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021),
+    m.add(revolve([(0, -0.02), (r * 0.9, -0.02), (r, 0), (r * 0.9, 0.02), (r * 0.85, 0.021),
         (0, 0.021)], n=24), turn=LYING_ALONG_Z, of=material)  # fmt: skip
-    m.add(turned([(0, 0.0211), (r * 0.8, 0.0211), (0, 0.022)], n=24), turn=LYING_ALONG_Z,
+    m.add(revolve([(0, 0.0211), (r * 0.8, 0.0211), (0, 0.022)], n=24), turn=LYING_ALONG_Z,
         of=plain("dial", m.pick((0.93, 0.93, 0.9), (0.9, 0.86, 0.76), (0.1, 0.1, 0.1)), 0.5))  # fmt: skip
     for long in (0.45, 0.7):
         m.add(slab((-0.0015, -0.005, 0.0222), (0.0015, long * r, 0.0228)),

@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core.classes import BAG, CLOTHES
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
-from pbrs_farm.dress.things.bodies import bevelled, loft, rounded, slab, stretched, tube, turned
+from pbrs_farm.dress.things.bodies import bevelled, loft, revolve, rounded, slab, stretched, tube
 from pbrs_farm.dress.things.boxes import tray
 from pbrs_farm.dress.things.cloth import bulged
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -27,8 +27,8 @@ def shoes(m: Maker) -> None:
     upper = plain("shoe", m.any_colour() if m.chance(0.5) else m.pick((0.14, 0.11, 0.1),
         (0.06, 0.06, 0.065), (0.35, 0.22, 0.13)), 0.6)  # fmt: skip
     sole = plain("sole", (0.85, 0.84, 0.8) if m.chance(0.5) else (0.1, 0.09, 0.08), 0.8)
-    dome = turned([(0, 0), (0.48, 0), (0.47, 0.3), (0.4, 0.65), (0.25, 0.9), (0, 1)], n=14)
-    foot = turned([(0, 0), (0.5, 0), (0.52, 0.6), (0.5, 1), (0, 1)], n=14)
+    dome = revolve([(0, 0), (0.48, 0), (0.47, 0.3), (0.4, 0.65), (0.25, 0.9), (0, 1)], n=14)
+    foot = revolve([(0, 0), (0.5, 0), (0.52, 0.6), (0.5, 1), (0, 1)], n=14)
     q = 0.62 if form == 6 else size_of
     long, wide = 0.27 * q, 0.088 * q
     for side in (-0.065, 0.065):

@@ -7,7 +7,7 @@ import numpy as np
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.things import materials
-from pbrs_farm.dress.things.bodies import frustum, hoop, loft, smooth, tube, turned, vessel
+from pbrs_farm.dress.things.bodies import frustum, hoop, loft, revolve, smooth, tube, vessel
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.things.outlines import bent, oval, rings, scaled
@@ -33,14 +33,14 @@ def cup(m: Maker) -> None:
                     (r * 1.15, 0.068)], 0.0025, n=20))  # fmt: skip
                 m.add(tube(bent([(r * 1.0, 0.058, 0), (r * 1.6, 0.06, 0), (r * 1.5, 0.03, 0),
                     (r * 0.85, 0.028, 0)], 0.015, n=3), 0.003, n=6))  # fmt: skip
-                m.add(turned([(0, 0), (0.04, 0), (0.075, 0.011), (0.074, 0.0125), (0.04, 0.006),
+                m.add(revolve([(0, 0), (0.04, 0), (0.075, 0.011), (0.074, 0.0125), (0.04, 0.006),
                     (0.03, 0.012), (0, 0.012)], n=24))  # fmt: skip
             case 3:  # for espresso, on its saucer
                 m.add(vessel([(0, 0.0082), (0.02, 0.0082), (0.027, 0.02), (0.029, 0.06)], 0.003,
                     n=18))  # fmt: skip
                 m.add(tube(bent([(0.027, 0.052, 0), (0.047, 0.054, 0), (0.045, 0.026, 0),
                     (0.026, 0.026, 0)], 0.012, n=3), 0.003, n=6))  # fmt: skip
-                m.add(turned([(0, 0), (0.03, 0), (0.055, 0.008), (0.054, 0.0095), (0.03, 0.005),
+                m.add(revolve([(0, 0), (0.03, 0), (0.055, 0.008), (0.054, 0.0095), (0.03, 0.005),
                     (0, 0.008)], n=22))  # fmt: skip
             case 4:  # a tall one
                 m.add(vessel([(0, 0), (0.028, 0), (0.034, 0.02), (0.04, 0.13)], 0.003, n=18))
@@ -84,9 +84,9 @@ def cup(m: Maker) -> None:
                 of=coat)  # fmt: skip
         case 11:  # for the way: a lid and a sleeve
             m.add(frustum((0.029, 0), (0.038, 0.13), n=20), of=plain("cup", m.any_colour(), 0.5))
-            m.add(turned([(0.0325, 0.045), (0.0335, 0.045), (0.037, 0.095), (0.0355, 0.095),
+            m.add(revolve([(0.0325, 0.045), (0.0335, 0.045), (0.037, 0.095), (0.0355, 0.095),
                 (0.0325, 0.045)], n=20), of=plain("sleeve", (0.35, 0.24, 0.16), 0.8))  # fmt: skip
-            m.add(turned([(0, 0.1302), (0.04, 0.1302), (0.04, 0.138), (0.034, 0.145), (0, 0.145)],
+            m.add(revolve([(0, 0.1302), (0.04, 0.1302), (0.04, 0.138), (0.034, 0.145), (0, 0.145)],
                 n=20), of=plain("cup lid", (0.12, 0.12, 0.12), 0.4))  # fmt: skip
         case 12:  # of glass, tea in it
             m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.95, tall)], 0.0025, n=20),
@@ -112,14 +112,14 @@ def glass(m: Maker) -> None:
                 m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.0025))
             case 1 | 2 | 3:  # for wine, red or white; a flute
                 h, q = m.uniform(0.17, 0.22), r if form == 1 else r * 1.25 if form == 2 else 0.026
-                m.add(turned([(0, 0), (0.034, 0), (0.032, 0.003), (0.005, 0.008), (0.004, h * 0.45),
-                    (0.02, h * 0.5), (q, h * (0.68 if form < 3 else 0.6)),
+                m.add(revolve([(0, 0), (0.034, 0), (0.032, 0.003), (0.005, 0.008),
+                    (0.004, h * 0.45), (0.02, h * 0.5), (q, h * (0.68 if form < 3 else 0.6)),
                     (q * (0.85 if form < 3 else 0.95), h),
                     (q * (0.85 if form < 3 else 0.95) - 0.0015, h - 0.0005),
                     (q - 0.0015, h * (0.68 if form < 3 else 0.6)), (0.018, h * 0.52),
                     (0, h * 0.49)], n=(16, 16, 20, 14)[form]))  # fmt: skip
             case 4:  # for cocktails
-                m.add(turned([(0, 0), (0.035, 0), (0.033, 0.003), (0.005, 0.008), (0.004, 0.1),
+                m.add(revolve([(0, 0), (0.035, 0), (0.033, 0.003), (0.005, 0.008), (0.004, 0.1),
                     (0.012, 0.105), (0.05, 0.165), (0.0485, 0.1655), (0.011, 0.109), (0, 0.107)],
                     n=20))  # fmt: skip
             case 5:  # for beer, waisted
@@ -150,7 +150,7 @@ def glass(m: Maker) -> None:
                 m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.9, 0.012), (r, 0.014), (r, 0.05),
                     (r * 0.97, 0.052), (r * 0.97, 0.06), (r, 0.062), (r, tall)], 0.0025, n=16))  # fmt: skip
     if form in (5, 7, 11):
-        m.add(turned([(0, 0.005), (r * 0.7, 0.005), (r * 0.72, 0.028), (0.02, 0.06),
+        m.add(revolve([(0, 0.005), (r * 0.7, 0.005), (r * 0.72, 0.028), (0.02, 0.06),
             (r * 0.72, 0.09), (0, 0.09)], n=14), of=drink)  # fmt: skip
 
 

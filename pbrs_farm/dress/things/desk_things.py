@@ -13,12 +13,12 @@ from pbrs_farm.dress.things.bodies import (
     bevelled,
     cylinder,
     frustum,
+    revolve,
     rounded,
     slab,
     sphere,
     stretched,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -95,7 +95,7 @@ def notebook(m: Maker) -> None:
         m.moved(turn=rotation_y(m.uniform(-0.6, 0.6)), at=(0.01, 0.0142 + 0.0045, 0)),
         m.of(plain("pen", m.pick((0.08, 0.1, 0.3), (0.05, 0.05, 0.05), (0.6, 0.1, 0.1)), 0.3)),
     ):
-        m.add(turned([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8),
+        m.add(revolve([(0, 0), (0.002, 0.002), (0.0045, 0.015), (0.0045, 0.138), (0, 0.14)], n=8),
             turn=LYING_ALONG_X, at=(-0.07, 0, 0))  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def pen_pot(m: Maker) -> None:
         angle = 2 * pi * k / 6 + m.uniform(-0.2, 0.2)
         tilt = m.uniform(0.1, 0.17)
         with m.moved(turn=rotation_y(angle)), m.of(plain("pen", m.colour_within(0.1, 0.8), 0.4)):
-            m.add(turned([(0, 0), (0.004, 0), (0.004, 0.15), (0, 0.156)], n=6),
+            m.add(revolve([(0, 0), (0.004, 0), (0.004, 0.15), (0, 0.156)], n=6),
                 turn=rotation_z(-tilt), at=(0.008, 0.0045, 0))  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def electronics(m: Maker) -> None:
             for y, r in ((h * 0.34, w * 0.36), (h * 0.76, w * 0.2)):
                 m.add(cylinder(r, 0, 0.004, n=20), turn=LYING_ALONG_Z, at=(0, y, d / 2 - 0.002),
                     of=mesh)  # fmt: skip
-                m.add(turned([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14), turn=LYING_ALONG_Z,
+                m.add(revolve([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14), turn=LYING_ALONG_Z,
                     at=(0, y, d / 2 + 0.0018), of=black)  # fmt: skip
         case 1:
             m.name, w, h = "radio", m.uniform(0.22, 0.3), m.uniform(0.13, 0.18)

@@ -12,11 +12,11 @@ from pbrs_farm.dress.things.bodies import (
     bevelled,
     cylinder,
     frustum,
+    revolve,
     slab,
     sphere,
     stretched,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -42,7 +42,7 @@ def groceries(m: Maker) -> None:
                     0.005, n=6), of=plain("crumb", (0.85, 0.7, 0.48), 0.9))  # fmt: skip
         case 1:  # cheese on a board
             m.add(cylinder(0.14, 0, 0.016, n=28), of=grain)
-            m.add(turned([(0, 0.0162), (0.055, 0.0162), (0.057, 0.03), (0.055, 0.045), (0, 0.045)],
+            m.add(revolve([(0, 0.0162), (0.055, 0.0162), (0.057, 0.03), (0.055, 0.045), (0, 0.045)],
                 n=22), at=(-0.05, 0, 0.02), of=plain("cheese", (0.93, 0.9, 0.8), 0.7))  # fmt: skip
             m.add(bevelled((0.02, 0.0162, -0.07), (0.1, 0.06, -0.01), 0.004),
                 of=plain("cheese", (0.9, 0.75, 0.35), 0.6))  # fmt: skip
@@ -50,9 +50,9 @@ def groceries(m: Maker) -> None:
                 m.add(sphere((0.05 + 0.022 * (k % 3), 0.028, 0.04 + 0.02 * (k // 3)), 0.012, n=8),
                     of=plain("grape", m.pick((0.25, 0.08, 0.2), (0.5, 0.6, 0.2)), 0.3))  # fmt: skip
         case 2:  # a cake on its stand
-            m.add(turned([(0, 0), (0.06, 0), (0.02, 0.02), (0.018, 0.07), (0.13, 0.085),
+            m.add(revolve([(0, 0), (0.06, 0), (0.02, 0.02), (0.018, 0.07), (0.13, 0.085),
                 (0.135, 0.092), (0, 0.092)], n=26), of=m.china())  # fmt: skip
-            m.add(turned([(0, 0.0922), (0.1, 0.0922), (0.102, 0.12), (0.1, 0.15), (0.09, 0.158),
+            m.add(revolve([(0, 0.0922), (0.1, 0.0922), (0.102, 0.12), (0.1, 0.15), (0.09, 0.158),
                 (0, 0.158)], n=26), of=plain("icing", m.pick((0.92, 0.9, 0.85), (0.3, 0.17, 0.1),
                 (0.9, 0.7, 0.72)), 0.5))  # fmt: skip
             for k in range(8):
@@ -70,10 +70,10 @@ def groceries(m: Maker) -> None:
         case 4:  # tins
             for k in range(m.integers(2, 6)):
                 with m.moved(at=(0.08 * (k % 2), 0.1105 * (k // 4), 0.08 * (k // 2 % 2))):
-                    m.add(turned([(0, 0), (0.035, 0), (0.037, 0.003), (0.035, 0.006),
+                    m.add(revolve([(0, 0), (0.035, 0), (0.037, 0.003), (0.035, 0.006),
                         (0.035, 0.104), (0.037, 0.107), (0.035, 0.11), (0, 0.108)], n=16),
                         of=plain("tin", (0.72, 0.72, 0.72), 0.3))  # fmt: skip
-                    m.add(turned([(0.0345, 0.008), (0.0356, 0.008), (0.0356, 0.102),
+                    m.add(revolve([(0.0345, 0.008), (0.0356, 0.008), (0.0356, 0.102),
                         (0.0345, 0.102), (0.0345, 0.008)], n=16),
                         of=plain("label", m.any_colour(), 0.5))  # fmt: skip
         case 5:  # eggs
@@ -91,7 +91,7 @@ def groceries(m: Maker) -> None:
                     turn=rotation_y(k), at=(0.058 * cos(1.257 * k), 0.058, 0.058 * sin(1.257 * k)),
                     of=crust)  # fmt: skip
         case 7:  # noodles in a jar
-            m.add(turned([(0, 0), (0.04, 0), (0.042, 0.004), (0.042, 0.28), (0, 0.28)], n=20),
+            m.add(revolve([(0, 0), (0.04, 0), (0.042, 0.004), (0.042, 0.28), (0, 0.28)], n=20),
                 of=glass())  # fmt: skip
             for k in range(14):
                 m.add(tube([(0.028 * cos(2.4 * k) * (k / 14) ** 0.5, 0.005,

@@ -15,10 +15,10 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     frustum,
     loft,
+    revolve,
     slab,
     sphere,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.maker import Maker, Pair, thing
@@ -158,9 +158,9 @@ def candle(m: Maker) -> None:
             for _ in range(m.integers(1, 4)):
                 h = m.uniform(0.06, 0.2)
                 with m.moved(at=(x, 0, m.uniform(-0.02, 0.02))):
-                    m.add(turned([(0, 0), (0.035, 0), (0.033, 0.006), (0.008, 0.012),
+                    m.add(revolve([(0, 0), (0.035, 0), (0.033, 0.006), (0.008, 0.012),
                         (0.007, h - 0.02), (0.015, h - 0.015), (0.015, h), (0, h)], n=16), of=stick)  # fmt: skip
-                    m.add(turned([(0, 0), (0.011, 0), (0.008, 0.19), (0, 0.2)], n=12),
+                    m.add(revolve([(0, 0), (0.011, 0), (0.008, 0.19), (0, 0.2)], n=12),
                         at=(0, h + 0.0002, 0), of=wax)  # fmt: skip
                 x += 0.085
         case 2:  # tea lights
@@ -197,16 +197,16 @@ def candle(m: Maker) -> None:
         case 5:  # on three arms
             h = m.uniform(0.14, 0.2)
             with m.of(stick):
-                m.add(turned([(0, 0), (0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h),
+                m.add(revolve([(0, 0), (0.05, 0), (0.048, 0.008), (0.01, 0.018), (0.008, h),
                     (0.016, h + 0.01), (0, h + 0.01)], n=18))  # fmt: skip
                 for x in (-1.0, 1.0):
                     m.add(tube(bent([(0, 0.55 * h, 0), (x * 0.09, 0.5 * h, 0),
                         (x * 0.09, 0.9 * h, 0)], 0.04, n=4), 0.006, n=8))  # fmt: skip
             for x, y in ((0.0, 1.0), (-0.09, 0.9), (0.09, 0.9)):
-                m.add(turned([(0, 0), (0.011, 0), (0.009, 0.14), (0, 0.15)], n=10),
+                m.add(revolve([(0, 0), (0.011, 0), (0.009, 0.14), (0, 0.15)], n=10),
                     at=(x, y * h + (0.0105 if x == 0.0 else 0.0), 0), of=wax)  # fmt: skip
         case 6:  # a ball on a dish
-            m.add(turned([(0, 0), (0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005),
+            m.add(revolve([(0, 0), (0.05, 0), (0.065, 0.01), (0.062, 0.012), (0.045, 0.005),
                 (0, 0.005)], n=20), of=stick)  # fmt: skip
             if m.chance(0.5):
                 m.add(sphere((0, 0.047, 0), 0.042, n=16), of=wax)
@@ -217,7 +217,8 @@ def candle(m: Maker) -> None:
 def pillar(m: Maker, r: float, tall: float, wax: Material) -> None:
     """A candle with its wick."""
     # The rim stands 4 mm above the hollow that the wick rises from.
-    m.add(turned([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)]), of=wax)
+    m.add(revolve([(0, 0), (r, 0), (r, tall - 0.004), (r - 0.004, tall), (0, tall - 0.004)]),
+        of=wax)  # fmt: skip
     m.add(frustum((0.0015, tall - 0.005), (0.001, tall + 0.008), n=5),
         of=plain("wick", (0.1, 0.1, 0.1), 0.9))  # fmt: skip
 

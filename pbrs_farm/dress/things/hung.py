@@ -18,7 +18,7 @@ from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, SHELVES, WHITEBOARD
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.dress.things.bodies import box, cylinder, slab, smooth, turned
+from pbrs_farm.dress.things.bodies import box, cylinder, revolve, slab, smooth
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import MIRROR_GLASS, plain
 from pbrs_farm.dress.things.outlines import Profile, spaced
@@ -90,7 +90,7 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
             match form:
                 case 1 | 3:  # knobs
                     with m.of(m.metal):
-                        m.add(turned([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
+                        m.add(revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
                             (0.013, 0.028), (0.0, 0.03)], n=14), turn=LYING_ALONG_Z,
                             at=(a, 0.07, d + (0.0235 if form == 3 else 0.0185)))  # fmt: skip
                 case 2:  # a grip edge
@@ -146,7 +146,7 @@ def ladle(m: Maker, x: float, y: float) -> None:
     with m.of(m.pick(m.metal, plain("handle", (0.08, 0.08, 0.08), 0.5),
         plain("handle " + m.style.wood.name, m.wood, 0.6))):  # fmt: skip
         stick(m, x, y - 0.028, low + 0.6 * r)
-    m.add(turned([(0.0, -r), (0.7 * r, -0.7 * r), (r, 0.0), (0.7 * r, 0.7 * r), (0.0, r)], n=14),
+    m.add(revolve([(0.0, -r), (0.7 * r, -0.7 * r), (r, 0.0), (0.7 * r, 0.7 * r), (0.0, r)], n=14),
         turn=np.diag((1.0, 1.0, 0.55)), at=(x, low, 0.045), of=m.metal)  # fmt: skip
 
 
@@ -165,7 +165,7 @@ def pan(m: Maker, x: float, y: float) -> None:
     """A pan that hangs from (x, y), its inside to the front."""
     r, low, black = m.uniform(0.08, 0.1), y - 0.13, plain("pan", (0.07, 0.07, 0.075), 0.4)
     m.add(slab((x - 0.009, low - 0.004, 0.028), (x + 0.009, y - 0.024, 0.046)), of=black)
-    m.add(turned([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
+    m.add(revolve([(0.0, 0.0), (0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005),
         (0.0, 0.005)], n=24), turn=LYING_ALONG_Z, at=(x, low - r, 0.008),
         of=black if m.chance(0.6) else m.metal)  # fmt: skip
 
@@ -175,7 +175,7 @@ def hung_cup(m: Maker, x: float, y: float) -> None:
     r, h = 0.038, 0.085
     with m.of(plain("hung cup", m.any_colour(), 0.25)):
         m.add(slab((x - 0.018, y - 0.05, 0.045 - 0.005), (x + 0.018, y - 0.026, 0.045 + 0.005)))
-        m.add(turned([(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004),
+        m.add(revolve([(0.0, 0.0), (r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004),
             (0.0, 0.004)], n=18), turn=LYING_ALONG_X, at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from numpy import pi
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.things.bodies import bevelled, loft, slab, tube, turned
+from pbrs_farm.dress.things.bodies import bevelled, loft, revolve, slab, tube
 from pbrs_farm.dress.things.maker import Maker, Pair
 from pbrs_farm.dress.things.materials import FROSTED
 from pbrs_farm.dress.things.outlines import bent, d_shape, ring_path, rings, scaled
@@ -70,10 +70,10 @@ def pull(m: Maker, kind: str, x: float, y: float, z: float, across: bool, long: 
     with m.of(material), m.moved(at=(x, y, z)):
         match kind:
             case "knob":
-                m.add(turned([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
+                m.add(revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.015, 0.016),
                     (0.013, 0.025), (0.0, 0.027)], n=10), turn=LYING_ALONG_Z)  # fmt: skip
             case "disc":
-                m.add(turned([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015),
+                m.add(revolve([(0.0, 0.0), (0.007, 0.0), (0.007, 0.014), (0.019, 0.015),
                     (0.019, 0.022), (0.0, 0.023)], n=12), turn=LYING_ALONG_Z)  # fmt: skip
         with m.moved(turn=rotation_z(0.0 if across else pi / 2)):
             match kind:
@@ -178,7 +178,7 @@ def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
             case "tapered":
                 m.add(tube([a, b], 0.3 * thick, n=12, end=0.55 * thick))
             case "bun":
-                m.add(turned(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
+                m.add(revolve(scaled(thick, high, [(0, 0), (0.3, 0), (0.62, 0.3), (0.62, 0.6),
                     (0.35, 0.85), (0.5, 1), (0, 1)]), n=16), at=(top[0], 0.0, top[1]))  # fmt: skip
             case "hairpin":
                 for s in (-1.0, 1.0):
@@ -187,7 +187,7 @@ def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,
                 m.add(tube([(foot[0] - 0.008, 0.005, foot[1]), (foot[0] + 0.008, 0.005, foot[1])],
                     0.005, n=6))  # fmt: skip
             case "turned":
-                m.add(turned(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
+                m.add(revolve(scaled(thick, high, [(0, 0), (0.35, 0), (0.4, 0.06), (0.28, 0.1),
                     (0.5, 0.3), (0.42, 0.62), (0.55, 0.7), (0.4, 0.74), (0.55, 0.78), (0.55, 1),
                     (0, 1)]), n=14), at=(top[0], 0.0, top[1]))  # fmt: skip
 

@@ -21,10 +21,10 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     frustum,
     loft,
+    revolve,
     rounded,
     slab,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.joints import Look, drawer_front, fronts_of, pull
 from pbrs_farm.dress.things.maker import Maker, Pair, Size, family
@@ -201,7 +201,7 @@ def kitchen_tap(m: Maker, y: float, z: float, top: float) -> None:
     material = m.pick(CHROME, CHROME, STEEL, BLACK_STEEL, m.metal)
     form, r, t = m.weighted(0.4, 0.3, 0.3), m.uniform(0.01, 0.014), top
     with m.of(material):
-        m.add(turned([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012),
+        m.add(revolve([(0.0, y), (0.028, y), (0.028, y + 0.006), (0.022, y + 0.012),
             (0.022, y + 0.05), (0.0, y + 0.05)], n=20), at=(0.0, 0.0, z))  # fmt: skip
         match form:
             case 0:  # an arch
@@ -233,21 +233,21 @@ def hob_top(
             ring = glossy("ring", (0.3, 0.3, 0.31), 0.3)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.075), (-0.24, 0.22, 0.075),
                 (0.24, 0.22, 0.1)):  # fmt: skip
-                m.add(turned([(r * 0.97, y + 0.0055), (r, y + 0.0055), (r, y + 0.0065),
+                m.add(revolve([(r * 0.97, y + 0.0055), (r, y + 0.0055), (r, y + 0.0065),
                     (r * 0.97, y + 0.0065), (r * 0.97, y + 0.0055)], n=28),
                     at=(x * w, 0.0, z + c * d), of=ring)  # fmt: skip
         case "plates":
             m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.073), (-0.24, 0.22, 0.073),
                 (0.24, 0.22, 0.09)):  # fmt: skip
-                m.add(turned([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
+                m.add(revolve([(0.0, y + 0.006), (r + 0.008, y + 0.006), (r + 0.006, y + 0.011),
                     (r, y + 0.012), (r, y + 0.019), (r * 0.3, y + 0.019), (r * 0.28, y + 0.016),
                     (0.0, y + 0.016)], n=26), at=(x * w, 0.0, z + c * d), of=CAST_IRON)  # fmt: skip
         case "gas":
             m.add(board(w, d, y, y + 0.008, 0.015, 0.003, z=z), of=material)
             for x, c, r in ((-0.24, -0.22, 0.05), (0.24, -0.22, 0.038), (-0.24, 0.22, 0.03),
                 (0.24, 0.22, 0.042)):  # fmt: skip
-                m.add(turned([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014),
+                m.add(revolve([(0.0, y + 0.007), (r + 0.012, y + 0.007), (r, y + 0.014),
                     (r, y + 0.022), (r - 0.008, y + 0.026), (0.0, y + 0.026)], n=18),
                     at=(x * w, 0.0, z + c * d), of=CAST_IRON)  # fmt: skip
             # Grates: a frame over each side and four fingers a burner.
@@ -291,7 +291,7 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: M
     knob = m.pick(RUBBER, STEEL, CHROME, WHITE)
     if has_knobs:
         for k in range(n):
-            m.add(turned([(0.0, 0.0), (0.02, 0.0), (0.018, 0.01), (0.016, 0.024), (0.0, 0.025)],
+            m.add(revolve([(0.0, 0.0), (0.02, 0.0), (0.018, 0.01), (0.016, 0.024), (0.0, 0.025)],
                 n=14), turn=LYING_ALONG_Z, at=(a + w * (k + 0.5) / n, d - panel_h / 2, z + 0.019),
                 of=knob)  # fmt: skip
         if m.chance(0.4):
@@ -484,9 +484,9 @@ def washing_machine(m: Maker, size: Size) -> None:
         m.pick(0.0, 0.0, 0.0, -0.02))  # fmt: skip
     frame = m.pick(CHROME, STEEL, material, glossy("dark hoop", (0.15, 0.15, 0.16), 0.3))
     with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
-        m.add(turned([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),
+        m.add(revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),
             (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36), of=frame)  # fmt: skip
-        m.add(turned([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
+        m.add(revolve([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
             (0.0, 0.036)], n=32), of=BLACK_GLASS)  # fmt: skip
     if m.chance(0.7):
         m.add(bevelled((x + r - 0.03, y - 0.04, f + 0.01), (x + r - 0.008, y + 0.04, f + 0.036),
@@ -494,7 +494,7 @@ def washing_machine(m: Maker, size: Size) -> None:
     # The drawer at the left, the dial in the middle or at the right, a display.
     m.add(bevelled((-hw + 0.02, h - 0.03 - strip + 0.015, f + 0.0115),
         (-hw + 0.18, h - 0.045, f + 0.016), 0.003), of=material)  # fmt: skip
-    m.add(turned([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20),
+    m.add(revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20),
         turn=LYING_ALONG_Z, at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
         of=m.pick(CHROME, material, RUBBER))  # fmt: skip
     m.add(slab((hw - 0.2, h - 0.03 - strip / 2 - 0.018, f + 0.0119),

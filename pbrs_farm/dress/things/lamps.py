@@ -15,11 +15,11 @@ from pbrs_farm.dress.things.bodies import (
     frustum,
     hoop,
     loft,
+    revolve,
     slab,
     sphere,
     stretched,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.maker import Maker, Size, family
 from pbrs_farm.dress.things.materials import (
@@ -38,7 +38,7 @@ from pbrs_farm.dress.things.outlines import bent, d_shape, fluted, oval, rect, r
 
 def lamp_shade(m: Maker, r0: float, r1: float, y0: float, y1: float, material: Material) -> None:
     """A shade of cloth or card r0 wide below, r1 above, from y0 to y1, its bulb in it."""
-    m.add(turned([(r0, y0), (r1, y1), (r1 - 0.003, y1), (r0 - 0.003, y0), (r0, y0)], n=28),
+    m.add(revolve([(r0, y0), (r1, y1), (r1 - 0.003, y1), (r0 - 0.003, y0), (r0, y0)], n=28),
         of=material)  # fmt: skip
     m.add(sphere((0.0, (y0 + y1) / 2, 0.0), min(0.035, 0.5 * r1), n=12), of=OPAL)
 
@@ -66,7 +66,7 @@ def standing_lamp(m: Maker, size: Size) -> None:
     tall, k1 = m.uniform(0.2, 0.32), m.uniform(0.6, 1.0)
     match form:
         case 0:  # a shade on a pole
-            m.add(turned([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03),
+            m.add(revolve([(0.0, 0.0), (r * 0.72, 0.0), (r * 0.72, 0.014), (0.02, 0.03),
                 (0.011, 0.05), (0.011, h - 0.5 * tall - 0.05), (0.0, h - 0.5 * tall - 0.05)], n=28),
                 of=material)  # fmt: skip
             lamp_shade(m, r, r * k1, h - tall, h, fabric)
@@ -76,7 +76,7 @@ def standing_lamp(m: Maker, size: Size) -> None:
                 m.add(tube([(0.96 * r * cos(2.0944 * k), 0.006, 0.96 * r * sin(2.0944 * k)),
                     (0.02 * cos(2.0944 * k), h - tall - 0.06, 0.02 * sin(2.0944 * k))], 0.012, n=8,
                     end=0.016), of=material)  # fmt: skip
-            m.add(turned([(0.0, h - tall - 0.1), (0.035, h - tall - 0.1), (0.035, h - tall - 0.05),
+            m.add(revolve([(0.0, h - tall - 0.1), (0.035, h - tall - 0.1), (0.035, h - tall - 0.05),
                 (0.01, h - tall - 0.03), (0.01, h - 0.5 * tall - 0.04),
                 (0.0, h - 0.5 * tall - 0.04)], n=16), of=material)  # fmt: skip
             lamp_shade(m, r, r * k1, h - tall, h, fabric)
@@ -86,10 +86,10 @@ def standing_lamp(m: Maker, size: Size) -> None:
             m.add(board(w, d, 0.0, 0.03, m.pick(0.02, 0.12, r), 0.004), of=material)
             m.add(tube([(0.0, 0.031, 0.0), (0.0, h - 0.02, 0.0)], q, n=24), of=OPAL)
             for y in (0.03, 0.36 * h, 0.68 * h, h - 0.022):
-                m.add(turned([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
+                m.add(revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
                     (q - 0.002, y + 0.022), (q - 0.002, y)], n=24), of=material)  # fmt: skip
         case 5:  # a ball, or three, on a pole
-            m.add(turned([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
+            m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24),
                 (0.0, h - 0.24)], n=28), of=material)  # fmt: skip
             m.add(sphere((0.0, h - 0.13, 0.0), 0.13, n=20), of=OPAL)
 
@@ -103,26 +103,26 @@ def arc_lamp(m: Maker, size: Size) -> None:
     material, form = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL), 2 + m.weighted(0.5, 0.5)
     match form:
         case 2:  # an arc
-            m.add(turned([(0.0, 0.0), (q, 0.0), (q, 0.03), (0.0, 0.035)], n=26),
+            m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.03), (0.0, 0.035)], n=26),
                 at=(-r + q, 0.0, 0.0),
                 of=m.pick(material, glossy("stone", (0.86, 0.85, 0.82), 0.25)))  # fmt: skip
             m.add(tube(bent([(-r + 0.1, 0.02, 0.0), (-r + 0.03, h * 0.7, 0.0),
                 (0.0, h - 0.006, 0.0), (r - 0.1, h - 0.08, 0.0), (r - 0.1, h - 0.2, 0.0)], 0.35,
                 n=6), 0.008, n=8), of=material)  # fmt: skip
             with m.moved(at=(r - 0.1, h - 0.34, 0.0)):
-                m.add(turned([(0.1, 0.0), (0.085, 0.07), (0.04, 0.13), (0.01, 0.15), (0.0, 0.15),
+                m.add(revolve([(0.1, 0.0), (0.085, 0.07), (0.04, 0.13), (0.01, 0.15), (0.0, 0.15),
                     (0.0, 0.145), (0.037, 0.126), (0.082, 0.067), (0.097, 0.0), (0.1, 0.0)], n=24),
                     of=material)  # fmt: skip
                 m.add(sphere((0.0, 0.05, 0.0), 0.03, n=12), of=OPAL)
         case 3:  # a reading lamp: two arms and a small head
-            m.add(turned([(0.0, 0.0), (q, 0.0), (q - 0.005, 0.015), (0.012, 0.022),
+            m.add(revolve([(0.0, 0.0), (q, 0.0), (q - 0.005, 0.015), (0.012, 0.022),
                 (0.01, 0.62 * h), (0.0, 0.62 * h)], n=26), at=(-r + q, 0.0, 0.0), of=material)  # fmt: skip
             with m.of(material):
                 m.add(tube([(-r + q, 0.61 * h, 0.0), (-0.2 * r, h - 0.02, 0.0)], 0.009, n=8))
                 m.add(tube([(-0.22 * r, h - 0.014, 0.0), (r - 0.06, h - 0.16, 0.0)], 0.009, n=8))
                 for x, y in ((-r + q, 0.61 * h), (-0.21 * r, h - 0.018)):
                     m.add(sphere((x, y, 0.0), 0.018, n=10))
-                m.add(turned([(0.075, 0.0), (0.04, 0.1), (0.02, 0.13), (0.0, 0.13), (0.0, 0.125),
+                m.add(revolve([(0.075, 0.0), (0.04, 0.1), (0.02, 0.13), (0.0, 0.13), (0.0, 0.125),
                     (0.036, 0.095), (0.072, 0.0), (0.075, 0.0)], n=22), turn=rotation_z(0.35),
                     at=(r - 0.1, h - 0.28, 0.0))  # fmt: skip
             m.add(sphere((r - 0.085, h - 0.235, 0.0), 0.025, n=10), of=OPAL)
@@ -150,12 +150,12 @@ def shade_lamp(m: Maker, size: Size) -> None:
             with m.of(material):
                 match foot:
                     case 0:  # turned of clay
-                        m.add(turned(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5),
+                        m.add(revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5),
                             (0.35, 0.85), (0.2, 1), (0, 1)]), n=24))  # fmt: skip
                     case 1:  # a ball
                         m.add(sphere((0.0, q, 0.0), q, n=18))
                     case 2:  # a rod on a plate
-                        m.add(turned([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f),
+                        m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f),
                             (0.0, f)], n=24))  # fmt: skip
                     case 3:  # a square block
                         m.add(loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0),
@@ -174,7 +174,7 @@ def shade_lamp(m: Maker, size: Size) -> None:
                             (2 * q, 12, 0.08, 0.4 * f), (1.1 * q, 12, 0.08, 0.85 * f),
                             (0.6 * q, 12, 0.08, 0.9 * f)]), sharp=70.0))  # fmt: skip
                     case 7:  # turned of wood
-                        m.add(turned([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06),
+                        m.add(revolve([(0.0, 0.0), (q, 0.0), (q, 0.02), (q * 0.4, 0.06),
                             (q * 0.55, 0.3 * f), (q * 0.3, 0.5 * f), (q * 0.5, 0.7 * f),
                             (q * 0.2, 0.9 * f), (q * 0.2, f), (0.0, f)], n=20))  # fmt: skip
             m.add(tube([(0.0, 0.3 * f, 0.0), (0.0, h - 0.5 * tall, 0.0)], 0.007, n=8), of=m.metal)
@@ -184,13 +184,13 @@ def shade_lamp(m: Maker, size: Size) -> None:
                     h - 0.5 * tall, (r + k1 * r) / 2.1 * sin(2.1 * k))], 0.002, n=5), of=m.metal)  # fmt: skip
         case 1:  # a ball on a foot
             q = min(r, 0.3 * h)
-            m.add(turned([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025),
+            m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.025),
                 (r * 0.25, h - 1.9 * q), (0.0, h - 1.9 * q)], n=24), of=material)  # fmt: skip
             m.add(sphere((0.0, h - q, 0.0), q, n=20), of=OPAL)
         case 2:  # a mushroom: a dome over a foot
-            m.add(turned([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
+            m.add(revolve([(0.0, 0.0), (r * 0.6, 0.0), (r * 0.55, 0.02), (r * 0.25, 0.1 * h),
                 (r * 0.2, 0.6 * h), (r * 0.3, 0.66 * h), (0.0, 0.66 * h)], n=22), of=material)  # fmt: skip
-            m.add(turned([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h),
+            m.add(revolve([(r * 0.93, 0.62 * h), (r, 0.63 * h), (r * 0.9, 0.8 * h),
                 (r * 0.6, 0.94 * h), (0.0, h), (0.0, h - 0.004), (r * 0.57, 0.93 * h),
                 (r * 0.87, 0.79 * h), (r * 0.93, 0.62 * h)], n=28), of=material)  # fmt: skip
             m.add(sphere((0.0, 0.72 * h, 0.0), 0.035, n=12), of=OPAL)
@@ -209,7 +209,7 @@ def arm_lamp(m: Maker, size: Size) -> None:
         glossy("enamel", m.any_colour(), 0.35))  # fmt: skip
     with m.of(material):
         if m.chance(0.7):
-            m.add(turned([(0.0, 0.0), (0.075, 0.0), (0.07, 0.02), (0.01, 0.026), (0.0, 0.026)],
+            m.add(revolve([(0.0, 0.0), (0.075, 0.0), (0.07, 0.02), (0.01, 0.026), (0.0, 0.026)],
                 n=22), at=(-r + 0.075, 0.0, 0.0))  # fmt: skip
         else:
             m.add(board(0.15, 0.15, 0.0, 0.018, 0.01, 0.003, x=-r + 0.075))
@@ -224,10 +224,10 @@ def arm_lamp(m: Maker, size: Size) -> None:
                 (r - 0.05, h - 0.007, 0.0), (r - 0.045, h - 0.08, 0.0)], 0.14, n=6), 0.007, n=8))  # fmt: skip
         with m.moved(at=(r - 0.056, h - 0.15, 0.0)):
             if m.chance(0.6):
-                m.add(turned([(0.055, 0.0), (0.05, 0.05), (0.02, 0.09), (0.0, 0.09), (0.0, 0.087),
+                m.add(revolve([(0.055, 0.0), (0.05, 0.05), (0.02, 0.09), (0.0, 0.09), (0.0, 0.087),
                     (0.018, 0.086), (0.047, 0.048), (0.052, 0.0), (0.055, 0.0)], n=20))  # fmt: skip
             else:
-                m.add(turned([(0.035, 0.0), (0.035, 0.08), (0.0, 0.09), (0.0, 0.086),
+                m.add(revolve([(0.035, 0.0), (0.035, 0.08), (0.0, 0.09), (0.0, 0.086),
                     (0.032, 0.078), (0.032, 0.0), (0.035, 0.0)], n=18))  # fmt: skip
             m.add(sphere((0.0, 0.032, 0.0), 0.02, n=10), of=OPAL)
 
@@ -251,10 +251,10 @@ def hanging_lamp(m: Maker, size: Size) -> None:
         match form:
             case 0:  # a bowl at the ceiling
                 m.add(cylinder(r, h - 0.025, h, n=32), of=material)
-                m.add(turned([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
+                m.add(revolve([(0.0, 0.0), (r * 0.5, 0.1 * h), (r * 0.85, 0.4 * h),
                     (r * 0.95, h - 0.026), (0.0, h - 0.026)], n=32), of=OPAL)  # fmt: skip
             case 1:  # a drum of cloth
-                m.add(turned([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
+                m.add(revolve([(r - 0.004, 0.0), (r, 0.0), (r, h), (0.0, h), (0.0, h - 0.004),
                     (r - 0.004, h - 0.004), (r - 0.004, 0.0)], n=32), of=fabric)  # fmt: skip
                 m.add(cylinder(r - 0.005, 0.015, 0.02, n=32), of=OPAL)
             case 2:  # a square plate
@@ -264,14 +264,14 @@ def hanging_lamp(m: Maker, size: Size) -> None:
                 m.add(bevelled((-r, h - 0.03, -0.03), (r, h, 0.03), 0.002), of=material)
                 for x in (-0.7, 0.0, 0.7):
                     with m.moved(at=(x * r, 0.0, 0.0), turn=rotation_x(x * 0.5)):
-                        m.add(turned([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
+                        m.add(revolve([(0.0, h - 0.03), (0.012, h - 0.03), (0.03, h - 0.045),
                             (0.032, 0.012), (0.0, 0.012)], n=16), of=material)  # fmt: skip
                         m.add(cylinder(0.026, 0.002, 0.0115, n=16), of=OPAL)
                 m.add(cylinder(d / 2, h - 0.02, h - 0.001, n=24), of=material)
             case 4:  # a drum of glass in a rim
                 m.add(cylinder(0.06, h - 0.02, h, n=20), of=material)
                 m.add(cylinder(r * 0.9, 0.02, h - 0.021, n=32), of=OPAL)
-                m.add(turned([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
+                m.add(revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
                     (r * 0.9, 0.0)], n=32), of=material)  # fmt: skip
     # Hanging ones, from a canopy by a cord.
     if h > 0.2:
@@ -282,19 +282,19 @@ def hanging_lamp(m: Maker, size: Size) -> None:
             m.add(tube([(0.0, low, 0.0), (0.0, h - 0.025, 0.0)], 0.0035, n=6), of=RUBBER)
         match form:
             case 0:  # a cone of metal
-                m.add(turned([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
+                m.add(revolve([(r, 0.0), (r * 0.55, 0.2 * h), (0.03, low), (0.0, low),
                     (0.0, low - 0.004), (0.027, low - 0.004), (r * 0.55 - 0.004, 0.2 * h - 0.002),
                     (r - 0.003, 0.0), (r, 0.0)], n=32), of=material)  # fmt: skip
                 m.add(sphere((0.0, 0.14 * h, 0.0), 0.036, n=14), of=OPAL)
             case 1:  # a drum of cloth
-                m.add(turned([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
+                m.add(revolve([(r, 0.0), (r * 0.98, low), (r * 0.98 - 0.003, low), (r - 0.003, 0.0),
                     (r, 0.0)], n=32), of=fabric)  # fmt: skip
                 m.add(sphere((0.0, 0.18 * h, 0.0), 0.045, n=14), of=OPAL)
                 for k in range(3):
                     m.add(tube([(0.0, low - 0.004, 0.0), (r * 0.975 * cos(2.1 * k), low - 0.004,
                         r * 0.975 * sin(2.1 * k))], 0.0025, n=5), of=material)  # fmt: skip
             case 2:  # a dome
-                m.add(turned([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
+                m.add(revolve([(r, 0.0), (r * 0.95, 0.12 * h), (r * 0.7, 0.26 * h), (0.03, low),
                     (0.0, low), (0.0, low - 0.004), (0.028, low - 0.005),
                     (r * 0.7 - 0.003, 0.26 * h - 0.004), (r * 0.95 - 0.004, 0.12 * h),
                     (r - 0.004, 0.0), (r, 0.0)], n=36), of=material)  # fmt: skip
@@ -344,10 +344,10 @@ def hanging_lamp(m: Maker, size: Size) -> None:
                         0.45 * low, (r - 0.03) * sin(a))], 0.08, n=4), 0.006, n=7), of=material)  # fmt: skip
                     m.add(frustum((0.022, 0.45 * low), (0.026, 0.5 * low), n=12),
                         at=((r - 0.03) * cos(a), 0.0, (r - 0.03) * sin(a)), of=material)  # fmt: skip
-                    m.add(turned([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
+                    m.add(revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low),
                         (0.0, 0.85 * low)], n=12),
                         at=((r - 0.03) * cos(a), 0.0, (r - 0.03) * sin(a)), of=OPAL)  # fmt: skip
-                m.add(turned([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10), of=material)
+                m.add(revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10), of=material)
             case 8:  # a bar with three shades
                 m.add(bevelled((-r, low - 0.02, -0.012), (r, low, 0.012), 0.002), of=material)
                 for x in (-0.5, 0.5):
@@ -357,7 +357,7 @@ def hanging_lamp(m: Maker, size: Size) -> None:
                     with m.moved(at=(x * r, 0.0, 0.0)):
                         m.add(tube([(0.0, 0.5 * low, 0.0), (0.0, low - 0.018, 0.0)], 0.003, n=5),
                             of=RUBBER)  # fmt: skip
-                        m.add(turned([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
+                        m.add(revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low),
                             (0.0, 0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low),
                             (0.057, 0.3 * low), (0.072, 0.0), (0.075, 0.0)], n=20), of=material)  # fmt: skip
                         m.add(sphere((0.0, 0.2 * low, 0.0), 0.03, n=10), of=OPAL)
@@ -365,11 +365,11 @@ def hanging_lamp(m: Maker, size: Size) -> None:
             case 9:  # leaves of a flower: three plates over each other
                 for k in range(3):
                     q, y = r * (1.0 - 0.24 * k), 0.1 * low + 0.3 * low * k
-                    m.add(turned([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
+                    m.add(revolve([(q, y), (q * 0.6, y + 0.22 * low), (0.02, y + 0.3 * low),
                         (0.02, y + 0.29 * low), (q * 0.6 - 0.002, y + 0.21 * low),
                         (q - 0.003, y - 0.002), (q, y)], n=30), of=material)  # fmt: skip
                 m.add(sphere((0.0, 0.22 * low, 0.0), 0.04, n=12), of=OPAL)
-                m.add(turned([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18),
+                m.add(revolve([(0.0, 0.0), (0.05, 0.005), (0.05, 0.03), (0.0, 0.03)], n=18),
                     of=material)  # fmt: skip
 
 
@@ -391,7 +391,7 @@ def sconce(m: Maker, size: Size) -> None:
             m.add(bevelled((-0.035, 0.0, 0.0), (0.035, 0.1, 0.015), 0.002), of=material)
             m.add(tube(bent([(0.0, 0.05, 0.01), (0.0, 0.03, d - r), (0.0, 0.4 * h, d - r)], 0.03,
                 n=3), 0.006, n=8), of=material)  # fmt: skip
-            m.add(turned([(r, 0.35 * h), (r * 0.75, h), (r * 0.75 - 0.003, h),
+            m.add(revolve([(r, 0.35 * h), (r * 0.75, h), (r * 0.75 - 0.003, h),
                 (r - 0.003, 0.35 * h), (r, 0.35 * h)], n=24), at=(0.0, 0.0, d - r), of=fabric)  # fmt: skip
             for k in range(3):
                 m.add(tube([(0.0, 0.4 * h, d - r), (r * 0.96 * cos(2.1 * k), 0.4 * h,
@@ -401,7 +401,7 @@ def sconce(m: Maker, size: Size) -> None:
         case 1:  # a ball on an arm
             r = min(0.4 * h, d / 2 - 0.01, hw)
             if w < h:
-                m.add(turned([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24),
+                m.add(revolve([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24),
                     turn=LYING_ALONG_Z, at=(0.0, h - hw, 0.0), of=material)  # fmt: skip
             m.add(bevelled((-hw, 0.0, 0.0), (hw, h, 0.01), 0.003), of=material)
             m.add(tube([(0.0, h / 2, 0.01), (0.0, h / 2, d - r)], 0.012, n=8), of=material)

@@ -10,10 +10,12 @@ solids, which are plain functions of bodies.py and cloth.py:
         with m.of(glass() if m.chance(0.3) else m.china()):
             m.add(vessel([(0, 0), (r, 0), (r, tall)], 0.004))
 
-Functions without a decorator are parts that several things share; they take the maker too. With
-`@family` a function describes furniture of the generated catalogue: it takes the size that was drawn
-for a variation. Metres, y up; what stands has its back at -z and its front at +z, what hangs has its
-back at z = 0. The order of draws decides what a seed gives: a draw put in between changes all after it.
+A function without a decorator is a part that several things share; it takes the maker too. With
+`@family` a function describes furniture of the generated catalogue: it also takes the size that was
+drawn for a variation, and pbrs_farm.plugin has these names for packages of one's own.
+
+Metres, y up. What stands has its back at -z and its front at +z; what hangs has its back at z = 0. The
+order of draws decides what a seed gives: a draw put in between changes all that follow.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import COLOURS, Rgb, Style
-from pbrs_farm.dress.things.assembly import Made, Part, hung, made, transformed
+from pbrs_farm.dress.things.assembly import Model, Part, hanging_piece, standing_piece, transformed
 from pbrs_farm.dress.things.materials import any_colour, metal, plain
 
 P = ParamSpec("P")
@@ -197,7 +199,7 @@ class Thing(Generic[P]):
 
     def make(
         self, rng: np.random.Generator, style: Style, *args: P.args, **kwargs: P.kwargs
-    ) -> Made:
+    ) -> Model:
         """One of them as a piece of the catalogue and its shape; BadInput where it has no solids."""
         m = Maker(rng, style)
         self.build(m, *args, **kwargs)
@@ -229,7 +231,7 @@ class Family:
         )
         return width, depth, height
 
-    def make(self, rng: np.random.Generator, style: Style, size: Size, *shared: Any) -> Made:
+    def make(self, rng: np.random.Generator, style: Style, size: Size, *shared: Any) -> Model:
         """A variation of that size; BadInput where it has no solids."""
         m = Maker(rng, style)
         self.build(m, size, *shared)
@@ -239,12 +241,12 @@ class Family:
 D = TypeVar("D", Thing[...], Family)
 
 
-def put_together(m: Maker, of: Thing[...] | Family) -> Made:
+def put_together(m: Maker, of: Thing[...] | Family) -> Model:
     """What was added, as a piece and its shape."""
     parts, name = m.finished(of.build.__module__, of.name), m.name or of.called
     if of.place in (Place.WALL, Place.CEILING):
-        return hung(name, of.group, of.nyu40, parts, (), of.place)
-    return made(name, parts, group=of.group, nyu40=of.nyu40, place=of.place)
+        return hanging_piece(name, of.group, of.nyu40, parts, (), of.place)
+    return standing_piece(name, parts, group=of.group, nyu40=of.nyu40, place=of.place)
 
 
 def thing(

@@ -15,12 +15,12 @@ from pbrs_farm.dress.things.bodies import (
     cylinder,
     frustum,
     loft,
+    revolve,
     rounded,
     slab,
     sphere,
     stretched,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -48,20 +48,20 @@ def ornament(m: Maker) -> None:
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=14), (0.035 * s, 0.032 * s, 0.055 * s)),
                     turn=rotation_x(-0.35), at=(0, 0.062 * s, 0))  # fmt: skip
                 m.add(sphere((0, 0.1 * s, 0.038 * s), 0.022 * s, n=12))
-                m.add(turned([(0, 0), (0.007 * s, 0), (0, 0.024 * s)], n=8), turn=LYING_ALONG_Z,
+                m.add(revolve([(0, 0), (0.007 * s, 0), (0, 0.024 * s)], n=8), turn=LYING_ALONG_Z,
                     at=(0, 0.1 * s, 0.055 * s))  # fmt: skip
                 m.add(stretched(sphere((0, 0, 0), 1.0, n=10), (0.014 * s, 0.006 * s, 0.045 * s)),
                     turn=rotation_x(0.5), at=(0, 0.05 * s, -0.06 * s))  # fmt: skip
-            m.add(turned([(0, 0), (0.03 * s, 0), (0.028 * s, 0.006), (0.006, 0.01),
+            m.add(revolve([(0, 0), (0.03 * s, 0), (0.028 * s, 0.006), (0.006, 0.01),
                 (0.005, 0.04 * s), (0, 0.04 * s)], n=14), of=m.metal)  # fmt: skip
         case 2:
             m.name = "cat"
             with m.of(own):
-                m.add(turned(scaled(s, s, [(0, 0), (0.042, 0), (0.046, 0.02), (0.034, 0.07),
+                m.add(revolve(scaled(s, s, [(0, 0), (0.042, 0), (0.046, 0.02), (0.034, 0.07),
                     (0.02, 0.1), (0, 0.105)]), n=16))  # fmt: skip
                 m.add(sphere((0, 0.12 * s, 0.008), 0.028 * s, n=12))
                 for x in (-0.016, 0.016):
-                    m.add(turned([(0, 0), (0.011 * s, 0), (0, 0.026 * s)], n=8),
+                    m.add(revolve([(0, 0), (0.011 * s, 0), (0, 0.026 * s)], n=8),
                         at=(x * s, 0.137 * s, 0.005))  # fmt: skip
                 m.add(tube(bent([(0.03 * s, 0.008, -0.03 * s), (0.07 * s, 0.008, -0.01),
                     (0.05 * s, 0.008, 0.04 * s)], 0.03, n=3), 0.008, n=6))  # fmt: skip
@@ -93,7 +93,7 @@ def ornament(m: Maker) -> None:
         case 5:
             m.name = "globe"
             r = m.uniform(0.06, 0.1)
-            m.add(turned([(0, 0), (r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025),
+            m.add(revolve([(0, 0), (r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025),
                 (r * 0.1, 0.06), (0, 0.06)], n=18), of=grain)  # fmt: skip
             m.add(sphere((0, r + 0.07, 0), r, n=20), of=plain("globe", m.pick((0.35, 0.5, 0.62),
                 (0.75, 0.68, 0.5), (0.2, 0.3, 0.4)), 0.35))  # fmt: skip
@@ -106,10 +106,10 @@ def ornament(m: Maker) -> None:
             h, r = m.uniform(0.13, 0.2), m.uniform(0.03, 0.04)
             for y in (0.0, h - 0.012):
                 m.add(cylinder(r + 0.012, 0, 0.012, n=18), at=(0, y, 0), of=grain)
-            m.add(turned([(0, 0.0125), (r * 0.9, 0.0125), (r, 0.035), (r * 0.8, 0.36 * h),
+            m.add(revolve([(0, 0.0125), (r * 0.9, 0.0125), (r, 0.035), (r * 0.8, 0.36 * h),
                 (0.004, 0.5 * h), (r * 0.8, 0.64 * h), (r, h - 0.035), (r * 0.9, h - 0.0125),
                 (0, h - 0.0125)], n=18), of=glass())  # fmt: skip
-            m.add(turned([(0, 0.013), (r * 0.86, 0.013), (r * 0.8, 0.03), (0, 0.3 * h)], n=16),
+            m.add(revolve([(0, 0.013), (r * 0.86, 0.013), (r * 0.8, 0.03), (0, 0.3 * h)], n=16),
                 of=plain("sand", (0.8, 0.66, 0.45), 0.9))  # fmt: skip
             for k in range(3):
                 m.add(tube([(cos(2.1 * k) * (r + 0.006), 0.006, sin(2.1 * k) * (r + 0.006)),
@@ -146,7 +146,7 @@ def ornament(m: Maker) -> None:
             m.add(tube([(0, 0, 0), (0, 0.3 * h, 0)], 0.008, n=8), of=grain)
             m.add(frustum((0.03, 0), (0.028, 0.008), n=14), of=grain)
             for k in range(3):
-                m.add(turned([(0, 0), (0.05 - 0.012 * k, 0.0), (0.03 - 0.008 * k, 0.12 * h),
+                m.add(revolve([(0, 0), (0.05 - 0.012 * k, 0.0), (0.03 - 0.008 * k, 0.12 * h),
                     (0.006, 0.28 * h), (0, 0.28 * h)], n=16), at=(0, (0.2 + 0.24 * k) * h, 0),
                     of=own)  # fmt: skip
         case 11:
@@ -179,7 +179,7 @@ def ornament(m: Maker) -> None:
             m.add(bevelled((-0.065, 0, -0.016), (0.065, 0.05, 0.016), 0.004), of=black)
             m.add(bevelled((-0.065, 0.05, -0.015), (0.065, 0.072, 0.015), 0.004), of=m.metal)
             m.add(bevelled((-0.02, 0.07, -0.012), (0.02, 0.085, 0.012), 0.003), of=m.metal)
-            m.add(turned([(0, 0), (0.027, 0), (0.027, 0.02), (0.024, 0.021), (0.024, 0.035),
+            m.add(revolve([(0, 0), (0.027, 0), (0.027, 0.02), (0.024, 0.021), (0.024, 0.035),
                 (0.018, 0.036), (0.014, 0.028), (0, 0.028)], n=20), turn=LYING_ALONG_Z,
                 at=(0.005, 0.034, 0.0155), of=black)  # fmt: skip
             for x in (-0.045, 0.045):
@@ -227,13 +227,13 @@ def ornament(m: Maker) -> None:
                     plain("green", (0.1, 0.5, 0.25), 0.4), plain("pale", (0.9, 0.9, 0.9), 0.4)))  # fmt: skip
         case 18:
             m.name = "snow_globe"
-            m.add(turned([(0, 0), (0.04, 0), (0.036, 0.02), (0.03, 0.025), (0, 0.025)], n=20),
+            m.add(revolve([(0, 0), (0.04, 0), (0.036, 0.02), (0.03, 0.025), (0, 0.025)], n=20),
                 of=own)  # fmt: skip
-            m.add(turned([(0, 0.0252), (0.024, 0.0252), (0.04, 0.045), (0.042, 0.062),
+            m.add(revolve([(0, 0.0252), (0.024, 0.0252), (0.04, 0.045), (0.042, 0.062),
                 (0.034, 0.088), (0.018, 0.1), (0, 0.103)], n=20), of=glass())  # fmt: skip
-            m.add(turned([(0, 0.0254), (0.022, 0.0254), (0.03, 0.038), (0, 0.043)], n=14),
+            m.add(revolve([(0, 0.0254), (0.022, 0.0254), (0.03, 0.038), (0, 0.043)], n=14),
                 of=plain("snow", (0.93, 0.93, 0.93), 0.9))  # fmt: skip
-            m.add(turned([(0, 0.04), (0.014, 0.042), (0, 0.08)], n=10),
+            m.add(revolve([(0, 0.04), (0.014, 0.042), (0, 0.08)], n=10),
                 of=plain("fir", (0.1, 0.3, 0.18), 0.8))  # fmt: skip
         case 19:
             m.name = "bead_string"
@@ -272,7 +272,7 @@ def ornament(m: Maker) -> None:
                 m.add(tube(bent([(0, 0.115 * s, -0.055 * s), (0, 0.11 * s, -0.08 * s),
                     (0, 0.05 * s, -0.085 * s)], 0.02, n=3), 0.006 * s, n=6))  # fmt: skip
                 for x in (-0.008, 0.008):
-                    m.add(turned([(0, 0), (0.005, 0), (0, 0.018)], n=6),
+                    m.add(revolve([(0, 0), (0.005, 0), (0, 0.018)], n=6),
                         at=(x, 0.182 * s, 0.07 * s))  # fmt: skip
         case 23:
             m.name = "blocks"
@@ -297,4 +297,4 @@ def sculpture(m: Maker) -> Surface:
         y, r = y + tall, r * m.uniform(0.6, 0.9)
     profile.append((0.0, y))
     profile[1] = (profile[1][0] + 0.01, 0.0)
-    return turned(profile, n=14)
+    return revolve(profile, n=14)

@@ -8,7 +8,7 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.things.bodies import bevelled, cylinder, rounded, slab, tube, turned
+from pbrs_farm.dress.things.bodies import bevelled, cylinder, revolve, rounded, slab, tube
 from pbrs_farm.dress.things.maker import Maker, Size, family, thing
 from pbrs_farm.dress.things.materials import CHROME, RUBBER, WHITE_STEEL, glossy, plain
 from pbrs_farm.dress.things.outlines import bent
@@ -106,6 +106,6 @@ def panel_radiator(m: Maker, size: Size) -> None:
             m.add(slab((x - 0.015, 0.25 * h, 0.0), (x + 0.015, 0.7 * h, z0 + 0.001)))
     m.add(tube(bent([(hw - 0.04, 0.06, z0 + 0.02), (hw - 0.012, 0.06, z0 + 0.02),
         (hw - 0.012, 0.06, 0.002)], 0.01, n=2), 0.008, n=7), of=CHROME)  # fmt: skip
-    m.add(turned([(0.0, 0.0), (0.02, 0.0), (0.022, 0.03), (0.016, 0.05), (0.0, 0.05)], n=12),
+    m.add(revolve([(0.0, 0.0), (0.02, 0.0), (0.022, 0.03), (0.016, 0.05), (0.0, 0.05)], n=12),
         turn=rotation_z(-pi / 2), at=(hw - 0.05, 0.09 if form < 2 else h - 0.09, d - 0.022),
         of=WHITE_STEEL)  # fmt: skip

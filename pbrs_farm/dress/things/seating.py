@@ -16,13 +16,13 @@ from pbrs_farm.dress.things.bodies import (
     disc,
     frustum,
     loft,
+    revolve,
     rounded,
     sheared,
     slab,
     sphere,
     square_tube,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.cloth import bulged, chair_shell, tub
 from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of, leg
@@ -46,7 +46,7 @@ def stool(m: Maker) -> None:
     r, tall = m.uniform(0.15, 0.19), m.uniform(0.42, 0.5)
     white = plain("stool white", (0.88, 0.88, 0.86), 0.4)
     board = plain("stool " + m.style.wood.name, m.wood, 0.45)
-    m.add(turned([(0, 0), (r - 0.006, 0), (r, 0.008), (r, 0.022), (r - 0.006, 0.03), (0, 0.03)],
+    m.add(revolve([(0, 0), (r - 0.006, 0), (r, 0.008), (r, 0.022), (r - 0.006, 0.03), (0, 0.03)],
         n=28), at=(0, tall - 0.03, 0), of=board)  # fmt: skip
     leg, n = frustum((0.013, 0), (0.018, 1.0), n=12), m.integers(3, 5)
     with m.of(white if m.chance(0.3) else board):
@@ -275,7 +275,7 @@ def armchair(m: Maker, size: Size) -> None:
                     at=(0.0, seat + (h - seat) / 2 - 0.035, -hd + 0.205))  # fmt: skip
         case 4:  # a shell on four legs or a swivel foot
             if m.chance(0.35):
-                m.add(turned([(0.0, 0.0), (0.26, 0.0), (0.25, 0.012), (0.03, 0.03), (0.03, 0.3),
+                m.add(revolve([(0.0, 0.0), (0.26, 0.0), (0.25, 0.012), (0.03, 0.03), (0.03, 0.3),
                     (0.0, 0.3)], n=28), of=m.pick(CHROME, BLACK_STEEL, STEEL))  # fmt: skip
             else:
                 four_legs(m, "tapered", w, d, 0.3, 0.04, 0.22, 0.14, feet_stuff)

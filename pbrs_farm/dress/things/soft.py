@@ -7,7 +7,7 @@ from itertools import product
 from pbrs_farm.core.classes import CLOTHES, PILLOW, TOWEL
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.dress.things.bodies import hoop, rounded, slab, sphere, tube, turned
+from pbrs_farm.dress.things.bodies import hoop, revolve, rounded, slab, sphere, tube
 from pbrs_farm.dress.things.cloth import bulged
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
@@ -34,9 +34,10 @@ def cushion(m: Maker) -> None:
                 m.add(bulged((edge, thick, edge), n=9))
                 m.add(hoop(rect(edge * 0.94, edge * 0.94, 0.03, n=2), 0.0, 0.006, n=5), of=trim)
             case 4:  # round, with a button
-                m.add(turned([(0, -0.06), (0.13, -0.055), (0.19, -0.03), (0.2, 0), (0.19, 0.03),
+                m.add(revolve([(0, -0.06), (0.13, -0.055), (0.19, -0.03), (0.2, 0), (0.19, 0.03),
                     (0.13, 0.055), (0.02, 0.05), (0, 0.045)], n=26))  # fmt: skip
-                m.add(turned([(0, 0.044), (0.018, 0.05), (0.014, 0.058), (0, 0.06)], n=12), of=trim)
+                m.add(revolve([(0, 0.044), (0.018, 0.05), (0.014, 0.058), (0, 0.06)], n=12),
+                    of=trim)  # fmt: skip
             case 5:  # a roll
                 m.add(tube([(-edge / 2, 0, 0), (-edge / 2 + 0.01, 0, 0), (edge / 2 - 0.01, 0, 0),
                     (edge / 2, 0, 0)], 0.08, n=18))  # fmt: skip
@@ -55,7 +56,7 @@ def cushion(m: Maker) -> None:
 def pouf(m: Maker) -> None:
     """A round seat of cloth, as high as a knee at most."""
     r, tall = m.uniform(0.2, 0.29), m.uniform(0.28, 0.4)
-    m.add(turned(scaled(r, tall, [(0, 0), (0.86, 0), (0.97, 0.15), (1, 0.5), (0.96, 0.85),
+    m.add(revolve(scaled(r, tall, [(0, 0), (0.86, 0), (0.97, 0.15), (1, 0.5), (0.96, 0.85),
         (0.84, 0.97), (0.5, 1), (0, 1)]), n=28), of=plain("pouf", m.textile(), 0.95))  # fmt: skip
 
 

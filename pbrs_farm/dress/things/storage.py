@@ -14,12 +14,12 @@ from pbrs_farm.dress.things.bodies import (
     board,
     cylinder,
     hoop,
+    revolve,
     rounded,
     slab,
     sphere,
     square_tube,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of, panel
 from pbrs_farm.dress.things.maker import Maker, Size, family
@@ -369,7 +369,7 @@ def coat_stand(m: Maker, size: Size) -> None:
                 m.add(tube([(0.0, 0.02, 0.0), (0.0, h - 0.06, 0.0)], 0.018, n=12))
                 m.add(sphere((0.0, h - 0.032, 0.0), 0.032, n=12))
                 if foot == 0:
-                    m.add(turned([(0.0, 0.0), (d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035),
+                    m.add(revolve([(0.0, 0.0), (d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035),
                         (0.0, 0.035)], n=30))  # fmt: skip
                 else:
                     for k in range(4):

@@ -15,10 +15,10 @@ from pbrs_farm.dress.things.bodies import (
     disc,
     hoop,
     loft,
+    revolve,
     slab,
     square_tube,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.joints import Look, drawer_front, four_legs, fronts_of, leg
 from pbrs_farm.dress.things.maker import Maker, Size, family
@@ -92,11 +92,11 @@ def under_top(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
             with m.of(material):
                 r = 0.34 * min(w, d)
                 if m.chance(0.5):
-                    m.add(turned([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
+                    m.add(revolve([(0.0, 0.0), (r, 0.0), (r, 0.012), (r * 0.3, 0.04), (0.045, 0.09),
                         (0.04, high - 0.06), (r * 0.4, high - 0.005), (r * 0.4, high), (0.0, high)],
                         n=28))  # fmt: skip
                 else:
-                    m.add(turned([(0.0, 0.12), (0.05, 0.12), (0.035, 0.25), (0.06, 0.4),
+                    m.add(revolve([(0.0, 0.12), (0.05, 0.12), (0.035, 0.25), (0.06, 0.4),
                         (0.045, high - 0.03), (0.1, high), (0.0, high)], n=18))  # fmt: skip
                     for k in range(4):
                         m.add(tube(bent([(0.0, 0.2, 0.0), (0.5 * r * cos(k * pi / 2 + pi / 4), 0.16,

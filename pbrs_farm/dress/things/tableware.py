@@ -10,10 +10,10 @@ from pbrs_farm.dress.things.bodies import (
     bevelled,
     cylinder,
     loft,
+    revolve,
     sphere,
     stretched,
     tube,
-    turned,
     vessel,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
@@ -46,11 +46,11 @@ def pile(m: Maker, n: int) -> None:
         with m.moved(at=(0, 0.0066 * k, 0)), m.of(glaze):
             match form:
                 case 0:  # flat
-                    m.add(turned([(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02),
+                    m.add(revolve([(0, 0), (r * 0.6, 0), (r * 0.72, 0.006), (r, 0.02),
                         (r - 0.002, 0.0225), (r * 0.7, 0.0095), (r * 0.6, 0.005), (0, 0.005)],
                         n=sides))  # fmt: skip
                 case 1:  # deep
-                    m.add(turned([(0, 0), (r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028),
+                    m.add(revolve([(0, 0), (r * 0.55, 0), (r, 0.026), (r - 0.002, 0.028),
                         (r * 0.55, 0.005), (0, 0.005)], n=sides))  # fmt: skip
                 case 2:  # square
                     m.add(loft(rings(rect, [(1.2 * r, 1.2 * r, 0.01, 0),
@@ -62,7 +62,7 @@ def pile(m: Maker, n: int) -> None:
                         (2.4 * r - 0.004, 1.6 * r - 0.004, 0.02), (1.6 * r, 1.0 * r, 0.005)],
                         n=18)))  # fmt: skip
                 case 4:  # with a well
-                    m.add(turned([(0, 0), (r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
+                    m.add(revolve([(0, 0), (r * 0.5, 0), (r * 0.6, 0.026), (r * 0.95, 0.034),
                         (r * 0.95 - 0.002, 0.036), (r * 0.58, 0.03), (r * 0.47, 0.005), (0, 0.005)],
                         n=sides))  # fmt: skip
                 case 5:  # fluted
@@ -80,7 +80,7 @@ def mills(m: Maker) -> None:
     """Salt and pepper."""
     # Foot, waist, head, and the knob that is turned.
     for k, colour in enumerate((m.dark_wood, (0.85, 0.84, 0.8))):
-        m.add(turned([(0, 0), (0.024, 0), (0.02, 0.03), (0.024, 0.07), (0.018, 0.082), (0.02, 0.1),
+        m.add(revolve([(0, 0), (0.024, 0), (0.02, 0.03), (0.024, 0.07), (0.018, 0.082), (0.02, 0.1),
             (0.012, 0.11), (0, 0.11)], n=12), at=(0.055 * k, 0, 0), of=plain("mill", colour, 0.35))  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def pot(m: Maker) -> None:
     r = m.uniform(0.09, 0.13)
     tall = r * m.uniform(0.8, 1.2)
     # Body, rim, the lid's dome and its knob in one closed profile.
-    m.add(turned([(0, 0), (r * 0.95, 0), (r, 0.01), (r, tall), (r * 1.03, tall),
+    m.add(revolve([(0, 0), (r * 0.95, 0), (r, 0.01), (r, tall), (r * 1.03, tall),
         (r * 0.9, tall + 0.012), (r * 0.2, tall + 0.025), (0.012, tall + 0.028),
         (0.018, tall + 0.045), (0, tall + 0.048)], n=20),
         of=m.metal if m.chance(0.6) else plain("enamel", m.any_colour(), 0.2))  # fmt: skip
@@ -106,7 +106,7 @@ def pan(m: Maker) -> None:
     m.add(vessel([(0, 0), (r * 0.85, 0), (r, 0.045)], 0.003, n=20), of=black)
     # The handle lies along +z, turned a little.
     with m.moved(turn=rotation_y(m.uniform(-0.5, 0.5))), m.of(black):
-        m.add(turned([(0, 0), (0.011, 0.0), (0.009, 0.1), (0.012, 0.18), (0, 0.18)], n=8),
+        m.add(revolve([(0, 0), (0.011, 0.0), (0.009, 0.1), (0.012, 0.18), (0, 0.18)], n=8),
             turn=LYING_ALONG_Z, at=(0, 0.035, r * 0.97))  # fmt: skip
 
 
@@ -114,7 +114,7 @@ def pan(m: Maker) -> None:
 def kitchen_roll(m: Maker) -> None:
     """A roll of kitchen paper."""
     # The paper, and the cardboard core 2 mm above it.
-    m.add(turned([(0, 0), (0.055, 0), (0.055, 0.23), (0.02, 0.23), (0.02, 0.232), (0, 0.232)],
+    m.add(revolve([(0, 0), (0.055, 0), (0.055, 0.23), (0.02, 0.23), (0.02, 0.232), (0, 0.232)],
         n=18), name="roll", of=plain("tissue", (0.92, 0.92, 0.9), 0.95))  # fmt: skip
 
 

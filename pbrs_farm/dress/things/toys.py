@@ -13,12 +13,12 @@ from pbrs_farm.dress.things.bodies import (
     frustum,
     hoop,
     loft,
+    revolve,
     rounded,
     slab,
     sphere,
     stretched,
     tube,
-    turned,
 )
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
@@ -93,7 +93,7 @@ def toy(m: Maker) -> None:
                     of=plain("lamp", (0.95, 0.9, 0.7), 0.2))  # fmt: skip
         case 4:
             m.name = "stacking_rings"
-            m.add(turned([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
+            m.add(revolve([(0, 0), (0.06, 0), (0.058, 0.012), (0.012, 0.014), (0.01, 0.15 * s),
                 (0, 0.16 * s)], n=18), of=grain)  # fmt: skip
             for k in range(5):
                 m.add(hoop(oval(0.085 - 0.011 * k, 0.085 - 0.011 * k, n=18), 0.03 + 0.0255 * s * k,
@@ -120,7 +120,7 @@ def toy(m: Maker) -> None:
             m.add(bevelled((-0.13, 0.042, 0.0), (0.13, 0.05, 0.055), 0.003), of=other)
             m.add(bevelled((-0.05, 0.042, -0.1), (0.05, 0.048, -0.07), 0.002), of=other)
             m.add(bevelled((-0.003, 0.045, -0.105), (0.003, 0.09, -0.07), 0.001), of=third)
-            m.add(turned([(0, 0), (0.01, 0), (0, 0.018)], n=10), turn=LYING_ALONG_Z,
+            m.add(revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10), turn=LYING_ALONG_Z,
                 at=(0, 0.045, 0.089), of=third)  # fmt: skip
             m.add(bevelled((-0.06, 0.041, 0.095), (0.06, 0.049, 0.099), 0.001),
                 turn=rotation_z(0.3), at=(0.013, 0, 0), of=grain)  # fmt: skip
@@ -131,9 +131,9 @@ def toy(m: Maker) -> None:
                 m.add(tube([(x, 0.014, 0.04), (x * 0.5, 0.045, 0.035)], 0.003, n=5), of=grain)
         case 7:
             m.name = "rocket"
-            m.add(turned([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
+            m.add(revolve([(0, 0.02), (0.03, 0.02), (0.04, 0.08), (0.038, 0.15), (0.02, 0.2),
                 (0, 0.225)], n=18), of=own)  # fmt: skip
-            m.add(turned([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
+            m.add(revolve([(0.037, 0.148), (0.0385, 0.148), (0.021, 0.2), (0, 0.228), (0, 0.224),
                 (0.018, 0.199), (0.037, 0.148)], n=18), of=other)  # fmt: skip
             for k in range(3):
                 m.add(loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
@@ -197,7 +197,7 @@ def toy(m: Maker) -> None:
                 for x, z in product((-0.02, 0.02), (-0.033, 0.033)):
                     m.add(tube([(x * 1.2, 0, z), (x, 0.06, z)], 0.011, n=8, end=0.014))
                 for k in range(5):
-                    m.add(turned([(0, 0), (0.01, 0), (0, 0.024)], n=6), at=(0,
+                    m.add(revolve([(0, 0), (0.01, 0), (0, 0.024)], n=6), at=(0,
                         0.096 - 0.002 * (k - 2) * (k - 2), -0.04 + 0.02 * k), of=other)  # fmt: skip
 
 
@@ -212,9 +212,9 @@ def ball(m: Maker) -> None:
             m.add(sphere((0, r, 0), r, n=18), of=own)
         case 1:
             m.name = "ball_of_two_colours"
-            m.add(turned(scaled(r, r, [(0, 0), (0.38, 0.08), (0.71, 0.3), (0.93, 0.63), (1, 1),
+            m.add(revolve(scaled(r, r, [(0, 0), (0.38, 0.08), (0.71, 0.3), (0.93, 0.63), (1, 1),
                 (0, 1)]), n=22), of=own)  # fmt: skip
-            m.add(turned(scaled(r, r, [(0, 1), (1, 1), (0.93, 1.37), (0.71, 1.7), (0.38, 1.92),
+            m.add(revolve(scaled(r, r, [(0, 1), (1, 1), (0.93, 1.37), (0.71, 1.7), (0.38, 1.92),
                 (0, 2)]), n=22), of=other)  # fmt: skip
         case 2:
             m.name = "ringed_ball"

@@ -7,7 +7,7 @@ from numpy import cos, pi, sin
 
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Surface
-from pbrs_farm.dress.things.bodies import loft, sphere, tube, turned, vessel
+from pbrs_farm.dress.things.bodies import loft, revolve, sphere, tube, vessel
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import glass, plain
 from pbrs_farm.dress.things.outlines import bent, fluted, oval, rect, ring_path, rings, scaled
@@ -69,11 +69,11 @@ def vase(m: Maker) -> None:
                     (r * 1.25, 0.35 * tall, 0.0), (r * 0.8, 0.3 * tall, 0.0)], 0.04, n=4), 0.008,
                     n=8))  # fmt: skip
             case 11:  # a jar with its lid
-                m.add(turned([(0, 0), (r * 0.7, 0), (r * 0.75, 0.01), (r, 0.4 * tall),
+                m.add(revolve([(0, 0), (r * 0.7, 0), (r * 0.75, 0.01), (r, 0.4 * tall),
                     (r * 1.05, 0.6 * tall), (r * 0.8, 0.76 * tall), (r * 0.5, 0.8 * tall),
                     (0, 0.8 * tall)], n=22))  # fmt: skip
-                m.add(turned(scaled(r, tall, [(0, 0.8002), (0.58, 0.8002), (0.6, 0.84), (0.3, 0.92),
-                    (0.12, 0.94), (0.14, 0.98), (0, 1)]), n=22))  # fmt: skip
+                m.add(revolve(scaled(r, tall, [(0, 0.8002), (0.58, 0.8002), (0.6, 0.84),
+                    (0.3, 0.92), (0.12, 0.94), (0.14, 0.98), (0, 1)]), n=22))  # fmt: skip
             case 12:  # three bellies one above another
                 m.add(vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.9, 0.1), (0.9, 0.22),
                     (0.5, 0.32), (0.8, 0.42), (0.8, 0.54), (0.45, 0.64), (0.65, 0.74), (0.6, 0.86),
@@ -82,7 +82,7 @@ def vase(m: Maker) -> None:
                 a = 0.36 * tall
                 m.add(tube(ring_path(a, n=24), 0.028, n=10), turn=rotation_x(pi / 2),
                     at=(0.0, a + 0.04, 0.0))  # fmt: skip
-                m.add(turned([(0, 0), (0.045, 0), (0.042, 0.012), (0.02, 0.03), (0, 0.03)], n=18))
+                m.add(revolve([(0, 0), (0.045, 0), (0.042, 0.012), (0.02, 0.03), (0, 0.03)], n=18))
                 m.add(vessel([(0, 0), (0.02, 0), (0.016, 0.03), (0.024, 0.06)], 0.003, n=16),
                     at=(0.0, 2 * a + 0.05, 0.0))  # fmt: skip
             case 14:  # flat, as a pillow

@@ -11,7 +11,7 @@ from pbrs_farm.core.classes import MIRROR, SINK
 from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     SWITCH_FORMS,
@@ -107,7 +107,7 @@ def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
 
 
 def hang_anywhere(
-    hanging: Hanging, made: Made, low_m: float, depth_m: float, rng: np.random.Generator, *,
+    hanging: Hanging, made: Model, low_m: float, depth_m: float, rng: np.random.Generator, *,
     above_m: float = 0.05, tags: tuple[str, ...] = (),
 ) -> bool:  # fmt: skip
     """Hang the thing at that height at a place drawn from all that have depth_m free before them.
@@ -155,7 +155,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
-def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Made | None:
+def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) -> Model | None:
     """A socket or switch of the catalogue that is as small as they are; None = make one."""
     fit = [p for p in catalogue.of(group) if max(p.size) < 0.2 and p.size[1] < 0.06]
     if not fit or rng.random() < 0.4:
@@ -166,7 +166,7 @@ def _draw_fitting(catalogue: Catalogue, group: str, rng: np.random.Generator) ->
 
 
 def _fit_beside_door(
-    hanging: Hanging, door: Passage, side: int, made: Made, rng: np.random.Generator
+    hanging: Hanging, door: Passage, side: int, made: Model, rng: np.random.Generator
 ) -> bool:
     """Hang a switch on one side of a door: the handle's side is unknown, so either that is free."""
     piece, shape = made

@@ -17,7 +17,7 @@ from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.classes import MIRROR, OTHERPROP, PICTURE
 from pbrs_farm.core.house import Material, MaterialKind, Surface, Texture
 from pbrs_farm.dress.style import Rgb, Style, shade
-from pbrs_farm.dress.things.assembly import Made, hung
+from pbrs_farm.dress.things.assembly import Model, hanging_piece
 from pbrs_farm.dress.things.hung import facing_disc, ring
 from pbrs_farm.dress.things.materials import metal, plain
 from pbrs_farm.geometry.solids import box, quads_surface
@@ -63,7 +63,7 @@ def faced_slab(name: str, low: F64, high: F64, z: tuple[float, float]) -> tuple[
 def framed(
     rng: np.random.Generator, style: Style, width: float, height: float, print_: Texture,
     frame: Material,
-) -> Made:  # fmt: skip
+) -> Model:  # fmt: skip
     """A print behind a moulding, with or without a mat; outer size in metres."""
     frame_m, depth = _moulding(rng, min(width, height))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
@@ -78,28 +78,28 @@ def framed(
         inner_low, inner_high, at = inner_low + mat - 0.002, inner_high - mat + 0.002, at - 0.002
     face, back = faced_slab("print", inner_low, inner_high, (0.001, at))
     parts += [(face, shown), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
-    return hung("framed_picture", "picture_frame", PICTURE, parts, [print_])
+    return hanging_piece("framed_picture", "picture_frame", PICTURE, parts, [print_])
 
 
-def canvas(width: float, height: float, print_: Texture, edge: Rgb) -> Made:
+def canvas(width: float, height: float, print_: Texture, edge: Rgb) -> Model:
     """A stretched canvas."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     face, back = faced_slab(
         "canvas", low, high, (0.0, 0.025 if max(width, height) < 0.8 else 0.035)
     )
     parts = [(face, _printed(print_)), (back, plain("canvas edge", edge, 0.85))]
-    return hung("canvas", "picture_frame", PICTURE, parts, [print_])
+    return hanging_piece("canvas", "picture_frame", PICTURE, parts, [print_])
 
 
-def poster(width: float, height: float, print_: Texture) -> Made:
+def poster(width: float, height: float, print_: Texture) -> Model:
     """A sheet of paper."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     face, back = faced_slab("poster", low, high, (0.0, 0.0015))
     parts = [(face, _printed(print_, 0.5)), (back, plain("paper", (0.92, 0.92, 0.9), 0.8))]
-    return hung("poster", "picture_frame", PICTURE, parts, [print_])
+    return hanging_piece("poster", "picture_frame", PICTURE, parts, [print_])
 
 
-def mirror(width: float, height: float, frame: Material | None, frame_m: float = 0.02) -> Made:
+def mirror(width: float, height: float, frame: Material | None, frame_m: float = 0.02) -> Model:
     """A mirror, framed or with a bare edge."""
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
     glass = Material("mirror", MaterialKind.MIRROR, specular=(0.9, 0.9, 0.9))
@@ -110,10 +110,10 @@ def mirror(width: float, height: float, frame: Material | None, frame_m: float =
         low, high, depth = low + frame_m, high - frame_m, 0.014
     face, back = faced_slab("mirror", low, high, (0.001 if frame else 0.0, depth))
     parts += [(face, glass), (back, plain("mirror edge", (0.35, 0.4, 0.4), 0.3))]
-    return hung("mirror", "mirror", MIRROR, parts)
+    return hanging_piece("mirror", "mirror", MIRROR, parts)
 
 
-def clock(diameter: float, dial: Texture, frame: Material) -> Made:
+def clock(diameter: float, dial: Texture, frame: Material) -> Model:
     """A round wall clock with a printed dial."""
     r = diameter / 2
     rim = facing_disc([(0, 0), (r, 0), (r, 0.035), (r - 0.012, 0.035), (r - 0.012, 0.024)], r)
@@ -124,7 +124,7 @@ def clock(diameter: float, dial: Texture, frame: Material) -> Made:
         (replace(rim, name="rim"), frame),
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
     ]
-    return hung("clock", "clock", OTHERPROP, parts, [dial])
+    return hanging_piece("clock", "clock", OTHERPROP, parts, [dial])
 
 
 def _moulding(rng: np.random.Generator, short: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace
 from pbrs_farm.dress.style import Rgb, Style, room_style
 from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import canvas, frame_material, framed, jpeg_texture, poster
 from pbrs_farm.dress.walls.prints import print_pixels
@@ -257,7 +257,7 @@ def _hang_group(
 def _framed_picture(
     rng: np.random.Generator, kind: str, size: tuple[float, float], shown: Print, style: Style,
     frame: Material,
-) -> Made:  # fmt: skip
+) -> Model:  # fmt: skip
     width, height = size
     if kind == "canvas":
         return canvas(width, height, shown.texture, shown.mean)

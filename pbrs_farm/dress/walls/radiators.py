@@ -10,7 +10,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import material_of_finish
 from pbrs_farm.dress.things import radiators
-from pbrs_farm.dress.things.assembly import Made
+from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.home.names import RADIATORS, words_of_item
 from pbrs_farm.home.room_use import RoomKind
@@ -35,7 +35,7 @@ def hang_radiators(hanging: Hanging, style: Style, share: float) -> None:
         return
     paint = material_of_finish(finish_scheme(hanging.house, style).radiator)
 
-    def make(wide: float, high: float) -> Made:
+    def make(wide: float, high: float) -> Model:
         return radiators.wall_radiator.make(rng, style, wide, high, paint)
 
     for window in room.windows:
@@ -58,7 +58,7 @@ def _hang_below(
     face: int,
     s: float,
     size: tuple[float, float],
-    make: Callable[[float, float], Made],
+    make: Callable[[float, float], Model],
 ) -> bool:
     width, height = size
     low = hanging.floor_y + _LOW_M

@@ -12,8 +12,8 @@ from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textiles.rug_patterns import RUGS, rug_pixels
 from pbrs_farm.dress.things import hung as hung_furniture
 from pbrs_farm.dress.things import radiators
-from pbrs_farm.dress.things.assembly import Made, Part, hung, transformed
-from pbrs_farm.dress.things.bodies import turned
+from pbrs_farm.dress.things.assembly import Model, Part, hanging_piece, transformed
+from pbrs_farm.dress.things.bodies import revolve
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.walls.fittings import hang_anywhere
 from pbrs_farm.dress.walls.hanging import IN_FRONT_M, WANTS, Hanging
@@ -55,7 +55,7 @@ def hang_shelves(hanging: Hanging, style: Style, share: float) -> None:
 
 def _shelf(
     rng: np.random.Generator, style: Style, board: Material, width: float, *, is_bath: bool
-) -> tuple[Made, float, float]:
+) -> tuple[Model, float, float]:
     """Something with shelves, how high above the floor its lower edge hangs, and what stays free above it."""
     depth = float(rng.uniform(0.14, 0.18) if is_bath else rng.uniform(0.19, 0.27))
     kind = rng.random()
@@ -86,7 +86,7 @@ def hang_cloth(hanging: Hanging, style: Style, share: float) -> None:
     hang_anywhere(hanging, wall_cloth(rng, style, width, height), 1.6 - height / 2, IN_FRONT_M, rng)
 
 
-def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Made:
+def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: float) -> Model:
     """A patterned cloth that hangs from a rod, a fringe at its foot."""
     fringe, rod = 0.09, 0.009
     pixels = rug_pixels(rng, width, height, style, str(rng.choice(list(RUGS))))
@@ -105,11 +105,11 @@ def wall_cloth(rng: np.random.Generator, style: Style, width: float, height: flo
         parts += [(part, yarn) for part in faced_slab("fringe", *ends, (0.003, 0.007))]
     along = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     long = width + 0.1
-    stick = turned([(0.0, 0.0), (rod, 0.0), (rod, long), (0.0, long)], n=12)
+    stick = revolve([(0.0, 0.0), (rod, 0.0), (rod, long), (0.0, long)], n=12)
     parts.append(
         (
             transformed(stick, along, (-long / 2, height + rod, rod)),
             plain("rod", style.wood.mean, 0.5),
         )
     )
-    return hung("wall_cloth", "wall_cloth", OTHERPROP, parts, [texture])
+    return hanging_piece("wall_cloth", "wall_cloth", OTHERPROP, parts, [texture])

@@ -19,7 +19,7 @@ from pbrs_farm.dress.dressing import Dressed, refit_after_repair
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import DressReport
 from pbrs_farm.dress.space import house_space
-from pbrs_farm.dress.things.assembly import hung
+from pbrs_farm.dress.things.assembly import hanging_piece
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.geometry.surface_points import item_triangles
@@ -66,7 +66,9 @@ def _distance(points: F64, corners: F64) -> float:
 def _with_sockets(source: House) -> Dressed:
     """A socket on each wall that a room sees, hung as the dressing hangs."""
     with closing(MutableHouse(source, 1)) as mutable:
-        lower = hung("socket", "socket", OTHERPROP, [(box_at([0, 0.04, 0.01]), Material("white"))])
+        lower = hanging_piece(
+            "socket", "socket", OTHERPROP, [(box_at([0, 0.04, 0.01]), Material("white"))]
+        )
         for space in house_space(mutable).rooms:
             hanging = Hanging(mutable, space, "walls")
             for k, face in enumerate(hanging.faces):

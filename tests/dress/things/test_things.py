@@ -10,8 +10,8 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.mesh import closed_edge_share, signed_volume, triangle_corners
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.things import books
-from pbrs_farm.dress.things.assembly import Made
-from pbrs_farm.dress.things.books import N_CELLS, book_covers
+from pbrs_farm.dress.things.assembly import Model
+from pbrs_farm.dress.things.book_covers import N_CELLS, book_covers
 from pbrs_farm.dress.things.things import THINGS
 
 _STYLE = style_for(np.random.default_rng(1), "nordic")
@@ -22,7 +22,7 @@ def _corners(shape: Shape) -> F64:
     return np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
 
 
-def _hold(made: Made, most_faces: int = 1500) -> None:
+def _hold(made: Model, most_faces: int = 1500) -> None:
     piece, shape = made
     corners = _corners(shape)
     assert closed_edge_share(np.round(corners, 6)) == 1.0, "closed"
