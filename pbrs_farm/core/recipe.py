@@ -122,13 +122,10 @@ class Recipe(FieldGroup):
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
 
-        A field of _CAME_LATER is left out at its default, and a group of such fields alone with
-        them, so that what was stored before the field existed keeps its digest.
-
-            >>> recipe_from_name("fast").digest() == recipe_from_name("fast", {"light.spp": "64"}).digest()
-            False
+        >>> recipe_from_name("fast").digest() == recipe_from_name("fast", {"light.spp": "64"}).digest()
+        False
         """
-        return self._digest(groups, with_light_groups=self.light.groups != "two")
+        return _digest_of_fields(self.model_dump(mode="json", exclude={"name"}), groups)
 
     def picture_digest(self, *groups: str) -> str:
         """As digest, without light.groups: it adds layers and changes no picture, so no seed.
@@ -136,57 +133,13 @@ class Recipe(FieldGroup):
         >>> isinstance(recipe_from_name("fast").picture_digest(), str)
         True
         """
-        return self._digest(groups, with_light_groups=False)
-
-    def _digest(self, groups: tuple[str, ...], *, with_light_groups: bool) -> str:
-        fields = self.model_dump(mode="json", exclude={"name"})
-        if not with_light_groups:
-            del fields["light"]["groups"]
-        for group, names in _CAME_LATER.items():
-            defaults = type(getattr(self, group)).model_fields
-            for name in names:
-                if fields[group][name] == defaults[name].default:
-                    del fields[group][name]
-            if not fields[group]:
-                del fields[group]
-        chosen = {g: fields[g] for g in ("seed", *groups) if g in fields}
-        return keys.digest(chosen if groups else fields)
+        fields = self.model_dump(mode="json", exclude={"name": True, "light": {"groups"}})
+        return _digest_of_fields(fields, groups)
 
 
-_CAME_LATER: Mapping[str, tuple[str, ...]] = {
-    "cameras": (
-        "max_opening_fraction",
-        "min_score",
-        "min_room_score",
-        "hfov_spread",
-        "likeness",
-        "walk_frames",
-        "walk_fps",
-        "walk_speed_mps",
-        "walk_turn_dps",
-        "walk_shake",
-        "stereo_m",
-        "roll_sd_deg",
-    ),
-    "dress": tuple(DressFields.model_fields),
-    "read": ("doors", "stand_ins"),
-    "blur": tuple(BlurFields.model_fields),
-    "lens": tuple(LensFields.model_fields),
-    "sensor": tuple(SensorFields.model_fields),
-    "repair": ("lamp_in_every_room", "lamp_lx", "add_ceilings"),
-    "surroundings": tuple(SurroundingFields.model_fields),
-    "selection": ("min_room_lx", "black_modes"),
-    "tone": ("pictures", "white", "glare", "exposure_ev", "contrast", "black", "spread"),
-    "sky": (
-        "sun_elevation_deg",
-        "sun_azimuth_deg",
-        "time",
-        "overcast",
-        "hour",
-        "latitude_deg",
-        "day_of_year",
-    ),
-}
+def _digest_of_fields(fields: Mapping[str, Any], groups: tuple[str, ...]) -> str:
+    return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
+
 
 _PHOTO: Mapping[str, Any] = {
     "preset": "photo",

@@ -10,9 +10,9 @@ Effects: those of the passes, which read files and the cached packages and write
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY
@@ -76,7 +76,7 @@ class Pass:
 
     version: raised when the pass makes another house of the same input; all that was made with the
     former one is made anew. groups: the recipe groups it reads. depends: what else its result
-    follows from, as JSON knows it; None for a pass that depends on its groups alone.
+    follows from, as JSON knows it.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Pass:
     groups: tuple[str, ...]
     run: Callable[[Preparation], Preparation]
     is_needed: _IsNeeded
-    depends: _Depends | None = None
+    depends: _Depends = field(default=lambda _source, _recipe: [])
 
 
 def dress_seed(source: SourceRef, recipe: Recipe) -> int:
@@ -117,9 +117,20 @@ def _is_dressed(source: SourceRef, recipe: Recipe) -> bool:
     return _is_home(source, recipe) and bool(dress_seed(source, recipe))
 
 
+def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    if source.kind != "plugin":
+        return []
+    # Which passes the plugin's home goes through is known once it is made: any may.
+    return [versions_of_passes(), recipe.digest("dress")]
+
+
 def _stand_ins_depend(_source: SourceRef, recipe: Recipe) -> list[object]:
     how = recipe.read.stand_ins
     return [catalogue_of(recipe.dress).digest if how == "pieces" else ""]
+
+
+def _furnish_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    return [dress_seed(source, recipe), catalogue_of(recipe.dress).digest]
 
 
 def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
@@ -127,7 +138,9 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     fields = recipe.dress.model_dump(
         mode="json", exclude={"seed", "catalogue", "furnish", "passes"}
     )
-    return [dress_seed(source, recipe), fields, catalogue_of(recipe.dress).digest]
+    plugins = filter(None, recipe.dress.passes.split(":"))
+    catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", plugins)
+    return [dress_seed(source, recipe), fields, catalogue.digest, marks]
 
 
 def _read(work: Preparation) -> Preparation:
@@ -238,32 +251,25 @@ def _edit(work: Preparation) -> Preparation:
 
 
 PASSES: Final = (
-    Pass("read", 5, ("read",), _read, lambda _source, _recipe: True),
+    Pass("read", 1, ("read",), _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 1, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
-    Pass(
-        "furnish", GENERATE_VERSION, ("dress",), _furnish,
-        _is_furnished, _dress_depends,
-    ),
-    Pass("dress", 19, ("dress",), _dress, _is_dressed, _dress_depends),
-    Pass("repair", 4, ("repair",), _repair, _is_home),
+    Pass("furnish", GENERATE_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
+    Pass("dress", 1, ("dress",), _dress, _is_dressed, _dress_depends),
+    Pass("repair", 1, ("repair",), _repair, _is_home),
     Pass(
         "surroundings", 1, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
-    Pass("edits", 1, (), _edit, lambda source, _recipe: bool(source.edits), lambda _source, _recipe: []),
+    Pass("edits", 1, (), _edit, lambda source, _recipe: bool(source.edits)),
 )  # fmt: skip
 
 PASS: Final = {p.name: p for p in PASSES}
-_OF_EVERY_HOUSE: Final = tuple(p for p in PASSES if p.depends is None)
-
-STEP_VERSION: Final = sum(p.version for p in _OF_EVERY_HOUSE)
-"""Of the step `house`: raised with the version of any pass that every house goes through."""
-
-STEP_GROUPS: Final = tuple(group for p in _OF_EVERY_HOUSE for group in p.groups)
-"""The recipe groups of the step `house`; those of other passes are in step_depends where they are used."""
 
 GROUPS: Final = tuple(dict.fromkeys(group for p in PASSES for group in p.groups))
 """Every recipe group that a finished house may depend on."""
+
+STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")
+"""The recipe groups of the step `house`; the fields of dressing are in step_depends where it is done."""
 
 
 def versions_of_passes() -> dict[str, int]:
@@ -276,20 +282,11 @@ def cache_key(source: SourceRef, recipe: Recipe) -> str:
     return keys.digest(source, recipe.digest(*GROUPS))
 
 
-def step_depends(source: SourceRef, recipe: Recipe) -> object:
-    """What the step `house` depends on beside STEP_GROUPS, for its digest: files, dressing, edits."""
-    known: list[Any] = [source.fingerprint]
-    # Dressing and furnishing share fields and catalogue.
-    parts: list[object] = []
-    is_furnished = recipe.dress.furnish != "none" and source.kind != "object"
-    if dress_seed(source, recipe) or is_furnished:
-        parts += [PASS["dress"].version, *_dress_depends(source, recipe)]
-        parts += ["furnish", GENERATE_VERSION] if is_furnished else []
-    if _has_stand_ins(source, recipe):
-        stand_ins = PASS["stand-ins"]
-        parts += [stand_ins.name, stand_ins.version, *_stand_ins_depend(source, recipe)]
-    if dress_seed(source, recipe) or is_furnished:
-        parts += marks_in_digest("passes", filter(None, recipe.dress.passes.split(":")))
-    known += [keys.digest(*parts)] if parts else []
-    known += [PASS["edits"].version] if source.edits else []
-    return known if len(known) > 1 else source.fingerprint
+def step_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    """What the step `house` depends on beside STEP_GROUPS, for its digest.
+
+    The source's files, then a row for each pass that the house goes through: name, version, and what
+    else it follows from.
+    """
+    passes = [p for p in PASSES if p.is_needed(source, recipe)]
+    return [source.fingerprint, *([p.name, p.version, *p.depends(source, recipe)] for p in passes)]

@@ -36,7 +36,7 @@ _VIEW_READS: Final = ("cameras", "truth", "opengl_dl", "opengl_il", "light", "de
 STEPS: Final = {
     step.name: step
     for step in (
-        Step("house", passes.STEP_VERSION, passes.STEP_GROUPS, per_view=False),
+        Step("house", 1, passes.STEP_GROUPS, per_view=False),
         Step("cameras", 2, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),

@@ -17,7 +17,7 @@ from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.layers import LAYER, LAYERS, OPTIONAL, layers_in_digest
+from pbrs_farm.core.layers import LAYER, LAYERS, layers_in_digest
 from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
@@ -129,12 +129,7 @@ def _written_layers(marker: Marker | None) -> tuple[str, ...]:
     """The optional layers that a view's labels were made with; () for other steps."""
     if marker is None or marker.step != "truth":
         return ()
-    if "layers" in marker.facts:
-        return tuple(name for name in marker.facts["layers"] if name in LAYER)
-    # Older markers say it by their files alone.
-    places = {keys.parse_house_key(file.key) for file in marker.files}
-    names = {place.file for place in places if place is not None}
-    return tuple(x for x in OPTIONAL if LAYER[x].file in names)
+    return tuple(name for name in marker.facts.get("layers", ()) if name in LAYER)
 
 
 def _union(asked: tuple[str, ...], written: tuple[str, ...]) -> tuple[str, ...]:

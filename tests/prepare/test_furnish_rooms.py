@@ -114,8 +114,8 @@ def test_furnishing_is_part_of_the_house_steps_digest() -> None:
     source = resolve(HOME.word)
     plain = recipe_from_name("fast", {"dress.catalogue": '"generated"'})
     asked = recipe_from_name("fast", {"dress.catalogue": '"generated"', "dress.furnish": "empty"})
-    assert step_depends(source, plain) == source.fingerprint
-    assert step_depends(source, asked) != source.fingerprint
+    assert [row[0] for row in step_depends(source, plain)[1:]] == ["read", "repair", "surroundings"]
+    assert "furnish" in [row[0] for row in step_depends(source, asked)[1:]]
     assert (uses_catalogue(source, plain), uses_catalogue(source, asked)) == (False, True)
     assert plain.digest("dress") == recipe_from_name(
         "preview", {"dress.catalogue": '"generated"'}

@@ -58,16 +58,6 @@ def test_layers_stay_whatever_later_runs_ask_for(tmp_path: Path, mode: str) -> N
         assert path.name in ("view.json", "histogram.json") or path.read_bytes() == data, path
 
 
-def test_layers_of_markers_that_do_not_name_them_stay(tmp_path: Path) -> None:
-    made(tmp_path, HELD)
-    (path,) = tmp_path.glob("houses/*/done/truth.*.json")
-    marker = json.loads(path.read_bytes())
-    assert marker["facts"].pop("layers") == list(wanted([], HELD).layers)
-    path.write_text(json.dumps(marker))
-    assert made(tmp_path).n_done == 0
-    assert {*FILES} <= listed(tmp_path)
-
-
 def test_a_layer_that_cannot_be_made_costs_none_that_is_there(tmp_path: Path) -> None:
     fisheye = {"lens.preset": "tum_vi", "image.width_px": "48"}
     made(tmp_path, ("albedo",), **fisheye)
