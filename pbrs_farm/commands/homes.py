@@ -122,8 +122,9 @@ def _make_of_plan(args: argparse.Namespace) -> int:
     from pbrs_farm.gallery.made_homes import write_home
     from pbrs_farm.generate.plans.plan_files import plan_from_file
     from pbrs_farm.generate.plans.plan_format import Part
-    from pbrs_farm.prepare.formats import PLAN, format_of_file
+    from pbrs_farm.prepare.formats import format_of_file
     from pbrs_farm.prepare.plan_house import furnish_plan_file
+    from pbrs_farm.read.common.format import PLAN
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.

@@ -22,13 +22,10 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.plugins import plugin, plugins
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.installation import install_command, is_installed
-from pbrs_farm.read.common.format import Format, GivenFile
+from pbrs_farm.read.common.format import PLAN, Format, GivenFile
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import fault_of, open_regular
-
-PLAN: Final = "plan"
-"""The kind of sources that are floor plans, of whatever format."""
 
 _HEAD_BYTES: Final = 4 * 2**20
 _MOST_BYTES: Final = 2**40

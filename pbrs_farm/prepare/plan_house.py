@@ -20,10 +20,9 @@ from pbrs_farm.generate.generated_home import GeneratedHome, furnish_storeys
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import part_of
-from pbrs_farm.prepare.formats import PLAN
 from pbrs_farm.prepare.stand_ins import with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import PLAN, GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.regular_files import digest_of_regular

@@ -48,3 +48,9 @@ def test_hooks_run_what_make_check_runs() -> None:
     check = (REPO / "Makefile").read_text(encoding="utf-8").partition("\ncheck:")[2]
     for program in re.findall(r"^\t\$\(BIN\)/([a-z-]+)", check.partition("\n\n")[0], re.MULTILINE):
         assert f".venv/bin/{program}" in hooks, program
+
+
+def test_no_modules_import_one_another_at_run_time() -> None:
+    from benchmarks.house import import_cycles, imports_of_modules
+
+    assert import_cycles(imports_of_modules()) == 0

@@ -18,7 +18,6 @@ from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.prepare import formats as table
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.formats import (
-    PLAN,
     format_of_file,
     format_of_kind,
     format_of_plugin,
@@ -28,6 +27,7 @@ from pbrs_farm.prepare.formats import (
 )
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
+from pbrs_farm.read.common.format import PLAN
 from pbrs_farm.store import MemoryStore
 from tests.inputs.sound_files import sound_files
 from tests.read import textured_sources

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from pbrs_farm.core.data_format import DataFormat
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.source_files import SourceFiles
+
+PLAN: Final = "plan"
+"""The kind of sources that are floor plans, of whatever format."""
 
 
 class GivenFile(NamedTuple):
