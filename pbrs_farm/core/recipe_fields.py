@@ -33,13 +33,16 @@ class ReadFields(FieldGroup):
     """Limits of what is read."""
 
     max_triangles: int = Field(
-        5_000_000, gt=0, le=50_000_000, description="of a house; more is refused"
+        5_000_000, gt=0, le=50_000_000, description="most triangles of a house; more is refused"
     )
     max_model_triangles: int = Field(
-        2_000_000, gt=0, le=50_000_000, description="of one model; more is refused"
+        2_000_000, gt=0, le=50_000_000, description="most triangles of one model; more is refused"
     )
     max_extent_m: float = Field(
-        1_000.0, gt=0, le=100_000.0, description="a piece farther out is refused"
+        1_000.0,
+        gt=0,
+        le=100_000.0,
+        description="farthest from the origin; a piece beyond it is refused",
     )
     hidden_levels: bool = Field(False, description="Sweet Home 3D: read levels not shown, too")
     doors: Literal["drawn", "open"] = Field(
@@ -57,19 +60,27 @@ class ReadFields(FieldGroup):
 class DressFields(FieldGroup):
     """Dressing: how far a home is made to look lived in, between reading and repair (docs/dress.md)."""
 
-    seed: int = Field(0, ge=0, lt=2**32, description="of what is chosen; 0 = not dressed")
-    surfaces: Share = Field(1.0, description="of rooms that get floors and walls of a style")
-    parts: Share = Field(1.0, description="of furniture whose wood, cloth and metal change")
-    swap: Share = Field(0.7, description="of furniture that another model of its class replaces")
-    furniture: Share = Field(1.0, description="of what is added along free walls, beside beds")
-    clutter: Share = Field(1.0, description="of the things that stand on furniture")
-    walls: Share = Field(1.0, description="of pictures, mirrors, clocks, sockets and switches")
-    textiles: Share = Field(1.0, description="of curtains, blinds, rugs, pillows, blankets")
-    lamps: Share = Field(1.0, description="of rooms without a lamp that get one")
+    seed: int = Field(0, ge=0, lt=2**32, description="seed of what is chosen; 0 = not dressed")
+    surfaces: Share = Field(1.0, description="share of rooms that get floors and walls of a style")
+    parts: Share = Field(1.0, description="share of furniture whose wood, cloth and metal change")
+    swap: Share = Field(
+        0.7, description="share of furniture that another model of its class replaces"
+    )
+    furniture: Share = Field(
+        1.0, description="share of the furniture that fits along free walls and beside beds"
+    )
+    clutter: Share = Field(1.0, description="share of the things that fit on furniture")
+    walls: Share = Field(
+        1.0, description="share of pictures, mirrors, clocks, sockets and switches"
+    )
+    textiles: Share = Field(1.0, description="share of curtains, blinds, rugs, pillows, blankets")
+    lamps: Share = Field(1.0, description="share of rooms without a lamp that get one")
     mess: Share = Field(
         0.3, description="how little was tidied up: chairs, beds, tables, clothes, pictures"
     )
-    style: str = Field("", max_length=64, description="every home's; empty = drawn by the seed")
+    style: str = Field(
+        "", max_length=64, description="the style of every home; empty = drawn by the seed"
+    )
     furnish: Literal["none", "empty"] = Field(
         "none", description="rooms that get furniture first: `empty` = those that have none"
     )
@@ -86,7 +97,7 @@ class RepairFields(FieldGroup):
     """Geometry repair (paper section 3, "Data")."""
 
     wall_thickness_m: float = Field(
-        0.10, gt=0, le=5, description="of planar walls, paper section 3"
+        0.10, gt=0, le=5, description="thickness of planar walls, paper section 3"
     )
     default_wall_rgb: tuple[Share, Share, Share] = Field(
         (1.0, 1.0, 1.0), description="sRGB of walls without a colour, paper section 3"
@@ -101,14 +112,23 @@ class RepairFields(FieldGroup):
         0.0,
         ge=0,
         le=1_000,
-        description="on the floor, that an added lamp aims at by the room's area; 0 = 1,600 lm each",
+        description="mean on the floor that an added lamp is sized for; 0 = 1,600 lm each",
     )
     add_ceilings: bool = Field(
         False, description="a ceiling at the walls' height over rooms that have walls and none"
     )
-    shade_transmission: float = Field(0.4, ge=0, le=1, description="diffuse, of enclosing shades")
-    min_escape: float = Field(0.2, ge=0, le=1, description="share of light below which a shade is")
-    bulb_radius_m: float = Field(BULB_RADIUS_M, gt=0, le=1, description="where none is given")
+    shade_transmission: float = Field(
+        0.4, ge=0, le=1, description="diffuse transmission of shades that enclose their bulb"
+    )
+    min_escape: float = Field(
+        0.2,
+        ge=0,
+        le=1,
+        description="lamps whose light output ratio is below this get a translucent shade",
+    )
+    bulb_radius_m: float = Field(
+        BULB_RADIUS_M, gt=0, le=1, description="radius of a bulb where the source gives none"
+    )
 
 
 class SurroundingFields(FieldGroup):
@@ -127,7 +147,7 @@ class CameraFields(FieldGroup):
         description="whose rules and score: paper, released; photo: as people photograph rooms; or a"
         " plugin's",
     )
-    n_sectors: int = Field(6, ge=1, le=360, description="of a room, equal angles each")
+    n_sectors: int = Field(6, ge=1, le=360, description="sectors of a room, of equal angles")
     cell_m: float = Field(0.25, ge=0.05, le=100, description="edge of the viewpoint grid")
     height_min_m: float = Field(1.5, gt=0, le=100, description="eye above the floor's surface")
     height_max_m: float = Field(1.6, gt=0, le=100)
@@ -142,12 +162,17 @@ class CameraFields(FieldGroup):
         0.0, ge=0, le=30, description="of a normal spread of the roll about level; 0 = level"
     )
     clearance_m: float = Field(
-        0.10, ge=0, le=10, description="from any obstacle, in three dimensions"
+        0.10, ge=0, le=10, description="least distance of the eye from any obstacle"
     )
     min_objects: int = Field(3, ge=0, le=65_535)
-    min_object_fraction: float = Field(0.01, ge=0, le=1, description="of the picture, per object")
+    min_object_fraction: float = Field(
+        0.01, ge=0, le=1, description="least share of the picture for an object to count"
+    )
     max_item_fraction: float = Field(
-        1.0, gt=0, le=1, description="of the picture, of any one object; 1 = off, as in the paper"
+        1.0,
+        gt=0,
+        le=1,
+        description="largest share of the picture of one object; 1 = off, as in the paper",
     )
     max_wall_fraction: float = Field(
         1.0, gt=0, le=1, description="the same of a wall, floor or ceiling; 1 = off"
@@ -155,7 +180,9 @@ class CameraFields(FieldGroup):
     max_opening_fraction: float = Field(
         1.0, gt=0, le=1, description="photo: of the picture, of all doors and windows together"
     )
-    min_score: float = Field(0.0, ge=0, le=2, description="photo: weaker views are left out")
+    min_score: float = Field(
+        0.0, ge=0, le=2, description="photo: views of a lower score are left out"
+    )
     min_room_score: float = Field(
         0.0, ge=0, le=2, description="photo: but a room's best view stays from here on"
     )
@@ -228,7 +255,9 @@ class LightFields(FieldGroup):
     rr_depth: int = Field(
         1, ge=1, le=1024, description="first vertex; docs/lab/light.md: measured the best of 1 to 6"
     )
-    filter: Literal["box", "tent"] = Field("tent", description="of a pixel's samples")
+    filter: Literal["box", "tent"] = Field(
+        "tent", description="reconstruction filter of a pixel's samples"
+    )
     pilot_spp: int = Field(
         4, ge=0, le=4096, description="32x24 pixels per emitter; 0 = uniform choice"
     )
@@ -246,7 +275,7 @@ class LightFields(FieldGroup):
         0.0,
         ge=0,
         le=604_800,
-        description="of a view's light, instead of samples or mutations; 0 = off",
+        description="seconds of light a view, instead of samples or mutations; 0 = off",
     )
     groups: Literal["two", "lamps"] = Field(
         "two", description="outdoor and indoor; `lamps`: a layer for each lamp, too (`path`)"
@@ -316,7 +345,9 @@ class EmissionFields(FieldGroup):
     """How strong lights are."""
 
     preset: Literal["photometric", "released"] = "photometric"
-    sky_lx: float = Field(10_000.0, gt=0, le=1e7, description="sky without sun on open ground")
+    sky_lx: float = Field(
+        10_000.0, gt=0, le=1e7, description="illuminance of the sky without sun on open ground"
+    )
     sun_lx: float = Field(60_000.0, ge=0, le=1e7, description="the sun's share, at most")
     lamp_lm: float = Field(1_600.0, gt=0, le=1e7, description="a Sweet Home 3D lamp of power 0.5")
     lm_per_watt: float = Field(13.0, gt=0, le=1e4, description="SUNCG's watts")
