@@ -40,19 +40,32 @@ class Intrinsics:
 
     @staticmethod
     def from_hfov(width_px: int, height_px: int, hfov_rad: float = PAPER_HFOV_RAD) -> Intrinsics:
-        """Square pixels, principal point in the middle, full horizontal field of view hfov_rad."""
+        """Square pixels, principal point in the middle, full horizontal field of view hfov_rad.
+
+        The default field of view is the paper's. The principal point is (width / 2, height / 2),
+        since pixel centres lie at +0.5; fy equals fx, so the vertical field of view follows from
+        the height.
+        """
         f = 0.5 * width_px / math.tan(0.5 * hfov_rad)
         return Intrinsics(width_px, height_px, f, f, 0.5 * width_px, 0.5 * height_px)
 
     def resized(self, width_px: int, height_px: int) -> Intrinsics:
-        """The same field of view on another pixel grid."""
+        """The same field of view on another pixel grid.
+
+        Both focal lengths and the principal point scale with the grid; the lens is kept. A size of
+        another aspect stretches the picture: fx and fy then differ.
+        """
         sx, sy = width_px / self.width_px, height_px / self.height_px
         return Intrinsics(
             width_px, height_px, self.fx * sx, self.fy * sy, self.cx * sx, self.cy * sy, self.lens
         )
 
     def zoomed(self, factor: float) -> Intrinsics:
-        """The focal length times factor: above 1 a narrower field of view."""
+        """The focal length times factor: above 1 a narrower field of view.
+
+        Size, principal point and lens stay: the picture is cut narrower about its principal point.
+        Not for panoramas, whose K says how the whole sphere lies on the pixels.
+        """
         return replace(self, fx=self.fx * factor, fy=self.fy * factor)
 
     @property
@@ -64,7 +77,13 @@ class Intrinsics:
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1]], np.float64)
 
     def directions(self, pixels: F64) -> F64:
-        """(N, 3) of pixel coordinates (N, 2): x right, y down, z forward, as Lens.directions."""
+        """(N, 3) of pixel coordinates (N, 2): x right, y down, z forward, as Lens.directions.
+
+        Pixels are float64 (x, y) with the origin at the top left and centres at +0.5: the centre of
+        the first pixel is (0.5, 0.5). Where the lens has no ray (outside a fisheye's circle, beyond
+        a fold) the direction is as Lens.directions says. The axes are OpenCV's, in the camera's
+        frame.
+        """
         plane = (pixels - [self.cx, self.cy]) / [self.fx, self.fy]
         return self.lens.directions(plane)
 
@@ -79,7 +98,12 @@ class Intrinsics:
 
 
 def intrinsics_from_k(size: tuple[int, int], k: Any, hfov_deg: float) -> Intrinsics:
-    """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view."""
+    """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view.
+
+    With K the field of view is ignored; without it pixels are square and hfov_deg lies between 0
+    and 175. Raises BadInput for a size below 1 pixel, such a field of view, or a K that is not (3,
+    3) finite numbers or has a skew or a focal length that is not positive. The lens is a pinhole.
+    """
     width, height = (int(v) for v in size)
     if min(width, height) < 1:
         raise BadInput("camera", "size", f"{width}x{height} is no size")

@@ -47,7 +47,11 @@ class Piece:
 
     @property
     def held_by(self) -> Place:
-        """What holds it: the place where it belongs, or a wall where its library hangs it there."""
+        """What holds it: the place where it belongs, or a wall where its library hangs it there.
+
+        Ask this, not `place`, where a thing is put: a cupboard that its library hangs 1.4 m up
+        belongs to the floor by its group, yet needs a wall.
+        """
         hangs = self.low_m > 0 and self.place in (Place.FLOOR, Place.SURFACE)
         return Place.WALL if hangs else self.place
 
@@ -63,7 +67,11 @@ class Shape:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) minimum and maximum in the piece's frame, metres."""
+        """(2, 3) minimum and maximum in the piece's frame, metres.
+
+        Computed at each call: keep it where it is used more than once. ValueError for a shape
+        without surfaces.
+        """
         return np.array(points_bounds(np.concatenate([s.positions for s in self.surfaces])))
 
 
@@ -94,11 +102,19 @@ class Catalogue:
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 
     def of(self, *groups: str) -> tuple[Piece, ...]:
-        """The pieces of these groups, in the catalogue's order."""
+        """The pieces of these groups, in the catalogue's order.
+
+        Empty for a group that the catalogue does not have: callers fall back to another piece or
+        leave the place free.
+        """
         return tuple(p for p in self.pieces if p.group in groups)
 
     def shape(self, piece: Piece) -> Shape | None:
-        """The piece's shape, loaded once; None where its model cannot be used."""
+        """The piece's shape, loaded once; None where its model cannot be used.
+
+        A failure is remembered too: a model that cannot be used is not read again. What it returns
+        is shared, so nothing may write into its arrays.
+        """
         if piece.id not in self._shapes:
             self._shapes[piece.id] = self.load(piece)
         return self._shapes[piece.id]

@@ -27,7 +27,13 @@ _MOST_NAMES: Final = 12  # names of fields that a hint lists
 
 
 def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHouse) -> Any:
-    """The JSON value in data; an error for text that is no JSON, NaN, or absurdly deep nesting."""
+    """The JSON value in data; an error for text that is no JSON, NaN, or absurdly deep nesting.
+
+    Every failure is one `error` (BadHouse unless another is given) that names the file and, where
+    it is known, the line and column or the byte: empty text, text that is not UTF-8, NaN and
+    Infinity, numbers of absurdly many digits, and nesting beyond Python's stack. What the value
+    holds is not checked: that is `checked`'s work.
+    """
     if not data.strip():
         raise error(file, "", "no valid JSON: the text is empty")
     try:
@@ -98,7 +104,13 @@ def _field_names(adapter: TypeAdapter[Any]) -> list[str]:
 
 
 def place_in(path: Sequence[int | str]) -> str:
-    """A place below a value as a reader would point to it: materials[0].texture."""
+    """A place below a value as a reader would point to it: materials[0].texture.
+
+    Numbers are indices and become [0]; names are joined by dots; an empty path gives "".
+
+        >>> place_in(["materials", 0, "texture"])
+        'materials[0].texture'
+    """
     steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return "".join(steps).removeprefix(".")
 
@@ -128,7 +140,11 @@ _WANTED: Final = {
 
 
 def sentence(fault: ErrorDetails) -> str:
-    """What is wrong, of one fault that pydantic found, in words that say nothing of pydantic."""
+    """What is wrong, of one fault that pydantic found, in words that say nothing of pydantic.
+
+    A fault of one of our own validators keeps its sentence; of pydantic's kinds the commonest have
+    sentences of ours, the others say what was expected and what was there instead.
+    """
     kind, facts = fault["type"], fault.get("ctx", {})
     if kind in ("value_error", "assertion_error"):
         return str(facts["error"])  # our own validators write sentences
@@ -154,7 +170,12 @@ def _shown_value(value: object) -> str:
 
 
 def exactly(n: int, what: str = "numbers") -> BeforeValidator:
-    """In Annotated: a list of n values, named by what they are where it is none."""
+    """In Annotated: a list of n values, named by what they are where it is none.
+
+    Put it before the item's own type, so that a list of the wrong length gives one sentence,
+    "expected 3 numbers", and not a fault for each value that is missing or too many. Lists and
+    tuples pass; what the values are is left to the type.
+    """
 
     def check(value: object) -> object:
         if not isinstance(value, list | tuple) or len(value) != n:

@@ -31,7 +31,13 @@ class DataFormat:
     beside: tuple[str, ...] = ()  # patterns of names of files that lie beside one and are no homes
 
     def is_sure_of(self, suffix: str, head: bytes) -> bool:
-        """Whether a file of this suffix (lower case) that begins with head is of this format."""
+        """Whether a file of this suffix (lower case) that begins with head is of this format.
+
+        A suffix of this format alone is enough. A suffix that several formats share
+        (`shared_suffixes`) needs `contains` to be found in head, the first bytes of the file. False
+        does not say that the file is of another format: only that its name and beginning do not
+        decide.
+        """
         if suffix not in self.suffixes:
             return False
         return suffix not in self.shared_suffixes or (
@@ -39,5 +45,10 @@ class DataFormat:
         )
 
     def has_keys(self, names: set[str]) -> bool:
-        """Whether a JSON file in which these names occur is of this format."""
+        """Whether a JSON file in which these names occur is of this format.
+
+        The format lists alternative sets of keys; one set that is wholly among the names is enough.
+        Names are compared wherever in the file they occur, so a file of another format that happens
+        to have them is taken for this one.
+        """
         return any(names.issuperset(keys) for keys in self.keys)

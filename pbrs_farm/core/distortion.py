@@ -29,7 +29,13 @@ _RESIDUAL: Final = 1e-10  # of a solution, at z = 1: a ten-millionth of a pixel
 
 
 def distorted(points: F64, coefficients: Coefficients) -> F64:
-    """(N, 2) points in the plane of undistorted points (N, 2) at z = 1."""
+    """(N, 2) points in the plane of undistorted points (N, 2) at z = 1.
+
+    Brown's radial-tangential model: coefficients are (k1, k2, p1, p2, k3), in OpenCV's order, for
+    points x / z and y / z before the camera. It is defined everywhere, but beyond `largest_radius`
+    it folds back over points nearer to the axis: callers leave those out. Brown 1966; the formula
+    is in the head of this module.
+    """
     k1, k2, p1, p2, k3 = coefficients
     a, b = points[:, 0], points[:, 1]
     s = a * a + b * b
@@ -40,7 +46,12 @@ def distorted(points: F64, coefficients: Coefficients) -> F64:
 
 
 def undistorted(points: F64, coefficients: Coefficients) -> F64:
-    """(N, 2) the inverse of distorted, by Newton's method; NaN where no undistorted point is."""
+    """(N, 2) the inverse of distorted, by Newton's method; NaN where no undistorted point is.
+
+    Coefficients as of `distorted`. A point is NaN where Newton's method leaves a residual, where
+    the Jacobian is not positive definite, or where the solution lies beyond `largest_radius`: such
+    a point of the picture is seen by no ray. N may be 0.
+    """
     if not len(points):
         return points.copy()
     # Start at the radius that the radial part alone maps to the point's.
@@ -70,7 +81,11 @@ def undistorted(points: F64, coefficients: Coefficients) -> F64:
 
 
 def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:
-    """dx/da, dx/db = dy/da and dy/db of distorted at (N, 2) points."""
+    """dx/da, dx/db = dy/da and dy/db of distorted at (N, 2) points.
+
+    Three (N,) float64 arrays, as the matrix is symmetric; coefficients as of `distorted`.
+    `undistorted` takes a solution only where it is positive definite.
+    """
     k1, k2, p1, p2, k3 = coefficients
     a, b = points[:, 0], points[:, 1]
     s = a * a + b * b
@@ -83,13 +98,21 @@ def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:
 
 
 def largest_radius(coefficients: Coefficients) -> float:
-    """The radius at z = 1 from which on the radial part runs back inwards; inf where it never does."""
+    """The radius at z = 1 from which on the radial part runs back inwards; inf where it never does.
+
+    Only k1, k2 and k3 count, so with strong tangential terms the fold lies a little elsewhere:
+    `undistorted` judges that by the Jacobian as well.
+    """
     k1, k2, _p1, _p2, k3 = coefficients
     return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3)))
 
 
 def first_root(polynomial: tuple[float, ...]) -> float:
-    """The least positive real root of the polynomial, constant first; inf where it has none."""
+    """The least positive real root of the polynomial, constant first; inf where it has none.
+
+    The coefficients are those of 1, s, s^2 ... Roots with an imaginary part up to rounding count as
+    real; 0 does not count.
+    """
     roots = np.roots(polynomial[::-1])
     real = roots.real[(np.abs(roots.imag) < 1e-12 * (1 + np.abs(roots))) & (roots.real > 0)]
     return float(real.min()) if len(real) else math.inf
@@ -116,20 +139,33 @@ _FISHEYE_STEPS: Final = 6
 
 
 def radius_of_angle(angle_rad: F64, coefficients: Coefficients) -> F64:
-    """The plane's radius of angles from the axis, of any shape."""
+    """The plane's radius of angles from the axis, of any shape.
+
+    Kannala and Brandt 2006: t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8), in focal lengths. Beyond
+    `angle_of_fold` the radius shrinks again, and its inverse is ambiguous.
+    """
     k1, k2, k3, k4 = coefficients
     s = angle_rad * angle_rad
     return np.asarray(angle_rad * (1 + s * (k1 + s * (k2 + s * (k3 + s * k4)))))
 
 
 def angle_of_fold(coefficients: Coefficients) -> float:
-    """The angle in rad from which on the radius shrinks; inf where it never does."""
+    """The angle in rad from which on the radius shrinks; inf where it never does.
+
+    Where the derivative of `radius_of_angle` first is 0. A lens sees up to this angle or its own
+    image circle, whichever is less.
+    """
     k1, k2, k3, k4 = coefficients
     return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3, 9 * k4)))
 
 
 def angle_of_radius(radius: F64, coefficients: Coefficients, largest_rad: float) -> F64:
-    """(N,) angles in rad of radii (N,), up to largest_rad; NaN for radii beyond its own."""
+    """(N,) angles in rad of radii (N,), up to largest_rad; NaN for radii beyond its own.
+
+    The inverse of `radius_of_angle` on 0..largest_rad, by a table and Newton's method. largest_rad
+    must not lie beyond `angle_of_fold`, where the radius is no longer monotone and the table's
+    order breaks.
+    """
     k1, k2, k3, k4 = coefficients
     grid = np.linspace(0.0, largest_rad, _FISHEYE_GRID)
     angle = np.interp(radius, radius_of_angle(grid, coefficients), grid)
@@ -145,7 +181,11 @@ def angle_of_radius(radius: F64, coefficients: Coefficients, largest_rad: float)
 
 
 def directions_of_fisheye(plane: F64, coefficients: Coefficients, largest_rad: float) -> F64:
-    """(N, 3) unit directions of points (N, 2) of the plane; NaN beyond largest_rad."""
+    """(N, 3) unit directions of points (N, 2) of the plane; NaN beyond largest_rad.
+
+    OpenCV's axes: x right, y down, z forward; an angle above 90 degrees has z < 0. The plane's unit
+    is the focal length, the axis at (0, 0).
+    """
     radius = np.linalg.norm(plane, axis=1)
     angle = angle_of_radius(radius, coefficients, largest_rad)
     # sin(t) / r is 1 on the axis.
@@ -154,7 +194,11 @@ def directions_of_fisheye(plane: F64, coefficients: Coefficients, largest_rad: f
 
 
 def fisheye_of_directions(directions: F64, coefficients: Coefficients, largest_rad: float) -> F64:
-    """(N, 2) the plane's points of directions (N, 3) of any length; NaN beyond largest_rad."""
+    """(N, 2) the plane's points of directions (N, 3) of any length; NaN beyond largest_rad.
+
+    OpenCV's axes. The direction exactly behind the camera has no side, and the one along the axis
+    is the centre: both give (0, 0), the first only where largest_rad reaches 180 degrees.
+    """
     across = np.linalg.norm(directions[:, :2], axis=1)
     angle = np.arctan2(across, directions[:, 2])
     radius = radius_of_angle(angle, coefficients)

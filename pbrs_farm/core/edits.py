@@ -109,7 +109,11 @@ SUFFIX: Final = "-e"
 
 
 def edits_digest(edits: Sequence[Edit]) -> str:
-    """Digest of edits in their order, "" of none; where a file lies is no matter, its content is."""
+    """Digest of edits in their order, "" of none; where a file lies is no matter, its content is.
+
+    Two lists that read equal files from different folders have one digest, since sha256 of the
+    content is part of each edit. The order counts: later edits act on what earlier ones left.
+    """
     if not edits:
         return ""
     rows = [edit.model_dump(mode="json") for edit in edits]
@@ -120,12 +124,20 @@ def edits_digest(edits: Sequence[Edit]) -> str:
 
 
 def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
-    """The id of a house with edits: `<house>-e<8 hex>`; its own without any."""
+    """The id of a house with edits: `<house>-e<8 hex>`; its own without any.
+
+    Eight digits tell the edits of one house apart; where equality must be sure, compare
+    `edits_digest`.
+    """
     return f"{house_id}{SUFFIX}{edits_digest(edits)[:8]}" if edits else house_id
 
 
 def files_of_edits(edits: Sequence[Edit]) -> dict[str, str]:
-    """Path -> sha256 of every file that edits read."""
+    """Path -> sha256 of every file that edits read.
+
+    Models that are placed and pictures that cover items; the digests are those of the time when the
+    edit was made. A path that two edits name appears once, with the digest of the last.
+    """
     found = {}
     for edit in edits:
         if isinstance(edit, PlaceModel):

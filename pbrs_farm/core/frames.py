@@ -21,24 +21,38 @@ PUBLISHED_FROM_OPENGL: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], 
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
-    """Pose of a camera with OpenCV axes from the pose with OpenGL axes."""
+    """Pose of a camera with OpenCV axes from the pose with OpenGL axes.
+
+    (4, 4) in and out. Positions and scale stay; the camera's y and z axes are turned round. The
+    same call maps back, since the change of axes is its own inverse.
+    """
     return world_from_camera @ OPENCV_FROM_OPENGL
 
 
 def rotation_x(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +x."""
+    """(3, 3) right-handed rotation about +x.
+
+    For column vectors, p' = R p: a positive angle takes +y towards +z.
+    """
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[1, 0, 0], [0, c, -s], [0, s, c]], np.float64)
 
 
 def rotation_y(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +y."""
+    """(3, 3) right-handed rotation about +y.
+
+    For column vectors, p' = R p: a positive angle takes +z towards +x, which is anticlockwise seen
+    from above.
+    """
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float64)
 
 
 def rotation_z(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +z."""
+    """(3, 3) right-handed rotation about +z.
+
+    For column vectors, p' = R p: a positive angle takes +x towards +y.
+    """
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float64)
 
@@ -49,19 +63,32 @@ LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0
 
 
 def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:
-    """(N, 3) points in frame a; a_from_b is (4, 4) affine."""
+    """(N, 3) points in frame a; a_from_b is (4, 4) affine.
+
+    points_b is (N, 3) of any float type; the result is float64. For directions and normals take the
+    rotation alone: this adds the translation. The last row of the matrix is not read, so a
+    projection is not divided out.
+    """
     p = np.asarray(points_b, np.float64)
     return np.asarray(p @ a_from_b[:3, :3].T + a_from_b[:3, 3])
 
 
 def linear_from_srgb(encoded: NDArray[np.floating]) -> F64:
-    """Linear values from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1)."""
+    """Linear values from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1).
+
+    Any shape; float64 comes back. Divide 8-bit values by 255 first. Values above 1 follow the same
+    curve; negative ones stay on its linear part.
+    """
     e = np.asarray(encoded, np.float64)
     return np.where(e <= 0.04045, e / 12.92, ((np.maximum(e, 0) + 0.055) / 1.055) ** 2.4)
 
 
 def srgb_from_linear(linear: NDArray[np.floating]) -> F64:
-    """sRGB-encoded values from linear ones, both in 0..1 (IEC 61966-2-1)."""
+    """sRGB-encoded values from linear ones, both in 0..1 (IEC 61966-2-1).
+
+    Any shape; float64 comes back, not rounded. It clips nothing: light above 1 gives values above
+    1, and negative values stay on the linear part.
+    """
     v = np.asarray(linear, np.float64)
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0) ** (1 / 2.4) - 0.055)
 

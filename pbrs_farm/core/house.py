@@ -97,7 +97,11 @@ class Material:
 
     @property
     def shows_maps(self) -> bool:
-        """Whether light follows its roughness and normal maps: glass and bulbs stay flat."""
+        """Whether light follows its roughness and normal maps: glass and bulbs stay flat.
+
+        The light renderer and the layers of surfaces both ask it, so that pictures and labels agree
+        on which maps count.
+        """
         return self.kind in (MaterialKind.OPAQUE, MaterialKind.MIRROR, MaterialKind.SHADE)
 
 
@@ -117,13 +121,22 @@ class Surface:
 
 
 def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
-    """(F, 3, 3) corners of all triangles of surfaces in their order, in double precision."""
+    """(F, 3, 3) corners of all triangles of surfaces in their order, in double precision.
+
+    (0, 3, 3) without surfaces, so that callers need no special case. Which surface a triangle is of
+    is not kept: count the faces, or take `geometry_from_house`.
+    """
     found = [triangle_corners(s.positions, s.faces) for s in surfaces]
     return np.concatenate([np.zeros((0, 3, 3)), *found])
 
 
 def part_of(surface: Surface, faces: I32, name: str) -> Surface:
-    """Some faces of a surface with the vertices they use, as a surface of its own."""
+    """Some faces of a surface with the vertices they use, as a surface of its own.
+
+    faces is (F, 3) int32 indices into the surface's vertices, with repetition allowed; vertices are
+    renumbered, those that no face uses are dropped. Material, texture coordinates and normals are
+    carried over.
+    """
     used, numbers = np.unique(faces, return_inverse=True)
     return Surface(
         name=name,
@@ -145,7 +158,11 @@ class Box:
 
     @property
     def corners(self) -> F64:
-        """(8, 3) corners in the world; corner i has the sign of bit k of i along axis k."""
+        """(8, 3) corners in the world; corner i has the sign of bit k of i along axis k.
+
+        float64, metres. Corner 0 is the least and corner 7 the greatest along all three axes of the
+        box; corners i and i ^ 1 share an edge along the first axis.
+        """
         signs = np.array([[1 if i >> k & 1 else -1 for k in range(3)] for i in range(8)])
         return np.asarray(self.centre + (signs * self.half) @ self.axes.T)
 
@@ -220,7 +237,11 @@ class Item:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) axis-aligned minimum and maximum, metres; NaN for an item without vertices."""
+        """(2, 3) axis-aligned minimum and maximum, metres; NaN for an item without vertices.
+
+        Computed from all vertices at each call, also those that no face uses: keep it where a loop
+        needs it. A NaN compares false with everything, so an item without vertices meets no box.
+        """
         points = [s.positions for s in self.surfaces if len(s.positions)]
         if not points:
             return np.full((2, 3), np.nan)
@@ -229,7 +250,11 @@ class Item:
 
     @property
     def oriented_box(self) -> Box:
-        """The item's box, or its axis-aligned one."""
+        """The item's box, or its axis-aligned one.
+
+        `box` where a reader knew the item's own axes. The axis-aligned one is NaN for an item
+        without vertices.
+        """
         if self.box is not None:
             return self.box
         low, high = self.bounds
@@ -237,7 +262,11 @@ class Item:
 
     @property
     def is_outside(self) -> bool:
-        """It is no part of the home: it lies before its windows."""
+        """It is no part of the home: it lies before its windows.
+
+        Such items are only seen through windows: the camera search and exports of a home leave them
+        out.
+        """
         return OUTSIDE in self.tags
 
     @property
@@ -368,11 +397,19 @@ class House:
         raise KeyError(room_id)
 
     def with_items(self, items: Iterable[Item]) -> House:
-        """The same house with other items (instance ids follow their order)."""
+        """The same house with other items (instance ids follow their order).
+
+        Levels, rooms, materials and textures are shared with this house. Labels and triangle
+        numbers belong to one order of items: arrays made from the old house do not fit the new one.
+        """
         return replace(self, items=tuple(items))
 
     def surfaces(self) -> Iterator[tuple[int, Item, int, Surface]]:
-        """(instance id, item, index in the item, surface) of every surface, in order."""
+        """(instance id, item, index in the item, surface) of every surface, in order.
+
+        The instance id counts items from 1, as in the item buffer (0 = nothing). The position in
+        this sequence is the number in Geometry.face_surface, with and without panes.
+        """
         for index, item in enumerate(self.items):
             for j, surface in enumerate(item.surfaces):
                 yield index + 1, item, j, surface
@@ -401,7 +438,13 @@ class Geometry:
 
 
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
-    """Concatenate every surface of house; with_panes False leaves out window panes (light only)."""
+    """Concatenate every surface of house; with_panes False leaves out window panes (light only).
+
+    float32 positions in metres, int32 faces into them, and for each face the instance id (uint32,
+    from 1), the material and the number of its surface in `House.surfaces`. Surface numbers are the
+    same with and without panes. Nothing is welded: vertices are as many as all surfaces have.
+    Normals and texture coordinates are zeros for a surface without.
+    """
     positions, normals, uvs, faces = [], [], [], []
     face_item, face_material, face_surface = [], [], []
     n_vertices = 0

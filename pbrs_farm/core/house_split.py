@@ -34,7 +34,11 @@ class SplitShares:
 
 
 def shares_from_text(text: str) -> SplitShares:
-    """80/10/10 as Shares; raises BadInput."""
+    """80/10/10 as Shares; raises BadInput.
+
+    Shares need not add up to 100: 8/1/1 says the same, since they are divided by their sum. One of
+    them may be 0. A sum that is not above 0, or not three numbers, is the BadInput.
+    """
     try:
         train, val, test = (float(part) for part in text.split("/"))
     except ValueError:
@@ -46,13 +50,22 @@ def shares_from_text(text: str) -> SplitShares:
 
 
 def home_of(house: str) -> str:
-    """The house's id without its digest and without its variant: `studio` of studio-1a2b3c4d-d3."""
+    """The house's id without its digest and without its variant: `studio` of studio-1a2b3c4d-d3.
+
+    Houses that are variants of one home go into one split by it: a network must not see in training
+    the walls that it is tested on. An id of another form is returned as it is.
+    """
     match = re.fullmatch(r"(?P<home>.+?)" + _DIGEST_AND_VARIANT.pattern, house)
     return match["home"] if match else house
 
 
 def split_of_house(house: str, shares: SplitShares | None = None) -> str:
-    """ "train", "val" or "test" of a house's id."""
+    """ "train", "val" or "test" of a house's id.
+
+    Decided by the home's name alone, through sha256: adding houses moves none of the others,
+    variants of one home stay together, and every machine says the same. The shares hold only on
+    average; of a few houses one split may be empty.
+    """
     shares = shares or SplitShares()
     # Take a number of 0..1 from the home's name.
     digest = hashlib.sha256(home_of(house).encode()).digest()

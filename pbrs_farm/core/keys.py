@@ -50,12 +50,22 @@ class HouseKey:
 
 
 def slug(name: str) -> str:
-    """name in lower case with only a-z, 0-9 and single dashes; "house" if nothing is left."""
+    """name in lower case with only a-z, 0-9 and single dashes; "house" if nothing is left.
+
+    At most 60 characters. Different names can have one slug, so ids add a digest to it.
+
+        >>> slug("Mein Haus (2).sh3d")
+        'mein-haus-2-sh3d'
+    """
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "house"
 
 
 def house_id(file_stem: str, source_sha256: str) -> str:
-    """`<slug of the file name>-<first 8 hex of the source's sha256>`."""
+    """`<slug of the file name>-<first 8 hex of the source's sha256>`.
+
+    The file's name is for people; the digest makes the id that of the content. So another content
+    is another id, and two files of one content and name share theirs.
+    """
     return f"{slug(file_stem)}-{source_sha256[:8]}"
 
 
@@ -74,7 +84,11 @@ def is_object(house: str) -> bool:
 
 
 def view_id(room_id: str, sector: int, k: int | None = None) -> str:
-    """`<room>_<sector>`, `_<k>` when a sector has several."""
+    """`<room>_<sector>`, `_<k>` when a sector has several.
+
+    Room and sector are those of the camera search; k numbers the views of a sector that keeps
+    several. Frames of a sequence and right views have ids of their own: `frame_id`, `right_id`.
+    """
     return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
 
 
@@ -84,18 +98,29 @@ def frame_id(number: int) -> str:
 
 
 def right_id(left: str) -> str:
-    """Id of a stereo pair's right view, of the left one's."""
+    """Id of a stereo pair's right view, of the left one's.
+
+    Not for a view that is itself a right one; `take_id` undoes it.
+    """
     return f"{left}_right"
 
 
 def take_id(view: str) -> str:
-    """What a camera takes at one setting: all frames of a house's clip, both eyes of a pair."""
+    """What a camera takes at one setting: all frames of a house's clip, both eyes of a pair.
+
+    What is drawn once a take, as the tone, takes its seed from this, so that a clip does not
+    flicker and both eyes agree.
+    """
     left = view.removesuffix("_right")
     return "clip" if left.startswith("frame_") else left
 
 
 def house_key(house: str, file: str = "") -> str:
-    """Key of a house's file; of its folder, with a trailing slash, when file is ""."""
+    """Key of a house's file; of its folder, with a trailing slash, when file is "".
+
+    Objects lie below another folder than houses; the id tells which it is. The file may itself
+    contain slashes. `parse_house_key` is the inverse.
+    """
     return f"{FOLDERS[is_object(house)]}/{house}/{file}"
 
 
@@ -110,17 +135,29 @@ def marker_name(step: str, view: str | None = None) -> str:
 
 
 def marker_key(house: str, step: str, view: str | None = None) -> str:
-    """Key of the marker that says a step is done."""
+    """Key of the marker that says a step is done.
+
+    With a view for steps that are done view by view. Whoever asks whether a step is done looks for
+    this key, not for the files of the step.
+    """
     return house_key(house, f"done/{marker_name(step, view)}.json")
 
 
 def unfinished_key(house: str, step: str = "", view: str = "") -> str:
-    """Key of what a step under way has kept; of the folder of all, with a trailing slash, when step is ""."""
+    """Key of what a step under way has kept; of the folder of all, with a trailing slash, when step is "".
+
+    What lies there may be deleted: the step then begins again.
+    """
     return house_key(house, f"unfinished/{step}.{view}.npz" if step else "unfinished/")
 
 
 def parse_house_key(key: str) -> HouseKey | None:
-    """What house_key, view_key or marker_key built the key of; None when none of them did."""
+    """What house_key, view_key or marker_key built the key of; None when none of them did.
+
+    For a marker `file` is "" and `step` is set, `view` too where the marker is of one view. Keys of
+    the root (recipe.json, selection/) give None, and so does an object's id below the houses'
+    folder.
+    """
     match = _HOUSE_KEY.fullmatch(key)
     if match is None or match["root"] != FOLDERS[is_object(match["house"])]:
         return None
@@ -129,7 +166,11 @@ def parse_house_key(key: str) -> HouseKey | None:
 
 
 def selection_key(run: str, ending: str) -> str:
-    """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that is no file name."""
+    """Key of a selection's "parquet", "jsonl" or "html"; BadInput for a name that is no file name.
+
+    Names of runs are of letters, digits, dots and dashes, since they become file names; anything
+    else could leave the folder.
+    """
     if not _RUN_NAME.fullmatch(run):
         raise BadInput("--run", run, "a run's name holds letters, digits, dots and dashes")
     return f"selection/{run}.{ending}"
@@ -141,7 +182,12 @@ def histogram_pack_key(house: str) -> str:
 
 
 def canonical_json(value: Any) -> str:
-    """JSON with sorted keys and no spaces: equal values give equal text."""
+    """JSON with sorted keys and no spaces: equal values give equal text.
+
+    Pydantic models are dumped first. Characters beyond ASCII are escaped; floats are written as
+    Python's repr, so 1 and 1.0 differ. TypeError for values that JSON does not know, arrays among
+    them.
+    """
     if isinstance(value, BaseModel):
         value = value.model_dump(mode="json")
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
@@ -153,10 +199,19 @@ def sha256(data: bytes) -> str:
 
 
 def digest(*parts: Any) -> str:
-    """First 32 hex of the sha256 over the parts' canonical JSON."""
+    """First 32 hex of the sha256 over the parts' canonical JSON.
+
+    The order of the parts counts. Anything that canonical_json takes may be a part; what is not
+    part of the digest does not make work be done again.
+    """
     return sha256("\n".join(canonical_json(p) for p in parts).encode())[:32]
 
 
 def seed(*parts: str | int) -> int:
-    """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7."""
+    """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7.
+
+    Every random choice takes its seed from names: the same names give the same numbers on every
+    machine and in every order of work. Give each purpose a word of its own among the parts, or two
+    choices are correlated.
+    """
     return int(digest(*parts)[:8], 16)

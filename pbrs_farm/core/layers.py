@@ -57,7 +57,10 @@ class Layer:
 
     @property
     def is_label(self) -> bool:
-        """Whether neighbouring values must not be mixed when the picture is scaled."""
+        """Whether neighbouring values must not be mixed when the picture is scaled.
+
+        True for classes, ids and masks: scale those by the nearest pixel, never by averaging.
+        """
         return self.shown_as in ("classes", "ids", "mask")
 
     @property

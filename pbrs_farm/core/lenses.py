@@ -65,7 +65,11 @@ class Lens:
 
     @property
     def largest_angle_rad(self) -> float:
-        """The angle from the axis beyond which nothing is seen."""
+        """The angle from the axis beyond which nothing is seen.
+
+        For a fisheye the image circle or the fold, whichever is nearer; for a radtan lens the angle
+        of its fold, or 90 degrees without one; 180 degrees for panoramas.
+        """
         if self.model == "fisheye":
             return min(self.max_angle_rad, angle_of_fold(self.coefficients))
         if self.model == "radtan":
@@ -89,7 +93,12 @@ class Lens:
         return np.where(np.isfinite(found).all(1, keepdims=True), found, 0.0)
 
     def plane_points(self, directions: F64) -> F64:
-        """(N, 2) points of the plane of directions (N, 3), any length; NaN where none is seen."""
+        """(N, 2) points of the plane of directions (N, 3), any length; NaN where none is seen.
+
+        Directions are OpenCV's (x right, y down, z forward). A pinhole and a radtan lens see
+        nothing at z <= 1e-9, a fisheye nothing beyond its largest angle; panoramas see everything.
+        Multiply by the focal lengths and add the principal point to get pixels.
+        """
         if self.model == "fisheye":
             return fisheye_of_directions(directions, self.coefficients, self.largest_angle_rad)
         if self.model == "equirect":
@@ -117,7 +126,12 @@ PINHOLE: Final = Lens()
 
 
 def lens_from_table(table: Mapping[str, Any]) -> Lens:
-    """The lens that Lens.table wrote; KeyError, TypeError or ValueError when it is none."""
+    """The lens that Lens.table wrote; KeyError, TypeError or ValueError when it is none.
+
+    The table may carry other keys, which are ignored; a missing max_angle_rad is 180 degrees.
+    KeyError for a coefficient that is missing, ValueError for an unknown model or text that is no
+    number.
+    """
     model = table["model"]
     if model not in COEFFICIENTS:
         raise ValueError(f"no lens model {model!r}")

@@ -52,7 +52,12 @@ class MadeHome:
 
     @property
     def word(self) -> str:
-        """The word that names this home alone."""
+        """The word that names this home alone.
+
+        What differs from the defaults is spelled out, the rest is left out: two equal homes have
+        one word, and `made_homes` reads it back. It is part of the digest, so its form must not
+        change.
+        """
         parts = [f"{PREFIX}{self.seed}"]
         plain = MadeHome(self.seed)
         for name, key in (("bedrooms", "rooms"), ("area", "area")):
@@ -91,7 +96,13 @@ def is_made(word: str) -> bool:
 
 
 def made_homes(word: str) -> list[MadeHome]:
-    """The homes of a word, one a seed. Raises BadInput for a word that names none."""
+    """The homes of a word, one a seed. Raises BadInput for a word that names none.
+
+    A word is made:FIRST..LAST,key=value,... with keys rooms, area, style, plans, storeys and
+    furniture=none; a single seed is a range of one. Every home of the word shares its options.
+    BadInput also for a range longer than MAX_HOMES and for wishes that no home meets
+    (`check_wishes`).
+    """
     # made:FIRST..LAST,key=value,...
     seeds, *options = word.removeprefix(PREFIX).split(",")
     first, last = _checked_range(word, seeds, MAX_SEED)
@@ -119,7 +130,12 @@ def made_homes(word: str) -> list[MadeHome]:
 
 
 def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: int = 1) -> None:
-    """Raise BadInput for a number of bedrooms, an area and storeys that no home meets."""
+    """Raise BadInput for a number of bedrooms, an area and storeys that no home meets.
+
+    bedrooms and area (m2) are inclusive ranges. A home must exist whose area overlaps the range,
+    for a number of bedrooms within it; two storeys need at least the bedrooms for which plans of
+    two storeys exist. The error names the range that would do.
+    """
     low, high = bedrooms
     if not 0 <= low <= high <= len(_AREA_OF_HOMES) - 1:
         text = "homes have 0 to 4 bedrooms"
@@ -145,7 +161,11 @@ def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: 
 
 
 def expanded(words: list[str]) -> list[str]:
-    """The words, each that names a range of made or plugins' homes replaced by one word a home."""
+    """The words, each that names a range of made or plugins' homes replaced by one word a home.
+
+    The order of the words is kept, and paths and other words pass unchanged. BadInput as of
+    `made_homes` and `plugin_homes`.
+    """
     found: list[str] = []
     for word in words:
         if is_made(word):

@@ -22,12 +22,19 @@ _NO_NORMAL = 100 * np.finfo(np.float64).eps  # of a face in a plane: twice its a
 
 
 def triangle_corners(positions: NDArray[np.floating], faces: NDArray[np.integer]) -> F64:
-    """(F, 3, 3) corners of the faces (F, 3) of a mesh, in double precision."""
+    """(F, 3, 3) corners of the faces (F, 3) of a mesh, in double precision.
+
+    positions is (V, 3) in any float type, faces (F, 3) indices below V; (0, 3, 3) for no faces.
+    Corners are copies: changing them does not change the mesh.
+    """
     return np.asarray(positions[faces], np.float64)
 
 
 def triangle_bounds(corners: F64) -> tuple[F64, F64]:
-    """(F, D) least and greatest coordinates of triangles (F, 3, D), in a fifth of numpy's time."""
+    """(F, D) least and greatest coordinates of triangles (F, 3, D), in a fifth of numpy's time.
+
+    D is 3 in space and 2 in a plan. NaN in a corner gives NaN in its box, which meets nothing.
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
@@ -44,13 +51,21 @@ def dots(a: F64, b: F64) -> F64:
 
 
 def points_bounds(points: NDArray[np.floating]) -> tuple[F64, F64]:
-    """(3,) least and greatest coordinates of points (N, 3), in a tenth of numpy's time; N > 0."""
+    """(3,) least and greatest coordinates of points (N, 3), in a tenth of numpy's time; N > 0.
+
+    float64 from points of any float type. ValueError for no points: ask first, or take Item.bounds,
+    which gives NaN.
+    """
     columns = np.ascontiguousarray(points.T)
     return columns.min(1).astype(np.float64), columns.max(1).astype(np.float64)
 
 
 def boxes_meeting(low: F64, high: F64, other_low: F64, other_high: F64) -> Bools:
-    """(N,) whether boxes low..high (N, 3) meet or touch the box other_low..other_high (3,)."""
+    """(N,) whether boxes low..high (N, 3) meet or touch the box other_low..other_high (3,).
+
+    A box with NaN meets nothing. Boxes that only touch count as meeting: grow or shrink them by a
+    tolerance where that matters.
+    """
     meets = np.asarray((high[:, 0] >= other_low[0]) & (low[:, 0] <= other_high[0]))
     for axis in (1, 2):
         meets &= (high[:, axis] >= other_low[axis]) & (low[:, axis] <= other_high[axis])
@@ -58,7 +73,11 @@ def boxes_meeting(low: F64, high: F64, other_low: F64, other_high: F64) -> Bools
 
 
 def unique_points(points: F64) -> F64:
-    """The different rows of points (N, 3) in lexicographic order, in half of numpy's time."""
+    """The different rows of points (N, 3) in lexicographic order, in half of numpy's time.
+
+    Rows count as different unless all three numbers are equal: round first to join points that lie
+    close. NaN differs from itself.
+    """
     ordered = points[np.lexsort(points.T[::-1])]
     x, y, z = ordered.T
     is_new = (x[1:] != x[:-1]) | (y[1:] != y[:-1]) | (z[1:] != z[:-1])
@@ -84,7 +103,11 @@ def finite_triangles(corners: F64) -> F64:
 
 
 def cross_products(a: F64, b: F64) -> F64:
-    """(..., 3) a x b, to the bit as numpy's, in a third of its time for a few vectors."""
+    """(..., 3) a x b, to the bit as numpy's, in a third of its time for a few vectors.
+
+    Shapes are broadcast against each other, as (N, 3) with (3,). The type is the wider one of the
+    two.
+    """
     out = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
@@ -92,7 +115,11 @@ def cross_products(a: F64, b: F64) -> F64:
 
 
 def area_vectors(corners: F64) -> F64:
-    """(F, 3) normals of triangles (F, 3, 3), twice the area long; their front is anticlockwise."""
+    """(F, 3) normals of triangles (F, 3, 3), twice the area long; their front is anticlockwise.
+
+    (0, 0, 0) for a triangle without area. Their sum over a closed mesh is 0. Take `unit_normals`
+    where only the direction counts.
+    """
     return cross_products(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
@@ -102,7 +129,11 @@ def face_areas(corners: F64) -> F64:
 
 
 def unit_normals(corners: F64) -> F64:
-    """(F, 3) unit normals of triangles (F, 3, 3); (0, 0, 0) where a face has no area."""
+    """(F, 3) unit normals of triangles (F, 3, 3); (0, 0, 0) where a face has no area.
+
+    The normal points to the side from which corners run anticlockwise. A sliver that is not quite
+    without area has a normal made of rounding errors: leave such faces out with `faces_with_area`.
+    """
     n = area_vectors(corners)
     return np.asarray(n / np.maximum(lengths(n)[:, None], _TINY))
 
@@ -138,7 +169,12 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
 
 
 def outside_area(corners: F64) -> float:
-    """m2 of triangles (F, 3, 3) seen from outside: both sides of a mesh that is open."""
+    """m2 of triangles (F, 3, 3) seen from outside: both sides of a mesh that is open.
+
+    A closed mesh counts once, since its inside cannot be seen; a curtain or a leaf counts from both
+    sides. Whether it is closed is judged by how many of its edges two faces share, with corners
+    rounded so that seams of textures do not open it.
+    """
     area = float(face_areas(corners).sum())
     is_closed = closed_edge_share(np.round(corners.astype(np.float32), _PLACE_DIGITS)) > _CLOSED
     return area if is_closed else 2 * area

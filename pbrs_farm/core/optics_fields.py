@@ -130,7 +130,12 @@ class LensFields(FieldGroup):
         return found
 
     def aspect_fault(self, width_px: int, height_px: int) -> str | None:
-        """Why a picture of that size cannot be the lens's, None where it can."""
+        """Why a picture of that size cannot be the lens's, None where it can.
+
+        The text names the --set options that mend it. Panoramas have a fixed aspect (2:1, six faces
+        in a row); a lens that states fx has that of the size it was calibrated at; any size fits a
+        pinhole or radtan lens without fx.
+        """
         if self.model in ("pinhole", "radtan") and self.fx == 0:
             return None
         w, h = {"equirect": _EQUIRECT_PX, "cubemap": _CUBEMAP_PX}.get(

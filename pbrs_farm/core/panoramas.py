@@ -31,7 +31,11 @@ FACE_AXES: Final[F64] = np.array(
 
 
 def directions_of_equirect(plane: F64) -> F64:
-    """(N, 3) unit directions of (longitude, latitude downwards) (N, 2); NaN beyond the poles."""
+    """(N, 3) unit directions of (longitude, latitude downwards) (N, 2); NaN beyond the poles.
+
+    Angles in radians; (0, 0) is the camera's forward axis, longitude grows to the right. OpenCV's
+    axes. Longitudes beyond pi wrap round and are not NaN.
+    """
     longitude, latitude = plane[:, 0], plane[:, 1]
     level = np.cos(latitude)
     found = np.stack(
@@ -41,13 +45,21 @@ def directions_of_equirect(plane: F64) -> F64:
 
 
 def equirect_of_directions(directions: F64) -> F64:
-    """(N, 2) longitude in -pi..pi and latitude downwards of directions (N, 3) of any length."""
+    """(N, 2) longitude in -pi..pi and latitude downwards of directions (N, 3) of any length.
+
+    Radians, OpenCV's axes; latitude is positive below the horizon. Straight up and down any
+    longitude is right, and 0 is given.
+    """
     x, y, z = directions.T
     return np.stack([np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))], axis=1)
 
 
 def directions_of_cubemap(plane: F64) -> F64:
-    """(N, 3) unit directions of points (N, 2) of the strip; NaN beside it."""
+    """(N, 3) unit directions of points (N, 2) of the strip; NaN beside it.
+
+    The strip has its six faces side by side, each two units wide and high: face k covers x from 2k
+    - 1 to 2k + 1, y from -1 to 1. Its order of faces is that of FACE_AXES.
+    """
     number = np.floor((plane[:, 0] + 1) / 2)
     inside = (number >= 0) & (number < 6) & (np.abs(plane[:, 1]) <= 1)
     axes = FACE_AXES[np.where(inside, number, 0).astype(np.int64)]
@@ -59,7 +71,11 @@ def directions_of_cubemap(plane: F64) -> F64:
 
 
 def cubemap_of_directions(directions: F64) -> F64:
-    """(N, 2) the strip's points of directions (N, 3) of any length, on the face that sees each."""
+    """(N, 2) the strip's points of directions (N, 3) of any length, on the face that sees each.
+
+    OpenCV's axes. On an edge between two faces the one that comes first in FACE_AXES is taken. NaN
+    for a direction of length 0.
+    """
     number = np.argmax(directions @ FACE_AXES[:, 2].T, axis=1)
     local = np.einsum("nij,nj->ni", FACE_AXES[number], directions)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -43,7 +43,11 @@ class PinholeFaces:
     y: F64
 
     def nearest(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        """(H, W, ...) the lens's picture by the nearest pixel; 0 where there is no ray."""
+        """(H, W, ...) the lens's picture by the nearest pixel; 0 where there is no ray.
+
+        For labels, whose values must not be mixed. pictures has one (h, w, ...) array a face, in
+        their order and all of one type, which is that of the result.
+        """
         out = np.zeros((*self.number.shape, *pictures[0].shape[2:]), pictures[0].dtype)
         for k, picture in enumerate(pictures):
             at = self.number == k
@@ -53,7 +57,11 @@ class PinholeFaces:
         return out
 
     def bilinear(self, pictures: Sequence[NDArray[np.floating]]) -> NDArray[np.float32]:
-        """(H, W, C) the lens's picture of (h, w, C) pictures; 0 where there is no ray."""
+        """(H, W, C) the lens's picture of (h, w, C) pictures; 0 where there is no ray.
+
+        For light and depth of surfaces, not for ids. pictures has one float array a face, at least
+        2 x 2 pixels; a border repeats itself, nothing is taken from the neighbouring face.
+        """
         out = np.zeros((*self.number.shape, pictures[0].shape[2]), np.float32)
         for k, picture in enumerate(pictures):
             at = self.number == k
@@ -69,7 +77,12 @@ class PinholeFaces:
 
 
 def faces_of_directions(directions: F64) -> PinholeFaces:
-    """The faces that hold all rays of a picture: (H, W, 3), OpenCV's axes, any length, 0 = no ray."""
+    """The faces that hold all rays of a picture: (H, W, 3), OpenCV's axes, any length, 0 = no ray.
+
+    One face where all rays lie within its widest angle about the axis, six faces of a cube
+    otherwise. The focal length is chosen so that the faces are finer than the finest part of the
+    lens's picture, up to a limit.
+    """
     length = np.linalg.norm(directions, axis=-1)
     has_ray = length > 0
     unit = directions / np.where(has_ray, length, 1.0)[..., None]

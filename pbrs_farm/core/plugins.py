@@ -44,7 +44,11 @@ class Plugin:
         return f"{self.name} of {self.package} {self.version}"
 
     def load(self) -> Any:
-        """Its object; MachineFailed where its module cannot be imported."""
+        """Its object; MachineFailed where its module cannot be imported.
+
+        Imports the package of the plugin and so runs its code; Python keeps the module, so a second
+        call is cheap. Any exception of the import becomes the MachineFailed.
+        """
         try:
             return self.entry.load()
         except Exception as error:
@@ -54,7 +58,11 @@ class Plugin:
 
 @cache
 def plugins(group: str) -> Mapping[str, Plugin]:
-    """The installed plugins of a group by name; of two of one name the first package's."""
+    """The installed plugins of a group by name; of two of one name the first package's.
+
+    Only names are read: no plugin's code runs before `Plugin.load`. Kept for the life of the
+    process, so a package that is installed meanwhile is not seen.
+    """
     found: dict[str, Plugin] = {}
     for entry in sorted(entry_points(group=f"pbrs_farm.{group}"), key=_order):
         package = entry.dist.name if entry.dist else "?"
@@ -74,7 +82,11 @@ def _order(entry: EntryPoint) -> tuple[str, str]:
 
 
 def plugin(group: str, name: str) -> Plugin:
-    """The plugin of that name; MachineFailed where none is installed, naming those that are."""
+    """The plugin of that name; MachineFailed where none is installed, naming those that are.
+
+    Its code is not loaded yet. The hint names the nearest known name, or says that a package is
+    lacking.
+    """
     known = plugins(group)
     if name not in known:
         hint = hint_of_choice(name, tuple(known)) if known else "install the package that has it"
@@ -95,7 +107,11 @@ def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
 
 
 def checked_names(group: str, names: str) -> str:
-    """Names of plugins with ':' between, all installed; ValueError naming one that is none."""
+    """Names of plugins with ':' between, all installed; ValueError naming one that is none.
+
+    For validators of fields: ValueError is what pydantic turns into a sentence with the field's
+    place. Empty parts are allowed, and the text is returned unchanged.
+    """
     known = plugins(group)
     for name in filter(None, names.split(":")):
         if name not in known:
@@ -135,7 +151,12 @@ def is_plugin(word: str) -> bool:
 
 
 def plugin_homes(word: str) -> list[PluginHome]:
-    """The homes that a word names; BadInput for one that is not written like that."""
+    """The homes that a word names; BadInput for one that is not written like that.
+
+    The form is plugin:NAME,FIRST..LAST,key=value,... with a single seed as a range of one. Whether
+    the plugin is installed, and knows the options, is asked only when a home is made. BadInput also
+    for a range longer than MAX_HOMES.
+    """
     name, *parts = word.removeprefix(PREFIX).split(",")
     numbers = [part for part in parts if "=" not in part]
     options = [part.partition("=") for part in parts if "=" in part]

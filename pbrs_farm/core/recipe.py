@@ -116,7 +116,11 @@ class Recipe(FieldGroup):
         return self
 
     def tone_of(self, house_id: str, view_id: str) -> ToneFields:
-        """The tone of one view: drawn for it where the recipe has a spread."""
+        """The tone of one view: drawn for it where the recipe has a spread.
+
+        Both eyes of a pair and all frames of a clip have one tone, since it is drawn for the take.
+        The same house, view and recipe seed give the same tone on every machine.
+        """
         return self.tone.drawn(keys.seed(house_id, keys.take_id(view_id), "tone", self.seed))
 
     def digest(self, *groups: str) -> str:
@@ -232,7 +236,12 @@ def changed_recipe(
 
 
 def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
-    """The recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe."""
+    """The recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe.
+
+    Only what was set in the recipe is kept: a preset of a sensor or lens fills the other fields
+    again, so that changing the preset changes all that follows from it. The recipe given is not
+    changed. Values are validated as from a file.
+    """
     if not settings:
         return recipe
     # Start from what was set: a preset of a sensor or a lens fills in the rest anew.
@@ -272,7 +281,11 @@ def _fault(fault: ErrorDetails) -> str:
 
 
 def field_paths() -> list[str]:
-    """Every field as --set names it: "seed", "light.spp" ..."""
+    """Every field as --set names it: "seed", "light.spp" ...
+
+    In the order of the model. Fields of a group of fields are "group.field"; a plain field is its
+    own name.
+    """
     paths = []
     for group, info in Recipe.model_fields.items():
         fields = getattr(info.annotation, "model_fields", None)
@@ -281,7 +294,11 @@ def field_paths() -> list[str]:
 
 
 def recipe_from_json(data: bytes, place: str) -> Recipe:
-    """A stored recipe; BadRecipe, naming its place, where it is none of this version."""
+    """A stored recipe; BadRecipe, naming its place, where it is none of this version.
+
+    For recipe.json in an output folder. For a .toml that a person wrote take formats.recipe_toml:
+    its errors name the entry.
+    """
     try:
         return Recipe.model_validate_json(data)
     except ValidationError:
@@ -301,7 +318,11 @@ def _set(fields: dict[str, Any], path: str, text: str) -> None:
 
 
 def differences(a: Recipe, b: Recipe) -> list[str]:
-    """ "group.field: a -> b" for every field that differs, names aside."""
+    """ "group.field: a -> b" for every field that differs, names aside.
+
+    For messages: empty where both are equal but for the name. A field that one recipe does not have
+    shows as None.
+    """
     lines: list[str] = []
 
     def walk(x: Any, y: Any, path: str) -> None:

@@ -43,12 +43,20 @@ Several = Annotated[tuple[_Of, ...], BeforeValidator(_several)]
 
 
 def read_toml(path: Path, kind: type[_T]) -> _T:
-    """A TOML table beside the code as that type; BadInput names the file and the entry."""
+    """A TOML table beside the code as that type; BadInput names the file and the entry.
+
+    kind is a type that pydantic validates: a dataclass, a model, a mapping. For tables that are
+    part of the package; recipes and other files of people have readers of their own.
+    """
     return _read(path, kind, tomllib.loads)
 
 
 def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
-    """The rows of a CSV table beside the code, lines with # left out; BadInput as of read_toml."""
+    """The rows of a CSV table beside the code, lines with # left out; BadInput as of read_toml.
+
+    row is the type of one row; an empty cell takes the default of its field. The first line that is
+    not a comment names the columns.
+    """
 
     def rows(text: str) -> list[dict[str, str]]:
         lines = (line for line in text.splitlines() if not line.startswith("#"))

@@ -27,7 +27,11 @@ def resized_by_area(picture: NDArray[np.uint8], width: int, height: int) -> NDAr
 
 
 def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
-    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, values kept."""
+    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, values kept.
+
+    For ids, classes and any other values that must not be mixed; without a change of size the array
+    itself is returned, not a copy.
+    """
     if array.shape[:2] == (height, width):
         return array
     rows = _nearest(array.shape[0], height)
@@ -36,7 +40,11 @@ def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
 
 
 def resized_any(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:
-    """(height, width) bool: whether any pixel that is covered is set in mask (H, W): lines stay whole."""
+    """(height, width) bool: whether any pixel that is covered is set in mask (H, W): lines stay whole.
+
+    For masks of thin things, as boundaries: shrinking by the nearest pixel would break them.
+    Without a change of size the mask itself is returned, not a copy.
+    """
     if mask.shape == (height, width):
         return mask
     for axis, n in ((0, height), (1, width)):

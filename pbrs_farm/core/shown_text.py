@@ -41,12 +41,19 @@ def shown(text: object, most: int = MAX_NAME) -> str:
 
 
 def printable(text: str) -> str:
-    """Text of many lines that can be printed: as shown, but line ends and length are kept."""
+    """Text of many lines that can be printed: as shown, but line ends and length are kept.
+
+    Control characters and others that could disturb a terminal become spaces. Use `shown` for a
+    name inside a sentence, where a line end must not survive and length is limited.
+    """
     return "\n".join(_cleaned(line) for line in text.split("\n"))
 
 
 def escaped(json_text: str) -> str:
-    """JSON with the characters that `shown` takes out written as \\uXXXX: nothing is lost."""
+    """JSON with the characters that `shown` takes out written as \\uXXXX: nothing is lost.
+
+    Reading the result back gives the same value. Line ends between values stay as they are.
+    """
     if json_text.isascii():
         return json_text
     return "".join(_escape(c) if _is_unsafe(c) and c != "\n" else c for c in json_text)
@@ -78,7 +85,11 @@ _AS_LIKELY: Final = 0.05  # of likeness: a second name is offered where it is ne
 
 
 def near_names(word: str, known: Iterable[str]) -> list[str]:
-    """The known names most like the word, case apart, the likeliest first; none when none is."""
+    """The known names most like the word, case apart, the likeliest first; none when none is.
+
+    Only the first 100 characters of the word count. Names nearly as likely as the best are given
+    with it.
+    """
     plain = {name.lower(): name for name in known}
     word = word[:100].lower()
     found = get_close_matches(word, plain, n=_MOST, cutoff=_LEAST_LIKENESS)
@@ -97,6 +108,9 @@ def question(names: list[str]) -> str:
 
 
 def hint_of_choice(word: str, known: Iterable[str]) -> str:
-    """ "did you mean A? of A, B, C": for a word out of a short list."""
+    """ "did you mean A? of A, B, C": for a word out of a short list.
+
+    For lists that fit a line; of many names take `did_you_mean`, which lists only the near ones.
+    """
     names = list(known)
     return " ".join(x for x in (did_you_mean(word, names), f"of {', '.join(names)}") if x)

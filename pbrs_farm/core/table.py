@@ -31,7 +31,11 @@ class Table(Sequence[Mapping[str, Any]]):
         return iter(self._rows)
 
     def column(self, name: str) -> list[Any]:
-        """A column's values; KeyError where a row has none of that name."""
+        """A column's values; KeyError where a row has none of that name.
+
+        In the order of the rows, as Python values. A column that only some rows have is a KeyError
+        too.
+        """
         return [row[name] for row in self._rows]
 
     def __repr__(self) -> str:

@@ -26,7 +26,11 @@ class FloorGrid:
 
     @staticmethod
     def over(x0: float, z0: float, x1: float, z1: float) -> FloorGrid:
-        """The grid over a rectangle, two cells wider on every side."""
+        """The grid over a rectangle, two cells wider on every side.
+
+        Metres in the plan, x0 <= x1 and z0 <= z1. Places of the rectangle, and two cells about
+        them, then have indices within the shape.
+        """
         shape = int((z1 - z0) / CELL_M) + 5, int((x1 - x0) / CELL_M) + 5
         return FloorGrid((x0 - 2 * CELL_M, z0 - 2 * CELL_M), shape)
 
@@ -39,7 +43,11 @@ class FloorGrid:
         return xx, zz
 
     def cells(self, places: F64) -> I64:
-        """(N, 2) row and column of plan places (N, 2); may lie outside."""
+        """(N, 2) row and column of plan places (N, 2); may lie outside.
+
+        places holds world x and z in metres; the cells are int64 (row along z, column along x). Ask
+        `holds` before indexing: a negative index would silently count from the other end.
+        """
         cells = np.floor((places - np.asarray(self.origin)) / CELL_M).astype(np.int64)
         return np.asarray(cells[:, ::-1])
 
@@ -52,7 +60,10 @@ class FloorGrid:
         return np.asarray(((cells >= 0) & (cells < self.shape)).all(1))
 
     def marked(self, places: F64) -> Bools:
-        """(H, W) the cells that hold one of the plan places (N, 2)."""
+        """(H, W) the cells that hold one of the plan places (N, 2).
+
+        Places outside the grid are left out. Several places in one cell mark it once.
+        """
         cells = self.cells(places)
         marks = np.zeros(self.shape, bool)
         marks[tuple(cells[self.holds(cells)].T)] = True
@@ -60,7 +71,12 @@ class FloorGrid:
 
 
 def clearance_m(free: Bools) -> F64:
-    """(H, W) metres from the middle of each cell to that of the nearest one that is not free."""
+    """(H, W) metres from the middle of each cell to that of the nearest one that is not free.
+
+    free is (H, W) bool; cells that are not free have 0. Beyond the grid nothing counts, and a grid
+    that is free all over has no meaningful result: leave a margin that is not free. Distances are
+    Euclidean.
+    """
     return np.asarray(ndimage.distance_transform_edt(free) * CELL_M)
 
 
