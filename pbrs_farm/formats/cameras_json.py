@@ -15,12 +15,20 @@ from pbrs_farm.formats.serialise import json_bytes
 
 
 def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[str, Any]:
-    """What cameras.json says. report: why the other candidates were rejected, as JSON values."""
+    """What cameras.json says. report: why the other candidates were rejected, as JSON values.
+
+    For a caller that adds to it or prints it; the step `cameras` writes `cameras_json`. The views
+    keep their order.
+    """
     return {"views": [_json_of_view(view) for view in views], "report": report}
 
 
 def cameras_json(views: Iterable[View], report: Mapping[str, Any]) -> bytes:
-    """The file, written by the step `cameras`."""
+    """The file, written by the step `cameras`.
+
+    report: why the other candidates were rejected, as JSON values. Equal views and reports give
+    equal bytes.
+    """
     return json_bytes(cameras_document(views, report))
 
 

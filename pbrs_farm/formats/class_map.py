@@ -53,7 +53,11 @@ class ClassRule:
     name: str
 
     def fits(self, instance: Mapping[str, Any]) -> bool:
-        """Whether an instance of view.json (class, kind, source_class, name) is meant."""
+        """Whether an instance of view.json (class, kind, source_class, name) is meant.
+
+        Case does not matter. A word with wildcards (`*`, `?`, `[`) is matched as a file name is,
+        against the names alone; a plain one must equal one of the fields.
+        """
         if _WILD.isdisjoint(self.word):
             return any(str(instance.get(f, "")).lower() == self.word for f in _FIELDS)
         return any(fnmatchcase(str(instance.get(f, "")).lower(), self.word) for f in _NAMES)
@@ -67,23 +71,39 @@ class ClassMap:
 
     @cached_property
     def names(self) -> dict[int, str]:
-        """Id -> name of each class, by id, 0 left out."""
+        """Id -> name of each class, by id, 0 left out.
+
+        Where two rows give one id different names, the last row's name counts.
+        """
         return dict(sorted({row.id: row.name for row in self.rows if row.id}.items()))
 
     @cached_property
     def structure(self) -> frozenset[int]:
-        """The ids whose rows all say a part of the building: wall, floor, ceiling, door, window."""
+        """The ids whose rows all say a part of the building: wall, floor, ceiling, door, window.
+
+        An id for which even one row names an object is no structure. Writers of detection formats
+        leave these ids out where they ask for objects alone.
+        """
         objects = {row.id for row in self.rows if row.word not in _STRUCTURE}
         return frozenset(self.names) - objects
 
     def id_of(self, instance: Mapping[str, Any]) -> int:
-        """The class of a row of view.json's `instances`; 0 where no row of the table fits."""
+        """The class of a row of view.json's `instances`; 0 where no row of the table fits.
+
+        The first row that fits decides: put the special above the general. 0 is also the id of what
+        a table maps to nothing.
+        """
         return next((row.id for row in self.rows if row.fits(instance)), 0)
 
     def label(
         self, instance: NDArray[Any], instances: Sequence[Mapping[str, Any]]
     ) -> NDArray[np.uint16]:
-        """(H, W) uint16 classes, of a map of instance ids (H, W) and the rows of view.json."""
+        """(H, W) uint16 classes, of a map of instance ids (H, W) and the rows of view.json.
+
+        instance: as in instance.png, 0 where nothing is; instances: its rows, each with an "id" >
+        0. An instance id without a row becomes 0. For many pictures of one house the rows are
+        matched anew on each call.
+        """
         # Look the class up by instance id; an id without a row is nothing.
         table = np.zeros(max([int(instance.max(initial=0)), *(r["id"] for r in instances)]) + 1)
         for row in instances:

@@ -54,7 +54,11 @@ class GlbWriter:
         self._accessors: list[dict[str, Any]] = []  # a view each, with type and count
 
     def add_bytes(self, data: bytes, *, target: int | None = None) -> int:
-        """Index of a new buffer view that holds data."""
+        """Index of a new buffer view that holds data.
+
+        target: glTF's number for vertices or indices, None for pictures and the like. The view
+        begins at a multiple of four bytes; the padding is not part of its length.
+        """
         # Begin every view at a multiple of four bytes, as accessors of floats need it.
         view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(data)}
         if target is not None:
@@ -64,7 +68,12 @@ class GlbWriter:
         return len(self._views) - 1
 
     def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
-        """Index of a new accessor over array (N, 2 or 3) float32, N >= 1."""
+        """Index of a new accessor over array (N, 2 or 3) float32, N >= 1.
+
+        with_bounds: for positions, of which glTF wants the least and greatest. Values are written
+        as they are: a number that is not finite must be refused before, since viewers reject the
+        file and `glb` raises on its bounds.
+        """
         # Give bounds where glTF asks for them: of positions.
         accessor = {
             "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
@@ -79,7 +88,11 @@ class GlbWriter:
         return len(self._accessors) - 1
 
     def add_faces(self, faces: I32) -> int:
-        """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1."""
+        """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1.
+
+        faces: int32, vertex numbers from 0, written as 32-bit unsigned ones; they are not checked
+        against the vertices.
+        """
         self._accessors.append(
             {
                 "bufferView": self.add_bytes(_little(faces, "<u4"), target=_ELEMENT_ARRAY_BUFFER),
@@ -91,7 +104,12 @@ class GlbWriter:
         return len(self._accessors) - 1
 
     def glb(self, document: dict[str, Any]) -> bytes:
-        """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary."""
+        """The file: document (empty lists dropped, as glTF asks) with buffers, and the binary.
+
+        document: glTF without accessors, bufferViews and buffers, which come from what was added.
+        Keys are sorted, so equal content gives equal bytes. Raises ValueError for a number that is
+        not finite.
+        """
         # Chunks are padded to 4 bytes: JSON with spaces, the binary one with zeros.
         text = json.dumps(
             self._whole(document), sort_keys=True, separators=(",", ":"), allow_nan=False
@@ -103,7 +121,11 @@ class GlbWriter:
         return _MAGIC + struct.pack("<II", 2, 12 + len(chunks)) + chunks
 
     def gltf(self, document: dict[str, Any], file: str) -> Gltf:
-        """The same without writing it: what a file of another format shows."""
+        """The same without writing it: what a file of another format shows.
+
+        file: the name that messages about it carry. For readers of scenes that were put together in
+        memory: they take a Gltf, whatever its file was.
+        """
         return Gltf(self._whole(document), (bytes(self._binary),), file)
 
     def _whole(self, document: dict[str, Any]) -> dict[str, Any]:
@@ -156,7 +178,11 @@ def _chunks(data: bytes, length: int, file: str) -> dict[int, bytes]:
 
 
 def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
-    """document[kind][index]; BadHouse if it does not exist."""
+    """document[kind][index]; BadHouse if it does not exist.
+
+    index: whatever stands in the file, so of any type; a negative number, a bool or a word is no
+    index. Use it wherever a file of a stranger names another part of itself.
+    """
     entries = gltf.document.get(kind, [])
     fits = isinstance(entries, list) and isinstance(index, int) and not isinstance(index, bool)
     if not fits or not 0 <= index < len(entries) or not isinstance(entries[index], dict):
@@ -166,7 +192,11 @@ def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
 
 
 def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
-    """holder[key] as a count >= 0; BadHouse otherwise."""
+    """holder[key] as a count >= 0; BadHouse otherwise.
+
+    key missing: the default. A bool, a float or a negative number raises, too; place (as
+    "accessors[3]") and key say in the message where it stands.
+    """
     value = holder.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise BadHouse(gltf.file, f"{place}.{key}", f"expected a count, got {str(value)[:40]}")
@@ -174,7 +204,11 @@ def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int
 
 
 def view_bytes(gltf: Gltf, index: Any) -> bytes:
-    """The bytes of buffer view index; BadHouse if it reaches outside its buffer."""
+    """The bytes of buffer view index; BadHouse if it reaches outside its buffer.
+
+    Copied out of the buffer, so that a caller may keep it. A byteStride is not applied: it is
+    whoever reads the accessor that steps through the view.
+    """
     # Check every number: the file may be a stranger's.
     place = f"bufferViews[{index}]"
     view = entry(gltf, "bufferViews", index)

@@ -58,13 +58,19 @@ class SparseCounts(Record):
 
     @staticmethod
     def of(counts: NDArray[np.uint32]) -> SparseCounts:
-        """The bins of counts that are not empty."""
+        """The bins of counts that are not empty.
+
+        counts: (bins,) uint32, one dimension. `dense` gives the same array back.
+        """
         bins = np.nonzero(counts)[0]
         filled = tuple(counts[bins].tolist())
         return SparseCounts(size=len(counts), bins=tuple(bins.tolist()), counts=filled)
 
     def dense(self) -> NDArray[np.uint32]:
-        """(size,) uint32."""
+        """(size,) uint32.
+
+        A fresh array with 0 in the bins that are not stored; SparseCounts.of is its inverse.
+        """
         counts = np.zeros(self.size, np.uint32)
         counts[list(self.bins)] = self.counts
         return counts
@@ -97,11 +103,19 @@ class ViewRecord(Record):
         return self
 
     def json_bytes(self) -> bytes:
-        """The record as canonical JSON: equal records give equal bytes."""
+        """The record as canonical JSON: equal records give equal bytes.
+
+        So a record may be compared, or named by a digest, by these bytes. `record_from_json` reads
+        them.
+        """
         plain = self.model_dump(mode="json")
         return (json.dumps(plain, sort_keys=True, separators=(",", ":")) + "\n").encode()
 
 
 def record_from_json(data: bytes, name: str) -> ViewRecord:
-    """The record in a histogram.json; BadInput naming the file when it is none."""
+    """The record in a histogram.json; BadInput naming the file when it is none.
+
+    name: of the file, for the message alone. A record of another shape (an older version's, or cut
+    short) raises as well, with the advice to render the view again.
+    """
     return checked(ViewRecord, data, name, hint="render the view again")

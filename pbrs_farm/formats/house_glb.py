@@ -66,7 +66,11 @@ def glb_from_house(house: House) -> bytes:
 
 
 def gltf_asset(house: House) -> dict[str, Any]:
-    """asset of a file made from house, with its source and the credit that it asks for."""
+    """asset of a file made from house, with its source and the credit that it asks for.
+
+    Its "extras" hold all of house.source; "copyright" is there only where the source names an
+    attribution, an author or a licence.
+    """
     source = house.source
     asset: dict[str, Any] = {
         "version": "2.0",
@@ -79,7 +83,10 @@ def gltf_asset(house: House) -> dict[str, Any]:
 
 
 def item_extras(item: Item, instance: int) -> dict[str, Any]:
-    """extras of an item's node: what it is."""
+    """extras of an item's node: what it is.
+
+    instance: the item's id in instance.png, its number in the house plus one.
+    """
     return {
         "instance": instance,
         "item": item.id,
@@ -92,7 +99,13 @@ def item_extras(item: Item, instance: int) -> dict[str, Any]:
 
 
 def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> dict[str, Any]:
-    """A surface as a primitive; BadHouse where a viewer could not open it."""
+    """A surface as a primitive; BadHouse where a viewer could not open it.
+
+    s: positions, normals and uvs are appended to the writer as they stand; v is turned over, since
+    glTF counts it from the top. A surface without faces becomes a cloud of points, so that its
+    vertices are not lost. BadHouse names item and surface for numbers that are not finite, faces
+    that name no vertex, and materials that do not exist.
+    """
     # Refuse what a viewer could not open.
     place = f"item {item.id}, surface {s.name}"
     for array in (s.positions, s.uvs, s.normals):
@@ -117,7 +130,11 @@ def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> di
 def write_textures(
     writer: glb.GlbWriter, textures: Mapping[str, Texture]
 ) -> tuple[dict[str, int], list[dict[str, Any]]]:
-    """(texture key -> glTF texture index, an image or a bare buffer view per texture)."""
+    """(texture key -> glTF texture index, an image or a bare buffer view per texture).
+
+    A picture of a kind that glTF does not know (its media type is neither PNG nor JPEG) is kept as
+    bytes without an image: our reader finds it again, a viewer shows the plain colour.
+    """
     images: dict[str, int] = {}
     kept: list[dict[str, Any]] = []
     for key, texture in textures.items():
@@ -130,7 +147,12 @@ def write_textures(
 
 
 def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
-    """A material; images: texture id -> index of the glTF texture."""
+    """A material; images: texture id -> index of the glTF texture.
+
+    Colours become linear, as glTF wants them; the kind stands in "extras". Refraction, lamps' power
+    and what else glTF's core has no word for is left out, so a reader takes these from the extras
+    alone.
+    """
     alpha, mode = _alpha(material)
     # Say what glTF knows of the material: colour, metal or not, roughness.
     pbr: dict[str, Any] = {

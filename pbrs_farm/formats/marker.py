@@ -58,7 +58,12 @@ def read_marker(store: Store, key: str) -> Marker | None:
 
 
 def copy_done(of: Store, to: Store, key: str) -> Marker | None:
-    """Copy what a step made and its marker, which it gives, over what is there; None where there is none."""
+    """Copy what a step made and its marker, which it gives, over what is there; None where there is none.
+
+    key: of the marker; files come along under their own keys. The old marker in `to` is removed
+    first, so that a copy that is cut short does not look done. ObjectMissing where a file that the
+    marker names is gone.
+    """
     marker = read_marker(of, key)
     if marker is not None:
         files = {file.key: of.get(file.key) for file in marker.files}

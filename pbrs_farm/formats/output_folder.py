@@ -43,7 +43,11 @@ class ViewEntry:
     facts: dict[str, Any] = field(default_factory=dict)  # view.json, {} where there is none yet
 
     def file(self, name: str) -> Path | None:
-        """The view's file of that name, or None."""
+        """The view's file of that name, or None.
+
+        name: as in the output folder, "radiance.exr" or "mlt_warm.png". Whether the file is whole
+        is not looked at.
+        """
         path = self.folder / name
         return path if path.is_file() else None
 

@@ -20,7 +20,11 @@ COLUMNS: Final = {
 
 
 def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
-    """The file, written by the step `pairs`; rows have the keys of COLUMNS."""
+    """The file, written by the step `pairs`; rows have the keys of COLUMNS.
+
+    A key that a row lacks becomes null, one that COLUMNS has not is dropped. Rows keep their order;
+    none at all gives a file with columns alone.
+    """
     table = pa.Table.from_pylist([dict(row) for row in rows], pa.schema(list(COLUMNS.items())))
     buffer = io.BytesIO()
     pq.write_table(table, buffer)
@@ -28,7 +32,11 @@ def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
 
 
 def pairs_from_parquet(data: bytes, place: str) -> list[dict[str, Any]]:
-    """The rows that pairs_parquet wrote; BadInput names place when data is no such file."""
+    """The rows that pairs_parquet wrote; BadInput names place when data is no such file.
+
+    Columns of a later version are passed over; one that is missing is an error. The table is held
+    in memory as dicts: for millions of pairs read the file with pyarrow instead.
+    """
     try:
         table = pq.read_table(io.BytesIO(data))
         rows: list[dict[str, Any]] = table.select(list(COLUMNS)).to_pylist()

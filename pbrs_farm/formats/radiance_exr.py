@@ -24,7 +24,11 @@ def _channels(image: str) -> str:
 
 
 def radiance_exr(images: Mapping[str, F32], *, attribution: str = "") -> bytes:
-    """The file of images by name, (H, W, 3) float32 each. attribution: the file's copyright."""
+    """The file of images by name, (H, W, 3) float32 each. attribution: the file's copyright.
+
+    All images have one size. Each becomes three channels, "<name>." and a letter; values are linear
+    radiance (or albedo, or normals), not tone mapped. `radiance_from_exr` reads the file.
+    """
     planes = {
         f"{name}.{channel}": image[..., k]
         for name, image in images.items()
@@ -41,7 +45,11 @@ class RadianceExr:
     place: str  # of the file, for messages
 
     def image(self, name: str) -> F32:
-        """(H, W, 3) float32 image of that name; BadInput when the file has none."""
+        """(H, W, 3) float32 image of that name; BadInput when the file has none.
+
+        name: "outdoor", "indoor", "albedo", "normal" or "lamp<n>", as they were written. Built anew
+        on each call.
+        """
         try:
             return np.stack([self.planes[f"{name}.{c}"] for c in _channels(name)], -1)
         except KeyError as error:
@@ -49,5 +57,9 @@ class RadianceExr:
 
 
 def radiance_from_exr(data: bytes, place: str) -> RadianceExr:
-    """What radiance_exr wrote; BadInput names place when data is no EXR."""
+    """What radiance_exr wrote; BadInput names place when data is no EXR.
+
+    place: file name or key, for messages. All layers are decoded now; which of them there are is
+    seen when `image` asks for one.
+    """
     return RadianceExr(layers_from_exr(data, place), place)

@@ -25,7 +25,12 @@ _MAX_BYTES: Final = 2**20
 
 
 def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
-    """The recipe of a file, called by the file's name; raises BadRecipe naming file and field."""
+    """The recipe of a file, called by the file's name; raises BadRecipe naming file and field.
+
+    overrides: "group.field" -> text, as on the command line; they win over the file. The file's key
+    `recipe` names the recipe it starts from ("fast" where it is left out). Raises BadRecipe for a
+    file that cannot be read, is no TOML, is too large, or sets what no recipe has.
+    """
     try:
         fields = tomllib.loads(read_regular(path, _MAX_BYTES).decode())
     except OSError as error:
@@ -44,7 +49,11 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
 
 
 def toml_from_recipe(recipe: Recipe) -> str:
-    """The recipe as a file that recipe_from_toml reads as the same values."""
+    """The recipe as a file that recipe_from_toml reads as the same values.
+
+    Every value is written, also those that are the default of the recipe it starts from, so that a
+    later change of defaults does not change the file's meaning; what is not set is left out.
+    """
     fields = recipe.model_dump(mode="json", exclude={"name"})
     lines = [f'recipe = "{recipe.name}"']
     # Values of the recipe itself stand above its groups.

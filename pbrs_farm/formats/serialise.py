@@ -39,7 +39,11 @@ SHAPES: Final[dict[tuple[str, str], tuple[int | None, ...]]] = {
 
 
 def json_from_value(value: Any) -> Any:
-    """Dicts, lists, numbers and strings that say the same as value, a frozen dataclass with arrays."""
+    """Dicts, lists, numbers and strings that say the same as value, a frozen dataclass with arrays.
+
+    Arrays become (nested) lists. NaN and infinities stay floats, for which strict JSON has no word:
+    whoever writes a file must refuse or replace them before.
+    """
     return to_jsonable_python(value, fallback=_list_from_array, inf_nan_mode="constants")
 
 

@@ -19,7 +19,12 @@ def view_description(
     recipe_digest: str,
     versions: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top."""
+    """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top.
+
+    recipe_digest: of the recipe that rendered the view; versions: program or library -> version.
+    The warnings are those of the step "light", each once; frame, time_s and left are there only for
+    views of a sequence or a stereo pair.
+    """
     table = facts.get("truth", {}).get("table", {})
     light = facts.get("light", {})
     sequence: dict[str, Any] = {}
@@ -50,7 +55,11 @@ def view_json(description: Mapping[str, Any]) -> bytes:
 
 
 def lamps_from_view_json(data: bytes, place: object) -> list[dict[str, Any]]:
-    """The rows of the house's lamps (transport/lamp_layers.py); BadInput names place if none."""
+    """The rows of the house's lamps (transport/lamp_layers.py); BadInput names place if none.
+
+    The light of single lamps is stored only by runs that ask for it: BadInput then says with which
+    command to render it.
+    """
     try:
         rows: list[dict[str, Any]] = json.loads(data)["modes"]["light"]["lamps"]
     except (ValueError, KeyError, TypeError):

@@ -59,7 +59,12 @@ def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> 
 
 
 def hull_of(points: F64) -> F64 | None:
-    """The corners (V, 3) of the convex hull of points; None where they lie in a plane."""
+    """The corners (V, 3) of the convex hull of points; None where they lie in a plane.
+
+    points: (N, 3) float64, finite. The corners are some of the points, unchanged; their order is
+    qhull's, so use `hull_faces` where the triangles are needed. Fewer than four points give None,
+    too.
+    """
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):
@@ -67,7 +72,12 @@ def hull_of(points: F64) -> F64 | None:
 
 
 def hull_faces(points: F64) -> I64:
-    """(F, 3) triangles of the convex hull of points, looking outwards; none where they lie in a plane."""
+    """(F, 3) triangles of the convex hull of points, looking outwards; none where they lie in a plane.
+
+    points: (N, 3) float64, finite; faces index into all of them, inner points are simply not named.
+    The order of the faces is qhull's. No error is raised for points without a volume: test the
+    length.
+    """
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
@@ -80,7 +90,11 @@ def hull_faces(points: F64) -> I64:
 
 
 def thickened(points: F64) -> F64:
-    """A flat thing as the corners (8, 3) of a box a millimetre thicker than it on every side."""
+    """A flat thing as the corners (8, 3) of a box a millimetre thicker than it on every side.
+
+    points: (N, 3), metres. The box lies along the axes, so a flat thing that stands askew becomes a
+    thick one: for physics engines that need a volume, not for measuring.
+    """
     low, high = points.min(0) - _FLAT_M, points.max(0) + _FLAT_M
     return np.array(
         [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]

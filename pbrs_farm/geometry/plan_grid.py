@@ -36,26 +36,43 @@ class PlanGrid:
 
     @staticmethod
     def around(points: Points2, turn_rad: float, cell_m: float, border_m: float) -> PlanGrid:
-        """The grid that covers plan points (N, 2) and border_m around them."""
+        """The grid that covers plan points (N, 2) and border_m around them.
+
+        points: world (x, z) in metres, at least one. turn_rad turns the grid's axes against the
+        world's, so that walls may run along its rows. The grid has a cell at least.
+        """
         local = points @ _plan_turn(turn_rad)
         low = local.min(0) - border_m
         columns, rows = np.maximum(np.ceil((local.max(0) + border_m - low) / cell_m), 1).astype(int)
         return PlanGrid(_plan_turn(turn_rad) @ low, turn_rad, cell_m, (int(rows), int(columns)))
 
     def cropped(self, cells: tuple[slice, ...]) -> PlanGrid:
-        """The grid of these rows and columns alone."""
+        """The grid of these rows and columns alone.
+
+        cells: slices of rows and of columns with whole numbers at both ends, as
+        scipy.ndimage.find_objects gives them; a slice without ends fails. Cells keep their places
+        in the world.
+        """
         rows, columns = cells
         shape = (rows.stop - rows.start, columns.stop - columns.start)
         return PlanGrid(self.plan_of(columns.start, rows.start), self.turn_rad, self.cell_m, shape)
 
     def local(self, points: F64) -> F64:
-        """(..., 3) world points as (column, height in metres, row), in cells from the corner."""
+        """(..., 3) world points as (column, height in metres, row), in cells from the corner.
+
+        The middle of cell (row r, column c) is at (c + 0.5, y, r + 0.5); points outside the grid
+        get numbers below 0 or above its shape.
+        """
         moved = points - np.array([self.origin[0], 0.0, self.origin[1]])
         turned = moved @ rotation_y(self.turn_rad)
         return np.asarray(turned / [self.cell_m, 1.0, self.cell_m])
 
     def plan_of(self, column: ArrayLike, row: ArrayLike) -> F64:
-        """(..., 2) world (x, z) of places given in cells from the corner."""
+        """(..., 2) world (x, z) of places given in cells from the corner.
+
+        column and row are broadcast against each other; whole numbers are corners of cells, halves
+        their middles. The inverse of `local`, without the height.
+        """
         local = np.stack(np.broadcast_arrays(column, row), -1).astype(np.float64) * self.cell_m
         return np.asarray(self.origin + local @ _plan_turn(self.turn_rad).T)
 
@@ -123,7 +140,12 @@ def _cells_over(grid: PlanGrid, local: F64, *, touched: bool) -> tuple[Ints, Int
 
 
 def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
-    """(rows, columns) whether a triangle covers the cell's middle, or touches the cell."""
+    """(rows, columns) whether a triangle covers the cell's middle, or touches the cell.
+
+    corners: (T, 3, 3) world, metres; triangles that stand upright cover no middle. Cells of the
+    outside are left out. touched: also true where a triangle only reaches into the cell, so that
+    nothing thin is lost.
+    """
     mask = np.zeros(grid.shape, np.bool_)
     _triangle, row, column, _doubled = _cells_over(grid, grid.local(corners), touched=touched)
     mask[row, column] = True
@@ -131,7 +153,11 @@ def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
 
 
 def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
-    """(G, rows, columns) whether a triangle of each group (T, 3, 3) covers the cell's middle."""
+    """(G, rows, columns) whether a triangle of each group (T, 3, 3) covers the cell's middle.
+
+    One pass over the triangles of all groups, where a loop of `covered` makes one for each. All
+    masks are held at once: mind the memory of many groups on a large grid.
+    """
     masks = np.zeros((len(groups), *grid.shape), np.bool_)
     if groups:
         group = np.repeat(np.arange(len(groups)), [len(g) for g in groups])
@@ -142,7 +168,11 @@ def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
 
 
 def top_heights(grid: PlanGrid, corners: F64) -> F64:
-    """(rows, columns) height of the highest triangle over each cell's middle; -inf = none."""
+    """(rows, columns) height of the highest triangle over each cell's middle; -inf = none.
+
+    corners: (T, 3, 3) world, metres. Heights are those of the triangles' planes in the middle of a
+    cell; a cell that no triangle covers there is -inf even if one touches it.
+    """
     top = np.full(grid.shape, -np.inf)
     hits = cells_over(grid, corners, touched=False)
     np.maximum.at(top, (hits.row, hits.column), hits.high)

@@ -13,25 +13,42 @@ from pbrs_farm.core.house import Room, Surface
 
 
 def signed_area(polygon: Points2) -> float:
-    """Area of (N, 2), positive if counter-clockwise with the second axis up."""
+    """Area of (N, 2), positive if counter-clockwise with the second axis up.
+
+    polygon: without its first corner repeated at the end; the sign tells the sense, so take abs()
+    for a size. Square metres when the polygon is in metres. In plan the axes are (x, z).
+    """
     x, z = polygon[:, 0], polygon[:, 1]
     return float(0.5 * np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))
 
 
 def room_shape(room: Room) -> shapely.Geometry:
-    """The room's polygon in plan (x, z), made valid; empty for fewer than three corners."""
+    """The room's polygon in plan (x, z), made valid; empty for fewer than three corners.
+
+    A polygon that crosses itself may become a MultiPolygon, or a collection: ask shapely for area,
+    contains and distances, and do not read its exterior. Unlike `Room.polygon` it is never invalid.
+    """
     if len(room.polygon) < 3 or not np.isfinite(room.polygon).all():
         return shapely.Polygon()
     return shapely.make_valid(shapely.Polygon(room.polygon))
 
 
 def counter_clockwise(polygon: Points2) -> Points2:
-    """polygon (N, 2), reversed if it runs clockwise."""
+    """polygon (N, 2), reversed if it runs clockwise.
+
+    The same array, not a copy, where it runs so already. "Counter-clockwise" holds with the second
+    axis up: in plan (x, z), seen from above with z down the page, it looks clockwise.
+    """
     return polygon if signed_area(polygon) >= 0 else polygon[::-1].copy()
 
 
 def triangulated(rings: Sequence[Points2]) -> tuple[Points2, I32]:
-    """Points (V, 2) and counter-clockwise triangles (F, 3) of an outline and its holes."""
+    """Points (V, 2) and counter-clockwise triangles (F, 3) of an outline and its holes.
+
+    rings: the outline first, then holes, each (N, 2) with either sense and without a repeated end.
+    Points are all rings' corners in order; none is added. Self-crossing outlines give triangles
+    that do not fill them: make them valid before.
+    """
     points = np.concatenate([np.asarray(r, np.float64) for r in rings])
     ends = np.cumsum([len(r) for r in rings]).astype(np.uint32)
     faces = np.asarray(mapbox_earcut.triangulate_float64(points, ends), np.int32).reshape(-1, 3)

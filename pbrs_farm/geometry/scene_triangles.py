@@ -30,7 +30,11 @@ class SceneTriangles:
         self._of_faces: dict[int, tuple[F64, F64]] = {}
 
     def of_item(self, index: int) -> F64:
-        """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres."""
+        """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres.
+
+        Computed on the first call and kept: do not write into it. (0, 3, 3) for an item without
+        faces. An IndexError says that the scene has no such item.
+        """
         if index not in self._corners:
             self._corners[index] = item_triangles(self.items[index])
         return self._corners[index]
@@ -42,12 +46,20 @@ class SceneTriangles:
         return self._of_faces[index]
 
     def items_in(self, low: F64, high: F64) -> list[int]:
-        """Indices of the items whose bounds meet the box low..high (3,)."""
+        """Indices of the items whose bounds meet the box low..high (3,).
+
+        low, high: metres, in the world. A bounding box that only touches counts; whether a face
+        lies in the box is `in_box`'s question.
+        """
         meets = boxes_meeting(self.bounds[:, 0], self.bounds[:, 1], low, high)
         return [int(i) for i in np.flatnonzero(meets)]
 
     def in_box(self, low: F64, high: F64) -> tuple[F64, I32]:
-        """(T, 3, 3) faces whose bounds meet the box low..high, and (T,) the item of each."""
+        """(T, 3, 3) faces whose bounds meet the box low..high, and (T,) the item of each.
+
+        low, high: metres. Faces are whole, not cut at the box, and one whose bounds meet it may
+        pass by it. The owner is the item's index in `items`, int32.
+        """
         parts, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int32)]
         for index in self.items_in(low, high):
             corners = self.of_item(index)

@@ -27,7 +27,11 @@ _BOX_FACES = (_QUAD + 4 * np.arange(6, dtype=np.int32)[:, None, None]).reshape(-
 
 
 def boxes_surface(name: str, boxes: Sequence[tuple[Triple, Triple]], material: int) -> Surface:
-    """A surface of boxes along the axes, each by its low and its high corner in metres."""
+    """A surface of boxes along the axes, each by its low and its high corner in metres.
+
+    Boxes that overlap stay as they are: inner faces are not removed, as for a sofa that is put
+    together from cushions. material: index into the house's materials.
+    """
     corners = np.asarray(boxes, np.float64).reshape(-1, 2, 3)
     quads = [box_quads((low + high) / 2, (high - low) / 2) for low, high in corners]
     return quads_surface(name, np.concatenate(quads), material)
@@ -69,7 +73,12 @@ def _faces_of_quads(n: int) -> I32:
 
 
 def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:
-    """(6, 4, 3) quads of an oriented box; axes: (3, 3), columns are unit, right-handed."""
+    """(6, 4, 3) quads of an oriented box; axes: (3, 3), columns are unit, right-handed.
+
+    centre, half: (3,) metres, half the length along each axis; axes: None for the world's. Corners
+    run so that quads look outwards as long as axes are right-handed; a mirrored frame turns them
+    inside out.
+    """
     axes = np.eye(3) if axes is None else axes
     corners = np.asarray(centre) + (_SIGNS * np.asarray(half)) @ axes.T
     return np.asarray(corners[_BOX_QUADS], np.float64)

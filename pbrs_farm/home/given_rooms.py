@@ -16,7 +16,11 @@ NO_ROOM: Final = "none"
 
 
 def given_room(source: str, name: str) -> str | None:
-    """The type of a source's name, whatever its case and joints; None where the table has none."""
+    """The type of a source's name, whatever its case and joints; None where the table has none.
+
+    source: the data set's name as in the table ("procthor", "zind"...). For names that follow no
+    table use the words of the name instead (`named_kind`).
+    """
     return _read_given_rooms().get((source, _plain_name(name)))
 
 

@@ -14,7 +14,12 @@ _LETTERS: Final = str.maketrans({"ł": "l", "ø": "o", "ß": "ss", "đ": "d", "�
 
 
 def folded(text: str) -> str:
-    """Lower case, without accents."""
+    """Lower case, without accents.
+
+    For comparing names of any language, not for showing. Letters that Unicode does not take apart
+    (as those with strokes) become plain ones as far as `_LETTERS` has them; Hangul syllables stay
+    whole.
+    """
     # What that takes apart besides (Hangul) is composed again.
     taken_apart = unicodedata.normalize("NFKD", text.casefold().translate(_LETTERS))
     plain = "".join(c for c in taken_apart if not unicodedata.combining(c))
@@ -22,12 +27,21 @@ def folded(text: str) -> str:
 
 
 def parted(text: str) -> str:
-    """The text with a space between the words of camelCase."""
+    """The text with a space between the words of camelCase.
+
+    "LivingRoom2" becomes "Living Room2": digits are not parted from letters, and runs of capitals
+    stay together up to the last one ("TVStand" is "TV Stand").
+    """
     return re.sub(r"(?<=[^\W\d_])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])", " ", text)
 
 
 def words_of(name: str) -> frozenset[str]:
-    """Folded words of letters alone; camelCase adds its parts, a plural adds its singular."""
+    """Folded words of letters alone; camelCase adds its parts, a plural adds its singular.
+
+    For matching a name against tables of words. Both the name as written and its parts count
+    ("BedRoom" has bed, room and bedroom); the singular is the word less a final s, right or not.
+    Digits and signs part words.
+    """
     words = re.findall(r"[^\W\d_]+", folded(f"{name} {parted(name)}"))
     return frozenset(words) | {word.removesuffix("s") for word in words}
 

@@ -61,7 +61,12 @@ def is_cooked_in(items: Iterable[Item]) -> bool:
 
 
 def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
-    """What the room is for: what it is called, else what the items (those in it) say."""
+    """What the room is for: what it is called, else what the items (those in it) say.
+
+    items: those that stand in the room; area_m2: of its floor. A name wins over furniture, but a
+    "studio" with a bed or a cooker is a home of one room. Never None: what nothing speaks for is
+    OTHER, or HALL when small.
+    """
     named = named_kind(" ".join((*room.types, room.name)))
     has = {item.nyu40 for item in items}
     # A studio is a study in some languages and a home of one room in others.
@@ -92,7 +97,11 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
 
 
 def named_kind(name: str) -> RoomKind | None:
-    """What a room of that name is for; None where the name does not say."""
+    """What a room of that name is for; None where the name does not say.
+
+    name: any text, types and name together; the words of many languages are known. The first rule
+    of the table that fits counts. Furniture is not asked: see `room_kind`.
+    """
     rule = _rule_for(name)
     return rule.use if rule else None
 

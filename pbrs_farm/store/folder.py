@@ -115,7 +115,12 @@ class FolderStore:
             raise self._failure(key, error) from error
 
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
-        """Remove unfinished files that killed writers left; their count."""
+        """Remove unfinished files that killed writers left; their count.
+
+        older_than_s: age of the youngest file to remove, seconds by this machine's clock; a file
+        that a writer still fills is younger than a day. Only the folder of unfinished files is
+        looked into, no object is touched.
+        """
         n_removed = 0
         oldest = time.time() - older_than_s  # younger ones may be in use
         for path in (self.root / TEMPORARY).glob("*"):
@@ -125,7 +130,11 @@ class FolderStore:
         return n_removed
 
     def tidy(self) -> None:
-        """Remove the folder of unfinished files where there is none; the next write makes it again."""
+        """Remove the folder of unfinished files where there is none; the next write makes it again.
+
+        A folder that still holds unfinished files stays, and so does one that may not be removed:
+        nothing is raised.
+        """
         with contextlib.suppress(OSError):
             (self.root / TEMPORARY).rmdir()
 

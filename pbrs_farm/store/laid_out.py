@@ -99,12 +99,21 @@ class LaidOutStore:
         return self.inner.url
 
     def around(self, wrap: Callable[[Store], Store]) -> LaidOutStore:
-        """The same layout over a wrapped store."""
+        """The same layout over a wrapped store.
+
+        wrap: takes the inner store and gives the one to use in its place, as one that tries again.
+        What this store has read of packs and still holds back is not taken over: wrap before the
+        first use.
+        """
         return LaidOutStore(wrap(self.inner), self._packs)
 
     @property
     def is_packed(self) -> bool:
-        """Whether the root that lies here is packed. Raises StoreFailed for a later layout."""
+        """Whether the root that lies here is packed. Raises StoreFailed for a later layout.
+
+        Asked of the store once and then remembered, but for a root that has not begun (no recipe in
+        it): there it is False until somebody writes.
+        """
         if self._known is None:
             # The layout is written before the recipe: ask in the other order.
             has_begun = self.inner.head(keys.RECIPE) is not None
@@ -216,7 +225,11 @@ class LaidOutStore:
         return Head(pack.rows[name][2], whole.modified_s if whole is not None else 0.0)
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """As Store.list. In a packed root the index of each pack below the prefix is read."""
+        """As Store.list. In a packed root the index of each pack below the prefix is read.
+
+        Keys come as callers know them, not as objects lie; what waits for its pack is written
+        first. In a packed root a listing costs a read for each pack: list no more than is needed.
+        """
         check_prefix(prefix)
         self._flush()
         if not self.is_packed:

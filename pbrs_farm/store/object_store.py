@@ -44,35 +44,67 @@ class Store(Protocol):
 
     @property
     def url(self) -> str:
-        """Where the store is, without secrets."""
+        """Where the store is, without secrets.
+
+        For messages. Do not tell stores apart by it: the endpoint of an S3 store is not in it, so
+        two services with a bucket of one name look the same.
+        """
         ...
 
     def put(self, key: str, data: bytes | memoryview) -> None:
-        """Write the object whole, over an older one if there is one."""
+        """Write the object whole, over an older one if there is one.
+
+        For what may change (a job's description, a report). A marker that must be written by one
+        writer alone goes through `put_if_absent`.
+        """
         ...
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
-        """Write the object unless it exists; True for the one writer who did."""
+        """Write the object unless it exists; True for the one writer who did.
+
+        False says that an object lay there before and was left as it is, whatever its bytes. Of
+        many writers at once one gets True, so that the answer may decide who goes on.
+        """
         ...
 
     def get(self, key: str) -> bytes:
-        """The object's bytes; ObjectMissing if there is none."""
+        """The object's bytes; ObjectMissing if there is none.
+
+        The whole object is held in memory; take `get_range` for a part, and the function
+        `get_or_none` where a missing object is no error.
+        """
         ...
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
-        """n_bytes of the object from a byte of it on, which it must have; else as get."""
+        """n_bytes of the object from a byte of it on, which it must have; else as get.
+
+        start counts from 0. Raises ObjectMissing if there is no object. Implementations may answer
+        a range that goes past the end with fewer bytes: take the size from `head` where it matters.
+        """
         ...
 
     def head(self, key: str) -> Head | None:
-        """Size of the object, None if there is none."""
+        """Size of the object, None if there is none.
+
+        One small request that reads no content; to learn whether an object is there before `get`,
+        use `get_or_none` instead.
+        """
         ...
 
     def list(self, prefix: str = "") -> Iterator[str]:
-        """Keys below the folder `prefix` ("" or "a/b/"), in no promised order."""
+        """Keys below the folder `prefix` ("" or "a/b/"), in no promised order.
+
+        Every object below it, at any depth, by its whole key. Raises StoreFailed at once for a
+        prefix that does not end with "/". What is put or deleted during the listing may be in it or
+        not.
+        """
         ...
 
     def delete(self, key: str) -> None:
-        """Remove the object; nothing happens if there is none."""
+        """Remove the object; nothing happens if there is none.
+
+        So it may be called twice. There is no deletion of a folder: list it and delete its keys.
+        """
         ...
 
 
@@ -93,12 +125,21 @@ class PackingStore(Store, Protocol):
     """A store that has a way of its own to put what a step made."""
 
     def put_done(self, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-        """As the function put_done."""
+        """As the function put_done.
+
+        A store has it where the files of several steps share one object; callers use the function,
+        which falls back to single objects.
+        """
         ...
 
 
 def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
-    """Put what a step made, by key, and then the marker under `key`, if-absent: it is seen last."""
+    """Put what a step made, by key, and then the marker under `key`, if-absent: it is seen last.
+
+    key: of the marker; files: whole key -> bytes, written first, so that a reader who sees the
+    marker finds them. Where a marker is there already it stays, but the files are written again. A
+    PackingStore may hold back what is given until the last step of its group is put.
+    """
     if isinstance(store, PackingStore):
         store.put_done(key, marker, files)
         return
@@ -121,7 +162,11 @@ def check_key(key: str) -> str:
 
 
 def check_prefix(prefix: str) -> str:
-    """prefix itself: "" or a folder with a trailing slash; raises StoreFailed otherwise."""
+    """prefix itself: "" or a folder with a trailing slash; raises StoreFailed otherwise.
+
+    Raises it for a prefix without the slash and for one whose segments no key may have ("..", a
+    leading dot). The root is "".
+    """
     if prefix and not prefix.endswith("/"):
         raise StoreFailed(prefix, "a prefix to list ends with '/'")
     if prefix:

@@ -34,14 +34,23 @@ class Pack:
     head: bytes
 
     def held(self, name: str) -> bytes | None:
-        """The bytes of a member, None where the beginning that was read ends before it does."""
+        """The bytes of a member, None where the beginning that was read ends before it does.
+
+        name: as `marker_of` or a file's name below the view's folder gives it; KeyError for one
+        that is not in `rows`. On None read the range that `rows` names from the pack's object.
+        """
         _step, start, n_bytes = self.rows[name]
         end = start + n_bytes
         return self.head[start:end] if end <= len(self.head) else None
 
 
 def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
-    """The tar of what steps made: step -> name below the view's folder, or of its marker -> bytes."""
+    """The tar of what steps made: step -> name below the view's folder, or of its marker -> bytes.
+
+    Markers come first and then the smallest members, so that one read of the beginning shows what
+    is done. Bytes depend on the members alone (no times, no owners): equal steps give equal packs.
+    An ordinary `tar` opens it.
+    """
     found = [
         (name, step, data) for step, members in steps.items() for name, data in members.items()
     ]
@@ -63,7 +72,11 @@ def pack_bytes(steps: Mapping[str, Mapping[str, bytes]]) -> bytes:
 
 
 def pack_from_head(data: bytes, key: str) -> Pack | None:
-    """The pack that begins with data; None where its index is longer. StoreFailed where it is none."""
+    """The pack that begins with data; None where its index is longer. StoreFailed where it is none.
+
+    data: the first bytes of the object, however many were read; key: for messages alone. On None
+    read more and ask again. A format that a later version wrote raises StoreFailed, too.
+    """
     try:
         entry = tarfile.TarInfo.frombuf(data[:TAR_BLOCK], "ascii", "strict")
         if entry.name != _INDEX:
@@ -92,7 +105,11 @@ def marker_of(step: str) -> str:
 
 
 def house_folder(house: str) -> str:
-    """Where a house's objects lie in a packed root, with a trailing slash."""
+    """Where a house's objects lie in a packed root, with a trailing slash.
+
+    house: id of a house or of an object, each of which has a top folder of its own. A folder of two
+    hex digits of the id's sha256 lies between, so that no folder holds all houses.
+    """
     top = keys.FOLDERS[keys.is_object(house)]
     return f"{top}/{keys.sha256(house.encode())[:2]}/{house}/"
 
@@ -107,7 +124,12 @@ def pack_key(house: str, view: str, group: str) -> str:
 
 
 def object_key(key: str) -> str:
-    """The object of a key that is of no view."""
+    """The object of a key that is of no view.
+
+    Of a house or object the folder is spread as `house_folder` says; all other keys (jobs, reports)
+    stay as they are. Files of views lie in packs and have no object of their own. `key_of_object`
+    goes back.
+    """
     top, _, rest = key.partition("/")
     house, slash, below = rest.partition("/")
     return f"{house_folder(house)}{below}" if top in keys.FOLDERS and slash else key
@@ -123,7 +145,11 @@ def file_or_marker(at: keys.HouseKey) -> str:
 
 
 def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
-    """The groups that may hold a view's file or marker, the likeliest first."""
+    """The groups that may hold a view's file or marker, the likeliest first.
+
+    at: of a file or marker of a view, as `keys` parses it. A marker has one place; a file that
+    plugins may have named is looked for in three.
+    """
     if at.step:
         return (GROUP_OF_STEP.get(at.step, at.step),)
     if at.file == "radiance.exr":
@@ -134,6 +160,9 @@ def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
 
 
 def steps_of(at: keys.HouseKey, group: str) -> tuple[str, ...]:
-    """Steps of a group whose own packs may hold what its pack lacks."""
+    """Steps of a group whose own packs may hold what its pack lacks.
+
+    at: of a marker or a file; of a marker only its own step is looked for.
+    """
     steps = (at.step,) if at.step else GROUPS[group]
     return tuple(step for step in steps if step != group)

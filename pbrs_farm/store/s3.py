@@ -67,7 +67,11 @@ _guard = _ForkGuard()
 
 
 def forbid_in_this_process() -> None:
-    """From now on every S3 call of this very process raises; its children may still call."""
+    """From now on every S3 call of this very process raises; its children may still call.
+
+    For a process that is going to fork: the client's threads do not survive that. It cannot be
+    undone; it holds for this process id, so a child that was forked from here is free.
+    """
     _guard.forbidden_pid = os.getpid()
 
 
