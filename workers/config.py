@@ -50,13 +50,20 @@ class Limits:
         _check_config(self, f"{_PREFIX}LIMITS_")
 
     def deadline_s(self, stage: str) -> float:
-        """Seconds a task of the stage may take."""
+        """Seconds a task of the stage may take.
+
+        Geometry, gl and light have limits of their own; all merges share that of reduce.
+        """
         return {GEOMETRY: self.geometry_s, GL: self.gl_s, LIGHT: self.light_s}.get(
             stage, self.reduce_s
         )
 
     def of_process(self, n_slots: int) -> ProcessLimits:
-        """The limits of the render process of one of n slots."""
+        """The limits of the render process of one of n slots.
+
+        n_slots: slots of this machine. Where no memory limit is configured each slot gets its share
+        of the machine's; a process is replaced by a fresh one between tasks at half of it.
+        """
         memory_mb = self.memory_mb or memory_share_mb(n_slots)
         return ProcessLimits(
             silence_s=self.silence_s,
@@ -158,7 +165,11 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
 
 
 def make_scratch(config: FarmConfig) -> None:
-    """The scratch folder, made where there is none. Raises MachineFailed where it cannot be written."""
+    """The scratch folder, made where there is none. Raises MachineFailed where it cannot be written.
+
+    An existing folder is only tested for being writable, nothing in it is touched. Call it once at
+    the start of a process, before it works.
+    """
     # A file in its place, a folder that is read-only or another user's: all are one line.
     fault = ""
     try:
@@ -226,6 +237,9 @@ def _with_password(url: str, password: str) -> str:
 
 
 def shown_url(url: str) -> str:
-    """A URL without its password, for messages."""
+    """A URL without its password, for messages.
+
+    User and password go both; the rest stays, also words of a query, so put no secret there.
+    """
     parts = urlsplit(url)
     return urlunsplit(parts._replace(netloc=parts.netloc.rpartition("@")[2]))

@@ -82,7 +82,12 @@ def _is_furnished(ref: SourceRef) -> bool:
 def needed_plugins(
     refs: Sequence[SourceRef], recipe: Recipe, layers: Sequence[str]
 ) -> tuple[str, ...]:
-    """The marks of the plugins that workers need for homes under a recipe."""
+    """The marks of the plugins that workers need for homes under a recipe.
+
+    layers: names of label layers, of which only plugins' are looked at. Homes, readers, passes,
+    pictures, cameras, layers and, where the recipe uses the catalogue, furniture; each mark once,
+    in that order. A plugin that is not installed here raises.
+    """
     named = [("homes", plugin_homes(ref.location)[0].name) for ref in refs if ref.kind == "plugin"]
     named += [("readers", ref.location.partition(":")[0]) for ref in refs if ref.kind == "reader"]
     named += [("passes", name) for name in recipe.dress.passes.split(":") if name]
@@ -109,7 +114,10 @@ def is_left_in_place(ref: SourceRef) -> bool:
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
-    """Key and bytes of the reference file a job is to be selected against; BadInput if none."""
+    """Key and bytes of the reference file a job is to be selected against; BadInput if none.
+
+    The key is named by the content, so putting it again is harmless. Nothing is written here.
+    """
     from pbrs_farm.curate.reference_build import read_reference
     from pbrs_farm.selection.reference_set import bytes_from_reference
 
@@ -138,7 +146,12 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
 
 
 def placed_catalogue(words: str) -> dict[str, str]:
-    """The words of dress.catalogue as workers find them -> as they were given."""
+    """The words of dress.catalogue as workers find them -> as they were given.
+
+    words: separated by ":". A file becomes a key that has the digest of its content; any other word
+    stays. The caller puts the files into the store under these keys; `local_catalogue` fetches
+    them.
+    """
     placed = {}
     for word in filter(None, words.split(":")):
         path = Path(word)
@@ -158,7 +171,12 @@ def with_catalogue(recipe: Recipe, words: str) -> Recipe:
 
 
 def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
-    """On a worker: the recipe with libraries of the store as files of this machine's cache."""
+    """On a worker: the recipe with libraries of the store as files of this machine's cache.
+
+    Effects: reads the store and writes to the cache folder; a library that is there already is not
+    fetched again. Words that name no library of the store stay. ObjectMissing where the store lost
+    one.
+    """
     words = []
     for word in filter(None, recipe.dress.catalogue.split(":")):
         # Fetch a library once; its name has the digest of its content.

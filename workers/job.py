@@ -148,18 +148,30 @@ _NOT_WORK = {
 
 
 def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
-    """The id of a job: equal for equal work, so that submitting twice is submitting once."""
+    """The id of a job: equal for equal work, so that submitting twice is submitting once.
+
+    spec: its own job_id may be anything; who submits, priority, limits and the like do not count.
+    The order of the houses does. 12 hex digits of a sha256.
+    """
     work = spec.model_dump(mode="json", exclude=_NOT_WORK)
     work["recipe"] = spec.recipe.digest()
     return keys.digest(work, [[h.house_id, h.sha256] for h in houses])[:12]
 
 
 def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
-    """houses.jsonl: a house a line, in the job's order."""
+    """houses.jsonl: a house a line, in the job's order.
+
+    `houses_from_lines` reads it. The line's number is the house's index, by which shards are cut:
+    do not sort it.
+    """
     return "".join(house.model_dump_json() + "\n" for house in houses).encode()
 
 
 def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:
-    """The houses of a houses.jsonl."""
+    """The houses of a houses.jsonl.
+
+    One after another, so that a million houses are not all objects at once. Raises pydantic's
+    ValidationError for a line that is none: we wrote the file ourselves.
+    """
     for line in data.splitlines():
         yield HouseEntry.model_validate_json(line)

@@ -18,7 +18,11 @@ class NoSecrets(logging.Formatter):
 
 
 def log_to_stderr(level: int | str = "INFO") -> None:
-    """Log to stderr with time, process and level; passwords in URLs are replaced by ***."""
+    """Log to stderr with time, process and level; passwords in URLs are replaced by ***.
+
+    For the main function of a process, never for library code: it replaces all handlers of the root
+    logger. Calling it again is harmless.
+    """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
     root = logging.getLogger()

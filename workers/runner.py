@@ -56,11 +56,20 @@ class StepRunner(Protocol):
     """Runs the steps of a task; raises the errors of pbrs_farm.core.errors."""
 
     def run(self, request: Request, on_step: OnText) -> Result:
-        """Do what the markers say is missing. on_step: called with the name of each step begun."""
+        """Do what the markers say is missing. on_step: called with the name of each step begun.
+
+        May be called again for a task that was cut off at any moment. Raises BadInput and its kin
+        for the house's own faults, Transient errors for what may work later; other exceptions count
+        as bugs.
+        """
         ...
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
-        """How far the house is. done: names of its markers, "<step>" or "<step>.<view>"."""
+        """How far the house is. done: names of its markers, "<step>" or "<step>.<view>".
+
+        Tells `recover` what to enter into the ledger; it must not make anything. A Survey without
+        batches says that geometry is to be done.
+        """
         ...
 
 

@@ -22,7 +22,11 @@ _BYTES_PER_PIXEL: Final = {"light": 22.0, "labels": 4.0}
 
 
 def seconds_per_view(recipe: Recipe) -> float:
-    """Expected seconds of light for a view on one slot of two cores."""
+    """Expected seconds of light for a view on one slot of two cores.
+
+    From the samples a pixel and the picture's size alone, never less than 1 s. What a scene costs,
+    how dark it is, and GPUs are not in it: the farm measures its own rates once a job runs.
+    """
     light = recipe.light
     # Outdoor and indoor light: two samples where the recipe says one.
     is_path = light.integrator == "path"
@@ -32,7 +36,12 @@ def seconds_per_view(recipe: Recipe) -> float:
 
 
 def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
-    """Expected houses, views, tasks, hours and storage of a job."""
+    """Expected houses, views, tasks, hours and storage of a job.
+
+    n_slots: of the farm, 0 counts as one. "slot_hours" is work, "hours" that over the slots;
+    "storage_gb" are gigabytes (10^9) of all outputs. A guess before anything was rendered: once the
+    job runs, `Farm.status` has measured rates.
+    """
     # Expect as many views a house as the paper had, or as were asked for.
     per_house = min(spec.n_views, VIEWS_PER_HOUSE) if spec.n_views else VIEWS_PER_HOUSE
     n_views = round(spec.n_houses * per_house)

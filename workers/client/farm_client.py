@@ -82,7 +82,11 @@ class Farm:
         self.rights = Rights(self.users, config.token)
 
     def acting_as(self, user: User, place: str) -> Farm:
-        """The same farm as this user sees it. place: where he sits, for the audit."""
+        """The same farm as this user sees it. place: where he sits, for the audit.
+
+        For a server that took the token from a request and asks for its user. Ledger, store and
+        registry are shared with this object; neither one's rights change the other's.
+        """
         other = copy.copy(self)
         other.rights = Rights(self.users, self.config.token, user, place)
         return other
@@ -131,7 +135,11 @@ class Farm:
         return Submitted(spec.job_id, len(houses), was)
 
     def check_store(self) -> None:
-        """Raises BadInput where workers live and none of them works on this farm's store."""
+        """Raises BadInput where workers live and none of them works on this farm's store.
+
+        For the moment before a job is submitted: its tasks would otherwise wait for ever. Costs one
+        read of the workers, and of the store only where workers name theirs.
+        """
         living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
         theirs = {
             w.fields["store_id"]: w.fields["store"] for w in living if w.fields.get("store_id")
@@ -161,7 +169,12 @@ class Farm:
         return lines
 
     def recover(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
-        """Rebuild the ledger of a job from storage, whatever Redis held of it."""
+        """Rebuild the ledger of a job from storage, whatever Redis held of it.
+
+        For a ledger that was lost (Redis restarted empty) or is doubted. Houses that storage shows
+        as done stay done, steps with markers are not made again. progress: called with lines for
+        people. Raises BadInput for a job that the store does not know, and for another user's.
+        """
         from workers.job import houses_from_lines
 
         self.users.restore(self.store)
@@ -190,7 +203,11 @@ class Farm:
         return self.recover(job, progress)
 
     def spec(self, job: str) -> JobSpec:
-        """What the job was submitted with; BadInput when the store knows no such job."""
+        """What the job was submitted with; BadInput when the store knows no such job.
+
+        From the store, so also of a job that the ledger lost; what `set_priority` and `limit`
+        changed later is in it. BadInput, too, for a text that is no job id.
+        """
         from pbrs_farm.core.checked_json import checked
         from workers.job import JobSpec
 
@@ -200,11 +217,19 @@ class Farm:
             raise BadInput(job, "", f"no such job in {self.store.url}") from None
 
     def jobs(self) -> list[JobView]:
-        """Every job in the ledger, oldest first."""
+        """Every job in the ledger, oldest first.
+
+        A few reads a job. A job that is forgotten meanwhile is left out; those that only the store
+        knows are `lost_jobs`.
+        """
         return [v for j in self.ledger.known_jobs() if (v := self.ledger.view(j)) is not None]
 
     def newest_job(self) -> str:
-        """The job submitted last; BadInput when there is none."""
+        """The job submitted last; BadInput when there is none.
+
+        "Last" by when it was opened in the ledger. Where the ledger is empty but the store is not,
+        the error's hint is to recover.
+        """
         known = self.ledger.known_jobs()
         if not known:
             lost = self.lost_jobs()
@@ -213,13 +238,19 @@ class Farm:
         return known[-1]
 
     def lost_jobs(self) -> list[str]:
-        """Jobs that the store knows and an empty ledger does not; [] where it holds any job."""
+        """Jobs that the store knows and an empty ledger does not; [] where it holds any job.
+
+        A listing of the store's jobs: seconds on a large one. Without a configured store [].
+        """
         from workers.coordinator.recover import lost_jobs
 
         return lost_jobs(self.ledger, self.store) if self.config.store_url else []
 
     def view(self, job: str) -> JobView:
-        """The ledger's view of a job; BadInput for an unknown one."""
+        """The ledger's view of a job; BadInput for an unknown one.
+
+        A snapshot: call again for news. `status` is the same for people, with rates and workers.
+        """
         view = self.ledger.view(check_job_id(job))
         if view is None:
             hint = "`recover` rebuilds a job from storage"
@@ -227,7 +258,12 @@ class Farm:
         return view
 
     def status(self, job: str) -> dict[str, Any]:
-        """State, stages (done, running, queued, failed, rate, ETA), houses, workers, storage."""
+        """State, stages (done, running, queued, failed, rate, ETA), houses, workers, storage.
+
+        Plain JSON values. "eta_s" is the longest of the stages', None where nothing can be said
+        yet; "held_back" says why a running job is not claimed now, "storage" is "ok" or why the
+        breaker is open. BadInput for an unknown job.
+        """
         view = self.view(job)
         workers = self.registry.workers()
         # A handful of reads, whatever the size of the job.
@@ -275,7 +311,12 @@ class Farm:
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
     def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
-        """The job's houses that are done, but for those known already."""
+        """The job's houses that are done, but for those known already.
+
+        besides: ids that the caller has seen done, which are not asked for again. Reads the job's
+        list of houses from the store and a field of each from Redis: for a follower of a large job,
+        not for a loop without pause.
+        """
         from workers.job import houses_from_lines
 
         entries = houses_from_lines(self.store.get(job_key(check_job_id(job), "houses.jsonl")))
@@ -283,7 +324,12 @@ class Farm:
         return set(self.ledger.finished(job, asked))
 
     def logs(self, job: str, text: str, attempt: int | None = None) -> str:
-        """The stored log of a task's attempt (the last one by default); BadInput when none."""
+        """The stored log of a task's attempt (the last one by default); BadInput when none.
+
+        text: "HOUSE/UNIT/STAGE". attempt: counts from 1. Only failed attempts and tasks of a minute
+        or more leave a log; the error names the attempts that have one. Bytes that are no UTF-8 are
+        replaced.
+        """
         task = task_from_text(text)
         # One object an attempt, in the folder of the task's unit.
         folder = log_key(job, str(task), 0).rpartition("/")[0] + "/"
@@ -307,7 +353,11 @@ class Farm:
             raise BadInput(str(task), "", "the job has no such task", hint=f"`why {task.house}`")
 
     def failures(self, job: str) -> list[dict[str, Any]]:
-        """Tasks that failed for good, alike ones together, most frequent first."""
+        """Tasks that failed for good, alike ones together, most frequent first.
+
+        A row per fingerprint: how many, an example message and log, up to 20 tasks, and the command
+        that repeats one. Reads every fault of the job.
+        """
         # fingerprint -> row; faults alike differ in numbers, ids and paths only
         kinds: dict[str, dict[str, Any]] = {}
         for task, fault in self.ledger.faults(job):
@@ -322,7 +372,12 @@ class Farm:
         return sorted(kinds.values(), key=lambda k: (-k["n"], k["fingerprint"]))
 
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
-        """Fresh attempts for these tasks, or for all that failed; those that were put back."""
+        """Fresh attempts for these tasks, or for all that failed; those that were put back.
+
+        Tasks that had not failed for good, or that do not exist, are left out of the answer without
+        an error; BadInput for a text that is no task and for another user's job. A job that was
+        done runs again.
+        """
         # The ledger forgets the failure, then storage does.
         self.rights.check_owner(job, self.view(job).user)
         chosen = list(tasks) or [task for task, _fault in self.ledger.faults(job)]
@@ -333,7 +388,11 @@ class Farm:
         return again
 
     def pause(self, job: str) -> str:
-        """Start nothing more; what runs, ends. The job's state afterwards."""
+        """Start nothing more; what runs, ends. The job's state afterwards.
+
+        Tasks that wait keep their places, `resume` goes on with them. BadInput for a job that the
+        ledger has not and for another user's, as in `resume`, `cancel` and `reduce`.
+        """
         return self._steer(job, "pause", "by hand")
 
     def resume(self, job: str) -> str:
@@ -341,15 +400,26 @@ class Farm:
         return self._steer(job, "resume")
 
     def cancel(self, job: str) -> str:
-        """Stop for good: what runs is killed. What is in storage stays; submit takes it up."""
+        """Stop for good: what runs is killed. What is in storage stays; submit takes it up.
+
+        It cannot be resumed, and a job that is done stays done. Submitting the same work again
+        makes only what is missing.
+        """
         return self._steer(job, "cancel", "by hand")
 
     def reduce(self, job: str) -> str:
-        """Merge what is there now, of a finished or a running job; its report says what lacks."""
+        """Merge what is there now, of a finished or a running job; its report says what lacks.
+
+        Only asks for it: a worker merges when a slot is free. A cancelled job is left as it is.
+        """
         return self._steer(job, "reduce")
 
     def set_priority(self, job: str, priority: int) -> str:
-        """Dispatch the job by another priority, 0 first, from the coordinator's next turn; its state."""
+        """Dispatch the job by another priority, 0 first, from the coordinator's next turn; its state.
+
+        priority: 0 to 9. It orders the jobs of one user; between users shares decide. Running tasks
+        go on.
+        """
         state = self._steer(job, "priority", str(priority))
         # A job that is recovered keeps it; who only steers may do without a store.
         if self.config.store_url:
@@ -360,7 +430,11 @@ class Farm:
     def limit(
         self, job: str, *, max_slots: int | None = None, budget_h: float | None = None
     ) -> str:
-        """Give a job another ceiling of tasks in flight or of slot-hours (0 = none); its state."""
+        """Give a job another ceiling of tasks in flight or of slot-hours (0 = none); its state.
+
+        What is not given stays. Tasks that run already are not stopped by a lower one. BadInput
+        when neither is given, for a job that the ledger has not, and for another user's.
+        """
         given = {"max_slots": max_slots, "budget_h": budget_h}
         chosen = {name: n for name, n in given.items() if n is not None}
         if not chosen:
@@ -373,7 +447,12 @@ class Farm:
         return state
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
-        """The worker finishes what it runs and leaves; BadInput when there is no such worker."""
+        """The worker finishes what it runs and leaves; BadInput when there is no such worker.
+
+        undo: let it take work again, also one that has left and is started anew under its name.
+        Only asks: the worker leaves when its tasks are done, see `workers`. An admin's right on a
+        farm with users.
+        """
         self.rights.check_admin("drain")
         if not self.registry.drain(worker, undo=undo):
             offer = did_you_mean(worker, [w.name for w in self.registry.workers()])

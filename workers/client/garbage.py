@@ -38,7 +38,11 @@ class Garbage:
 
 
 def keep_from_text(text: str) -> float:
-    """Seconds of "30d", "12h", "2w". Raises BadInput for what is none."""
+    """Seconds of "30d", "12h", "2w". Raises BadInput for what is none.
+
+    Hours, days and weeks in whole numbers; no sum as "1d12h", and no bare number, so that nobody
+    takes days for seconds.
+    """
     match = _KEEP.fullmatch(text)
     if match is None:
         raise BadInput("--keep", text, "no time", hint="30d, 12h or 2w")
@@ -46,7 +50,12 @@ def keep_from_text(text: str) -> float:
 
 
 def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
-    """What may go, by kind. now_s: seconds since 1970, by the clock of the store's objects."""
+    """What may go, by kind. now_s: seconds since 1970, by the clock of the store's objects.
+
+    keep_s: age from which an object may go, seconds. Only looks; `remove` deletes. What a live job
+    may still need is never in it: an object that no manifest names is kept as long as a live job
+    works on its house. Lists the whole store and asks it for the age of each candidate.
+    """
     store = farm.store
     states = {job: _state_of_job(farm, job) for job in _jobs(store)}
     is_old = _older_than(store, now_s - keep_s)
@@ -71,7 +80,11 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
 
 
 def remove(farm: Farm, found: Iterable[Garbage]) -> int:
-    """Delete what was found, and forget cancelled jobs of which nothing is left; how many objects."""
+    """Delete what was found, and forget cancelled jobs of which nothing is left; how many objects.
+
+    found: of `garbage`, best of a moment ago: an object is deleted without another look at its age.
+    An object that is gone already is no error, but counts.
+    """
     n = 0
     for kind in found:
         for key in kind.found:

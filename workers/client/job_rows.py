@@ -14,13 +14,20 @@ if TYPE_CHECKING:
 
 
 def job_rows(farm: Farm) -> list[dict[str, Any]]:
-    """A row per job in the ledger, oldest first; a few reads each, whatever its size."""
+    """A row per job in the ledger, oldest first; a few reads each, whatever its size.
+
+    Plain JSON values; `Farm.status` says more of one job.
+    """
     slots = farm.registry.slots()
     return [job_row(view, slots) for view in farm.jobs()]
 
 
 def job_row(view: JobView, slots: Mapping[str, int]) -> dict[str, Any]:
-    """A job's row. slot_hours: spent by tasks that are done; slot_hours_left: expected."""
+    """A job's row. slot_hours: spent by tasks that are done; slot_hours_left: expected.
+
+    slots: stage -> tasks that workers can run at once, for the ETA. Of a job that is over "eta_s"
+    is None and "slot_hours_left" 0, whatever was left undone.
+    """
     stages = stage_views(view, slots)
     # Of a job that is over nothing is to come, though tasks behind failed ones were never run.
     is_over = view.state not in ("loading", "running", "paused")

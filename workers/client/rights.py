@@ -30,7 +30,11 @@ class Rights:
         self._place = place or platform.node()
 
     def who(self) -> User | None:
-        """Who asks; None on a farm without users. Raises BadInput for one it does not know."""
+        """Who asks; None on a farm without users. Raises BadInput for one it does not know.
+
+        Asks the table of users in Redis on each call, so a user that was removed loses his rights
+        at once. Raises as well where the farm has users and no token is given.
+        """
         if self._acting is not None or not self._users.all():
             return self._acting
         if not self._token:
@@ -44,26 +48,40 @@ class Rights:
         return found
 
     def check_owner(self, job: str, owner: str) -> None:
-        """Raises BadInput where the job is another user's; an admin may steer all."""
+        """Raises BadInput where the job is another user's; an admin may steer all.
+
+        owner: name of the job's user, "" for a job of the time before there were users, which only
+        an admin may steer then. On a farm without users everybody may.
+        """
         user = self.who()
         if user is not None and not user.is_admin and user.name != owner:
             raise BadInput(job, "", f"is a job of {owner or 'no user'}", hint="an admin may")
 
     def check_admin(self, what: str) -> None:
-        """Raises BadInput where a user who is no admin asks."""
+        """Raises BadInput where a user who is no admin asks.
+
+        what: the command, for the message. On a farm without users everybody may.
+        """
         user = self.who()
         if user is not None and not user.is_admin:
             raise BadInput(what, "", "only an admin may")
 
     def check_preempt(self) -> None:
-        """Raises BadInput where a user asks who may submit no urgent job."""
+        """Raises BadInput where a user asks who may submit no urgent job.
+
+        An admin always may. On a farm without users everybody may.
+        """
         user = self.who()
         if user is not None and not (user.is_admin or user.may_preempt):
             hint = f"an admin's `pbrs-farm users limit {user.name} --may-preempt yes`"
             raise BadInput("--preempt", user.name, "may submit no urgent job", hint=hint)
 
     def note(self, what: str, of: str, answer: str) -> None:
-        """Keep the line of a change: when, who, from where, what, and what came of it."""
+        """Keep the line of a change: when, who, from where, what, and what came of it.
+
+        Call it after the change. what: the command; of: the job, user or worker it was about. Texts
+        are cut and stripped of control characters; an unknown token leaves the user "".
+        """
         # Also of the first user, who had no token before.
         user = self._acting
         if user is None and self._token:

@@ -17,7 +17,11 @@ _COUNTS: Final = {
 
 
 def status_text(status: Mapping[str, Any]) -> str:
-    """A few lines: the job, a row per stage, what is wrong."""
+    """A few lines: the job, a row per stage, what is wrong.
+
+    status: of `Farm.status`. Lines that have nothing to say (failures, refusals, storage in order)
+    are left out.
+    """
     houses = status["houses"]
     lines = [
         f"job {status['job']}  {status['state']}"
@@ -56,7 +60,10 @@ def status_text(status: Mapping[str, Any]) -> str:
 
 
 def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A task a line, and below it what is known."""
+    """A task a line, and below it what is known.
+
+    rows: of `Farm.explain`. What a row does not have is not printed.
+    """
     lines = []
     for row in rows:
         lines.append(f"{row['task']}: {row['state']}")
@@ -84,7 +91,10 @@ def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
-    """A kind of failure a paragraph, the most frequent first."""
+    """A kind of failure a paragraph, the most frequent first.
+
+    kinds: of `Farm.failures`. Five tasks of each are named, the command repeats one of them.
+    """
     if not kinds:
         return "nothing failed for good"
     parts = []
@@ -98,7 +108,11 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
 
 
 def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A worker a line, whether it lives, and how many do."""
+    """A worker a line, whether it lives, and how many do.
+
+    rows: with worker, state and age_s, and of the worker's own fields what it reported; "?" stands
+    for what an older one does not say.
+    """
     if not rows:
         return "no workers"
     wide = 2 + max(len("version"), *(len(row.get("version", "?")) for row in rows))
@@ -162,7 +176,10 @@ def changes_text(rows: Sequence[Mapping[str, str]]) -> str:
 
 
 def duration_text(seconds: float | None) -> str:
-    """ "42s", "7m", "3.1h", "2.5d"; "-" when not known."""
+    """ "42s", "7m", "3.1h", "2.5d"; "-" when not known.
+
+    119 s are "119s", 120 s "2.0m", two days "2.0d".
+    """
     if seconds is None:
         return "-"
     # Each unit up to some multiple of it: 119 s, but 2 m.

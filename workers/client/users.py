@@ -16,7 +16,11 @@ if TYPE_CHECKING:
 
 
 def limits_of(**given: Any) -> dict[str, Any]:
-    """Fields of a User that were given; BadInput for a number that is none of a quota."""
+    """Fields of a User that were given; BadInput for a number that is none of a quota.
+
+    None means not given and is left out; 0 is a limit of a quota ("none"), never a share. given:
+    fields of User. `change_user` takes the answer.
+    """
     limits = {name: value for name, value in given.items() if value is not None}
     for name in ("max_slots", "slot_hours"):
         if not 0 <= limits.get(name, 0) < math.inf:
@@ -44,7 +48,11 @@ def add_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> str:
 
 
 def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
-    """Another share or quota; jobs that run follow it within seconds."""
+    """Another share or quota; jobs that run follow it within seconds.
+
+    limits: field of User -> value, as `limits_of` gives them; others stay. BadInput for an unknown
+    user, for nothing to change, and where no admin would be left.
+    """
     farm.rights.check_admin("users limit")
     if not limits:
         hint = "--share, --max-slots, --slot-hours, --admin, --may-preempt"
@@ -57,7 +65,11 @@ def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
 
 
 def remove_user(farm: Farm, name: str) -> None:
-    """His token says nothing any more; his jobs go on. The last one may go, too."""
+    """His token says nothing any more; his jobs go on. The last one may go, too.
+
+    BadInput for an unknown user, and for the only admin while others are left. With the last user
+    the farm asks nobody who he is again.
+    """
     farm.rights.check_admin("users remove")
     users = farm.users.all()
     del users[known_user(users, name).name]
@@ -68,7 +80,11 @@ def remove_user(farm: Farm, name: str) -> None:
 
 
 def user_rows(farm: Farm) -> list[dict[str, Any]]:
-    """A row per user: share, quotas, what his jobs hold now and took in the last days."""
+    """A row per user: share, quotas, what his jobs hold now and took in the last days.
+
+    Reads the view of every active job. "slot_hours_used" is of the last SPENT_DAYS days and of
+    tasks that are done; limits of 0 mean none.
+    """
     users, spent = farm.users.all(), farm.users.spent_h()
     views = [farm.ledger.view(job) for job in farm.ledger.active_jobs()]
     return [

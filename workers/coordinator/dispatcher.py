@@ -65,7 +65,13 @@ class Dispatcher:
         self._turns = MessageTurns()
 
     def send_ready(self, views: Sequence[JobView]) -> int:
-        """Send what there is room for; how many tasks. views: most urgent first. Raises NotLeading."""
+        """Send what there is room for; how many tasks. views: most urgent first. Raises NotLeading.
+
+        Room is what slots can take soon, so a job of millions of tasks does not fill the broker.
+        Shares between users and priorities are kept over time, not in one call: what a job leaves
+        goes to others. Raises LedgerUnavailable where Redis or the broker does not answer; what was
+        not sent is sent again later.
+        """
         windows = self._windows(views)
         room = {pool: _free_in_window(views, pool, n) for pool, n in windows.items()}
         given = self._turns.split(room, views, windows=windows, share_of=self._share_of)
@@ -82,7 +88,12 @@ class Dispatcher:
         return n_sent
 
     def send_lost_again(self, views: Sequence[JobView]) -> int:
-        """Send again what was lost between ledger and broker: old messages whose queue is empty."""
+        """Send again what was lost between ledger and broker: old messages whose queue is empty.
+
+        Only a stage whose queue is empty and whose tasks waited `resend_s` seconds. A message too
+        many does no harm: the second claim is refused. Returns how many were sent, 0 when another
+        coordinator leads.
+        """
         n_sent = 0
         for view in views:
             for stage in STAGES:
@@ -235,7 +246,12 @@ def _groups(tasks: Sequence[TaskId], most: int) -> Iterator[list[TaskId]]:
 
 
 def celery_sender(app: Any) -> Send:
-    """A function that sends messages through a Celery application."""
+    """A function that sends messages through a Celery application.
+
+    app: of `make_app`. A message is (queue, job, tasks as `group_text` writes them, digest of the
+    recipe). The function raises LedgerUnavailable where the broker takes no message; some of the
+    batch may have gone out.
+    """
     from kombu.exceptions import OperationalError
 
     def send(messages: Iterable[tuple[str, str, str, str]]) -> None:

@@ -46,7 +46,11 @@ class FarmAlerts:
         self._posted: dict[str, str] = {}  # alert that goes on -> its reason
 
     def look(self, views: Sequence[JobView], workers: Iterable[WorkerView], breaker: str) -> None:
-        """Compare with what was seen before. breaker: why claims are stopped, or ""."""
+        """Compare with what was seen before. breaker: why claims are stopped, or "".
+
+        views: of all active jobs; one that is missing ends its alerts. workers: all that the
+        registry knows. An alert is posted once, when it begins, and once more when it is over.
+        """
         now = self._clock()
         found: dict[str, str] = {}
         for view in views:

@@ -16,17 +16,28 @@ WORK_POOLS: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU)  # each has a queue; mergin
 
 
 def is_in_pool(view: JobView, pool: str) -> bool:
-    """Whether the job's tasks of that stage belong to the pool: its light is on GPUs, or is not."""
+    """Whether the job's tasks of that stage belong to the pool: its light is on GPUs, or is not.
+
+    Only light has two pools; for all others the answer is True for the pool of the stage's own
+    name.
+    """
     return pool_of(stage_of_pool(pool), gpu=view.uses_gpu) == pool
 
 
 def is_stopped(view: JobView, stage: str) -> bool:
-    """Whether nothing of the stage is sent now, because the user's slot-hours are spent."""
+    """Whether nothing of the stage is sent now, because the user's slot-hours are spent.
+
+    Merges are never stopped so: they take little and make what is done usable.
+    """
     return view.blocked_queues == (EVERYWHERE,) and stage in (GEOMETRY, GL, LIGHT)
 
 
 def n_ready(view: JobView, pool: str) -> int:
-    """Tasks in a pool that could be sent, with those that wait until they may be tried again."""
+    """Tasks in a pool that could be sent, with those that wait until they may be tried again.
+
+    Counts of the ledger at the time of the view; a house that is not admitted counts as one task of
+    geometry. 0 for a job that does not run, but for its last merge.
+    """
     stage = stage_of_pool(pool)
     # Of a job that does not run only its last merge goes on.
     if not is_in_pool(view, pool) or (view.state != "running" and stage != JOB):
@@ -39,7 +50,11 @@ def n_ready(view: JobView, pool: str) -> int:
 
 
 def n_queued_or_running(view: JobView, pool: str) -> int:
-    """Tasks in a pool whose message is on its way or that run."""
+    """Tasks in a pool whose message is on its way or that run.
+
+    0 for a job whose tasks of the stage belong to the other pool. `n_ready` counts those that wait
+    in the ledger.
+    """
     stage = stage_of_pool(pool)
     if not is_in_pool(view, pool):
         return 0
@@ -61,6 +76,9 @@ def n_slots(view: JobView, pool: str, state: str) -> int:
 
 
 def n_claimed_together(view: JobView, stage: str) -> int:
-    """How many tasks of a stage a slot claims at once: about TOGETHER_S of work, one at least."""
+    """How many tasks of a stage a slot claims at once: about TOGETHER_S of work, one at least.
+
+    From the mean of the job's own tasks; 1 before one has ended. Never more than MOST_TOGETHER.
+    """
     seconds = mean_s([view], stage)
     return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1

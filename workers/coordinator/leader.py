@@ -95,7 +95,12 @@ class Coordinator:
         self.leading = False
 
     def run(self, stop: threading.Event) -> None:
-        """Turn after turn until stop is set; Redis may go away and come back."""
+        """Turn after turn until stop is set; Redis may go away and come back.
+
+        stop: set by a signal; the loop ends within a turn and a pause. It never raises
+        LedgerUnavailable: it logs it, loses the lead and tries again. Several processes may run it
+        at once, of which one leads.
+        """
         while not stop.is_set():
             try:
                 if self.turn():
@@ -115,7 +120,12 @@ class Coordinator:
             _log.warning("%s", error)
 
     def turn(self) -> int:
-        """One round of duties; how many messages were sent."""
+        """One round of duties; how many messages were sent.
+
+        For tests and for `run`; the caller pauses between turns. 0 also while standing by and while
+        the breaker is open. Duties that are due less often (leases, rates, limits, notices) keep
+        their own clocks. Raises LedgerUnavailable.
+        """
         # A standby is alive as well.
         if self._is_due("alive", _REAP_EVERY_S):
             touch(self._config.heartbeat_file)
@@ -232,7 +242,12 @@ def _notice(config: FarmConfig, ledger: RedisLedger) -> Callable[[], None]:
 
 
 def main() -> int:
-    """`python -m workers.coordinator.leader`: lead, or stand by, until a signal ends it."""
+    """`python -m workers.coordinator.leader`: lead, or stand by, until a signal ends it.
+
+    1, with a line on stderr, when configuration or scratch folder are wrong. It waits for Redis as
+    long as need be, serves metrics where a port is configured, and gives up the lead on SIGTERM or
+    SIGINT.
+    """
     from workers.queue.celery_app import make_app
 
     log_to_stderr()

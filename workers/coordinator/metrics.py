@@ -43,7 +43,11 @@ class FarmCollector:
         self._table = UserTable(ledger)
 
     def collect(self) -> Iterator[Metric]:
-        """All metrics; only pbrs_up 0 when Redis does not answer."""
+        """All metrics; only pbrs_up 0 when Redis does not answer.
+
+        Called by the Prometheus client at each scrape, in its thread: a few reads a job. Nothing is
+        cached.
+        """
         try:
             # All or nothing: half an answer would look like a farm that lost its jobs.
             metrics = [*self._farm(), *self._jobs()]
@@ -202,7 +206,11 @@ def _seconds(views: list[JobView]) -> Metric:
 
 
 def serve_metrics(config: FarmConfig, ledger: RedisLedger) -> Any:
-    """Serve /metrics on the configured port in a thread of its own."""
+    """Serve /metrics on the configured port in a thread of its own.
+
+    Gives what prometheus_client gives: the server and its thread, a daemon. Raises OSError where
+    the port is taken. There is no authentication: keep the port inside.
+    """
     registry = CollectorRegistry(auto_describe=False)
     registry.register(FarmCollector(ledger))
     return start_http_server(config.metrics_port, registry=registry)

@@ -23,7 +23,11 @@ class Rates:
     _rate: dict[str, dict[str, float]] = field(default_factory=dict)  # job -> stage -> 1/s
 
     def update(self, view: JobView, now_s: float) -> dict[str, float]:
-        """Stage -> tasks per second, from this look at the job and the ones before."""
+        """Stage -> tasks per second, from this look at the job and the ones before.
+
+        now_s: monotonic, seconds. An exponential mean over looks at any distance; empty after the
+        first look, since one count is no rate. A count that fell (a retry) counts as none done.
+        """
         rates = self._rate.setdefault(view.job_id, {})
         done = {s: view.counts.get(f"done:{s}", 0.0) for s in STAGES}
         before = self._last.get(view.job_id)
@@ -59,7 +63,11 @@ class StageView:
 
 
 def views_per_hour(view: JobView) -> float:
-    """Views finished an hour: the rate of the last stage of batches times the views of a batch."""
+    """Views finished an hour: the rate of the last stage of batches times the views of a batch.
+
+    0 before the last stage has ended a batch. Taken from the ledger's rates, so it is as old as the
+    leader's last look.
+    """
     last = view.fields.get("stages", "").rpartition(",")[2]
     n_batches = view.counts.get(f"done:{last}", 0.0)
     per_batch = view.counts.get("views", 0.0) / n_batches if n_batches else 0.0
@@ -67,7 +75,11 @@ def views_per_hour(view: JobView) -> float:
 
 
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
-    """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50."""
+    """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50.
+
+    slots: stage -> tasks that workers can run at once, 0 where none can. Stages that the job has
+    not (light of a job without it) are left out.
+    """
     return [
         _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _has_stage(view, stage)
     ]
@@ -126,7 +138,11 @@ def expected_total(view: JobView, stage: str) -> int:
 
 
 def durations(view: JobView, stage: str) -> dict[int, float]:
-    """Histogram of a stage's task durations: k -> tasks that took 2^(k-1) to 2^k seconds."""
+    """Histogram of a stage's task durations: k -> tasks that took 2^(k-1) to 2^k seconds.
+
+    Sparse: powers without tasks are missing. k is -3 for all that is shorter, so 1/8 s is the
+    finest edge. For `quantile_s`.
+    """
     prefix = f"took:{stage}:"
     return {
         int(name.removeprefix(prefix)): n
@@ -136,7 +152,10 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
 
 
 def mean_s(views: Iterable[JobView], stage: str) -> float:
-    """Mean seconds of the stage's tasks over all these jobs, 0 before one has ended."""
+    """Mean seconds of the stage's tasks over all these jobs, 0 before one has ended.
+
+    views: of several jobs, when one alone has too few tasks to say. Failed attempts are not in it.
+    """
     seconds, n = 0.0, 0.0
     for view in views:
         seconds += view.counts.get(f"seconds:{stage}", 0.0)
@@ -145,7 +164,10 @@ def mean_s(views: Iterable[JobView], stage: str) -> float:
 
 
 def quantile_s(counts: Mapping[int, float], share: float) -> float:
-    """Seconds below which `share` of tasks ended, by a histogram over powers of two; 0 = none ended."""
+    """Seconds below which `share` of tasks ended, by a histogram over powers of two; 0 = none ended.
+
+    counts: of `durations`. The upper edge of the bin, so up to twice too much. share: in (0, 1].
+    """
     wanted = share * sum(counts.values())
     seen = 0.0
     for power in sorted(counts):

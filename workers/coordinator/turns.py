@@ -202,7 +202,11 @@ class MessageTurns:
         return given
 
     def charge(self, pool: str, job: str, n_sent: int) -> None:
-        """So many tasks of the job were sent."""
+        """So many tasks of the job were sent.
+
+        Call it with what was really sent, which may be less than `split` gave: the rest is not held
+        against the job. A job that is not in the pool's turns is passed over.
+        """
         if job in self._passes.get(pool, {}):
             self._passes[pool][job] += n_sent * self._strides[pool][job]
 

@@ -40,7 +40,11 @@ class Webhook:
         self._tries: Counter[tuple[str, str]] = Counter()
 
     def look(self, views: list[JobView]) -> None:
-        """Post what is new of these jobs."""
+        """Post what is new of these jobs.
+
+        What was posted is kept in the ledger, so that a new leader does not repeat it. A post that
+        fails is tried again at later looks, five times in all.
+        """
         for view in views:
             notified = view.fields.get("notified", "")
             if view.outcome not in _POSTED_STATES:
@@ -62,7 +66,10 @@ class Webhook:
 
 
 def notice(view: JobView) -> dict[str, Any]:
-    """What is posted of a job; `text` is what chat programs show."""
+    """What is posted of a job; `text` is what chat programs show.
+
+    Plain JSON values. The keys are a contract with receivers: add, never rename.
+    """
     counts = view.counts
     reason = view.fields.get("reason", "")
     row: dict[str, Any] = {
@@ -84,7 +91,11 @@ def notice(view: JobView) -> dict[str, Any]:
 
 
 def poster(url: Secret) -> Post:
-    """A Post to the URL. Raises BadInput for one that is no http or https."""
+    """A Post to the URL. Raises BadInput for one that is no http or https.
+
+    The function waits for the answer and raises OSError for a failed one, as urllib does. The URL
+    is a secret: chat programs put their token in it.
+    """
     if urlsplit(url.reveal()).scheme not in ("http", "https"):
         raise BadInput("environment", "PBRS_WEBHOOK", "expected an http:// or https:// URL")
 

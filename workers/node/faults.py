@@ -27,7 +27,11 @@ _PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
 
 
 def class_of(error: BaseException) -> FaultClass:
-    """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again."""
+    """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again.
+
+    By the error's type alone. "machine" and "resource" count against the worker, too; "storage" is
+    nobody's and costs no attempt.
+    """
     # From the outermost: what is nobody's fault, the input's, the machine's, ours.
     if isinstance(error, StoreRefused | Transient):
         return "storage"
@@ -41,7 +45,11 @@ def class_of(error: BaseException) -> FaultClass:
 
 
 def fingerprint(error: BaseException) -> str:
-    """Equal for faults alike: type, place in our code, and the message without its numbers."""
+    """Equal for faults alike: type, place in our code, and the message without its numbers.
+
+    For grouping, so it must not differ between machines or versions of libraries: the innermost
+    frame of our own code names the place, without a line number.
+    """
     # The innermost frame in our own code; library frames differ by version.
     place = ""
     for frame in traceback.extract_tb(error.__traceback__):
@@ -51,12 +59,19 @@ def fingerprint(error: BaseException) -> str:
 
 
 def without_numbers(text: str) -> str:
-    """text with numbers, ids and paths replaced, at most 160 characters."""
+    """text with numbers, ids and paths replaced, at most 160 characters.
+
+    White space becomes single blanks first. Two messages about different houses become equal.
+    """
     return _NUMBERS.sub("#", _PATHS.sub("PATH", " ".join(text.split())))[:160]
 
 
 def one_line(error: BaseException) -> str:
-    """The error as a line for people, at most 500 characters."""
+    """The error as a line for people, at most 500 characters.
+
+    The type's name goes before it, except for errors whose texts are whole sentences for people
+    (BadInput, StoreFailed).
+    """
     text = " ".join(str(error).split()) or "no message"
     name = "" if isinstance(error, BadInput | StoreFailed) else f"{type(error).__name__}: "
     return f"{name}{text}"[:500]

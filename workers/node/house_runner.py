@@ -42,7 +42,11 @@ _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 
 
 def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
-    """The runner of a worker or of `recover`."""
+    """The runner of a worker or of `recover`.
+
+    on_waiting: called with a reason while the store does not answer, for up to `storage_patience_s`
+    seconds; then the store's error is raised. Each slot takes its share of the machine's cores.
+    """
     store = store_from_url(config.store_url, config.store)
 
     def with_patience(inner: Store) -> Store:
@@ -71,7 +75,12 @@ class HouseRunner:
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
     def run(self, request: Request, on_step: OnText) -> Result:
-        """One task; raises what its steps raise."""
+        """One task; raises what its steps raise.
+
+        on_step: called with each step's name when it begins, for the log and the watchdog. What is
+        done already is not made again. The errors are those of the package's tree; `class_of` says
+        whose fault it is.
+        """
         spec = self._spec(request.job_id)
         with one_task(self._store, reads_whole=request.stage in (GL, LIGHT)) as store:
             return self._run(store, request, spec, on_step)
@@ -102,7 +111,11 @@ class HouseRunner:
         return Result(n_views=len(request.views))
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
-        """What the markers' names say of a house: see workers.runner.Survey."""
+        """What the markers' names say of a house: see workers.runner.Survey.
+
+        done: names of the house's markers, as `done_steps` gives them. Reads the cameras of the
+        house from the store once its geometry is done.
+        """
         # Without its cameras nobody knows the views of the house.
         if not done.issuperset(steps_before_views(spec, house)):
             return Survey()
@@ -227,7 +240,11 @@ def want_of(spec: JobSpec) -> Wanted:
 
 
 def steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
-    """Steps of the stage geometry: of the house, but for those that the first batch of light makes."""
+    """Steps of the stage geometry: of the house, but for those that the first batch of light makes.
+
+    Where the recipe leaves dark rooms out, illuminance is among them, since it decides which views
+    there are.
+    """
     # Illuminance comes before the views where it decides which of them are made.
     want = want_of(spec)
     later = () if plan.leaves_out_dark_rooms(spec.recipe, want, house) else ("illuminance",)
@@ -235,12 +252,18 @@ def steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
 
 
 def batch_stages(want: Wanted) -> tuple[str, ...]:
-    """The stages a batch of views goes through: light only when a mode needs it."""
+    """The stages a batch of views goes through: light only when a mode needs it.
+
+    In order; the stage gl always comes first and makes labels and OpenGL pictures.
+    """
     return (GL, LIGHT) if "light" in view_steps(want) else (GL,)
 
 
 def steps_of_stage(spec: JobSpec, stage: str) -> tuple[str, ...]:
-    """The steps of a view that one stage does; the last stage also writes view.json."""
+    """The steps of a view that one stage does; the last stage also writes view.json.
+
+    For gl all but the light's steps, for light these. stage: one of these two.
+    """
     steps = view_steps(want_of(spec))
     last = stage == spec.batch_stages[-1]
     return tuple(

@@ -23,13 +23,20 @@ from workers.runner import OnText
 
 
 def house_ids(store: Store, spec: JobSpec) -> list[str]:
-    """The job's houses in its order."""
+    """The job's houses in its order.
+
+    Read from the store on each call; a house's place in the list decides its shard.
+    """
     data = store.get(job_key(spec.job_id, "houses.jsonl"))
     return [house.house_id for house in houses_from_lines(data)]
 
 
 def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
-    """Write the manifests of a shard's houses as one; houses without one are left out."""
+    """Write the manifests of a shard's houses as one; houses without one are left out.
+
+    shard: from 0; houses of a shard lie together in the job's order. Writes one object and may be
+    repeated: the same manifests give the same bytes. on_step: called before each house.
+    """
     # Read the shard's slice of the job's order.
     size = spec.rules.shard_size
     parts = []

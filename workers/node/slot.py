@@ -73,7 +73,11 @@ class _Claimed:
 
 
 def make_slot(config: FarmConfig) -> Slot:
-    """The slot of this pool process, with its ledger in Redis and a render process of its own."""
+    """The slot of this pool process, with its ledger in Redis and a render process of its own.
+
+    Effects: makes a folder for its log and starts a process. Call it after the fork of the pool,
+    once per pool process: the connections and the child must not be shared.
+    """
     from workers.ledger.redis_ledger import RedisLedger
     from workers.ledger.worker_registry import Registry
     from workers.node.renderer import HANDLER

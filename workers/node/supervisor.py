@@ -61,7 +61,11 @@ class _Orders:
 
 
 def command(config: FarmConfig) -> list[str]:
-    """The Celery worker's command line; no secret is on it."""
+    """The Celery worker's command line; no secret is on it.
+
+    For exec or subprocess without a shell. Redis and the store come from the environment;
+    concurrency is the number of slots.
+    """
     return [
         sys.executable, "-m", "celery", "--app", "workers.queue.celery_app", "worker",
         "--concurrency", str(config.slots), "--queues", ",".join(config.queues or QUEUES),
@@ -71,7 +75,11 @@ def command(config: FarmConfig) -> list[str]:
 
 
 def check_machine(config: FarmConfig) -> None:
-    """What a worker needs before it takes work: Redis and room on scratch. Raises PbrsError."""
+    """What a worker needs before it takes work: Redis and room on scratch. Raises PbrsError.
+
+    Waits for Redis as long as need be and touches the liveness file meanwhile. LLVM and OpenGL are
+    not tried here: the render process finds out.
+    """
     RedisLedger(config).wait_until_there(meanwhile=lambda: touch(config.heartbeat_file))
     if not config.store_url:
         raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
@@ -83,7 +91,11 @@ def check_machine(config: FarmConfig) -> None:
 
 
 def sweep(config: FarmConfig) -> None:
-    """Remove what an earlier life of this worker left on scratch."""
+    """Remove what an earlier life of this worker left on scratch.
+
+    Only files that carry this worker's name, and folders of processes that do not run any more:
+    several workers may share a scratch folder. Call it before the worker starts.
+    """
     config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
     config.leaving_file.unlink(missing_ok=True)
