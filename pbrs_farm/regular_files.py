@@ -6,6 +6,7 @@ and a file larger than its limit would fill the memory: each is an OSError whose
 
 from __future__ import annotations
 
+import codecs
 import errno
 import hashlib
 import os
@@ -66,9 +67,18 @@ def read_given(
 def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
     """The text of a file that a user names, as read_given; raises error where it is no UTF-8."""
     try:
-        return read_given(path, MAX_TEXT_BYTES, error=error).decode("utf-8")
+        return text_from_bytes(read_given(path, MAX_TEXT_BYTES, error=error))
     except UnicodeDecodeError:
         raise error(path, "", "cannot be read: is no UTF-8 text") from None
+
+
+def text_from_bytes(data: bytes, errors: str = "strict") -> str:
+    """The text of a file that any system may have written, without its byte order mark.
+
+    It is UTF-8, or UTF-16 where the mark says so. errors: as of bytes.decode.
+    """
+    is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return data.decode("utf-16" if is_wide else "utf-8-sig", errors)
 
 
 def digest_of_regular(path: Path) -> str:

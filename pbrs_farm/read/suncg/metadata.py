@@ -22,6 +22,7 @@ from pbrs_farm.core.house import ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.regular_files import text_from_bytes
 
 CLASS_TABLES: Final = ("ModelCategoryMappingNewActive.csv", "ModelCategoryMapping.csv")
 VARIANT_TABLE: Final = "models.csv"
@@ -94,7 +95,7 @@ def _find_light_table(folder: RootFolder, *names: str) -> tuple[str, bytes] | No
 
 def _parse_csv(name: str, data: bytes) -> list[dict[str, str]]:
     try:
-        text = data.decode("utf-8-sig")
+        text = text_from_bytes(data)
         rows = list(csv.DictReader(io.StringIO(text)))
     except UnicodeDecodeError as error:
         raise BadHouse(name, f"byte {error.start}", "no valid table: not UTF-8") from None
@@ -145,19 +146,32 @@ def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
         return {}
     name, data = found
     lamps = {}
-    for number, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
+    for number, line in enumerate(text_from_bytes(data, "replace").splitlines(), 1):
         words = line.split()
         if not words:
             continue
         try:
-            n_bulbs = int(words[1])
-            bulbs = tuple(int(w) for w in words[2 : 2 + n_bulbs])
-            n_shades = int(words[2 + n_bulbs])
-            shades = tuple(int(w) for w in words[3 + n_bulbs : 3 + n_bulbs + n_shades])
+            lamps[words[0]] = _lamp_materials(words[1:])
         except (ValueError, IndexError):
-            raise BadHouse(name, f"line {number}", "expected counts and indices") from None
-        lamps[words[0]] = LampMaterials(bulbs, shades)
+            text = "expected counts, each with as many materials: 1 material_3 1 material_2"
+            raise BadHouse(name, f"line {number}", text) from None
     return lamps
+
+
+def _lamp_materials(words: list[str]) -> LampMaterials:
+    """The materials of a row `n material_i ... k material_j ...`: n bulbs, then k shades."""
+    n_bulbs = int(words[0])
+    bulbs, rest = words[1 : 1 + n_bulbs], words[1 + n_bulbs :]
+    n_shades = int(rest[0])
+    shades = rest[1 : 1 + n_shades]
+    if len(bulbs) != n_bulbs or len(shades) != n_shades:
+        raise ValueError("fewer materials than the row counts")
+    return LampMaterials(*(tuple(map(_material_position, named)) for named in (bulbs, shades)))
+
+
+def _material_position(word: str) -> int:
+    """The position in the MTL of `material_3`, as the released table writes it, or of a bare 3."""
+    return int(word.rpartition("_")[2])
 
 
 def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:

@@ -206,7 +206,10 @@ def _write_tables(root: Path) -> None:
     lines = [f"{i},{m},{f},{c},{e},{n},,,{a}" for i, (m, f, c, e, n, a) in enumerate(rows)]
     write(root / "metadata/ModelCategoryMappingNewActive.csv", "\n".join([head, *lines]) + "\n")
     write(root / "metadata/models.csv", 'id,front,variantIds\ndoor,"0,0,1","door,door_0"\n')
-    write(root / "metadata/light_geometry_compact.txt", "lamp 1 1 1 2\nbare_lamp 1 7 0\n")
+    write(
+        root / "metadata/light_geometry_compact.txt",
+        "lamp 1 material_1 1 material_2\nbare_lamp 1 material_7 0\n",
+    )
     write(root / "metadata/suncgModelLights.json", json.dumps({
         "lamp": [
             light("PointLight", [-0.2, 1.55, 0.0], 60),

@@ -130,6 +130,8 @@ def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
         ("object/chair/chair.obj", "v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n", "not a number"),
         ("object/chair/chair.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "not an index"),
         ("metadata/light_geometry_compact.txt", "lamp 3 1\n", "line 1"),
+        ("metadata/light_geometry_compact.txt", "a 1 material_0 0\nlamp 1 bulb 0\n", "line 2"),
+        ("metadata/light_geometry_compact.txt", "lamp 0 2 material_1\n", "line 1"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "Sun"}]}', r"lamp\[0\]"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "PointLight", "power": 3}]}', "position"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": []}]}', r"lamp\[0\]"),

@@ -40,6 +40,20 @@ def test_a_bulb_index_beyond_the_models_materials_leaves_the_bulb_to_repair(hous
     assert np.allclose([light.position, light.position_end], [[3.4, 0.65, 2.5], [3.6, 0.65, 2.5]])
 
 
+@pytest.mark.parametrize(
+    "row",
+    ["lamp 1 material_1 1 material_2", "lamp 1 1 1 2", "\ufefflamp 1 material_1 1 material_2\r"],
+)
+def test_rows_of_the_lamp_table_name_materials_or_count_them(tmp_path: Path, row: str) -> None:
+    suncg_root.write_root(tmp_path)
+    table = tmp_path / "metadata/light_geometry_compact.txt"
+    table.write_text(f"{row}\nbare_lamp 2 material_1 material_0 0\n", newline="")
+    house = read_suncg(tmp_path, HOUSE, ReadFields())
+    assert material_of(house, "0_4", "material_1_0").kind is MaterialKind.BULB
+    assert material_of(house, "0_4", "material_2").kind is MaterialKind.SHADE
+    assert material_of(house, "0_5", "material_0").kind is MaterialKind.BULB
+
+
 def test_lights_turn_with_their_mirrored_lamp(tmp_path: Path) -> None:
     suncg_root.write_root(tmp_path)
     plain = suncg_root.house_json()
