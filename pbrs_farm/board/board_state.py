@@ -49,7 +49,12 @@ class Board:
 
 
 def new_board(store: Store, options: BoardOptions, farm: LiveFarm | None = None) -> Board:
-    """A board of an output root; what it makes is kept below options.cache, by the root's URL."""
+    """A board of an output root; what it makes is kept below options.cache, by the root's URL.
+
+    Nothing runs yet: `Board.start` begins to look at the root, which is only read. Two boards of
+    one root with one cache share their index. Without a farm there are no pages of jobs and no
+    users but the board's own token.
+    """
     folder = options.cache / keys.digest(store.url)
     reader = RootReader(store)
     index = ViewIndex(folder / "index.sqlite")

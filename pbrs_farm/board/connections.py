@@ -19,7 +19,11 @@ from pbrs_farm.board.options import BoardLimits, is_loopback
 
 
 def connection_class(limits: BoardLimits) -> type[asyncio.Protocol]:
-    """uvicorn's connection under these limits."""
+    """uvicorn's connection under these limits.
+
+    A class of its own for each call, as uvicorn makes the connections itself and passes no
+    arguments.
+    """
 
     class Connection(_Bounded):
         pass

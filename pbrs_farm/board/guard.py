@@ -54,7 +54,11 @@ class Buckets:
         self._left: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tokens, at which time
 
     def takes(self, address: str) -> bool:
-        """Whether the address may ask once more now; if so, it has."""
+        """Whether the address may ask once more now; if so, it has.
+
+        Tokens of the address come back with time. Only so many addresses are remembered: the one
+        that asked longest ago is forgotten first, and starts with a full bucket again.
+        """
         now, left = self._clock(), self._filled(address)
         may = left >= 1
         self._left.pop(address, None)
@@ -250,7 +254,11 @@ def _text_response(status: int, text: str, headers: dict[str, str] | None = None
 
 
 def form_values(body: bytes) -> dict[str, str]:
-    """Name -> value of a form's body; of a name that stands twice the last."""
+    """Name -> value of a form's body; of a name that stands twice the last.
+
+    {} for a body that is not UTF-8 or has more than 64 fields. Empty values are kept. Nothing is
+    checked: values are text from anybody.
+    """
     try:
         found = parse_qs(body.decode("utf-8"), keep_blank_values=True, max_num_fields=64)
     except ValueError:
@@ -259,6 +267,9 @@ def form_values(body: bytes) -> dict[str, str]:
 
 
 async def form_of(request: Request) -> dict[str, str]:
-    """The form of a request that passed the guard."""
+    """The form of a request that passed the guard.
+
+    The guard has read and bounded the body; without it the form is empty.
+    """
     body: Any = request.scope.get("board_body") or b""
     return form_values(body)

@@ -79,12 +79,19 @@ class LiveFarm:
         return self._asked(job, lambda: self._read_job(job))
 
     def log(self, job: str, task: str) -> str:
-        """The end of a task's stored log. Raises BadInput where there is none."""
+        """The end of a task's stored log. Raises BadInput where there is none.
+
+        Only the last part of a long log.
+        """
         text = self.farm.logs(job, task)
         return text[-_MAX_LOG:]
 
     def finished_houses(self) -> set[str]:
-        """The houses of every job that need no more work; those known before if Redis is silent."""
+        """The houses of every job that need no more work; those known before if Redis is silent.
+
+        Grows only: what was finished stays so while the board runs. Asks the farm once a job that
+        finished something since.
+        """
         try:
             for job in self.farm.ledger.known_jobs():
                 view = self.farm.ledger.view(job)
@@ -184,7 +191,11 @@ class Audit:
         self._lock = threading.Lock()
 
     def note(self, *, address: str, user: str, what: str, of: str, answer: str) -> None:
-        """Write one line: when, who, from which address, what was done to what, what came of it."""
+        """Write one line: when, who, from which address, what was done to what, what came of it.
+
+        Lines are appended and also logged, and none is ever changed. Write it after the thing was
+        done or refused, with what came of it.
+        """
         row = {
             "utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "address": address,
@@ -199,7 +210,10 @@ class Audit:
         _LOG.warning("audit: %s", line)
 
     def last(self) -> list[dict[str, Any]]:
-        """The last changes, newest first."""
+        """The last changes, newest first.
+
+        [] where nothing was ever done. Lines of older boards have no user, which is "" here.
+        """
         try:
             with self._file.open(encoding="utf-8") as file:
                 lines = deque(file, maxlen=_SHOWN)

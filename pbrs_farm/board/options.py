@@ -50,7 +50,11 @@ class BoardOptions:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host's name or address means this machine."""
+    """Whether a host's name or address means this machine.
+
+    "localhost", 127.0.0.0/8 and ::1, in brackets too. Other names are not looked up and count as
+    public, 0.0.0.0 as well.
+    """
     if host.lower() == "localhost":
         return True
     try:

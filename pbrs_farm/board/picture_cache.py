@@ -34,7 +34,12 @@ class PictureCache:
         return self.folder / digest[:2] / f"{digest}.{ending}"
 
     def get(self, words: tuple[str, ...], ending: str, make: Callable[[], bytes]) -> bytes:
-        """The picture of these words, made when there is none yet. Raises what make raises."""
+        """The picture of these words, made when there is none yet. Raises what make raises.
+
+        Whatever decides the picture belongs among the words, the version of its files too: nothing
+        is ever made again. One picture is made at a time, and who waits for the same one finds it
+        made.
+        """
         path = self.file(words, ending)
         try:
             return path.read_bytes()
@@ -63,7 +68,11 @@ class PictureCache:
             self.sweep()
 
     def sweep(self) -> None:
-        """Remove the files made first until the folder is within its size."""
+        """Remove the files made first until the folder is within its size.
+
+        By the time at which they were written, not last read. What is removed is made again when
+        asked for.
+        """
         found = sorted(
             (e.stat().st_mtime, e.stat().st_size, e.path) for e in _cached_files(self.folder)
         )

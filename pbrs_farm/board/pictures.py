@@ -38,7 +38,12 @@ def title_of(layer: str) -> str:
 
 
 def shown_pixels(layer: str, data: bytes, place: str) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a layer's file. Raises BadInput where it cannot be read."""
+    """(H, W, 3) uint8 sRGB of a layer's file. Raises BadInput where it cannot be read.
+
+    data is the stored file, place what messages call it. Ids and classes become colours, depth a
+    scale between its own percentiles: never decode values from it. Not for radiance, which is no
+    picture.
+    """
     return shown_colours(LAYER[layer], layer_from_bytes(layer, data, place))
 
 
@@ -48,14 +53,21 @@ def shown_png(layer: str, data: bytes, place: str) -> bytes:
 
 
 def thumbnail_jpeg(layer: str, data: bytes, place: str) -> bytes:
-    """JPEG of a layer, small. Raises BadInput where it cannot be read."""
+    """JPEG of a layer, small. Raises BadInput where it cannot be read.
+
+    Labels are made small by the nearest pixel, so that no new colour comes in between two classes.
+    """
     pixels = shown_pixels(layer, data, place)
     small = images.thumbnail(pixels, max_edge_px=THUMBNAIL_PX, nearest=LAYER[layer].is_label)
     return images.jpeg_from_array(np.ascontiguousarray(small), _QUALITY)
 
 
 def packet(layers: Mapping[str, NDArray[Any]]) -> bytes:
-    """The packet of the layers there are; those of another size than the first are left out."""
+    """The packet of the layers there are; those of another size than the first are left out.
+
+    Width, height and a bit for each layer that is there, then the planes in the order of PLANES,
+    rows from the top. Layers that PLANES does not name are left out.
+    """
     shape = next((layers[name].shape[:2] for name, *_ in PLANES if name in layers), (0, 0))
     flags, planes = 0, []
     for name, bit, dtype, behind in PLANES:

@@ -42,12 +42,19 @@ class RootReader:
         return None if head is None else head.n_bytes
 
     def get(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes:
-        """The object's bytes. Raises StoreFailed, ObjectMissing where there is none of that size."""
+        """The object's bytes. Raises StoreFailed, ObjectMissing where there is none of that size.
+
+        Bounded, since stored files may come from anybody: give most_bytes where more than JSON is
+        read. A key that leads out of the root is refused.
+        """
         self._size_within(key, most_bytes)
         return self.store.get(key)
 
     def pieces(self, key: str, most_bytes: int) -> tuple[int, Iterator[bytes]]:
-        """The object's size and its bytes piece by piece. Raises as get."""
+        """The object's size and its bytes piece by piece. Raises as get.
+
+        The size is asked first; an object that shrinks meanwhile fails while it is being sent.
+        """
         n_bytes = self._size_within(key, most_bytes)
         starts = range(0, n_bytes, PIECE_BYTES)
         return n_bytes, (
@@ -55,14 +62,21 @@ class RootReader:
         )
 
     def get_or_none(self, key: str, most_bytes: int = MAX_JSON_BYTES) -> bytes | None:
-        """The object's bytes, None where they cannot be had."""
+        """The object's bytes, None where they cannot be had.
+
+        For what a page can do without. It hides a store that does not answer: take `get` where the
+        difference matters.
+        """
         try:
             return self.get(key, most_bytes)
         except PbrsError:
             return None
 
     def json_object(self, key: str) -> dict[str, Any]:
-        """The JSON object under a key, {} where there is none or it is damaged."""
+        """The JSON object under a key, {} where there is none or it is damaged.
+
+        Fields may be missing or of any type: check each that is used.
+        """
         data = self.get_or_none(key)
         try:
             value = json.loads(data) if data is not None else {}

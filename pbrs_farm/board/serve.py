@@ -31,7 +31,11 @@ _BACKLOG = 256
 
 
 def application(board: Board) -> ASGIApp:
-    """The application of a board; it starts and ends the board's threads with itself."""
+    """The application of a board; it starts and ends the board's threads with itself.
+
+    An ASGI application whose requests all pass the guard; what raises becomes an answer with the
+    fault's status. Limits of connections are set by `server_of`: another server needs its own.
+    """
 
     @asynccontextmanager
     async def lifespan(_app: Starlette) -> AsyncIterator[None]:
@@ -110,7 +114,11 @@ class _Server(uvicorn.Server):
 
 
 def server_of(board: Board) -> uvicorn.Server:
-    """The server of a board; `run` or `serve` it. It believes no forwarded address."""
+    """The server of a board; `run` or `serve` it. It believes no forwarded address.
+
+    Access is not logged. Behind a proxy every request has the proxy's address, as forwarded ones
+    could be made up.
+    """
     return _Server(
         board,
         uvicorn.Config(
@@ -130,7 +138,11 @@ def server_of(board: Board) -> uvicorn.Server:
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
-    """A socket that listens there; BadInput when the port is taken or the address not ours."""
+    """A socket that listens there; BadInput when the port is taken or the address not ours.
+
+    It can be bound again at once after a board has ended. Port 0 takes a free one: ask the socket
+    which.
+    """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

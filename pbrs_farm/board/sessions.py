@@ -38,7 +38,10 @@ class Sessions:
         self._lock = threading.Lock()
 
     def knows(self, token: str) -> bool:
-        """Whether a word is the token; takes the same time for every wrong one."""
+        """Whether a word is the token; takes the same time for every wrong one.
+
+        An empty token is never known, so a board that has none lets nobody in by it.
+        """
         # Digests are of one length, whatever the words' is.
         expected = self._token.reveal()
         return bool(expected) and hmac.compare_digest(_digest(token), _digest(expected))
@@ -48,7 +51,11 @@ class Sessions:
         return "" if self.knows(token) else self._user_by(token) or None
 
     def open(self, user: str = "") -> str:
-        """A new session's word. user: whose it is, "" with the board's own token."""
+        """A new session's word. user: whose it is, "" with the board's own token.
+
+        The word goes into a cookie; only its digest is kept. It ends after a fixed life, or when so
+        many sessions are open that the oldest goes. Sessions do not outlive the process.
+        """
         session = secrets.token_urlsafe(32)
         with self._lock:
             self._open[_digest(session)] = (time.monotonic() + _LIFE_S, user)
@@ -72,11 +79,18 @@ class Sessions:
         return user if time.monotonic() < ends else None
 
     def form_word(self, session: str) -> str:
-        """What a form of this session must carry."""
+        """What a form of this session must carry.
+
+        Follows from the session and a key of this process, so it needs no memory; a form of another
+        site cannot know it.
+        """
         return hmac.new(self._key, session.encode(), hashlib.sha256).hexdigest()
 
     def is_form_word(self, session: str, word: str) -> bool:
-        """Whether a form carries the word of its session."""
+        """Whether a form carries the word of its session.
+
+        Compares in constant time. Text from anybody: it may be of any length and content.
+        """
         expected = self.form_word(session).encode()
         return hmac.compare_digest(word[:_MAX_WORD].encode("utf-8", "replace"), expected)
 

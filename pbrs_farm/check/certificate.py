@@ -40,11 +40,18 @@ class Certificate(Record):
 
     @property
     def is_clean(self) -> bool:
-        """Nothing failed, and there was something to check."""
+        """Nothing failed, and there was something to check.
+
+        Ties and notes do not count against it; a folder without a finished view is not clean.
+        """
         return self.n_views > 0 and not any(c.failed for c in self.counts.values())
 
     def text(self) -> str:
-        """The certificate as lines for a terminal."""
+        """The certificate as lines for a terminal.
+
+        A table of all checks, what was and was not looked at, the failures that were kept, and
+        CLEAN or NOT CLEAN as the last line, which scripts may look for.
+        """
         what = "every pixel" if self.all_pixels else "a sample of pixels"
         lines = [
             f"{self.folder}: {self.n_houses} houses, {self.n_views} views, {what}",
@@ -90,18 +97,30 @@ class Tally:
         self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
-        """checked more things were looked at, of which ties are ties."""
+        """checked more things were looked at, of which ties are ties.
+
+        Ties are things of which two answers are right; they are part of checked. Report failures
+        with `fail`, after adding: it does not add to what was looked at.
+        """
         row = self._counts.setdefault(check, [0, 0, 0])
         row[0] += int(checked)
         row[2] += int(ties)
 
     def coincide(self, house: str, items: tuple[str, str]) -> None:
-        """One more pixel of a house shows either of two coincident surfaces of these items."""
+        """One more pixel of a house shows either of two coincident surfaces of these items.
+
+        The order of the two items is no matter. Such pixels are listed in the certificate, not
+        counted as failures.
+        """
         a, b = sorted(shown(item) for item in items)
         self._coincident[house, a, b] = self._coincident.get((house, a, b), 0) + 1
 
     def fail(self, check: str, place: str, what: str, n_failed: int = 1) -> None:
-        """n_failed of the things already added failed at place."""
+        """n_failed of the things already added failed at place.
+
+        All failures are counted; of each check only the first MAX_LISTED are listed with their
+        place. Text from files is made printable here.
+        """
         self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
         listed = self._listed.setdefault(check, [])
         if len(listed) < MAX_LISTED:
@@ -112,7 +131,10 @@ class Tally:
         self.notes.append(shown(text, MAX_MESSAGE))
 
     def expect(self, check: str, place: str, holds: bool, what: str) -> bool:
-        """One thing was looked at; it fails with what unless it holds."""
+        """One thing was looked at; it fails with what unless it holds.
+
+        Gives back holds, so that a check can return where nothing else makes sense.
+        """
         self.add(check, 1)
         if not holds:
             self.fail(check, place, what)
@@ -133,7 +155,11 @@ class Tally:
         looked_at: tuple[str, ...] = (),
         not_looked_at: tuple[str, ...] = (),
     ) -> Certificate:
-        """What was collected."""
+        """What was collected.
+
+        The tally may go on afterwards; the certificate does not change. Checks appear in the order
+        in which they first looked at something.
+        """
         return Certificate(
             folder=folder,
             all_pixels=all_pixels,

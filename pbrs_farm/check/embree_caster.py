@@ -40,7 +40,11 @@ class Rays:
             self._caster = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh, scale_to_box=False)
 
     def first(self, origin: Floats, directions: Floats) -> Faces:
-        """(N,) number of the triangle each ray hits first, -1 = nothing; origin (3,) or (N, 3)."""
+        """(N,) number of the triangle each ray hits first, -1 = nothing; origin (3,) or (N, 3).
+
+        directions (N, 3) of any length; a direction (0, 0, 0) is a pixel without a ray and meets
+        nothing. Faces are hit from both sides.
+        """
         if self._caster is None or not len(directions):
             return np.full(len(directions), -1, np.int64)
         origins = np.broadcast_to(origin, directions.shape)
@@ -49,7 +53,12 @@ class Rays:
         return np.where((local >= 0) & directions.any(1), self._face[local], -1)
 
     def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats:
-        """(N,) distance in lengths of directions to each face's plane; 0 where face is -1."""
+        """(N,) distance in lengths of directions to each face's plane; 0 where face is -1.
+
+        In double precision from the plane itself, more exact than the caster's own. Where a ray
+        runs along the plane the result is inf or NaN; whether the point lies in the triangle is not
+        asked.
+        """
         normal, corner = self._normal[face], self._corner[face]
         # Intersect the ray with the plane through the corner.
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -58,7 +67,10 @@ class Rays:
         return np.where(face >= 0, t, 0.0)
 
     def normal(self, face: Faces, directions: Floats) -> Floats:
-        """(N, 3) unit normals turned against directions; 0 where face is -1."""
+        """(N, 3) unit normals turned against directions; 0 where face is -1.
+
+        Of the triangle, not of the shading: float64 in the world.
+        """
         normal = self._normal[face]
         turned = np.where(np.einsum("ni,ni->n", normal, directions)[:, None] > 0, -normal, normal)
         return np.where(face[:, None] >= 0, turned, 0.0)

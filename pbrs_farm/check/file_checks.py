@@ -16,7 +16,10 @@ from pbrs_farm.check.stored_files import (
 
 
 def check_files(root: Path, house: Path, tally: Tally) -> None:
-    """Compare manifest.jsonl of house with the files on disk and with the done markers."""
+    """Compare manifest.jsonl of house with the files on disk and with the done markers.
+
+    A file below views that no row lists fails as well.
+    """
     # Each listed file is there, with the bytes and the hash that are listed.
     rows = _manifest(house / "manifest.jsonl", house.name, tally)
     for key, row in rows.items():
@@ -30,7 +33,11 @@ def check_files(root: Path, house: Path, tally: Tally) -> None:
 
 
 def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
-    """The root's manifest.jsonl is the houses' manifests one after another, if there is one."""
+    """The root's manifest.jsonl is the houses' manifests one after another, if there is one.
+
+    Nothing is counted where the root has no manifest. houses must be in the order in which it was
+    merged.
+    """
     merged = root / "manifest.jsonl"
     if not merged.is_file():
         return

@@ -29,7 +29,11 @@ class StoredLens:
 
     @staticmethod
     def of(table: dict[str, Any]) -> StoredLens:
-        """From view.json; KeyError or ValueError for a lens there is not."""
+        """From view.json; KeyError or ValueError for a lens there is not.
+
+        Written apart from core.lenses, so that a fault there is not confirmed by itself. A pinhole
+        has no table: its views have no StoredLens.
+        """
         model = table["model"]
         if model not in ("radtan", "fisheye", "equirect", "cubemap"):
             raise ValueError(f"no lens model {model!r}")
@@ -39,7 +43,11 @@ class StoredLens:
         return StoredLens(model, k, p, float(table.get("max_angle_rad", np.pi)))
 
     def rays(self, plane: Floats) -> Floats:
-        """(N, 3) directions with OpenCV's axes, of unit depth, of points (N, 2) of the plane."""
+        """(N, 3) directions with OpenCV's axes, of unit depth, of points (N, 2) of the plane.
+
+        Of unit depth for radtan; of unit length for fisheye and equirect, whose depth is the
+        distance. (0, 0, 0) beyond the image circle of a fisheye.
+        """
         if self.model == "equirect":
             longitude, latitude = plane.T
             horizontal = np.cos(latitude)
@@ -64,7 +72,11 @@ class StoredLens:
         return np.where(seen[:, None], np.stack(parts, axis=1), 0.0)
 
     def plane_and_depth(self, points: Floats) -> tuple[Floats, Floats]:
-        """(N, 2) of the plane and (N,) depth of points (N, 3), OpenCV's axes; NaN = unseen."""
+        """(N, 2) of the plane and (N,) depth of points (N, 3), OpenCV's axes; NaN = unseen.
+
+        Points are in the camera's frame, metres. Depth is z for radtan and the distance for the
+        others, as the layers store it.
+        """
         x, y, z = points.T
         distance = np.sqrt(x * x + y * y + z * z)
         if self.model == "equirect":

@@ -32,7 +32,11 @@ _FACTOR = 0.002  # of exposure and gains that view.json tells
 
 
 def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """Develop radiance.exr again, and compare with the stored pictures of the light modes."""
+    """Develop radiance.exr again, and compare with the stored pictures of the light modes.
+
+    Does nothing where the view has no picture of a light mode, no radiance.exr or no recipe:
+    `methods.not_looked_at` says so. arrays has the layers by name.
+    """
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None or not view.has("radiance.exr"):
         return

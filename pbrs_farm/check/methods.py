@@ -51,7 +51,10 @@ _NEVER = (
 
 
 def looked_at(views: list[StoredView]) -> tuple[str, ...]:
-    """A line for each kind of file that was recomputed: its name, in how many views, how."""
+    """A line for each kind of file that was recomputed: its name, in how many views, how.
+
+    In the order of the list of methods, without kinds of files that no view has.
+    """
     counts = _file_counts(views)
     return tuple(
         f"{file} ({counts[file]}): {how}"
@@ -61,7 +64,11 @@ def looked_at(views: list[StoredView]) -> tuple[str, ...]:
 
 
 def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
-    """A line for each kind of file that a hash alone speaks for, or little more."""
+    """A line for each kind of file that a hash alone speaks for, or little more.
+
+    With each view whose light could not be developed again and why, and the lines that hold for
+    every root.
+    """
     counts = _file_counts(views)
     layers = {layer.file for layer in LAYERS}
     lines = []

@@ -47,7 +47,11 @@ class OtherView:
     lens: StoredLens | None = None  # as the view's own: a run has one
 
     def pixels(self, points: Floats) -> tuple[Floats, Floats]:
-        """(N, 2) px of world points (N, 3), and (N,) their depth; NaN where they are behind."""
+        """(N, 2) px of world points (N, 3), and (N,) their depth; NaN where they are behind.
+
+        float64. Depth is z for a pinhole, else what the lens's layers store. A point less than 1 mm
+        before a pinhole counts as behind.
+        """
         local = (points - self.world_from_camera[:3, 3]) @ self.world_from_camera[:3, :3]
         if self.lens is not None:
             plane, depth = self.lens.plane_and_depth(local)
@@ -68,7 +72,11 @@ class Followed:
 
 
 def other_view(view: StoredView, relation: str) -> OtherView | None:
-    """The partner of that relation that view.json names, None without it."""
+    """The partner of that relation that view.json names, None without it.
+
+    Its size and lens are those of the view itself. KeyError or ValueError where the row in the
+    table is damaged.
+    """
     row = view.table.get("partners", {}).get(relation)
     if row is None:
         return None
@@ -84,7 +92,11 @@ def follow_points(
     z: Floats,
     rays: Rays,
 ) -> Followed:
-    """The surfaces at depth z (N,) metres behind pixels' centres, looked for in the other picture."""
+    """The surfaces at depth z (N,) metres behind pixels' centres, looked for in the other picture.
+
+    rows and columns are (N,) indices of pixels. Flow is in px from the pixel's own centre; the
+    state of each point is OUTSIDE, SEEN or HIDDEN.
+    """
     points, px, margin = _points_of(view, other, rows, columns, z)
     with np.errstate(invalid="ignore"):
         inside = margin >= 0
@@ -102,7 +114,10 @@ def near_edge(
     z: Floats,
     rays: Rays,
 ) -> Bools:
-    """(N,) another state is as right: on the border of the other picture, or beside what hides it."""
+    """(N,) another state is as right: on the border of the other picture, or beside what hides it.
+
+    Ask it only of points whose stored state differs from `follow_points`: it casts rays five times.
+    """
     points, _px, margin = _points_of(view, other, rows, columns, z)
     with np.errstate(invalid="ignore"):
         is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
@@ -200,12 +215,19 @@ def _judge_motion(name: str, values: Floats, found: Followed) -> tuple[Bools, Bo
 
 
 def half_step(values: Floats) -> Floats:
-    """Half the distance between 16-bit floats next to values: what storing them may cost."""
+    """Half the distance between 16-bit floats next to values: what storing them may cost.
+
+    A stored value is right within this of the computed one; float64, of any shape. Values must lie
+    within the range of 16-bit floats.
+    """
     return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
 
 
 def check_partners(views: list[StoredView], tally: Tally) -> None:
-    """Each partner that is stored itself has the pose and K that the view's table says."""
+    """Each partner that is stored itself has the pose and K that the view's table says.
+
+    Partners that the folder does not have are passed over, as a view may be rendered alone.
+    """
     by_name = {view.folder.name: view for view in views}
     for view in views:
         for relation, row in sorted(view.table.get("partners", {}).items()):

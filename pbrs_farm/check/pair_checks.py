@@ -25,7 +25,11 @@ COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_m
 
 
 def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
-    """Recompute the shares of some pairs of a house that has the file."""
+    """Recompute the shares of some pairs of a house that has the file.
+
+    At most MOST_PAIRS, drawn by the house's name, so the same each time. A house without
+    pairs.parquet counts nothing; one that cannot be read is a failure.
+    """
     file = house / "pairs.parquet"
     if not file.is_file():
         return

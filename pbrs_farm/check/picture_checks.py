@@ -28,7 +28,11 @@ _MOVES = {
 
 
 def check_edges(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """The edges of the OpenGL pictures lie on those of the instances, and nowhere better than as stored."""
+    """The edges of the OpenGL pictures lie on those of the instances, and nowhere better than as stored.
+
+    Mirrored, turned and shifted copies must not fit better: this finds pictures of another camera,
+    not small errors. A view with few edges is a note and not counted.
+    """
     outline = _outline(arrays["instance"])
     n = int(outline.sum())
     for mode in ("opengl_dl", "opengl_il"):
@@ -79,7 +83,10 @@ def _fit(outline: NDArray[np.bool_], edges: Floats) -> float:
 
 
 def check_histogram(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """Count the view's histograms and quality numbers again, where it has them."""
+    """Count the view's histograms and quality numbers again, where it has them.
+
+    Each number of the file is expected on its own, so that the certificate names which one differs.
+    """
     if not view.has("histogram.json"):
         return
     place = f"{view.place}/histogram.json"

@@ -242,13 +242,21 @@ def _of_face(table: NDArray[Any], face: Faces) -> NDArray[Any]:
 
 
 def published_axes(world: Floats, view: StoredView) -> Floats:
-    """(N, 3) x right, y forward, z up from world directions."""
+    """(N, 3) x right, y forward, z up from world directions.
+
+    world is (N, 3) of directions, not points: the camera's position does not enter. The view's pose
+    has OpenCV's axes.
+    """
     camera = world @ view.world_from_camera[:3, :3]
     return np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
 
 
 def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
-    """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing."""
+    """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing.
+
+    stored is (N, 3) as in the layer, 0..65535 for -1..1, nothing = 32768 three times; expected is
+    (N, 3) float64, of unit length or 0. The tolerance is NORMAL_TOLERANCE_DEG.
+    """
     # Compare by the sine: the cosine of a small angle is too flat.
     decoded = stored * (2 / 65535) - 1
     length = np.linalg.norm(decoded, axis=1)

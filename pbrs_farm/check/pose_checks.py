@@ -23,7 +23,11 @@ _MAX_PARTNERS = 40  # views that one view is held against
 
 
 def check_pose(view: StoredView, tally: Tally) -> None:
-    """The pose is a rotation and a position, both conventions agree, and K is a pinhole's."""
+    """The pose is a rotation and a position, both conventions agree, and K is a pinhole's.
+
+    K must have positive focal lengths and a principal point within the picture. After wrong shapes
+    nothing else of the pose is judged.
+    """
     # Shapes first: nothing else can be computed without them.
     opencv = view.world_from_camera
     opengl = np.array(view.table["world_from_camera_opengl"], np.float64)

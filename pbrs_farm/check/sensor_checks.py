@@ -40,7 +40,11 @@ _REACH_PX = 7  # of the neighbours that a pixel may have measured
 
 
 def check_derived(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """Judge hha and the depth sensors, where the view has them."""
+    """Judge hha and the depth sensors, where the view has them.
+
+    arrays has the layers by name, depth among them. What a sensor adds at random is judged by what
+    its neighbours allow, and by the mean over flat surfaces.
+    """
     depth = arrays["depth"]
     if "hha" in arrays:
         _check_hha(view, arrays, tally)

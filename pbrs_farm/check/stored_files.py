@@ -31,7 +31,10 @@ def stored_bytes(file: Path) -> bytes:
 
 
 def stored_digest(file: Path) -> str:
-    """Hex sha256 of the file, whatever its size; raises BadFile."""
+    """Hex sha256 of the file, whatever its size; raises BadFile.
+
+    Reads it piece by piece. BadFile for what is no regular file or cannot be read.
+    """
     try:
         return digest_of_regular(file)
     except OSError as error:
@@ -39,7 +42,11 @@ def stored_digest(file: Path) -> str:
 
 
 def stored_object(file: Path) -> dict[str, Any]:
-    """The JSON object in the file; raises BadFile."""
+    """The JSON object in the file; raises BadFile.
+
+    BadFile for a file that cannot be read, is no JSON, or holds another value than an object.
+    Nothing of its content is checked.
+    """
     return object_from_json(stored_bytes(file))
 
 

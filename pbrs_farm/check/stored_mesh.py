@@ -37,7 +37,11 @@ class Colours:
     def at(
         self, material: NDArray[np.int64], uv: NDArray[np.float64], most: float
     ) -> NDArray[np.float64]:
-        """(N, 3) sRGB 0..255: colour times texture at uv (N, 2), v down, held to most in linear."""
+        """(N, 3) sRGB 0..255: colour times texture at uv (N, 2), v down, held to most in linear.
+
+        material is (N,) int64 indices. Textures are filtered between texels; most is the largest
+        linear value, as a picture cannot show more. Zeros where the mesh has no materials.
+        """
         if not len(self.factors):
             return np.zeros((len(material), 3))
         linear = self.factors[material]
@@ -99,7 +103,11 @@ class Triangles:
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
-    """Every triangle of every node; raises BadGlb."""
+    """Every triangle of every node; raises BadGlb.
+
+    Of the binary glTF that `house.glb` is, read apart from the exporter. BadGlb for anything that
+    cannot be followed: damaged chunks, indices that point nowhere, other types.
+    """
     try:
         return _triangles(*_chunks(data))
     except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:

@@ -115,7 +115,11 @@ class StoredView:
 
 
 def views_of_house(house: Path) -> tuple[list[StoredView], dict[Path, str]]:
-    """Every view of a house folder that has a readable view.json, by name; the others' faults."""
+    """Every view of a house folder that has a readable view.json, by name; the others' faults.
+
+    The faults are by file, for the certificate: a damaged view.json is one of them and does not
+    hide the other views. No other file is read yet.
+    """
     views, faults = [], {}
     for file in sorted(house.glob("views/*/view.json")):
         try:

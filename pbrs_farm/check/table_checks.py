@@ -35,7 +35,11 @@ class HouseItems:
         self._alone: dict[int, tuple[Floats, Rays]] = {}
 
     def alone(self, instance: int) -> tuple[Floats, Rays]:
-        """Corners (N, 3) of an item's triangles, and rays that meet nothing else."""
+        """Corners (N, 3) of an item's triangles, and rays that meet nothing else.
+
+        Kept for each item once asked, since several views show it. (0, 3) for an instance without
+        triangles.
+        """
         if instance not in self._alone:
             t = self._triangles
             faces = t.faces[t.instance == instance]
@@ -67,7 +71,11 @@ class HouseItems:
 def check_rows(
     view: StoredView, instance: NDArray[Any], items: HouseItems, n_pixels: int | None, tally: Tally
 ) -> None:
-    """Judge box3d, visible_fraction and truncated of every row; n_pixels as of verify."""
+    """Judge box3d, visible_fraction and truncated of every row; n_pixels as of verify.
+
+    instance is (H, W) ids as stored. An item without a triangle in house.glb fails at once;
+    visible_fraction is judged only where the row has one.
+    """
     for row in view.table["instances"]:
         number = int(row["id"])
         place = f"{view.place} instance {number}"

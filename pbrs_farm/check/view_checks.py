@@ -27,7 +27,11 @@ _NORMAL_ERROR = 1e-4  # of a component stored in 16 bits
 
 
 def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | None:
-    """The basic layers by name, None when one of them is missing, damaged or of a wrong shape."""
+    """The basic layers by name, None when one of them is missing, damaged or of a wrong shape.
+
+    Optional layers are in it where the view has their file and it can be read; radiance is left to
+    the check of the light. Every fault is told to the tally here.
+    """
     arrays = {}
     for layer in LAYERS:
         # A basic layer that is missing fails; an optional one may be absent.
@@ -125,7 +129,11 @@ def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tal
 
 
 def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
-    """Layers against each other over the whole picture: valid, unit normals, ids, boundary."""
+    """Layers against each other over the whole picture: valid, unit normals, ids, boundary.
+
+    Needs no rays: it runs on every pixel of every view. arrays has at least the basic layers, all
+    of the view's size.
+    """
     instance, depth, valid = arrays["instance"], arrays["depth"], arrays["valid"]
     _same(view, tally, "valid = depth", (valid == 255) == (depth > 0))
     _same(view, tally, "valid is 0 or 255", (valid == 255) | (valid == 0))

@@ -30,7 +30,11 @@ class SvgPicture:
         element(self._svg, tag, content, **attributes)
 
     def svg(self) -> Markup:
-        """The picture as text, its words escaped."""
+        """The picture as text, its words escaped.
+
+        To be put into a page: it is marked as safe for templates, since text was escaped when it
+        was drawn.
+        """
         return Markup(svg_text(self._svg))
 
 
@@ -65,7 +69,12 @@ class PlotArea(SvgPicture):
         self.add("text", text, x=self.x(at[0]), y=self.y(at[1]) + dy, text_anchor=anchor)
 
     def axes(self, x_title: str, x_ticks: Sequence[str], y_ticks: Sequence[str]) -> None:
-        """Ticks at equal steps along both axes and the title of the lower one."""
+        """Ticks at equal steps along both axes and the title of the lower one.
+
+        At least two ticks an axis, the first at 0 and the last at the end; each of the vertical
+        axis draws a grid line, so call it before the data. Ticks are texts: the scale of the data
+        is the caller's.
+        """
         for k, tick in enumerate(x_ticks):
             self.text((k / (len(x_ticks) - 1), 0), tick, "middle", 16)
         for k, tick in enumerate(y_ticks):
@@ -83,7 +92,12 @@ class PlotArea(SvgPicture):
 
 
 def distribution(scores: F64, kept: Bools, threshold: float, title: str) -> Markup:
-    """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold."""
+    """Scores 0..1 in 50 bars, the kept part of each apart, and the threshold.
+
+    scores is (n,) float64, kept (n,) bool of the same views. The axis counts views and is rounded
+    up to four whole steps; without any score the chart is empty but drawn. Scores outside 0..1 are
+    left out.
+    """
     # Count all views and the kept ones by the same bars.
     edges = np.linspace(0, 1, 51)
     whole, _ = np.histogram(scores, edges)

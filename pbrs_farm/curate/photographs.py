@@ -240,7 +240,11 @@ class NyuMat:
         return int(self._depths.shape[0])
 
     def photos(self, numbers: Collection[int] | None = None) -> Iterator[Photo]:
-        """The photographs in order, ids from 0001; one at a time in memory. numbers: those alone, from 1."""
+        """The photographs in order, ids from 0001; one at a time in memory. numbers: those alone, from 1.
+
+        Numbers beyond the last are left out without a word. The picture is (H, W, 3) uint8, depth
+        (H, W) in whole mm. BadInput names the image where the file is damaged.
+        """
         chosen = range(1, len(self) + 1) if numbers is None else sorted(numbers)
         for k in (number - 1 for number in chosen if number <= len(self)):
             place = f"image {k + 1}"
@@ -254,7 +258,11 @@ class NyuMat:
 
 
 def sha256_of_files(paths: list[Path]) -> str:
-    """sha256 over the files' own, in the order given; of the file itself when there is one."""
+    """sha256 over the files' own, in the order given; of the file itself when there is one.
+
+    BadInput where a file cannot be read. The names do not count, the order does; no files at all
+    have the digest of no bytes.
+    """
     digests = []
     for path in paths:
         try:

@@ -72,6 +72,9 @@ def _counted(
 
 
 def read_reference(path: Path) -> Reference:
-    """The reference in a file; BadInput naming it when it is missing or none."""
+    """The reference in a file; BadInput naming it when it is missing or none.
+
+    Also for one of another version: it must be built again, as counts depend on the settings.
+    """
     hint = "`pbrs-farm reference build` makes one"
     return reference_from_bytes(read_given(path, hint=hint), str(path))

@@ -255,7 +255,11 @@ def _thumbnail_url(pixels: Srgb8Image) -> str:
 
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:
-    """(a * b * c, 3) sRGB of the middle of each colour bin, in the order of the counts."""
+    """(a * b * c, 3) sRGB of the middle of each colour bin, in the order of the counts.
+
+    bins is the number along each of three channels. For "ycbcr" middles that are no colour are
+    clipped to the nearest values of 0..255; any other space is taken for RGB.
+    """
     # Enumerate the middles, the first channel slowest.
     axes = [(np.arange(n) + 0.5) * 256 / n for n in bins]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

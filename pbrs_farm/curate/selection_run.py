@@ -77,7 +77,11 @@ def select(
 
 
 def verdict_table(store: Store, run: str = "default") -> Any:
-    """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none."""
+    """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none.
+
+    A pyarrow table, a row a view, rejected ones included with their reason. It is that of the time
+    of `pbrs-farm select`: views rendered since are not in it.
+    """
     table = _stored_run(store, run)
     if table is None:
         hint = "`pbrs-farm select` first"
@@ -86,7 +90,10 @@ def verdict_table(store: Store, run: str = "default") -> Any:
 
 
 def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
-    """The histograms of one house, from its pack when that is up to date."""
+    """The histograms of one house, from its pack when that is up to date.
+
+    Out of date, or missing, it is counted anew from the views' histograms.
+    """
     views = _houses(store, house)[house]
     return _house_pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
@@ -219,7 +226,11 @@ def _write_run(
 
 
 def json_lines(table: Any) -> bytes:
-    """A line of JSON for each row; numbers with at most six decimals, null where not known."""
+    """A line of JSON for each row; numbers with at most six decimals, null where not known.
+
+    table is a pyarrow table; the keys of a line are in the order of its columns. Works in batches,
+    since at the paper's scale the result has hundreds of megabytes.
+    """
     names = table.column_names
     opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
     file = io.BytesIO()  # getvalue does not copy: at the paper's scale this is 300 MB

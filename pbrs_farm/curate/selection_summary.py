@@ -66,7 +66,11 @@ class SelectionSummary(Record):
 def summary_of(
     judged: Any, run: str, fields: SelectionFields, reference: Reference
 ) -> SelectionSummary:
-    """The summary of a table of verdicts."""
+    """The summary of a table of verdicts.
+
+    judged is the table of verdicts, a row a view. Statistics of scores are over the views that have
+    one; tallies by house and type of room over all.
+    """
     # Views without a score are null there and count in no statistics of scores.
     colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
     counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
@@ -97,7 +101,11 @@ def summary_of(
 
 
 def good_scores(judged: Any) -> tuple[F64, F64]:
-    """Colour and depth scores of the views that nothing but thresholds, caps and balance can reject."""
+    """Colour and depth scores of the views that nothing but thresholds, caps and balance can reject.
+
+    Two float64 arrays of the same views, those without a score left out: what a threshold would
+    choose among. A view that several reasons reject counts only if all of them are of choice.
+    """
     of_quality = set(REASONS) - _OF_CHOICE
     is_good = [
         not of_quality.intersection(text.split(",")) for text in judged["reasons"].to_pylist()
@@ -108,7 +116,11 @@ def good_scores(judged: Any) -> tuple[F64, F64]:
 
 
 def yield_curve(scores: F64, n_views: int) -> list[float]:
-    """Share of n_views whose score is above each of THRESHOLDS; zeros where there are no scores."""
+    """Share of n_views whose score is above each of THRESHOLDS; zeros where there are no scores.
+
+    scores is (n,), the lesser of colour and depth for both together; n_views counts all views, also
+    those without a score. A score equal to a threshold does not pass it.
+    """
     if not len(scores):
         return [0.0] * len(THRESHOLDS)
     # Count by sorting once: the scores above each threshold.

@@ -54,7 +54,11 @@ def class_decisions(items: Iterable[Mapping[str, Any]]) -> tuple[ClassDecision, 
 
 
 def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
-    """The decisions as a Markdown table, and how many items each rule decided."""
+    """The decisions as a Markdown table, and how many items each rule decided.
+
+    In the order given. What ends as otherprop is counted in the last line, since a name that should
+    have a class of its own shows there.
+    """
     by_rule = Counter[str]()
     for d in decisions:
         by_rule[d.rule] += d.n_items

@@ -38,7 +38,10 @@ class ClassStatistics(Record):
     decisions: tuple[ClassDecision, ...] = ()  # by which rule, over all houses
 
     def text(self) -> str:
-        """The statistics as a Markdown table and a list."""
+        """The statistics as a Markdown table and a list.
+
+        Sections for unmapped names and decisions are there only where there are some.
+        """
         lines = [
             f"{self.n_views} views, {self.classes_per_image:.1f} classes a view",
             "",

@@ -77,7 +77,11 @@ def contact_sheet(
 
 
 def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
-    """At most max_views of views, taken in turn from each house and there from each room."""
+    """At most max_views of views, taken in turn from each house and there from each room.
+
+    The result keeps the order of views. With fewer rooms than max_views several of a room are
+    taken; equal input gives equal choice, nothing is drawn.
+    """
     # Group by house and room.
     rooms: dict[str, dict[str, list[ViewEntry]]] = defaultdict(lambda: defaultdict(list))
     for view in views:

@@ -49,7 +49,11 @@ class CardTiles:
 
 
 def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
-    """Tiles of at most THUMBNAIL_PX as a view's card shows them."""
+    """Tiles of at most THUMBNAIL_PX as a view's card shows them.
+
+    Pictures become data URLs, so a card needs no file beside the page. The classes are those of the
+    first tile that has some, the shape (H, W) that of the first with pixels.
+    """
     rows = tuple(
         {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}
         for t in tiles
@@ -187,12 +191,18 @@ def _tile_url(tile: Tile) -> str:
 
 
 def data_url(data: bytes, kind: str) -> str:
-    """The bytes of a picture as a URL that needs no network; kind: "png" or "jpeg"."""
+    """The bytes of a picture as a URL that needs no network; kind: "png" or "jpeg".
+
+    For pages that are one file. A third longer than the bytes.
+    """
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def small_jpeg(pixels: Srgb8Image, max_bytes: int) -> bytes:
-    """JPEG bytes at the best of four qualities that keeps within max_bytes; else made smaller."""
+    """JPEG bytes at the best of four qualities that keeps within max_bytes; else made smaller.
+
+    Below 16 px an edge it gives up and returns what it has, which may be larger than max_bytes.
+    """
     for quality in (84, 74, 62, 48):
         data = images.jpeg_from_array(pixels, quality)
         if len(data) <= max_bytes:

@@ -20,7 +20,11 @@ def page(package: str, template: str, **values: Any) -> str:
 
 @functools.cache
 def compile_template(package: str, template: str) -> Template:
-    """The template file of a package, ready to be filled; each is compiled once a process."""
+    """The template file of a package, ready to be filled; each is compiled once a process.
+
+    Names in the template that are not given when it is filled are errors, and all text is escaped
+    but markupsafe.Markup. `page` fills one in a single call.
+    """
     environment = Environment(
         loader=PackageLoader(package, ""),
         autoescape=True,

@@ -19,7 +19,11 @@ _NEAR_TO_FAR: Final = np.array(
 
 
 def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
-    """Metres of the 1st and 99th percentile of depth_mm where it is known; (0, 1) if it is nowhere."""
+    """Metres of the 1st and 99th percentile of depth_mm where it is known; (0, 1) if it is nowhere.
+
+    depth_mm is an array of any shape, whole millimetres, 0 = unknown. The range is at least 1 mm,
+    so that it can be divided by. Percentiles, so that one far window does not darken a room.
+    """
     known = depth_mm[depth_mm > 0]
     if not known.size:
         return 0.0, 1.0
@@ -58,7 +62,11 @@ def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
 
 
 def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids lie far apart."""
+    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids lie far apart.
+
+    instance is (H, W), 0 = nothing, which has the colour of no class. Colours repeat in large
+    scenes only nearly: two ids far apart may look alike. Do not decode ids from them.
+    """
     ids = np.arange(int(instance.max(initial=0)) + 1)
     # Step hues by the golden ratio, and vary value and saturation, so neighbours differ.
     hue = (ids * 0.61803398875) % 1.0
@@ -86,7 +94,11 @@ def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image
 
 
 def normal_colours(normal_label: NDArray[Any]) -> Srgb8Image:
-    """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost."""
+    """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost.
+
+    normal_label is (H, W, 3 or more), uint16 as stored or uint8. The axes are the layer's own: x
+    right, y forward, z up in the published convention.
+    """
     if normal_label.dtype == np.uint8:
         return np.asarray(normal_label[..., :3], np.uint8)
     return np.asarray(normal_label[..., :3] >> 8, np.uint8)

@@ -45,7 +45,11 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
 
 
 def legend(semantic: NDArray[Any], width_px: int) -> Srgb8Image:
-    """(H', width_px, 3) a row of chips per class in semantic, largest share first."""
+    """(H', width_px, 3) a row of chips per class in semantic, largest share first.
+
+    semantic is an array of NYU40 ids, of any shape; shares are of all its pixels, 0 included as a
+    class. The height follows from how many chips fit a row.
+    """
     # List the classes that are seen, largest first.
     counts = np.bincount(semantic.reshape(-1), minlength=1)
     classes = [int(i) for i in np.argsort(-counts, kind="stable") if counts[i]]

@@ -70,7 +70,11 @@ def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
 
 
 def write_home(path: Path, home: GeneratedHome) -> None:
-    """Write a home's file and the picture of its plan. Raises BadInput where another home lies."""
+    """Write a home's file and the picture of its plan. Raises BadInput where another home lies.
+
+    The .svg stands beside the file with its stem. A file that is there already must be of the same
+    origin and is kept as it is; its picture is drawn again.
+    """
     if path.exists():
         _check_same(path, home.origin)
     else:
@@ -80,7 +84,11 @@ def write_home(path: Path, home: GeneratedHome) -> None:
 
 
 def plans_page(folder: Path) -> str:
-    """The HTML page of every plan in a folder, in the order of their seeds."""
+    """The HTML page of every plan in a folder, in the order of their seeds.
+
+    A plan is listed where both its .svg and its .sh3d are there. Shorter names come first, so that
+    seed 10 comes after 9.
+    """
     names = [p.stem for p in folder.glob("*.svg") if p.with_suffix(".sh3d").exists()]
     names.sort(key=lambda name: (len(name), name))
     return page("pbrs_farm.gallery", "plans.html", names=names)

@@ -33,17 +33,27 @@ class SheetParts:
         self._thread.shutdown(cancel_futures=True)
 
     def make(self, house_id: str, view_id: str) -> None:
-        """Begin the parts of a view whose files are all written."""
+        """Begin the parts of a view whose files are all written.
+
+        Returns at once: a thread reads the view's files, so they must be complete. What fails there
+        is a view without parts, not an error here.
+        """
         folder = self._folder / keys.view_key(house_id, view_id, "view.json")
         view = ViewEntry(OutputHouse(house_id, "", ""), view_id, "", "", folder.parent)
         self._made[view.folder] = self._thread.submit(_part_sizes, view)
 
     def tiles(self) -> dict[Path, Sequence[Tile]]:
-        """View folder -> the tiles of its row, of all views whose parts could be made."""
+        """View folder -> the tiles of its row, of all views whose parts could be made.
+
+        Waits for the parts that were begun.
+        """
         return {folder: tiles for folder, (tiles, _card) in self._results().items()}
 
     def cards(self) -> dict[Path, CardTiles]:
-        """View folder -> the tiles of its card, of all views whose parts could be made."""
+        """View folder -> the tiles of its card, of all views whose parts could be made.
+
+        Waits for the parts that were begun. Smaller than `tiles`, and encoded as a page needs them.
+        """
         return {folder: card for folder, (_tiles, card) in self._results().items()}
 
     def _results(self) -> dict[Path, _Parts]:

@@ -56,13 +56,20 @@ class _Layer:
 
 
 def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
-    """The view's tiles in the order of TILES; one that is absent or damaged says so in its place."""
+    """The view's tiles in the order of TILES; one that is absent or damaged says so in its place.
+
+    Reads the view's files and keeps nothing. A tile's longer edge has at most max_edge_px.
+    """
     (tiles,) = tiles_of_sizes(view, max_edge_px)
     return tiles
 
 
 def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]]:
-    """As tiles_of for each of several sizes; every layer is read once."""
+    """As tiles_of for each of several sizes; every layer is read once.
+
+    A tuple for each size, in the order given. Cheaper than several calls of tiles_of, since
+    decoding costs most.
+    """
     layers = [_shown_layer(view, kind) for kind in TILES]
     return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]
 

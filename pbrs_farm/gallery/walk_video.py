@@ -28,7 +28,11 @@ _DEFAULT_FPS: Final = 30.0
 
 
 def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
-    """House id -> the left frames of its sequence in their order; houses without any are left out."""
+    """House id -> the left frames of its sequence in their order; houses without any are left out.
+
+    Frames are known by "frame" in their view.json, right eyes by "left". Gaps are not filled: a
+    sequence that is only partly rendered has the frames that are there.
+    """
     found: dict[str, list[ViewEntry]] = {}
     for view in views:
         if view.facts.get("frame") is not None and not view.facts.get("left"):
@@ -52,7 +56,12 @@ def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
 
 
 def film(pictures: Iterator[Srgb8Image], fps: Fraction) -> bytes:
-    """An mp4 file (H.264, 4:2:0) of pictures (H, W, 3) of one size; an odd row or column is cut off."""
+    """An mp4 file (H.264, 4:2:0) of pictures (H, W, 3) of one size; an odd row or column is cut off.
+
+    pictures are uint8 sRGB, encoded one by one as they come, so a long film needs little memory;
+    the first decides the size. One thread encodes, so the same pictures give the same bytes with
+    the same libraries. Needs PyAV.
+    """
     import av
 
     buffer = io.BytesIO()

@@ -726,7 +726,11 @@ def make(seed: int, rooms: str = "", **options: Any) -> Home:
 
 
 def recipe_of(recipe: str | Path | Recipe) -> Recipe:
-    """A recipe by name, by .toml file, or itself. Raises BadRecipe."""
+    """A recipe by name, by .toml file, or itself. Raises BadRecipe.
+
+    A name is one of the presets; a path or text that ends in .toml is read from disk. What is
+    neither, a number for instance, raises BadRecipe as well.
+    """
     if isinstance(recipe, Recipe):
         return recipe
     if str(recipe).endswith(".toml"):

@@ -83,7 +83,12 @@ def settled_poses(
 def penetration_m(
     house: House, placed: Sequence[tuple[Model, F64]], targets: Sequence[Target]
 ) -> float:
-    """How deep the deepest contact is of models (model, world_from_model) at rest, metres."""
+    """How deep the deepest contact is of models (model, world_from_model) at rest, metres.
+
+    0 where nothing penetrates. Poses are float64 (4, 4), world_from_model, of at least one model.
+    Only solids of the home around the tops of the targets take part. BadInput where no target has a
+    level top, MachineFailed without MuJoCo.
+    """
     mujoco = _mujoco()
     things = [_Body(model, None, pose) for model, pose in placed]
     parts = {thing.model: _parts_of(thing.model) for thing in things}

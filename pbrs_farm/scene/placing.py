@@ -103,7 +103,11 @@ def scattered_poses(
 
 
 def furniture_of(house: House, room: Room) -> list[Item]:
-    """What stands in a room and has a level top, no higher than eyes, that people put things on."""
+    """What stands in a room and has a level top, no higher than eyes, that people put things on.
+
+    Tables, desks, cabinets, shelves, chairs and the like by their NYU40 class; one whose tops all
+    lie above eye level is left out. In the order of the house's items.
+    """
     scene = SceneTriangles(house.items)
     return [
         item
@@ -117,7 +121,11 @@ def furniture_of(house: House, room: Room) -> list[Item]:
 def level_tops_of(
     house: House, targets: Sequence[Target], border_m: float | None = None
 ) -> list[TargetTops]:
-    """tops_of, without targets that have none; BadInput where none has any."""
+    """tops_of, without targets that have none; BadInput where none has any.
+
+    For calls that cannot go on without a place. border_m as of tops_of. The message names the
+    targets.
+    """
     found = [one for one in tops_of(house, targets, border_m) if one.tops]
     if not found:
         text = f"no support has a level surface: {_names_of(targets)}"
@@ -128,7 +136,12 @@ def level_tops_of(
 def tops_of(
     house: House, targets: Sequence[Target], border_m: float | None = None
 ) -> list[TargetTops]:
-    """The free surfaces of each target, in their order; border_m: as of supports_of_item."""
+    """The free surfaces of each target, in their order; border_m: as of supports_of_item.
+
+    A room gives its floor, an item the level tops of its mesh; a target without any has no tops,
+    and the caller decides. Items must be those of this house: the same objects, not equal ones.
+    Tops above eye level are left out where a target has lower ones.
+    """
     scene = SceneTriangles(house.items)
     rooms = {room.id: room for room in house.rooms}
     border = {} if border_m is None else {"border_m": border_m}
@@ -146,7 +159,11 @@ def tops_of(
 
 
 def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:
-    """(4, 4) world_from_model of a thing that stands upright: the middle of its foot is at foot (3,)."""
+    """(4, 4) world_from_model of a thing that stands upright: the middle of its foot is at foot (3,).
+
+    float64. foot is (3,) metres in the world; the yaw turns about +y. The middle is that of the
+    bounding box after the turn, so a thing that leans does not stand on its centre of mass.
+    """
     turn = rotation_y(yaw_rad) @ model.upright
     points = model.shape.points @ turn.T
     low, high = points.min(0), points.max(0)

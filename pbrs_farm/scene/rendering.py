@@ -62,7 +62,11 @@ class Renderer:
         self._houses = HouseCache()
 
     def house(self, source: SourceRef, recipe: Recipe) -> FinishedHouse:
-        """The house of a source, read, dressed, repaired and edited; those of the last homes are kept."""
+        """The house of a source, read, dressed, repaired and edited; those of the last homes are kept.
+
+        The same source and recipe give the same object as long as it is among the last homes; else
+        all steps of the house run again. Do not change it.
+        """
         key = cache_key(source, recipe)
         with self._lock:
             made = self._finished.get(key)
@@ -76,24 +80,38 @@ class Renderer:
         return made
 
     def sampled(self, source: SourceRef, recipe: Recipe) -> bytes:
-        """cameras.json of the step `cameras`."""
+        """cameras.json of the step `cameras`.
+
+        The bytes as they would be stored in a root. Reads and dresses the home first, where that
+        was not done.
+        """
         return self.call(lambda: self._cameras(source, recipe))
 
     def frames(
         self, source: SourceRef, recipe: Recipe, viewpoints: Sequence[Viewpoint], want: Wanted,
         observe: Callable[[str], None] = lambda _view: None,
     ) -> Views:  # fmt: skip
-        """The viewpoints' frames: the steps of `want` for each, in a store of their own."""
+        """The viewpoints' frames: the steps of `want` for each, in a store of their own.
+
+        Blocks until all are done. Ctrl-C lets the step under way end and begins no other.
+        """
         return self.call(lambda: self._frames(source, recipe, viewpoints, want, observe))
 
     def sketches(
         self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
     ) -> list[NDArray[np.uint8]]:
-        """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored."""
+        """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored.
+
+        uint8 sRGB. Quick, for aiming cameras: no light is traced and no labels are made. The house
+        is prepared first, where that was not done.
+        """
         return self.call(lambda: self._sketches(source, recipe, cameras))
 
     def close(self) -> None:
-        """Let go of every home."""
+        """Let go of every home.
+
+        It may be used again afterwards: homes are then read anew.
+        """
         if self._thread is not None:
             self.call(self._houses.clear)
         self._stores.clear()
@@ -101,7 +119,12 @@ class Renderer:
         self._houses.before_edits.clear()
 
     def call(self, task: Callable[[], _T]) -> _T:
-        """What a task gives, done in the thread that works: rays and pictures have their state there."""
+        """What a task gives, done in the thread that works: rays and pictures have their state there.
+
+        Calls of several threads are done one after another. A task that itself calls runs at once,
+        so that callbacks cannot wait for themselves. MachineFailed in a process that was forked
+        from one that renders, since the state of rays and pictures does not survive a fork.
+        """
         if os.getpid() != self._pid:
             hint = 'multiprocessing.set_start_method("spawn"), or render in the children alone'
             raise MachineFailed("this process was forked from one that renders", hint=hint)

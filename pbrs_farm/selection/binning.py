@@ -97,7 +97,11 @@ def finest_passing(rows: Sequence[BinningRow]) -> Binning:
 
 
 def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
-    """The table as text: "*" marks what was chosen for colour and for depth."""
+    """The table as text: "*" marks what was chosen for colour and for depth.
+
+    rows go from the coarsest binning to finer ones. A line says so where not even the coarsest lets
+    enough of the photographs pass, in which case it is taken all the same.
+    """
     lines = ["colour bins      pass  median    depth bins  pass  median"]
     for r in rows:
         c = "*" if r.binning.colour == chosen.colour else " "

@@ -16,7 +16,11 @@ _FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a cla
 
 
 def class_shares(texts: Sequence[str]) -> F32:
-    """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts."""
+    """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts.
+
+    Column k is class k; 0 is unknown. A text may be empty, and classes that it does not name have
+    0. ValueError or IndexError for a text of another form: texts come from tables of this package.
+    """
     shares = np.zeros((len(texts), N_CLASSES), np.float32)
     for row, text in enumerate(texts):
         for pair in text.split():

@@ -117,7 +117,11 @@ def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:
 
 
 def bytes_from_pack(pack: HistogramPack) -> bytes:
-    """The pack as one object; equal packs give equal bytes."""
+    """The pack as one object; equal packs give equal bytes.
+
+    A line of JSON with the settings, house, source and ids, then the three tables of numbers,
+    compressed. `pack_from_bytes` reads it back.
+    """
     head: dict[str, Any] = {"format": _FORMAT, "settings": pack.settings.model_dump(mode="json")}
     head |= {name: getattr(pack, name) for name in ("house", "source", *_TEXTS)}
     body = b"".join(
@@ -129,7 +133,12 @@ def bytes_from_pack(pack: HistogramPack) -> bytes:
 
 
 def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
-    """The pack in an object; BadInput naming it when it is damaged."""
+    """The pack in an object; BadInput naming it when it is damaged.
+
+    The settings come with it and the lengths of all tables are checked against them. BadInput too
+    for another version of the format. Whether it is up to date is not asked here: compare `source`.
+    The arrays are read-only.
+    """
     try:
         line, _, rest = data.partition(b"\n")
         head = json.loads(line)
@@ -159,7 +168,11 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
 
 
 def pack_source(data: bytes) -> str:
-    """Only the `source` of a pack's object, "" if it has none: is it still up to date?"""
+    """Only the `source` of a pack's object, "" if it has none: is it still up to date?
+
+    Reads the first line alone, without decompressing the numbers. A damaged object gives "", which
+    equals no source, so the pack is made again.
+    """
     try:
         return str(json.loads(data.partition(b"\n")[0])["source"])
     except (ValueError, KeyError, TypeError):

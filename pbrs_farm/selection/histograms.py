@@ -36,7 +36,11 @@ def histogram(
 
 
 def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
-    """(colour_bins ** 3,) uint32 counts of the pixels of (H, W, 3) uint8 in settings.colour_space."""
+    """(colour_bins ** 3,) uint32 counts of the pixels of (H, W, 3) uint8 in settings.colour_space.
+
+    Bins are the leading bits of each channel, the first channel slowest, so colour_bins is a power
+    of two. The counts sum to H W. ValueError for any other shape or type than (H, W, 3) uint8.
+    """
     if rgb_srgb8.ndim != 3 or rgb_srgb8.shape[2] != 3 or rgb_srgb8.dtype != np.uint8:
         raise ValueError(f"a picture is (H, W, 3) uint8, got {rgb_srgb8.shape} {rgb_srgb8.dtype}")
     pixels = _ycbcr(rgb_srgb8) if settings.colour_space == "ycbcr" else rgb_srgb8
@@ -50,7 +54,12 @@ def colour_counts(rgb_srgb8: Srgb8Image, settings: HistogramFields) -> Counts:
 
 
 def depth_counts(depth_mm: NDArray[np.integer], settings: HistogramFields) -> Counts:
-    """(depth_bins,) uint32 counts of known depths; beyond either end counts in the end's bin."""
+    """(depth_bins,) uint32 counts of known depths; beyond either end counts in the end's bin.
+
+    depth_mm is (H, W) of whole millimetres, 0 = unknown and not counted; the range of the bins is
+    settings.depth_min_m to depth_max_m. The counts sum to the pixels of known depth. ValueError for
+    floats, which would be metres.
+    """
     if depth_mm.ndim != 2 or not np.issubdtype(depth_mm.dtype, np.integer):
         raise ValueError(f"depth is (H, W) whole millimetres, got {depth_mm.dtype}")
     # Count each millimetre first: a table of 65536 bins is quicker than a division per pixel.

@@ -29,7 +29,12 @@ ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
 
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
-    """Brightness and saturation of (H, W, 3) uint8."""
+    """Brightness and saturation of (H, W, 3) uint8.
+
+    Brightness is the median luma of every second pixel in each direction, 0..1, from sRGB-encoded
+    values; blown is the share of all pixels whose brightest channel is saturated. For pictures as
+    developed, not for radiance.
+    """
     # Every second pixel is plenty for a median, and quick.
     r, g, b = (rgb_srgb8[::2, ::2, k].astype(np.uint32) for k in range(3))
     # Find the median by counting, with BT.709 weights in 1/256.
@@ -79,7 +84,12 @@ def view_record(
     scene: SceneQuality,
     settings: HistogramFields,
 ) -> ViewRecord:
-    """The record of a view from its pictures by mode, (H, W, 3) uint8, and depth (H, W) in mm."""
+    """The record of a view from its pictures by mode, (H, W, 3) uint8, and depth (H, W) in mm.
+
+    Colour is counted in the mode of the selection where there is a picture of it, else in all
+    modes; brightness in all. depth_mm as of `depth_counts`. At least one picture must be given for
+    a colour score.
+    """
     modes = [SCORED_MODE] if SCORED_MODE in pictures else sorted(pictures)
     return ViewRecord(
         settings=settings,

@@ -95,7 +95,12 @@ class Scorer:
     def score_all(
         self, packs: Iterable[HistogramPack], batch_views: int = BATCH_VIEWS
     ) -> Iterator[Any]:
-        """Score tables of a stream of packs, about batch_views rows each."""
+        """Score tables of a stream of packs, about batch_views rows each.
+
+        Packs are not split, so a batch may be larger by most of a pack; the last may be smaller.
+        Lazy: packs are read as tables are asked for, so that the memory needed does not grow with
+        the root. Nothing comes of no packs.
+        """
         # Gather packs until they fill a batch.
         held: list[HistogramPack] = []
         n = 0  # their views

@@ -102,7 +102,11 @@ def _class_bits(instances: Any) -> int:
 
 
 def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
-    """(house, view) -> "" where the last selection kept it, else why not; {} without a selection."""
+    """(house, view) -> "" where the last selection kept it, else why not; {} without a selection.
+
+    A selection that is missing or damaged gives {}: a board shows the views all the same. At the
+    paper's scale the file has hundreds of megabytes and is read whole.
+    """
     run = reader.json_object(keys.SELECTION).get("run")
     if not run:
         return {}
@@ -115,6 +119,9 @@ def verdicts(reader: RootReader) -> dict[tuple[str, str], str]:
 
 
 def selection_fingerprint(reader: RootReader) -> str:
-    """A text that changes when another selection was made."""
+    """A text that changes when another selection was made.
+
+    "" without a selection. Reads the small selection.json, not the table of verdicts.
+    """
     data = reader.get_or_none(keys.SELECTION)
     return "" if data is None else keys.sha256(data)

@@ -42,7 +42,11 @@ class ViewFilter:
     page: int = 1
 
     def url(self, path: str = "/views", **changes: Any) -> str:
-        """The address of the same filter with changes; what stands at its default is left out."""
+        """The address of the same filter with changes; what stands at its default is left out.
+
+        A change of anything but the page goes back to page 1, since the pages of another filter are
+        others.
+        """
         values = asdict(replace(self, **({"page": 1} | changes)))
         said = {k: v for k, v in values.items() if v != _DEFAULTS[k]}
         return f"{path}?{urlencode(said)}" if said else path
@@ -52,7 +56,11 @@ _DEFAULTS: Final = {f.name: f.default for f in fields(ViewFilter)}
 
 
 def filter_from_query(query: Mapping[str, str]) -> ViewFilter:
-    """The filter that an address says."""
+    """The filter that an address says.
+
+    Never fails: a value that is not of its closed list is left out, words are cut, and a page that
+    is no number is 1.
+    """
     words = {name: query.get(name, "").strip()[:_MAX_WORD] for name in _DEFAULTS if name != "page"}
     # Take of each closed list only what stands in it.
     allowed: dict[str, Collection[str]] = {
@@ -87,7 +95,10 @@ class ListedView:
         return bool(self.layers & LAYER_BIT[layer])
 
     def shown_layer(self, wanted: str = "") -> str:
-        """The layer a thumbnail shows: the one wanted, else the best picture there is, or ""."""
+        """The layer a thumbnail shows: the one wanted, else the best picture there is, or "".
+
+        A wanted layer that the view lacks gives "", not another in its place.
+        """
         if wanted:
             return wanted if self.has(wanted) else ""
         best = [*(mode.value for mode in reversed(ALL_MODES)), "semantic", "depth"]
@@ -126,7 +137,11 @@ class Queries:
         self._menu = lru_cache(maxsize=8)(self._menus)
 
     def views(self, wanted: ViewFilter) -> Page[ListedView]:
-        """The views of a page, by house and id."""
+        """The views of a page, by house and id.
+
+        A number beyond the last page gives the last. Counting is kept as long as the index does not
+        change.
+        """
         where, values = _where(wanted)
         n_rows = self._count(where, values, self._index.generation)
         n_pages = max(1, -(-n_rows // VIEWS_PER_PAGE))
@@ -159,7 +174,11 @@ class Queries:
         return [_view(r) for r in self._index.rows(f"{_VIEW} WHERE v.house = ?", (house,))]
 
     def homes(self, words: str, number: int) -> Page[ListedHome]:
-        """The homes of a page, by name. words: part of a name or id."""
+        """The homes of a page, by name. words: part of a name or id.
+
+        Sorted by name, then id. A number beyond the last page gives the last. Letters in words
+        match anywhere in a name or id; "" lists all.
+        """
         where = f"WHERE {_NAMED}" if words else ""
         values = (_pattern(words),) if words else ()
         n_rows = self._index.rows(f"SELECT count(*) AS n FROM house {where}", values)[0]["n"]

@@ -66,7 +66,11 @@ class Refresher:
             self._ended.wait(max(pause_s, took_s * (1 / _SHARE - 1)))
 
     def refresh(self) -> None:
-        """Enter what is new or changed, forget what is gone."""
+        """Enter what is new or changed, forget what is gone.
+
+        Runs in the refresher's thread; tests call it directly. A house is read again when its
+        fingerprint differs, so a root of many homes that did not change costs a listing.
+        """
         known = self._index.fingerprints()
         now = self._houses.fingerprints()
         changed = [house for house, print_ in now.items() if known.get(house) != print_]

@@ -95,7 +95,11 @@ class StoredHouses:
 
 
 def view_keys(reader: RootReader, house: str) -> Iterable[str]:
-    """The keys below the views of a house: in a folder as they lie there, else by its manifest."""
+    """The keys below the views of a house: in a folder as they lie there, else by its manifest.
+
+    A remote store is not listed where the house's manifest can be read, since listing is slow and
+    costs money there; a manifest that is damaged is passed over.
+    """
     prefix = keys.house_key(house, "views/")
     if not isinstance(reader.store, FolderStore):
         data = reader.get_or_none(keys.house_key(house, keys.MANIFEST))

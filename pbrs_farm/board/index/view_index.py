@@ -60,7 +60,11 @@ class ViewIndex:
         return self._generation
 
     def rows(self, sql: str, values: Sequence[Any] = ()) -> list[sqlite3.Row]:
-        """What a SELECT finds."""
+        """What a SELECT finds.
+
+        Each thread has a connection of its own, so pages read while the refresher writes. Values go
+        in as parameters, never into the text of the statement.
+        """
         return self._connection().execute(sql, values).fetchall()
 
     def fingerprints(self) -> dict[str, str]:
@@ -73,7 +77,11 @@ class ViewIndex:
         return str(found[0]["text"]) if found else ""
 
     def enter(self, houses: Iterable[tuple[HouseRow, str]]) -> None:
-        """Put houses with their fingerprints in place of what was known of them."""
+        """Put houses with their fingerprints in place of what was known of them.
+
+        One transaction: a reader sees all of the houses or none. Views of a house that are gone
+        leave with the old rows.
+        """
         with self._writing, self._connection() as connection:
             for house, fingerprint in houses:
                 _enter_house(connection, house, fingerprint)
@@ -88,7 +96,11 @@ class ViewIndex:
         self._generation += 1
 
     def set_verdicts(self, reasons: Mapping[tuple[str, str], str], fingerprint: str) -> None:
-        """Enter what a selection said of the views: "" kept, else why not."""
+        """Enter what a selection said of the views: "" kept, else why not.
+
+        Verdicts of an earlier selection go first, so a view that the new one does not name has
+        none. A view that the index does not have yet gets none before this is called again.
+        """
         with self._writing, self._connection() as connection:
             connection.execute("UPDATE view SET reason = NULL WHERE reason IS NOT NULL")
             connection.executemany(

@@ -75,7 +75,11 @@ def log(request: Request) -> Response:
 
 
 async def events(request: Request) -> Response:
-    """GET /farm/events: the parts of a page that changed, as server-sent events."""
+    """GET /farm/events: the parts of a page that changed, as server-sent events.
+
+    503 when so many pages listen already that no stream is left; the stream ends when the board
+    does.
+    """
     farm, board = live_farm(request), board_of(request)
     name = request.query_params.get("job", "")[:40]
     if not board.streams.acquire(blocking=False):
@@ -130,7 +134,11 @@ def _farm_parts(request: Request, farm: LiveFarm, job: str) -> dict[str, str]:
 
 
 def confirm(request: Request) -> Response:
-    """GET /farm/confirm?what=pause&job=JOB: asks before anything is done."""
+    """GET /farm/confirm?what=pause&job=JOB: asks before anything is done.
+
+    Every button leads here first, so that a link that somebody sends changes nothing. 404 for what
+    cannot be done, as for a priority without its value.
+    """
     live_farm(request)
     what, of = request.query_params.get("what", ""), request.query_params.get("of", "")[:200]
     text = (_OF_JOBS | _OF_WORKERS).get(what)
@@ -142,7 +150,11 @@ def confirm(request: Request) -> Response:
 
 
 async def steer(request: Request) -> Response:
-    """POST /farm/do: does it, writes the audit line, and goes back."""
+    """POST /farm/do: does it, writes the audit line, and goes back.
+
+    Carries the form's word of its session, which the guard checks before. A refusal of the farm is
+    a page with status 409 and is in the audit too.
+    """
     farm, board = live_farm(request), board_of(request)
     form = await form_of(request)
     what, of, to = form.get("what", ""), form.get("of", "")[:200], form.get("to", "")[:40]

@@ -31,7 +31,11 @@ def house_glb(request: Request) -> Response:
 
 
 def scene(request: Request) -> Response:
-    """GET /homes/HOUSE/scene.json: rooms, cameras with their pictures, refusals counted."""
+    """GET /homes/HOUSE/scene.json: rooms, cameras with their pictures, refusals counted.
+
+    Stored files may come from anybody: rows of the wrong shape are left out, and a home without a
+    house.json has no rooms here.
+    """
     home = asked_home(request)
     board = board_of(request)
     # Stored files may come from anybody: every field may be missing or of another type.
@@ -54,7 +58,11 @@ def scene(request: Request) -> Response:
 
 
 def candidates(request: Request) -> Response:
-    """GET /homes/HOUSE/candidates.json: every viewpoint that was tried (pages/tried_viewpoints.py)."""
+    """GET /homes/HOUSE/candidates.json: every viewpoint that was tried (pages/tried_viewpoints.py).
+
+    Seconds the first time, then kept until the home's files change. 422 with the reason where they
+    cannot be sampled again.
+    """
     home = asked_home(request)
     board = board_of(request)
     version = board.index.fingerprints().get(home.id, "")

@@ -35,7 +35,11 @@ _HEAD: Final = struct.Struct("<III?")  # bytes of radiance.exr, view.json, recip
 def light_packet_in_process(
     radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool
 ) -> bytes:
-    """The packet of a view, made by a process of its own. Raises BadInput with what it said."""
+    """The packet of a view, made by a process of its own. Raises BadInput with what it said.
+
+    Kept out of the server: decoding light needs much memory, and a fault in a library then ends
+    that process alone. BadInput as well where it takes too long.
+    """
     head = _HEAD.pack(len(radiance), len(view_json), len(recipe), denoise)
     command = [sys.executable, "-m", "pbrs_farm.board.pages.light_packet"]
     try:
@@ -55,7 +59,12 @@ def light_packet_in_process(
 
 
 def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: bool) -> bytes:
-    """The packet of a view's light. Raises BadInput, and MachineFailed without a denoiser."""
+    """The packet of a view's light. Raises BadInput, and MachineFailed without a denoiser.
+
+    radiance is the bytes of radiance.exr, recipe those of recipe.json. One plane for outdoor light,
+    one for each lamp that is stored by itself, else one for all indoor light, and the albedo.
+    Planes of light are scaled by `scale_of` and have glare added already.
+    """
     from pbrs_farm.run.relight import relight_layers
     from pbrs_farm.transport.develop.tone_mapping import add_glare, exposure_of
 
@@ -77,7 +86,12 @@ def light_packet(radiance: bytes, view_json: bytes, recipe: bytes, *, denoise: b
 
 
 def packet(planes: Mapping[str, NDArray[np.float32]], facts: Mapping[str, Any]) -> bytes:
-    """The packet of (H, W, 3) planes, all of one size."""
+    """The packet of (H, W, 3) planes, all of one size.
+
+    float32 planes, stored as little-endian half floats: negative values and NaN become 0, too large
+    ones the largest. In the head is a line of JSON with the size, the names in order, and the
+    facts.
+    """
     height, width = next(iter(planes.values())).shape[:2]
     described = {"width": width, "height": height, "planes": list(planes), **facts}
     text = json.dumps(described, allow_nan=False).encode()
@@ -90,7 +104,11 @@ def packet(planes: Mapping[str, NDArray[np.float32]], facts: Mapping[str, Any]) 
 
 
 def scale_of(exposure: float, largest: float) -> float:
-    """The power of two nearest to the exposure that keeps the largest radiance a half float."""
+    """The power of two nearest to the exposure that keeps the largest radiance a half float.
+
+    A power of two changes no digit of a float. exposure must be above 0; largest is the greatest
+    radiance of all planes together, 0 for a black picture.
+    """
     power = round(math.log2(exposure))
     if largest > 0:
         power = min(power, math.floor(math.log2(_LARGEST / largest)))
@@ -98,7 +116,11 @@ def scale_of(exposure: float, largest: float) -> float:
 
 
 def lamp_rows(view_json: bytes) -> list[dict[str, Any]]:
-    """What the page shows of each lamp of view.json; [] where light was not stored by lamp."""
+    """What the page shows of each lamp of view.json; [] where light was not stored by lamp.
+
+    Names are made printable, as stored files may come from anybody. One row of another form empties
+    the list.
+    """
     try:
         rows = json.loads(view_json)["modes"]["light"]["lamps"]
         return [

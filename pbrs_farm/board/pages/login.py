@@ -47,7 +47,11 @@ async def log_out(request: Request) -> Response:
 
 
 def asset(request: Request) -> Response:
-    """GET /static/NAME: a file of the package, by its name in a table."""
+    """GET /static/NAME: a file of the package, by its name in a table.
+
+    Answers 304 to a browser that has these bytes; an address with the right version may be kept for
+    a year. Names are looked up in a table, so no path can leave the folder.
+    """
     found = board_of(request).assets.get(request.path_params["name"])
     if found is None:
         raise HTTPException(404, "There is no such file.")

@@ -22,7 +22,11 @@ class RecipeWords:
 
 
 def recipe_words(reader: RootReader) -> RecipeWords | None:
-    """The root's recipe from the preset that it is nearest to; None without one of this version."""
+    """The root's recipe from the preset that it is nearest to; None without one of this version.
+
+    The nearest preset is that with the fewest fields that differ; of equals the one that the recipe
+    is named after.
+    """
     # A root that is still empty, or of another version, has pages all the same.
     data = reader.get_or_none(keys.RECIPE, _MOST_BYTES)
     if data is None:

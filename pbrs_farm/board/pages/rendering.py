@@ -20,7 +20,11 @@ _MAX_PAGES_SHOWN: Final = 2  # before and after the one that is shown
 
 
 def environment(found: Mapping[str, Asset]) -> Environment:
-    """The templates; only markupsafe.Markup is not escaped, an unknown name is an error."""
+    """The templates; only markupsafe.Markup is not escaped, an unknown name is an error.
+
+    found are the assets that templates may link. Text is escaped, and made printable unless it is
+    Markup: names in stored files may hold anything.
+    """
 
     def asset_url(name: str) -> str:
         return f"/static/{name}?v={found[name].version}"
@@ -73,7 +77,10 @@ def view_url(house: str, view: str, rest: str = "") -> str:
 
 
 def thumb_url(view: ListedView, layer: str) -> str:
-    """The address of a view's thumbnail; it changes with the house's files, so it can be kept."""
+    """The address of a view's thumbnail; it changes with the house's files, so it can be kept.
+
+    Use it for every link to a thumbnail: an address without the version may show an old picture.
+    """
     return view_url(view.house, view.id, f"/thumb/{layer}.jpg?v={quote(view.version, safe='')}")
 
 
@@ -88,7 +95,11 @@ def log_url(job: str, task: str) -> str:
 
 
 def page_numbers(number: int, n_pages: int) -> list[int]:
-    """The numbers of pages that a page links: first, last and those beside it; 0 = a gap."""
+    """The numbers of pages that a page links: first, last and those beside it; 0 = a gap.
+
+        >>> page_numbers(5, 9)
+        [1, 0, 3, 4, 5, 6, 7, 0, 9]
+    """
     near = range(number - _MAX_PAGES_SHOWN, number + _MAX_PAGES_SHOWN + 1)
     wanted = sorted({1, n_pages, *near} & set(range(1, n_pages + 1)))
     numbers: list[int] = []

@@ -20,7 +20,11 @@ _TIMEOUT_S: Final = 300.0
 
 
 def candidates_in_process(store_url: str, house: str) -> bytes:
-    """The JSON of `candidates`, made by a process of its own. Raises BadInput with what it said."""
+    """The JSON of `candidates`, made by a process of its own. Raises BadInput with what it said.
+
+    Sampling loads ray casters and takes seconds; a process of its own keeps the server small.
+    BadInput as well where it takes too long.
+    """
     command = [sys.executable, "-m", "pbrs_farm.board.pages.tried_viewpoints", store_url, house]
     try:
         done = subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=False)

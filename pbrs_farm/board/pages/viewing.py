@@ -64,7 +64,11 @@ def view(request: Request) -> Response:
 
 
 def thumb(request: Request) -> Response:
-    """GET .../thumb/LAYER.jpg: a layer small, made once."""
+    """GET .../thumb/LAYER.jpg: a layer small, made once.
+
+    404 for a layer that the view does not have. May be kept for ever, as the address has the
+    version of the house's files.
+    """
     found, layer = asked_view(request), _asked_layer(request)
 
     def make() -> bytes:
@@ -74,7 +78,11 @@ def thumb(request: Request) -> Response:
 
 
 def shown(request: Request) -> Response:
-    """GET .../shown/LAYER.png: a layer at its full size, labels as colours."""
+    """GET .../shown/LAYER.png: a layer at its full size, labels as colours.
+
+    A photograph is sent as it is stored; labels become colours once and are kept. 404 for a layer
+    that the view does not have.
+    """
     found, layer = asked_view(request), _asked_layer(request)
 
     def make() -> bytes:
@@ -88,7 +96,10 @@ def shown(request: Request) -> Response:
 
 
 def file(request: Request) -> Response:
-    """GET .../file/LAYER: the stored file of a layer, to be saved."""
+    """GET .../file/LAYER: the stored file of a layer, to be saved.
+
+    Sent piece by piece, so a large file needs no memory; 404 above the board's limit for files.
+    """
     found, layer = asked_view(request), _asked_layer(request)
     board = board_of(request)
     key = keys.view_key(found.house, found.id, LAYER[layer].file)
@@ -112,7 +123,10 @@ def view_json(request: Request) -> Response:
 
 
 def pixels(request: Request) -> Response:
-    """GET .../pixels: the labels of every pixel (board/pictures.py)."""
+    """GET .../pixels: the labels of every pixel (board/pictures.py).
+
+    A layer that is damaged is left out, and the page then says nothing of it. Packed with gzip.
+    """
     found = asked_view(request)
     arrays: dict[str, Any] = {}
     for layer, *_ in PLANES:
