@@ -181,7 +181,11 @@ def _probe(
 
 
 def check_variant(name: str) -> str:
-    """Mitsuba's variant of that name traces a ray."""
+    """Mitsuba's variant of that name traces a ray.
+
+    Traces in this process, so a library that crashes ends it: the doctor runs each check in a
+    child. SystemExit with the reason where it does not work.
+    """
     from pbrs_farm.raycast import variant
 
     # Dr.Jit would load an old LLVM and crash.
@@ -237,7 +241,11 @@ def check_redis(url: str) -> str:
 
 
 def check_store(url: str) -> str:
-    """The store at url keeps an object."""
+    """The store at url keeps an object.
+
+    Writes, reads and removes doctor/probe.txt. SystemExit or the store's own error where one of
+    these fails.
+    """
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 

@@ -213,7 +213,11 @@ def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.u
 
 
 def decode_radiance(data: bytes, name: str) -> F32:
-    """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable."""
+    """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable.
+
+    Values are as stored, not scaled or clipped. Channels are found by the names R, G and B, in
+    whatever order they lie; other channels are dropped.
+    """
     kind = _kind(data, name)
     if kind not in (".hdr", ".exr"):
         raise BadInput(name, "", "not a Radiance HDR or OpenEXR picture")

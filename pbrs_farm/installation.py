@@ -78,7 +78,11 @@ def install_command(*extras: str) -> str:
 
 
 def pip_command() -> str:
-    """How this Python's own pip is called: "pip" only where that word starts it, as in an active environment."""
+    """How this Python's own pip is called: "pip" only where that word starts it, as in an active environment.
+
+    For hints of what to install: the words go before "install", and always reach the environment
+    that runs us.
+    """
     found = shutil.which("pip")
     is_ours = found is not None and Path(found).parent == Path(sys.executable).parent
     return "pip" if is_ours else f"{sys.executable} -m pip"

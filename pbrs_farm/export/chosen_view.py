@@ -69,7 +69,11 @@ class Choice:
             raise BadInput("--shard-size", str(self.views_per_shard), "expected 1 or more")
 
     def takes(self, name: str) -> bool:
-        """Whether a layer is exported where a view has it; valid comes with normal."""
+        """Whether a layer is exported where a view has it; valid comes with normal.
+
+        Without a choice all modes and layers are taken but radiance, which must be named: it is
+        large.
+        """
         if name in _MODES:
             return self.modes is None or name in self.modes
         if self.layers is None:
@@ -78,7 +82,10 @@ class Choice:
 
     @property
     def class_names(self) -> dict[int, str]:
-        """Id -> name of the classes that are exported, by id: NYU40's, or those of the user's table."""
+        """Id -> name of the classes that are exported, by id: NYU40's, or those of the user's table.
+
+        Ids may have gaps; class 0, nothing, is not among them.
+        """
         if self.classes is not None:
             return self.classes.names
         return {k: name for k, name in enumerate(NYU40_NAMES) if k}
@@ -114,7 +121,11 @@ class ChosenView:
 
     @property
     def picture(self) -> str | None:
-        """The mode of the view's picture, None without any."""
+        """The mode of the view's picture, None without any.
+
+        Of several modes the first of PICTURES that is chosen and there, so that an export has one
+        picture a view.
+        """
         return next((str(mode) for mode in PICTURES if self.has(mode)), None)
 
     def has(self, name: str) -> bool:
@@ -153,7 +164,11 @@ class ChosenView:
         return json.dumps(self.facts, separators=(",", ":")).encode()
 
     def data(self, name: str) -> bytes:
-        """The layer's file: as stored where nothing is resized; classes of the user as uint16."""
+        """The layer's file: as stored where nothing is resized; classes of the user as uint16.
+
+        Byte for byte the stored file where nothing changes, which keeps its hash. BadInput where it
+        is damaged or gone.
+        """
         if name == _CLASSES and self.choice.classes is not None:
             return png_from_array(self.array(name))
         if self.choice.size is None:
@@ -210,7 +225,10 @@ def require_lens(view: ChosenView, form: str, *models: str) -> None:
 
 
 def blenderproc_k(k: list[list[float]]) -> list[list[float]]:
-    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel."""
+    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel.
+
+    Ours have centres at +0.5. For forms whose readers count pixels from their centres, as BOP's.
+    """
     (fx, skew, cx), (_zero, fy, cy), last = k
     return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
 
@@ -222,7 +240,11 @@ def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def resize_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
-    """A layer on another grid: as the table of layers says (Layer.resized)."""
+    """A layer on another grid: as the table of layers says (Layer.resized).
+
+    name is that of core/layers.py, array (H, W, ...) as stored; values in px, as disparity and
+    flow, are scaled with the grid. Lines stay whole, the stronger value over the weaker one.
+    """
     layer = LAYER[name]
     if layer.resized == "area":
         return resized_by_area(array, width, height)

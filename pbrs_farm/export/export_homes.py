@@ -64,7 +64,10 @@ def _write_home(home: ExportedHome, folder: Path, form: HomeForm) -> int:
 
 
 def house_folders(folder: Path) -> list[Path]:
-    """Folders that hold house.glb and house.json: folder itself, or those below its houses."""
+    """Folders that hold house.glb and house.json: folder itself, or those below its houses.
+
+    Sorted by name. BadInput where there is none; houses that lack one of the files are left out.
+    """
     below = folder / "houses"
     found = sorted(below.iterdir()) if below.is_dir() else [folder]
     found = [f for f in found if (f / "house.glb").is_file() and (f / "house.json").is_file()]
@@ -75,7 +78,11 @@ def house_folders(folder: Path) -> list[Path]:
 
 
 def stored_house(folder: Path) -> House:
-    """The house of a folder's house.glb and house.json; BadInput where they are damaged."""
+    """The house of a folder's house.glb and house.json; BadInput where they are damaged.
+
+    Also without a recipe or manifest beside it. BadInput for what is no regular file or larger than
+    a scene may be.
+    """
     try:
         data = {
             name: read_regular(folder / name, MAX_SCENE_BYTES)

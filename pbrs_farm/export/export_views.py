@@ -93,7 +93,10 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
 
 
 def remarks_of(out: Path) -> list[str]:
-    """What a user should know of an export: its data.yaml's comments, which views are left out."""
+    """What a user should know of an export: its data.yaml's comments, which views are left out.
+
+    Read from the files of the export, so also of one made earlier. [] where nothing was left out.
+    """
     files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
     lines = [line for file in files if file.is_file() for line in file.read_text().splitlines()]
     return [

@@ -68,7 +68,11 @@ class Lamp:
 
     @property
     def candela(self) -> float:
-        """The intensity of a point, or within the cone of a spot."""
+        """The intensity of a point, or within the cone of a spot.
+
+        As if the flux were even over the sphere, or over the cone of half angle `spot[1]`: glTF and
+        USD want an intensity, not a flux.
+        """
         cutoff = self.spot[1] if self.spot else np.pi
         return float(self.flux_lm / (2 * np.pi * (1 - np.cos(cutoff))))
 
@@ -100,7 +104,11 @@ class Piece:
 
     @cached_property
     def colliders(self) -> tuple[F64, ...]:
-        """Convex parts (V, 3), local; () of the building and of what has no surface."""
+        """Convex parts (V, 3), local; () of the building and of what has no surface.
+
+        Found by cutting the mesh into parts and taking each one's hull; kept. A hull is larger than
+        its part, so a gap in furniture may be closed.
+        """
         triangles = corners_of_surfaces(self.surfaces)
         if self.is_building or not len(triangles):
             return ()
@@ -147,7 +155,12 @@ class ExportedHome:
 
     @cached_property
     def navigable(self) -> dict[str, list[F64]]:
-        """Room id -> outlines (N, 2) in plan of the floor where a disc of WALKER_M can stand."""
+        """Room id -> outlines (N, 2) in plan of the floor where a disc of WALKER_M can stand.
+
+        Metres, world x and z. Only outer outlines: what a ring encloses, as a table in the middle
+        of a room, is not cut out. A room without a place to stand has []. Things count by their
+        boxes, and doors do not join rooms here.
+        """
         return {room.id: _walkable(room, self.pieces) for room in self.house.rooms}
 
     @property
@@ -274,5 +287,8 @@ def rooms_json(house: House) -> list[dict[str, Any]]:
 
 
 def digest_name(data: bytes) -> str:
-    """A name for a file by its content, so that equal things are written once."""
+    """A name for a file by its content, so that equal things are written once.
+
+    16 hex digits: enough for the pieces of one export, no proof of equality.
+    """
     return keys.sha256(data)[:16]

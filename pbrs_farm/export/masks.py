@@ -12,7 +12,11 @@ _TOLERANCE_PX: Final = 0.75  # of a polygon's outline: flattens the steps of a s
 
 
 def run_lengths(mask: NDArray[np.bool_]) -> dict[str, list[int]]:
-    """COCO's uncompressed run lengths of mask (H, W): column by column, zeros first."""
+    """COCO's uncompressed run lengths of mask (H, W): column by column, zeros first.
+
+    mask is (H, W) bool. Fit for JSON; pycocotools takes it after frPyObjects. "size" is [height,
+    width].
+    """
     # Cut where the value changes; a mask that starts with ones has a first run of 0.
     flat = mask.T.reshape(-1)
     changes = np.nonzero(np.diff(flat, prepend=False))[0]

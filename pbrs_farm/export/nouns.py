@@ -29,7 +29,11 @@ _NUMBERS: Final = (
 
 
 def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
-    """What a thing is called; "" for one without a class."""
+    """What a thing is called; "" for one without a class.
+
+    row is one of facts' instances. Where NYU40's class says little, as otherprop, the kind or the
+    thing's own short name is taken.
+    """
     if view.choice.classes is not None:
         return str(row["own_class_name"])
     name = str(row["class"])
@@ -43,7 +47,10 @@ def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
 
 
 def plural(noun: str) -> str:
-    """Many of a noun: "chairs", "boxes", "sets of shelves", "people"."""
+    """Many of a noun: "chairs", "boxes", "sets of shelves", "people".
+
+    English, for the nouns that captions use; only the last word before "of" changes.
+    """
     head, of, rest = noun.partition(" of ")
     first, space, last = head.rpartition(" ")
     if last in _PLURALS:

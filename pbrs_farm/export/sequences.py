@@ -53,7 +53,10 @@ def pose_opencv(view: ChosenView) -> F64:
 
 
 def required_picture(view: ChosenView, form: str) -> str:
-    """The mode of the view's picture; BadInput where it has none."""
+    """The mode of the view's picture; BadInput where it has none.
+
+    form is the name that the message uses.
+    """
     if view.picture is None:
         hint = "run it with --modes, or export labels in another form"
         raise BadInput(f"{view.house.id}/{view.id}", "", f"{form} needs a picture", hint=hint)

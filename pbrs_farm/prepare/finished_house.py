@@ -30,7 +30,11 @@ class HouseBeforeEdits:
         self._finished: FinishedHouse | None = None
 
     def get(self, source: SourceRef, recipe: Recipe) -> FinishedHouse | None:
-        """The finished house of a source without edits, where it is the one that is kept."""
+        """The finished house of a source without edits, where it is the one that is kept.
+
+        source must be one without edits: take `SourceRef.unedited` first. One house is kept, the
+        last.
+        """
         return self._finished if self._key == cache_key(source, recipe) else None
 
     def keep(self, source: SourceRef, recipe: Recipe, finished: FinishedHouse) -> None:

@@ -53,7 +53,10 @@ def format_of_kind(kind: str) -> Format | None:
 
 
 def format_of_plugin(name: str) -> Format:
-    """The entry that a plugin brings; MachineFailed where none is installed, or it brings another thing."""
+    """The entry that a plugin brings; MachineFailed where none is installed, or it brings another thing.
+
+    Loads the plugin's code. Take `formats_of_plugins` for all.
+    """
     one = plugin("readers", name)
     entry = one.load()
     if not isinstance(entry, Format):
@@ -62,7 +65,11 @@ def format_of_plugin(name: str) -> Format:
 
 
 def plugin_of_file(path: Path) -> str | None:
-    """The name of the plugin that reads what lies at a path, where one does."""
+    """The name of the plugin that reads what lies at a path, where one does.
+
+    Loads the code of plugins one after another until one knows the file. Nothing is loaded where no
+    reader is installed or the path is not there.
+    """
     names = plugins("readers")
     if not names or not path.exists():
         return None
@@ -85,7 +92,11 @@ def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
 
 
 def is_beside_homes(path: Path) -> bool:
-    """Whether a file's name says that it belongs to a home that lies beside it."""
+    """Whether a file's name says that it belongs to a home that lies beside it.
+
+    Such a file in a folder of homes is no home and no fault either. The case of letters is no
+    matter.
+    """
     patterns = [pattern for one in formats() for pattern in one.beside]
     return any(fnmatch(path.name.lower(), pattern) for pattern in patterns)
 

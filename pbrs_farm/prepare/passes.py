@@ -88,14 +88,21 @@ class Pass:
 
 
 def dress_seed(source: SourceRef, recipe: Recipe) -> int:
-    """The seed a source is dressed by: its own, else the recipe's; 0 = it is not dressed."""
+    """The seed a source is dressed by: its own, else the recipe's; 0 = it is not dressed.
+
+    An object without context is never dressed. The source's own seed comes from the word of the
+    command line, and stands before the recipe's.
+    """
     if source.kind == "object":
         return 0
     return source.dress_seed or recipe.dress.seed
 
 
 def uses_catalogue(source: SourceRef, recipe: Recipe) -> bool:
-    """Whether a source's house takes anything from the catalogue of furniture."""
+    """Whether a source's house takes anything from the catalogue of furniture.
+
+    Where it does not, no catalogue needs to be read.
+    """
     stands_in = _has_stand_ins(source, recipe) and recipe.read.stand_ins == "pieces"
     return stands_in or _is_furnished(source, recipe) or bool(dress_seed(source, recipe))
 
@@ -278,7 +285,11 @@ def versions_of_passes() -> dict[str, int]:
 
 
 def cache_key(source: SourceRef, recipe: Recipe) -> str:
-    """Equal for equal finished houses: of a source, with its edits, and the fields that passes read."""
+    """Equal for equal finished houses: of a source, with its edits, and the fields that passes read.
+
+    Changes with every file that the source reads, its edits, and the groups of fields that passes
+    read; fields of light or cameras do not change it.
+    """
     return keys.digest(source, recipe.digest(*GROUPS))
 
 

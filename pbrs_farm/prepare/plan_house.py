@@ -32,7 +32,11 @@ LEFT_OUT = "plan-left-out"
 
 
 def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
-    """The house of a plan, with an item for each thing that it names. Raises BadInput, naming the place."""
+    """The house of a plan, with an item for each thing that it names. Raises BadInput, naming the place.
+
+    Things that cannot be drawn, by their class or for want of a box, are notes of the house. It has
+    no cameras.
+    """
     path = given.path
     file = upright(plan_from_file(path, part_of(given.part)))
     notes = Notes(str(path), strict=fields.strict)
@@ -60,7 +64,11 @@ def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
 
 
 def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
-    """An item for each thing of a plan that is drawn, on the levels of the house, which go from below."""
+    """An item for each thing of a plan that is drawn, on the levels of the house, which go from below.
+
+    As many storeys as the house has levels, or ValueError. Ids are by storey and number in the
+    plan, also of things that are not drawn.
+    """
     levels = sorted(house.levels, key=lambda level: level.elevation)
     found = []
     for number, (level, storey) in enumerate(zip(levels, storeys, strict=True)):
@@ -78,7 +86,11 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
 def furnish_plan_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
 ) -> GeneratedHome:
-    """A plan as a home's file: its things where the plan has them, other rooms furnished by a seed."""
+    """A plan as a home's file: its things where the plan has them, other rooms furnished by a seed.
+
+    The plans, not the file's name, decide together with the seed: equal plans and seeds give equal
+    homes.
+    """
     plans = [s.plan for s in file.storeys]
     key = repr(plans[0]) if len(plans) == 1 else repr(plans)
     file = upright(file)

@@ -103,14 +103,21 @@ class SourceRef(Record):
 
     @property
     def unedited(self) -> SourceRef:
-        """The same house before its edits."""
+        """The same house before its edits.
+
+        Itself where it has no edits. Its id is that of the house before them, dressed or not.
+        """
         if not self.edits:
             return self
         own = self.house_id.removesuffix(edited_id("", self.edits))
         return self.model_copy(update={"house_id": own, "edits": ()})
 
     def edited(self, *edits: Edit) -> SourceRef:
-        """The same house with these edits after its own."""
+        """The same house with these edits after its own.
+
+        Edits come after those that it has; the id follows from all of them together. Nothing is
+        read or checked here.
+        """
         every = (*self.edits, *edits)
         house_id = edited_id(self.unedited.house_id, every)
         return self.model_copy(update={"house_id": house_id, "edits": every})
@@ -333,7 +340,11 @@ def _of_plugin(word: str) -> SourceRef:
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
-    """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out."""
+    """The words `ROOT/house/<id>` for every id in a list file, blank and # lines left out.
+
+    BadHouse, with the line, for an id that is too long for a folder's name. That the houses exist
+    is not checked.
+    """
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     for number, house in enumerate(ids, 1):
         if len(house.encode()) > _LONGEST_ID and not house.startswith("#"):
@@ -364,7 +375,11 @@ def model_of_object(location: str) -> ObjectModel:
 
 
 def check_unchanged(source: SourceRef) -> None:
-    """Raise BadHouse or MachineFailed where a file is not what it was when the source was named."""
+    """Raise BadHouse or MachineFailed where a file is not what it was when the source was named.
+
+    Reads all files of the source again. MachineFailed where another version of a package or plugin
+    is to blame, so that another machine may do it; BadHouse where the user's own file changed.
+    """
     # Name the source again and compare the digests.
     now = _reference(source.kind, source.location, SourceFiles(), source.models, source.part)
     if now.sha256 == source.sha256 and now.companions == source.companions:

@@ -69,7 +69,12 @@ def has_box_only_items(house: House) -> bool:
 
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
-    """The house with a piece, a box or nothing for each told thing; notes say what was left out."""
+    """The house with a piece, a box or nothing for each told thing; notes say what was left out.
+
+    Pieces come from the catalogue, and their credits go into the source's attribution. Without such
+    things it is the house itself. how "none" leaves them out, and a note says how many; catalogue
+    is read only for "pieces".
+    """
     told = [item for item in house.items if BOX_ONLY in item.tags]
     if not told:
         return house

@@ -20,7 +20,11 @@ _ROUNDS = 5  # of looking again; more houses than that do not come in while a te
 
 
 def write_attribution(store: Store) -> None:
-    """Write ATTRIBUTION.txt where a house of the root shows what must be credited."""
+    """Write ATTRIBUTION.txt where a house of the root shows what must be credited.
+
+    Other workers may finish houses meanwhile: it looks again after writing, and stops when nothing
+    is new. A root whose houses ask for no credit gets no file.
+    """
     # Look again after writing: a house may have come in meanwhile.
     seen: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
@@ -32,7 +36,10 @@ def write_attribution(store: Store) -> None:
 
 
 def write_attribution_of(store: Store, rows: Sequence[dict[str, str]]) -> None:
-    """Write ATTRIBUTION.txt of these dressing_rows, where they ask for one."""
+    """Write ATTRIBUTION.txt of these dressing_rows, where they ask for one.
+
+    Left alone where it is equal already; an old file is not removed when no row asks for one.
+    """
     homes = (row.get("attribution", "") for row in rows)
     text = attribution_text(homes, _credits(store, (row["key"] for row in rows)))
     if not text:
@@ -70,7 +77,11 @@ def _paragraph(title: str, lines: set[str]) -> list[str]:
 
 
 def dressing_rows(manifest: bytes) -> list[dict[str, str]]:
-    """The rows of every dress.json in a manifest."""
+    """The rows of every dress.json in a manifest.
+
+    Only lines of dress.json are parsed, since a root's manifest may have millions. [] for an empty
+    manifest.
+    """
     found = re.finditer(rb"^.*/" + re.escape(keys.DRESS).encode() + rb".*$", manifest, re.MULTILINE)
     return [json.loads(match[0]) for match in found]
 

@@ -33,7 +33,10 @@ def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster
 
 
 def check_camera_file(fields: CameraFields) -> None:
-    """Raise BadInput for a camera file or trajectory that cannot be read, before a home is."""
+    """Raise BadInput for a camera file or trajectory that cannot be read, before a home is.
+
+    Reads and parses the whole file and keeps nothing. Does nothing for cameras of other sources.
+    """
     if fields.source == "trajectory":
         poses_from_tum(camera_file_text(fields), fields.file)
     elif fields.source == "file":
@@ -42,7 +45,11 @@ def check_camera_file(fields: CameraFields) -> None:
 
 
 def with_lens(view: View, lens: LensFields) -> View:
-    """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold."""
+    """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold.
+
+    The picture's size stays; focal lengths and the principal point become those of the lens. The
+    pose stays, and with it what the view was chosen for.
+    """
     try:
         intrinsics = lens.intrinsics(view.camera.intrinsics)
     except ValueError as error:

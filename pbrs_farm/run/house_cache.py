@@ -44,7 +44,11 @@ class CachedHouse:
 
     @cached_property
     def house(self) -> House:
-        """The house as its bundle holds it."""
+        """The house as its bundle holds it.
+
+        Loaded once. BadHouse for a damaged bundle; StoreFailed where it is not there, as before the
+        step `house`.
+        """
         from pbrs_farm.formats.house_bundle import house_from_bundle
 
         get = self.store.get
@@ -72,14 +76,22 @@ class CachedHouse:
 
     @cached_property
     def rasterizer(self) -> Rasterizer:
-        """The GL renderer."""
+        """The GL renderer.
+
+        Takes a GL context of this thread: use and close it in the thread that asked first. Built
+        with the recipe's raster fields.
+        """
         from pbrs_farm.raster import Rasterizer
 
         return Rasterizer(self.house, self.textures, self.recipe.raster)
 
     @cached_property
     def light_scene(self) -> LightScene:
-        """The scene that carries light."""
+        """The scene that carries light.
+
+        Loads Mitsuba, geometry and textures, which takes seconds: ask for it only where light is
+        traced.
+        """
         from pbrs_farm.transport.light_scene import LightScene
 
         return LightScene.load(self.house, self.textures, self.recipe, self.sky)
@@ -105,7 +117,11 @@ class CachedHouse:
         return views[view_id]
 
     def views(self, cameras_digest: str) -> Mapping[str, View]:
-        """All views of the house by id, in the order of cameras.json; as for view."""
+        """All views of the house by id, in the order of cameras.json; as for view.
+
+        cameras_digest is that of the file in the step's marker: with another one the file is read
+        again.
+        """
         # Parse the file once for all views of the house.
         if self._views is None or self._views[0] != cameras_digest:
             key = keys.house_key(self.house_id, "cameras.json")
@@ -117,7 +133,10 @@ class CachedHouse:
         self._views = None
 
     def close(self) -> None:
-        """Free what the GPU or Mitsuba holds."""
+        """Free what the GPU or Mitsuba holds.
+
+        The object can be used again afterwards, and loads anew what is asked for.
+        """
         # Drop each cached property by name: scenes before the arrays they refer to.
         rasterizer = self.__dict__.pop("rasterizer", None)
         if rasterizer is not None:
@@ -128,7 +147,11 @@ class CachedHouse:
 
 
 def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[str]]:
-    """Decoded textures by id, and the ids of those that cannot be read."""
+    """Decoded textures by id, and the ids of those that cannot be read.
+
+    (H, W, 3 or 4) uint8 sRGB each. An unreadable picture is no error: its surfaces keep the plain
+    colour of their material, and the caller decides whether to tell.
+    """
     from pbrs_farm.images import decode_texture
 
     decoded: dict[str, Any] = {}
@@ -152,7 +175,11 @@ class HouseCache:
         self._held: tuple[tuple[str, str, str, str], CachedHouse] | None = None
 
     def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:
-        """The loaded house, the same object as long as nothing it depends on changes."""
+        """The loaded house, the same object as long as nothing it depends on changes.
+
+        Only one house is held: another one, or another digest or recipe, closes it first. So do not
+        keep what it returned across calls.
+        """
         # Scenes depend on the recipe, too.
         key = (store.url, house_id, digest, recipe.digest())
         if self._held is None or self._held[0] != key:

@@ -50,11 +50,20 @@ class LightCheckpoint:
         }
 
     def kept(self, part: str) -> Arrays:
-        """The state of a part; {} where nothing was kept."""
+        """The state of a part; {} where nothing was kept.
+
+        Arrays as `keep` was given them, by name. A checkpoint of another recipe or home is never
+        loaded: its digest is part of what is compared.
+        """
         return self._loaded.get(part, {})
 
     def keep(self, part: str, share: float, state: Callable[[], Arrays]) -> None:
-        """Tell the share that is done; write the states of all parts when a minute has passed."""
+        """Tell the share that is done; write the states of all parts when a minute has passed.
+
+        share is 0..1 of the whole step. state is called only when something is written, so copying
+        from the GPU costs nothing in between; it is called later too, for another part's turn, and
+        must then still be right.
+        """
         self._states[part] = state
         now = self._clock()
         if now - self._told_s >= _TELL_EVERY_S:

@@ -21,7 +21,10 @@ from pbrs_farm.store.object_store import LAYOUT, Store, get_or_none
 
 
 def attribution(store: Store, house_id: str) -> str:
-    """The line every product of the house must carry, "" if its source asks for none."""
+    """The line every product of the house must carry, "" if its source asks for none.
+
+    A house.json that is missing or damaged gives "" as well.
+    """
     key = keys.house_key(house_id, "house.json")
     data = get_or_none(store, key)
     if data is None:
@@ -33,7 +36,11 @@ def attribution(store: Store, house_id: str) -> str:
 
 
 def finish_house(store: Store, house_id: str) -> int:
-    """Write the house's manifest if it changed, remove what done steps kept; the number of objects."""
+    """Write the house's manifest if it changed, remove what done steps kept; the number of objects.
+
+    Lists what markers say, whether or not the file is there. An equal manifest is not written
+    again, since its date tells when the house last changed.
+    """
     # A manifest lists what the markers say, not what lies in the folder.
     found = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in found if marker is not None]
@@ -51,14 +58,21 @@ def finish_house(store: Store, house_id: str) -> int:
 
 
 def merge_manifests(store: Store, house_ids: list[str]) -> None:
-    """Write the root's manifest.jsonl from those of the houses that have one."""
+    """Write the root's manifest.jsonl from those of the houses that have one.
+
+    In the order of the ids, whatever the order of house_ids; houses without a manifest add nothing.
+    """
     # A house that failed before its first marker has none.
     found = (keys.house_key(house_id, keys.MANIFEST) for house_id in sorted(house_ids))
     store.put(keys.MANIFEST, b"".join(get_or_none(store, key) or b"" for key in found))
 
 
 def finish_root(store: Store, houses: Iterable[str]) -> None:
-    """Write the manifests of these houses and that of the root, and whose works it shows."""
+    """Write the manifests of these houses and that of the root, and whose works it shows.
+
+    The root's manifest then covers every house of the folder, those of earlier runs too. Safe to
+    call again, also while other workers write.
+    """
     for house_id in houses:
         finish_house(store, house_id)
     # The root's manifest covers every house of the folder, those of former runs too.
@@ -109,7 +123,11 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
 
 @contextmanager
 def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
-    """The folder of an output root: the one named, or of a URL or a packed root a copy, removed afterwards."""
+    """The folder of an output root: the one named, or of a URL or a packed root a copy, removed afterwards.
+
+    A copy of a remote or packed root is whole: mind its size. What is written into the copy is
+    lost. A folder that is no root is yielded as it is.
+    """
     if "://" not in word and not (Path(word) / LAYOUT).is_file():
         yield Path(word)
         return

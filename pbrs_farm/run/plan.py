@@ -69,7 +69,10 @@ def wanted(
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
-    """Steps of a house in the order they run, all before the steps of its views."""
+    """Steps of a house in the order they run, all before the steps of its views.
+
+    The order is one that satisfies what each step reads. Pairs are of houses only, not of objects.
+    """
     needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
     pairs = ("pairs",) if want.pairs and not keys.is_object(house_id) else ()
     return ("house", "cameras", *needed, *pairs)
@@ -83,7 +86,11 @@ def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:
 
 
 def view_steps(want: Wanted) -> tuple[str, ...]:
-    """Steps of one view in the order they run. Either light mode makes both: one trace fills both."""
+    """Steps of one view in the order they run. Either light mode makes both: one trace fills both.
+
+    `truth` comes first, since others read its labels, and `view` last, since it lists what there
+    is.
+    """
     names = ["truth"]
     names += [m.value for m in (Mode.OPENGL_DL, Mode.OPENGL_IL) if m in want.modes]
     if any(m.groups for m in want.modes):

@@ -40,7 +40,11 @@ class LampFactor:
 
 
 def linear_aovs(radiance: RadianceExr) -> LinearAovs:
-    """What `develop` reads of a radiance.exr; BadInput when an image is missing."""
+    """What `develop` reads of a radiance.exr; BadInput when an image is missing.
+
+    float32 (H, W, 3) each: outdoor, indoor, albedo and normal, as they were stored and not
+    denoised.
+    """
     image = radiance.image
     return LinearAovs(image("outdoor"), image("indoor"), image("albedo"), image("normal"))
 
@@ -56,7 +60,11 @@ class RelightLayers:
 def relight_layers(
     radiance: RadianceExr, rows: Sequence[Mapping[str, Any]], *, denoise: bool
 ) -> RelightLayers:
-    """The layers whose sums `relit` tones. rows: the lamps of view.json, () where it has none."""
+    """The layers whose sums `relit` tones. rows: the lamps of view.json, () where it has none.
+
+    With denoise, each lamp's layer is denoised and scaled so that their sum is the denoised indoor
+    light. MachineFailed without a denoiser. BadInput where the file lacks a layer that rows name.
+    """
     aovs = linear_aovs(radiance)
     layers = {int(r["number"]): radiance.image(r["layer"]) for r in rows if r["layer"]}
     if not denoise:
@@ -109,7 +117,11 @@ def lamps_of_view(view: Path) -> list[dict[str, Any]]:
 
 
 def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor]) -> dict[int, F32]:
-    """Lamp's number -> (3,) factors. BadInput for a word that names no lamp, saying which exist."""
+    """Lamp's number -> (3,) factors. BadInput for a word that names no lamp, saying which exist.
+
+    rows are those of `lamps_of_view`. A word may name several lamps; of two words for one lamp the
+    last counts. Factors are float32 linear RGB; lamps that no word names are not in the result.
+    """
     factors: dict[int, F32] = {}
     for asked in words:
         # Find the lamps that the word names.
@@ -124,7 +136,11 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
 
 
 def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]:
-    """The rows of lamps that words name one by one and that bring no light to a view."""
+    """The rows of lamps that words name one by one and that bring no light to a view.
+
+    Words with a * are passed over: who dims all lamps of a kind does not care which of them are
+    seen. BadInput as of `lamp_factors`.
+    """
     rows = lamps_of_view(view)
     named = lamp_factors(rows, [w for w in words if "*" not in w.word])
     return [row for row in rows if int(row["number"]) in named and not row["layer"]]

@@ -50,7 +50,10 @@ def option(
 
 
 def options_of(model: type[Record]) -> dict[str, tuple[str, Option]]:
-    """Option's name as in job files and namespaces -> (field, how it is written), in their order."""
+    """Option's name as in job files and namespaces -> (field, how it is written), in their order.
+
+    Fields without an option are left out.
+    """
     found: dict[str, tuple[str, Option]] = {}
     for field, info in model.model_fields.items():
         shown: Any = (cast(Any, info.json_schema_extra) or {}).get("option")

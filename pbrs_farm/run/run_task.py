@@ -47,7 +47,11 @@ _OF_FINISHING = (
 
 
 def make_handler(send: Send) -> Handler:
-    """The handler of a render process: it keeps the house it worked on last loaded."""
+    """The handler of a render process: it keeps the house it worked on last loaded.
+
+    The handler answers each line with "done", when all steps have run or were left out; faults of
+    steps are messages before it. The house is freed when the process ends.
+    """
     house_cache = HouseCache()
     atexit.register(house_cache.clear)
 
@@ -87,7 +91,11 @@ def _load(modules: Sequence[str]) -> None:
 
 
 def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: RenderTask) -> None:
-    """Run the steps of one task; a failed one leaves out those that read what it makes."""
+    """Run the steps of one task; a failed one leaves out those that read what it makes.
+
+    A step that fails does not raise: its fault is sent, and the steps that read what it makes are
+    left out. `view` never is, since it lists whatever there is.
+    """
     work = Work(
         store=store_from_url(setting.store_url, setting.store),
         recipe=setting.recipe,
@@ -145,7 +153,10 @@ def _event_of_outcome(work: Work, name: str, outcome: Outcome, seconds: float) -
 
 
 def limit_threads(step: str, n_threads: int) -> None:
-    """Give Dr.Jit its share of the cores before a step first uses it."""
+    """Give Dr.Jit its share of the cores before a step first uses it.
+
+    Does nothing where the process has all cores, and for steps that do not use Dr.Jit.
+    """
     if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
         set_threads(n_threads)
 

@@ -68,7 +68,11 @@ class Schedule:
             self._begin_house(self._houses.popleft(), RENDER)
 
     def drive(self, pool: Pool) -> None:
-        """Until nothing waits and nobody works."""
+        """Until nothing waits and nobody works.
+
+        Idle processes are asked first, each with the house it holds; then events are taken, which
+        may add tasks. Returns also when everything failed: the outcome is in what was reported.
+        """
         while self._houses or any(self._waiting.values()) or pool.n_busy:
             for lane in self._waiting:
                 for held in pool.idle_houses(lane):

@@ -132,7 +132,10 @@ def room_of(house: House, view: View) -> Room | None:
 
 
 def camera_seed(house_id: str, recipe: Recipe) -> int:
-    """The sampler's seed for a house under a recipe."""
+    """The sampler's seed for a house under a recipe.
+
+    Follows from the fields that cameras depend on alone: another light does not move a camera.
+    """
     return keys.seed(house_id, "cameras", recipe.digest("cameras"))
 
 
@@ -351,7 +354,10 @@ def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
 
 @functools.cache
 def versions() -> Mapping[str, str]:
-    """Versions of what makes the pictures; found once a process."""
+    """Versions of what makes the pictures; found once a process.
+
+    "-" for a package that is not installed.
+    """
     found = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
     for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
         try:

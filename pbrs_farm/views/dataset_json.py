@@ -40,7 +40,11 @@ class Dataset:
 
 
 def dataset_json(dataset: Dataset, also: Mapping[str, Any]) -> bytes:
-    """The file. also: what a reader does not need: arrays, class colours, credits, card."""
+    """The file. also: what a reader does not need: arrays, class colours, credits, card.
+
+    also must be JSON values. Shards are in the order given, which is the order in which they are
+    read.
+    """
     row = {
         "form": _FORM,
         "size": dataset.size,
@@ -55,7 +59,11 @@ def dataset_json(dataset: Dataset, also: Mapping[str, Any]) -> bytes:
 
 
 def dataset_from_json(data: bytes, place: str) -> Dataset:
-    """The Dataset that dataset_json wrote; BadInput, naming place, for anything else."""
+    """The Dataset that dataset_json wrote; BadInput, naming place, for anything else.
+
+    What dataset_json wrote for people is not read. A file of another version is refused by its
+    form, and one with unknown modes or layers, or without shards, too.
+    """
     try:
         row = json.loads(data)
         if row["form"] != _FORM:

@@ -19,7 +19,10 @@ AXES: Final[dict[str, tuple[tuple[int, int], ...]]] = {
 
 
 def axes_from_published(axes: str) -> NDArray[np.float32]:
-    """(3, 3) matrix: n in the axes of that name = matrix @ n in published axes."""
+    """(3, 3) matrix: n in the axes of that name = matrix @ n in published axes.
+
+    A signed permutation, so its transpose is its inverse. KeyError for a name that is not in AXES.
+    """
     matrix = np.zeros((3, 3), np.float32)
     for row, (column, sign) in enumerate(AXES[axes]):
         matrix[row, column] = sign
@@ -40,7 +43,11 @@ def axes_from_axes(to: str, of: str) -> NDArray[np.float32]:
 def decode_normal(
     stored: NDArray[np.uint16], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.float32]:
-    """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid."""
+    """(H, W, 3) float32 normals in the axes of that name, of unit length within 3e-5; 0 if not valid.
+
+    stored is (H, W, 3) uint16 with 0..65535 for -1..1 in published axes; valid is (H, W), and what
+    it leaves out becomes (0, 0, 0). KeyError for axes of an unknown name.
+    """
     normal = np.empty(stored.shape, np.float32)
     # Each published channel becomes an axis, turned round where the sign says.
     for axis, (channel, sign) in enumerate(AXES[axes]):
@@ -55,7 +62,11 @@ def decode_normal(
 def encode_normal(
     normal: NDArray[np.float32], valid: NDArray[np.bool_], axes: str
 ) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid."""
+    """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid.
+
+    normal is (H, W, 3) of unit vectors; components beyond -1..1 are clipped. The inverse of
+    `decode_normal` up to half a step of 65535.
+    """
     stored = np.full(normal.shape, 32768, np.uint16)
     for axis, (channel, sign) in enumerate(AXES[axes]):
         scaled = (sign * normal[..., axis].astype(np.float64) + 1) * (65535 / 2)

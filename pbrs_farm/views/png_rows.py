@@ -41,7 +41,11 @@ _DAMAGED: Final = "cannot be read as a picture: damaged or truncated"
 
 
 def png_of_rows(array: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of (H, W) or (H, W, 3) uint8, or uint16; equal arrays give equal bytes."""
+    """PNG bytes of (H, W) or (H, W, 3) uint8, or uint16; equal arrays give equal bytes.
+
+    Every row is stored as its difference from the one above, which `array_of_rows` undoes quickly;
+    any PNG reader can read it. Other types and numbers of channels are not handled.
+    """
     height, width = array.shape[:2]
     kind = 0 if array.ndim == 2 else 2
     big_endian = np.ascontiguousarray(array, array.dtype.newbyteorder(">"))

@@ -31,7 +31,11 @@ def flip(sample: Sample) -> Sample:
 
 
 def crop(sample: Sample, left: int, top: int, width: int, height: int) -> Sample:
-    """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput."""
+    """The part of width x height pixels at (left, top); K's principal point moves. Raises BadInput.
+
+    The arrays are copies. BadInput for a part that is empty or not wholly inside. Boxes and masks
+    made from the whole sample do not follow.
+    """
     full_width, full_height = sample.size
     fits = 0 <= left <= full_width - width and 0 <= top <= full_height - height
     if not fits or width < 1 or height < 1:
@@ -67,7 +71,11 @@ def resize(sample: Sample, width: int, height: int) -> Sample:
 def resize_k(
     k: NDArray[np.float32], of: tuple[int, int], to: tuple[int, int]
 ) -> NDArray[np.float32]:
-    """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`."""
+    """K (3, 3) of a picture of size `of` (width, height) for the same picture of size `to`.
+
+    float32 comes back. Pixel centres lie at +0.5, so the principal point scales as the size does.
+    Not for a crop, which moves it.
+    """
     scale = np.array([to[0] / of[0], to[1] / of[1], 1], np.float64)
     return np.asarray(k.astype(np.float64) * scale[:, None], np.float32)
 

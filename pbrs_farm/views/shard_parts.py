@@ -34,7 +34,11 @@ _PARTS: Final = {
 
 
 def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """.npz bytes; equal arrays give equal bytes."""
+    """.npz bytes; equal arrays give equal bytes.
+
+    In the order given, with a fixed date for each member; compressed. Arrays of objects are a
+    ValueError.
+    """
     whole = io.BytesIO()
     with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
         for name, array in arrays.items():
@@ -47,7 +51,10 @@ def npz_of_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
 
 
 def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
-    """Name -> array; BadInput, naming place, where data is no .npz or is damaged."""
+    """Name -> array; BadInput, naming place, where data is no .npz or is damaged.
+
+    Arrays of objects are refused, so a file from a stranger runs no code.
+    """
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
@@ -64,7 +71,11 @@ def arrays_of_npz(data: bytes, place: str) -> dict[str, NDArray[Any]]:
 
 
 def label_parts(stored: Stored) -> dict[str, bytes]:
-    """Part -> bytes of a view's labels, in a fixed order."""
+    """Part -> bytes of a view's labels, in a fixed order.
+
+    stored has a view's arrays by name as they lie in a root; those that it does not have make no
+    part. The picture is not among them.
+    """
     parts: dict[str, bytes] = {}
     for part in dict.fromkeys(_PARTS.values()):
         arrays = {n: stored[n] for n, own in _PARTS.items() if own == part and n in stored}
@@ -75,14 +86,22 @@ def label_parts(stored: Stored) -> dict[str, bytes]:
 
 
 def part_of_array(name: str, mode: str, parts: Collection[str]) -> str:
-    """The part that holds an array of a view that has these parts."""
+    """The part that holds an array of a view that has these parts.
+
+    For colour the JPEG where there is one, else the PNG; parts are the names of those that the view
+    has. KeyError for an array that no part holds.
+    """
     if name != "colour":
         return _PARTS[name]
     return f"{mode}.jpg" if f"{mode}.jpg" in parts else f"{mode}.png"
 
 
 def arrays_of_part(names: Sequence[str], part: str, data: bytes, place: str) -> Stored:
-    """The arrays of those names in a part; BadInput, naming place, where it is damaged."""
+    """The arrays of those names in a part; BadInput, naming place, where it is damaged.
+
+    place is what messages call it. BadInput also for a name that the part lacks, or a PNG that
+    `pack` did not write.
+    """
     if part.endswith(".npz"):
         arrays = arrays_of_npz(data, place)
         for name in names:

@@ -79,7 +79,12 @@ class ShardSet:
             raise BadInput(self.url, "", f"no pictures in {request.mode} light", hint=hint)
 
     def read_at(self, shard: Shard, view: int, request: SampleRequest) -> Sample:
-        """The Sample of a view by its place in a shard."""
+        """The Sample of a view by its place in a shard.
+
+        The quick way to go through shards in their order; by name there is `read`, which needs the
+        list of all views. BadInput for a place beyond the views, or where an array asked for was
+        not packed.
+        """
         opened = self._opened(shard)
         if view >= len(opened.views):
             text = f"{len(opened.views)} views, {shard.n_views} were packed"
@@ -96,7 +101,11 @@ class ShardSet:
         return sample_of_stored(facts, arrays, request)
 
     def refs(self) -> tuple[ViewRef, ...]:
-        """All views by name: opens every shard once."""
+        """All views by name: opens every shard once.
+
+        Sorted, houses before objects; kept afterwards. Slow over a network, since each shard is
+        opened: `read_at` does without.
+        """
         if not self._at:
             for shard in self.dataset.shards:
                 opened = self._opened(shard)
@@ -197,6 +206,9 @@ class ShardSet:
 
 
 def views_of_shards(store: Store) -> Views:
-    """The views of shards by name."""
+    """The views of shards by name.
+
+    Opens every shard once. Splits are as packed.
+    """
     shards = ShardSet(store)
     return Views(shards, shards.refs(), {})

@@ -47,7 +47,11 @@ def write_samples(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]
 
 
 def members_of_tar(tar: Buffer, place: str) -> Iterator[Member]:
-    """The files of a tar in its order; BadInput, naming place, where it is damaged or cut short."""
+    """The files of a tar in its order; BadInput, naming place, where it is damaged or cut short.
+
+    Only plain files with short names, as `pack` writes them: not a reader for any tar. Lazy; the
+    file's bytes are not read, only headers.
+    """
     at = 0
     while at + _BLOCK <= len(tar):
         header = bytes(tar[at : at + _BLOCK])

@@ -68,7 +68,11 @@ class ViewFacts:
 
 
 def facts_from_json(row: Any, place: str) -> ViewFacts:
-    """ViewFacts of view.json, or of a packed view's; BadInput, naming place, for anything else."""
+    """ViewFacts of view.json, or of a packed view's; BadInput, naming place, for anything else.
+
+    Checks that K is (3, 3), the pose (4, 4) and the size at least 1 pixel, and nothing else of the
+    row. A view without a room has "".
+    """
     try:
         k, pose = (
             tuple(tuple(float(x) for x in line) for line in row[name])
@@ -85,7 +89,13 @@ def facts_from_json(row: Any, place: str) -> ViewFacts:
 
 
 def array_names(layers: tuple[str, ...]) -> tuple[str, ...]:
-    """The arrays that layers are read from: valid comes with normal."""
+    """The arrays that layers are read from: valid comes with normal.
+
+    In the order of layers, each once.
+
+        >>> array_names(("depth", "normal"))
+        ('depth', 'normal', 'valid')
+    """
     names = [n for layer in layers for n in ((layer, "valid") if layer == "normal" else (layer,))]
     return tuple(dict.fromkeys(names))
 
@@ -118,7 +128,11 @@ def _were_8_bits(array: NDArray[np.uint16]) -> bool:
 
 
 def resize_stored(stored: Stored, size: Size) -> Stored:
-    """The arrays on another grid: colour by area, boundaries where any is, all others nearest."""
+    """The arrays on another grid: colour by area, boundaries where any is, all others nearest.
+
+    size is (width, height). Labels are never mixed, so a class that is thinner than a pixel may
+    vanish; boundaries do not.
+    """
     return {name: _resized(name, array, *size) for name, array in stored.items()}
 
 
@@ -131,7 +145,11 @@ def _resized(name: str, array: NDArray[Any], width: int, height: int) -> NDArray
 
 
 def sample_of_stored(facts: ViewFacts, stored: Stored, request: SampleRequest) -> Sample:
-    """The Sample of a view's stored arrays, at the size asked for."""
+    """The Sample of a view's stored arrays, at the size asked for.
+
+    Depth becomes float32 metres (0 = nothing), normals unit vectors in request.axes, boundary and
+    valid bool; colour, class40 and instance stay as stored. K follows the size.
+    """
     size = request.size or facts.size
     stored = resize_stored(stored, size)
     arrays: dict[str, Any] = {

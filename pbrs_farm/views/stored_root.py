@@ -89,7 +89,11 @@ class StoredRoot:
         return sample_of_stored(self.facts(ref), self.arrays(ref, request), request)
 
     def arrays(self, ref: ViewRef, request: SampleRequest) -> dict[str, NDArray[Any]]:
-        """The arrays of a request as they are stored, at their own size."""
+        """The arrays of a request as they are stored, at their own size.
+
+        Whole numbers as in the files: depth in mm, normals in 0..65535. BadInput for one that is
+        damaged, or of another size than the view's.
+        """
         size = self.facts(ref).size
         arrays = {}
         for name in array_names(request.layers):
@@ -125,7 +129,11 @@ class StoredRoot:
             raise BadInput(f"{self.url}/{key}", "", "not a selection: damaged") from None
 
     def credits(self, houses: Iterable[str]) -> tuple[str, ...]:
-        """The lines that every product of these houses must carry, each once."""
+        """The lines that every product of these houses must carry, each once.
+
+        In the order of the houses; of dressed homes those of the whole root, since they are kept in
+        one file.
+        """
         lines = [attribution(self._store, house) for house in houses]
         # Dressed homes have their credits in a file of its own.
         with suppress(ObjectMissing):
@@ -164,7 +172,11 @@ class StoredRoot:
 
 
 def finished_views(store: Store) -> frozenset[tuple[str, str]]:
-    """(house, view) of every finished view of a store, none where it is empty."""
+    """(house, view) of every finished view of a store, none where it is empty.
+
+    Finished is a view whose view.json is there, as that is written last. Lists the store, which
+    takes long for a remote root.
+    """
     found = _files_of_views(store)
     return frozenset((ref.house, ref.view) for ref, files in found.items() if _TABLE in files)
 
@@ -236,7 +248,11 @@ def _copy_cameras(of: Store, to: Store, house: str) -> None:
 
 
 def views_of_root(store: Store) -> Views:
-    """The finished views of an output root; those a run has begun only are in left_out."""
+    """The finished views of an output root; those a run has begun only are in left_out.
+
+    BadInput where the folder has no finished view, with a word about views that a run has begun.
+    Lists the store once; files are read when they are asked for.
+    """
     root = StoredRoot(store)
     refs = root.refs
     if not refs:

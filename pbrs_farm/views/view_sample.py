@@ -47,7 +47,10 @@ class Sample:
         return int(first.shape[1]), int(first.shape[0])
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays there are, by field; valid beside normal."""
+        """The arrays there are, by field; valid beside normal.
+
+        The arrays themselves, not copies, in the order of LAYERS.
+        """
         named = ((name, getattr(self, name)) for name in (*LAYERS, "valid"))
         return {name: array for name, array in named if array is not None}
 

@@ -436,7 +436,10 @@ def _small(frame: Frame) -> str:
 
 
 def figure_html(title: str, rgb: NDArray[np.uint8], width_px: int) -> str:
-    """A picture (H, W, 3) sRGB of that width with its title below, the bytes within the text."""
+    """A picture (H, W, 3) sRGB of that width with its title below, the bytes within the text.
+
+    For notebooks: a JPEG at twice the width, so not for reading pixel values. The title is escaped.
+    """
     from pbrs_farm.images import jpeg_from_array, thumbnail
 
     small = thumbnail(rgb, max_edge_px=2 * width_px)  # dense screens show two pixels as one

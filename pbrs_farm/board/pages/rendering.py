@@ -97,8 +97,8 @@ def log_url(job: str, task: str) -> str:
 def page_numbers(number: int, n_pages: int) -> list[int]:
     """The numbers of pages that a page links: first, last and those beside it; 0 = a gap.
 
-        >>> page_numbers(5, 9)
-        [1, 0, 3, 4, 5, 6, 7, 0, 9]
+    >>> page_numbers(5, 9)
+    [1, 0, 3, 4, 5, 6, 7, 0, 9]
     """
     near = range(number - _MAX_PAGES_SHOWN, number + _MAX_PAGES_SHOWN + 1)
     wanted = sorted({1, n_pages, *near} & set(range(1, n_pages + 1)))

@@ -57,7 +57,10 @@ class Body:
 
     @property
     def shells(self) -> list[Shell]:
-        """Its connected parts, found at the first call."""
+        """Its connected parts, found at the first call.
+
+        Found at the first call and kept: few bodies are ever asked.
+        """
         if self._shells is None:
             self._shells = shells_of(self.corners)
         return self._shells
@@ -99,7 +102,11 @@ def piece_id(item: Item) -> str:
 
 
 def has_same_mesh(a: Item, b: Item) -> bool:
-    """Whether two items have the same triangles, whatever they are made of and in which order."""
+    """Whether two items have the same triangles, whatever they are made of and in which order.
+
+    Equal to the bit: a door that was parted into leaf and frame is equal, one that was moved is
+    not. Normals and texture coordinates are not compared.
+    """
     if a is b or a.surfaces is b.surfaces:
         return True
     if a.n_faces != b.n_faces:
@@ -118,7 +125,11 @@ def has_same_mesh(a: Item, b: Item) -> bool:
 
 
 def shells_of(corners: F64) -> list[Shell]:
-    """The connected parts of triangles (F, 3, 3); corners of one place are one vertex."""
+    """The connected parts of triangles (F, 3, 3); corners of one place are one vertex.
+
+    float64 corners; triangles with two corners at one place are left out. Places must be equal to
+    the bit, so meshes with gaps of rounding fall apart: weld such ones first.
+    """
     faces, vertices = welded(corners)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
     if not len(faces):
@@ -148,7 +159,11 @@ def _shell(vertices: F64, faces: Faces) -> Shell:
 
 
 def welded(corners: F64) -> tuple[Faces, F64]:
-    """Faces (F, 3) as numbers of places, and the places (V, 3), of triangles (F, 3, 3)."""
+    """Faces (F, 3) as numbers of places, and the places (V, 3), of triangles (F, 3, 3).
+
+    int64 faces. Places are those that differ in any bit, in no order that means something; -0
+    counts as 0.
+    """
     points = np.ascontiguousarray(corners.reshape(-1, 3)) + 0.0  # no negative zero
     # Compare the bits of whole points: faster than comparing column by column.
     keys = points.view(np.dtype((np.void, 24))).ravel()
@@ -157,6 +172,9 @@ def welded(corners: F64) -> tuple[Faces, F64]:
 
 
 def boxes_of(bodies: Sequence[Body]) -> tuple[F64, F64]:
-    """(N, 3) lowest and highest corners of bodies."""
+    """(N, 3) lowest and highest corners of bodies.
+
+    float64 metres, (0, 3) for no bodies.
+    """
     low = np.array([b.low for b in bodies]).reshape(-1, 3)
     return low, np.array([b.high for b in bodies]).reshape(-1, 3)

@@ -192,7 +192,11 @@ def _take_out(house: MutableHouse, out: Mapping[int, str]) -> None:
 
 
 def pass_that_added(item: Item) -> str:
-    """The pass that added an item, read from its id `dress-<pass>-<n>`."""
+    """The pass that added an item, read from its id `dress-<pass>-<n>`.
+
+    "dress" for an id of another form. Only of items that dressing added: those of the source have
+    ids of their own.
+    """
     words = item.id.split("-")
     return words[1] if len(words) > 2 and words[0] == "dress" else "dress"
 

@@ -27,7 +27,12 @@ _BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 
 
 def near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
-    """Pairs of numbers, ascending, of a new body and any other that boxes cannot tell apart."""
+    """Pairs of numbers, ascending, of a new body and any other that boxes cannot tell apart.
+
+    A pair of two new bodies comes once, and pairs of two old ones never. What may share space
+    (`is_allowed`) and kinds that are not measured are left out. Whether the meshes do meet is still
+    to be asked.
+    """
     low, high = boxes_of(bodies)
     measured = np.array([b.item.kind not in _UNMEASURED for b in bodies], bool)
     is_new = np.array([b.is_new for b in bodies], bool) & measured
@@ -47,7 +52,11 @@ def _box_depth(low: F64, high: F64, lows: F64, highs: F64) -> F64:
 
 
 def is_allowed(a: Body, b: Body) -> bool:
-    """Whether two things may share space: rugs under legs, curtains against walls and windows."""
+    """Whether two things may share space: rugs under legs, curtains against walls and windows.
+
+    A rug only where it is new; curtains and blinds against walls, doors or windows behind them. The
+    order of the two is no matter.
+    """
     for one, other in ((a, b), (b, a)):
         if one.is_new and one.item.nyu40 == FLOOR_MAT:
             return True

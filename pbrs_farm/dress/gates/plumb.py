@@ -71,7 +71,11 @@ class Plumb:
             self._grids.append(grid)
 
     def hits(self, points: F64, reach_m: float) -> Hits:
-        """Every face at most reach_m above or below points (N, 3), edges included."""
+        """Every face at most reach_m above or below points (N, 3), edges included.
+
+        A point may have no hit or many, in no order of height. float64 metres. Of each hit it gives
+        the number of the point, the height and whose face it is.
+        """
         found = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
         place, triangle = (np.concatenate(parts) for parts in zip(*found, strict=True))
         # Leave out faces that lie too high or too low, then those beside the place.

@@ -144,7 +144,11 @@ class Solids:
         self._made: dict[int, tuple[Shell, Any]] = {}
 
     def shared(self, a: Shell, b: Shell) -> list[F64]:
-        """The connected parts of what two closed shells share, as triangles (F, 3, 3)."""
+        """The connected parts of what two closed shells share, as triangles (F, 3, 3).
+
+        [] where one of the two is no closed solid, or what they share is a speck. Solids of shells
+        are kept, as one meets several others.
+        """
         solid_a, solid_b = self._solid(a), self._solid(b)
         if solid_a is None or solid_b is None:
             return []

@@ -61,7 +61,11 @@ def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[i
 
 
 def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
-    """By what the thing of the source was held that a body has replaced, among the same bodies."""
+    """By what the thing of the source was held that a body has replaced, among the same bodies.
+
+    Only for a body that has replaced a thing of the source. What a source let float may float as it
+    did: the gate compares with this.
+    """
     body = bodies[number]
     assert body.was is not None
     corners = item_triangles(body.was)

@@ -41,7 +41,11 @@ def _is_in_the_way(body: Body) -> bool:
 
 
 def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """How many sides of doors there are, and the new bodies in a swing or within 0.8 m of one."""
+    """How many sides of doors there are, and the new bodies in a swing or within 0.8 m of one.
+
+    Windows are not counted, nor sides that lead to no room. Curtains, and what is lower than a step
+    or over one's head, are in nobody's way.
+    """
     n, found = 0, []
     boxes = boxes_of(bodies)
     for door in space.passages:
@@ -77,7 +81,11 @@ def _enters(body: Body, door: Passage, side: int, low: F64, high: F64) -> bool:
 
 
 def in_front_of(passage: Passage, side: int, points: F64) -> F64:
-    """(..., 3) points as metres along a passage from its middle, world y, and out from the wall."""
+    """(..., 3) points as metres along a passage from its middle, world y, and out from the wall.
+
+    points (..., 3) in the world, metres. The third number is positive on that side of the wall and
+    negative within it.
+    """
     moved = points - passage.face_point(side)
     return np.stack([moved @ passage.along, points[..., 1], moved @ passage.inward(side)], axis=-1)
 

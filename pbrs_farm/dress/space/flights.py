@@ -32,7 +32,11 @@ class Flights:
 
 
 def flights_of(house: MutableHouse, room: Room, area: BaseGeometry) -> Flights:
-    """The stairs of the house that stand in a room or arrive in it. area: the room's plan."""
+    """The stairs of the house that stand in a room or arrive in it. area: the room's plan.
+
+    Two plan areas: the stairs themselves, and what lies before their ends, where one steps on and
+    off. Flights of other storeys that come near in plan are left out. Empty areas without stairs.
+    """
     under, before = [], []
     near = area.buffer(_REACH_M)
     for treads, plan in _stairs(house):

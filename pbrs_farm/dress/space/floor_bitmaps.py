@@ -27,7 +27,11 @@ class FloorBitmap:
     ways: NDArray[np.int32]  # (H, W) number of the connected way one can walk; 0 = none
 
     def cells(self, places: F64) -> NDArray[np.int64]:
-        """(N, 2) row and column of plan places (N, 2); may lie outside."""
+        """(N, 2) row and column of plan places (N, 2); may lie outside.
+
+        int64. Ask whether they lie inside before indexing: a negative index would count from the
+        other end.
+        """
         return FloorGrid(self.origin, self.inside.shape).cells(places)
 
     @property
@@ -64,7 +68,11 @@ def floor_bitmap(
 
 
 def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> FloorBitmap:
-    """The floor when a body (H, W) stands there, too; width_m: of the ways that are left."""
+    """The floor when a body (H, W) stands there, too; width_m: of the ways that are left.
+
+    The bitmap given is not changed. Takes a distance transform, so try many places by the occupied
+    cells first.
+    """
     occupied = bitmap.occupied | body
     ways = connected_ways(bitmap.inside & ~occupied, width_m)
     return replace(bitmap, occupied=occupied, ways=ways)

@@ -76,7 +76,11 @@ def _area_by_squares(points: F64) -> BaseGeometry:
 
 
 def areal(shape: BaseGeometry) -> BaseGeometry:
-    """shape without lines and points, valid."""
+    """shape without lines and points, valid.
+
+    What shapely's overlays leave of touching edges would else be drawn and measured. An empty shape
+    where nothing has an area.
+    """
     shape = shapely.make_valid(shape)
     if shape.geom_type in ("Polygon", "MultiPolygon"):
         return shape

@@ -50,7 +50,11 @@ class RoomSpace:
     above: F64  # (F, 3, 3) triangles of ceilings and of what else is over it
 
     def ceiling_y(self, places: F64) -> F64:
-        """(N,) y of the lowest structure above the floor at plan places (N, 2), else the nominal one."""
+        """(N,) y of the lowest structure above the floor at plan places (N, 2), else the nominal one.
+
+        World metres; places holds world x and z. The nominal height is where no structure lies over
+        a place.
+        """
         return _ceiling(self.above, self.room)(places)
 
 
@@ -137,7 +141,11 @@ def house_space(house: MutableHouse) -> HouseSpace:
 
 
 def floor_space(house: MutableHouse) -> HouseSpace:
-    """As house_space, without the faces of walls: doors, windows, floors and points cost less."""
+    """As house_space, without the faces of walls: doors, windows, floors and points cost less.
+
+    For passes that place nothing on walls: `faces` of every room is empty. What is found of items
+    is kept in the house and used again.
+    """
     kept = house.kept.get("space")
     if not isinstance(kept, _KeptSpaces):
         kept = house.kept["space"] = _empty_house(house)

@@ -45,7 +45,12 @@ class WallAreas:
 def room_faces(
     planes: Iterable[WallPlane], rooms: Sequence[Room], areas: Sequence[BaseGeometry]
 ) -> dict[int, list[WallFace]]:
-    """The wall faces of each room (by its number), cut to the room, nothing in front considered."""
+    """The wall faces of each room (by its number), cut to the room, nothing in front considered.
+
+    A face is a rectangle of cells in the plane of a wall, with FAR_M free before cells that the
+    wall covers and 0 elsewhere. Of rooms that overlap the smaller one has the face. Limit it by
+    `with_structure` and `with_things`.
+    """
     order = sorted(range(len(areas)), key=lambda k: (areas[k].area, k))
     found: dict[int, list[WallFace]] = {}
     for plane in planes:
@@ -94,7 +99,11 @@ def _rooms_before(
 def with_structure(
     face: WallFace, walls: WallAreas, passages: Sequence[Passage], ceiling_y: Callable[[F64], F64]
 ) -> WallFace:
-    """The face with its free space limited by walls, openings and ceilings."""
+    """The face with its free space limited by walls, openings and ceilings.
+
+    The face given is not changed. ceiling_y gives the height, world metres, over plan places (N,
+    2). Things of the room are not considered: see `with_things`.
+    """
     clear = face.clear.copy()
     columns = np.asarray((np.arange(clear.shape[1]) + 0.5) * CELL_M, np.float64)
     ys = face.low_y + (np.arange(clear.shape[0]) + 0.5) * CELL_M
@@ -129,7 +138,10 @@ def with_things(face: WallFace, hidden: Sequence[Hidden | None]) -> WallFace:
 
 
 def reach_of(face: WallFace) -> F64:
-    """(2, 3) bounds of the space before the face in which things limit it."""
+    """(2, 3) bounds of the space before the face in which things limit it.
+
+    Metres, world; a thing whose box does not meet it hides nothing of the face.
+    """
     ends = [face.point(s, y, out) for s in (0.0, face.length) for y in (face.low_y, face.high_y)
             for out in (-0.03, FAR_M)]  # fmt: skip
     return np.array([np.min(ends, 0), np.max(ends, 0)])

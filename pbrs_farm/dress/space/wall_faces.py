@@ -59,17 +59,27 @@ class WallFace:
         return float(np.arctan2(self.normal[0], self.normal[2]))
 
     def point(self, s: float, y: float, out_m: float = 0.0) -> F64:
-        """(3,) world point at s along the face, at world height y, out_m before it."""
+        """(3,) world point at s along the face, at world height y, out_m before it.
+
+        s in metres from the face's first column, y in world metres and not from the floor.
+        """
         point = self.origin + self.along * s + self.normal * out_m
         point[1] = y
         return np.asarray(point)
 
     def s_of(self, points: F64) -> F64:
-        """(N,) how far along the face points (N, 3) lie."""
+        """(N,) how far along the face points (N, 3) lie.
+
+        Metres from the first column; below 0 or above `length` beside the face. points are float64,
+        world.
+        """
         return np.asarray((points - self.origin) @ self.along)
 
     def out_of(self, points: F64) -> F64:
-        """(N,) how far before the face points (N, 3) lie."""
+        """(N,) how far before the face points (N, 3) lie.
+
+        Metres along the normal; negative behind the wall's plane.
+        """
         return np.asarray((points - self.origin) @ self.normal)
 
     def recess_m(self, s0: float, s1: float) -> float:
@@ -79,7 +89,11 @@ class WallFace:
         return float(part.min()) if part.size else 0.0
 
     def free_m(self, s0: float, s1: float, y0: float, y1: float) -> float:
-        """The least free space before the rectangle s0..s1, y0..y1 (world heights); 0 beyond the face."""
+        """The least free space before the rectangle s0..s1, y0..y1 (world heights); 0 beyond the face.
+
+        Metres out from the wall; s along the face, y0 and y1 in the world. A rectangle that reaches
+        beyond the face anywhere has 0.
+        """
         rows, columns = self._window(s0, s1, y0, y1)
         n_rows, n_columns = self.clear.shape
         if rows[0] < 0 or columns[0] < 0 or rows[1] > n_rows or columns[1] > n_columns:
@@ -145,7 +159,11 @@ class WallPlane:
     behind: F64  # (F,) metres that a triangle lies behind the plane
 
     def recess(self, s0: float, n_columns: int) -> F32:
-        """(S,) how far the nearest triangle of each column from s0 on lies behind the plane."""
+        """(S,) how far the nearest triangle of each column from s0 on lies behind the plane.
+
+        float32 metres, 0 where a column has no triangle. The plane itself is where the outermost
+        triangle lies.
+        """
         found = np.full(n_columns, np.inf)
         s = (self.corners[:, :, 0] - s0) / CELL_M
         first = np.clip(np.floor(s.min(1) + 1e-6), 0, n_columns).astype(int)
@@ -160,7 +178,11 @@ class WallPlane:
         return np.asarray(points[:, [0, 2]])
 
     def covered(self, s0: float, y0: float, shape: tuple[int, int]) -> Bools:
-        """(H, S) cells, from s0 and y0 on, whose middle is on a triangle."""
+        """(H, S) cells, from s0 and y0 on, whose middle is on a triangle.
+
+        s0 along the plane and y0 in the world, metres; shape is (rows, columns). Middles on an edge
+        count as covered.
+        """
         ss = s0 + (np.arange(shape[1]) + 0.5) * CELL_M
         yy = y0 + (np.arange(shape[0]) + 0.5) * CELL_M
         found = np.zeros(shape, bool)
@@ -181,7 +203,12 @@ class WallPlane:
 
 
 def wall_planes(walls: Sequence[Item]) -> Iterator[WallPlane]:
-    """The upright planes of walls, largest triangle first; both sides of walls that are not closed."""
+    """The upright planes of walls, largest triangle first; both sides of walls that are not closed.
+
+    Faces that lean or lie level are left out, and planes whose largest triangle is smaller than a
+    least area. Triangles of several walls in one plane are one, with the id of the wall whose
+    triangle is largest.
+    """
     corners, owner = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for number, wall in enumerate(walls):
         own = item_triangles(wall)
@@ -223,7 +250,10 @@ def _is_closed(corners: F64) -> bool:
 
 
 def runs(room_of_column: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    """(room, first column, end column) of each stretch of columns of one room, -1 left out."""
+    """(room, first column, end column) of each stretch of columns of one room, -1 left out.
+
+    Stretches shorter than a least length are left out: nothing hangs there.
+    """
     values = np.asarray(room_of_column)
     edges = np.flatnonzero(np.diff(values)) + 1
     for start, end in zip(np.r_[0, edges], np.r_[edges, len(values)], strict=True):
@@ -258,7 +288,12 @@ def _least_around(depth: F32) -> F32:
 
 
 def hidden_cells(face: WallFace, points: F64) -> Hidden | None:
-    """What a thing hides of a face; points (N, 3): on its surface, grown by a cell."""
+    """What a thing hides of a face; points (N, 3): on its surface, grown by a cell.
+
+    points (N, 3) float64 in the world; None where none of them is near the face. Points farther
+    than FAR_M before it, or behind its plane, hide nothing. Sample surfaces as densely as the
+    cells, or gaps stay free.
+    """
     out, s, y = face.out_of(points), face.s_of(points), points[:, 1] - face.low_y
     n_rows, n_columns = face.clear.shape
     near = (out > -0.03) & (out < FAR_M)

@@ -52,7 +52,11 @@ _KEPT_SHARE = 0.1  # share of photographed floors and walls that stay as they ar
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:
-    """(2,) a corner of the room in plan and (2, 2) unit rows along its longer and shorter side."""
+    """(2,) a corner of the room in plan and (2, 2) unit rows along its longer and shorter side.
+
+    By the least rotated rectangle around the room, with a fixed sense, so that it does not depend
+    on where the outline begins. The world's axes for a room without an area.
+    """
     if area.is_empty:
         return np.zeros(2), np.eye(2)
     box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(area))[:4]

@@ -168,7 +168,11 @@ def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
 
 def caption(view: ChosenView) -> dict[str, Any]:
-    """text, objects and relations of a view, as write_captions says."""
+    """text, objects and relations of a view, as write_captions says.
+
+    Wholly from labels, so the same view gives the same words. Objects carry box2d as view.json has
+    it; relations name them by id.
+    """
     things = _things(view)
     relations = _relations(view, things)
     objects = [{"id": t.id, "noun": t.noun, "box2d": t.row["box2d"]} for t in things]

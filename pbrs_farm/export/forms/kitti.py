@@ -74,7 +74,12 @@ def _labels(view: ChosenView) -> dict[str, bytes]:
 
 
 def kitti_flow(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16: 64 x + 2**15, 64 y + 2**15, 1; 0 in all three where not valid (H, W)."""
+    """(H, W, 3) uint16: 64 x + 2**15, 64 y + 2**15, 1; 0 in all three where not valid (H, W).
+
+    flow is (H, W, 2) px, x right and y down, from the first picture to the second. Flow beyond what
+    16 bits hold (512 px) is marked as not valid. The order of channels is that of KITTI's files,
+    read as RGB.
+    """
     steps = np.rint(flow.astype(np.float64) * 64) + 2**15
     valid = valid & ((steps >= 0) & (steps <= 65535)).all(-1)
     png = np.concatenate([steps.clip(0, 65535), np.ones((*valid.shape, 1))], axis=-1)

@@ -29,7 +29,10 @@ _LEAST_RADIUS_M: Final = 0.005
 
 
 def write_usd(home: ExportedHome, folder: Path) -> int:
-    """<house id>.usdc and textures/; the number of files."""
+    """<house id>.usdc and textures/; the number of files.
+
+    Needs the module pxr. folder must exist.
+    """
     need("pxr")
     textures = _write_textures(home.house, folder)
     _Stage(home, folder / f"{home.house.id}.usdc", textures).save()

@@ -13,7 +13,11 @@ from pbrs_farm.installation import need
 
 
 def write_usdz(home: ExportedHome, folder: Path) -> int:
-    """<house id>.usdz, which holds its textures; the number of files, 1."""
+    """<house id>.usdz, which holds its textures; the number of files, 1.
+
+    Written by way of a .usdc in a temporary folder. Needs the module pxr; MachineFailed where the
+    package could not be written.
+    """
     need("pxr")
     from pxr import UsdUtils
 

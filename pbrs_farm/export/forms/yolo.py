@@ -49,7 +49,11 @@ def _box_lines(view: ChosenView) -> Iterable[str]:
 
 
 def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
-    """The instances that count as objects, each with its class's number."""
+    """The instances that count as objects, each with its class's number.
+
+    Numbers count classes from 0 in the order of class_names, as YOLO wants, and are not the
+    classes' ids. Nothing, walls, floors and ceilings are left out of NYU40's.
+    """
     numbers = {k: number for number, k in enumerate(view.choice.class_names)}
     # Of a user's classes every one counts: the table says which.
     none = _NO_BOX if view.choice.classes is None else (0,)

@@ -73,7 +73,11 @@ class ChildProcess:
             self._requests.flush()
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Its next line, None when none came in time or the pipe is closed."""
+        """Its next line, None when none came in time or the pipe is closed.
+
+        Without its line end. A child that closed its pipe is waited for up to a second, so that
+        `exit_code` says how it ended. From one thread only.
+        """
         # Read on where no whole line is held yet.
         if b"\n" not in self._buffer:
             readable, _, _ = select.select([self._replies], [], [], timeout_s)
@@ -94,7 +98,11 @@ class ChildProcess:
         return self._process.poll()
 
     def kill(self) -> None:
-        """Kill it and whatever it started; it is gone afterwards."""
+        """Kill it and whatever it started; it is gone afterwards.
+
+        SIGKILL to its whole process group: nothing of it can clean up. Take `close` where it should
+        free what it holds.
+        """
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -145,7 +153,10 @@ class ChildProcess:
 
 
 def ending(code: int) -> str:
-    """How a process ended, in words; code: minus the signal that killed it."""
+    """How a process ended, in words; code: minus the signal that killed it.
+
+    Signals are named; SIGKILL says that memory may have been short, as the kernel kills so.
+    """
     if code == -signal.SIGKILL:
         return "its process was killed by SIGKILL from outside (out of memory?)"
     if code < 0:
@@ -154,7 +165,11 @@ def ending(code: int) -> str:
 
 
 def die_with_parent(sign: int = signal.SIGKILL) -> None:
-    """Ask Linux to send us the signal when the thread that started us ends."""
+    """Ask Linux to send us the signal when the thread that started us ends.
+
+    The thread, not the process: a parent must start children from a thread that lives as long as
+    they should. Linux only. It is lost when the child starts another program with other rights.
+    """
     parent = os.getppid()
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(sign), 0, 0, 0)
     # The parent may have ended before prctl.
@@ -177,7 +192,10 @@ class Message:
     body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
 
     def line(self) -> bytes:
-        """The message as message_from_line reads it."""
+        """The message as message_from_line reads it.
+
+        One line, its end included; the body must be JSON values.
+        """
         return json.dumps(asdict(self), separators=(",", ":")).encode() + b"\n"
 
 

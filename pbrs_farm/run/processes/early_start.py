@@ -20,7 +20,11 @@ _STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]
 
 
 def start_early(target: str) -> None:
-    """Start a process of `target` (see task_loop.main) for the next child_of to take."""
+    """Start a process of `target` (see task_loop.main) for the next child_of to take.
+
+    It loads libraries while its parent still reads options. Call it once a target, and
+    `end_untaken` at the end of whoever called it.
+    """
     folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
     _STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
 

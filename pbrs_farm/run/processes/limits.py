@@ -37,7 +37,11 @@ class ProcessLimits:
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
-    """Memory this container or machine may use, in MiB."""
+    """Memory this container or machine may use, in MiB.
+
+    limits are files of cgroups, version 1 or 2; the least of them that is a number counts. What
+    other processes already use is not taken off.
+    """
     # Take the container's limit where it is below what the machine has.
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for path in limits:
@@ -56,12 +60,19 @@ def is_room_for_two() -> bool:
 
 
 def memory_share_mb(n_processes: int) -> float:
-    """What one of n render processes may hold: its share of nine tenths of the machine, in MiB."""
+    """What one of n render processes may hold: its share of nine tenths of the machine, in MiB.
+
+    A tenth is left for the scheduler and the system.
+    """
     return _SHARE_OF_MACHINE * machine_mb() / max(1, n_processes)
 
 
 def tree_mb(pid: int) -> float:
-    """Resident memory of a process and all it started, in MiB; pages they share count for each."""
+    """Resident memory of a process and all it started, in MiB; pages they share count for each.
+
+    0 for a process that is gone. Pages shared between the processes make the sum larger than what
+    they take together.
+    """
     try:
         # Children are listed by the thread that started them.
         lists = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
@@ -71,7 +82,10 @@ def tree_mb(pid: int) -> float:
 
 
 def resident_mb(pid: int) -> float:
-    """Resident memory of a process in MiB, 0 when it is gone."""
+    """Resident memory of a process in MiB, 0 when it is gone.
+
+    Read from /proc, so Linux only; pages shared with others count in full.
+    """
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError, ValueError):

@@ -87,7 +87,11 @@ class Pool:
         return sum(w.task is not None for w in self._workers)
 
     def idle_houses(self, lane: int) -> list[str]:
-        """The house each idle process holds in memory ("" for none): a place per idle process."""
+        """The house each idle process holds in memory ("" for none): a place per idle process.
+
+        A process that is not started yet holds "". As many entries as tasks that the lane can take
+        now.
+        """
         idle = [w.held_house for w in self._of(lane) if w.task is None]
         return idle + [""] * (self._lanes[lane] - len(self._of(lane)))
 
@@ -96,7 +100,12 @@ class Pool:
         return {w.task.house_id for w in self._workers if w.task is not None}
 
     def give(self, task: RenderTask, lane: int) -> None:
-        """Hand a task to an idle process of the lane, one that holds its house if there is one."""
+        """Hand a task to an idle process of the lane, one that holds its house if there is one.
+
+        Only where `idle_houses` of the lane says that one is free. Loading a house costs more than
+        the views of a room, so one that holds it comes first, then one that holds nothing, then
+        any.
+        """
         # Loading a house costs more than the views of a room: prefer the process that has it, then
         # a fresh process, then any.
         idle = [w for w in self._of(lane) if w.task is None]
@@ -118,7 +127,11 @@ class Pool:
         return self._workers[-1]
 
     def events(self) -> Iterator[Event]:
-        """What happens next, at least once a second; nothing when no process has a task."""
+        """What happens next, at least once a second; nothing when no process has a task.
+
+        Waits up to a second. Ends of tasks, faults and messages come in the order in which each
+        process said them; a process that died is an event and no error.
+        """
         busy = [w for w in self._workers if w.task is not None]
         if busy:
             select.select([w.process for w in busy], [], [], CHECK_EVERY_S)
@@ -169,5 +182,9 @@ def _events_in(worker: _Worker, task: RenderTask, message: Message) -> Iterator[
 
 
 def last_lines(log: str) -> str:
-    """The last three lines a process' libraries printed, on one line."""
+    """The last three lines a process' libraries printed, on one line.
+
+    For the message of a process that died: what it said last is the likeliest cause. "" for an
+    empty log.
+    """
     return " | ".join([line.strip() for line in log.splitlines() if line.strip()][-3:])

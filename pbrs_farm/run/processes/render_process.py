@@ -84,7 +84,11 @@ class RenderProcess:
         return child
 
     def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
-        """Give it a task of at most task_s seconds; the process is started when there is none."""
+        """Give it a task of at most task_s seconds; the process is started when there is none.
+
+        One task at a time. The request waits in the pipe until the process has loaded its
+        libraries; the log of the last task is emptied.
+        """
         assert not self._is_busy, "one task at a time"
         # The request waits in the process's pipe until it is ready.
         child = self.start()
@@ -96,7 +100,11 @@ class RenderProcess:
         child.send(request)
 
     def poll(self, timeout_s: float) -> Message | Ended | None:
-        """What it says next, or how its task ended; None when nothing happens in timeout_s."""
+        """What it says next, or how its task ended; None when nothing happens in timeout_s.
+
+        Limits of time and memory are looked at here, once a second: who does not poll lets a
+        process run on. What a dying process said last is given before its end.
+        """
         child = self._child
         assert child is not None
         assert self._is_busy, "no task to wait for"
@@ -114,7 +122,11 @@ class RenderProcess:
         return None if line is None else self._heard(message_from_line(line))
 
     def kill(self, cause: str, text: str) -> Ended:
-        """End the running task and its process."""
+        """End the running task and its process.
+
+        cause is the word that retries are decided by, text the sentence for people. The next task
+        starts a new process.
+        """
         self.stop()
         return Ended(self._clock() - self._begun_at, cause, text)
 

@@ -20,7 +20,12 @@ from pbrs_farm.run.processes.child_process import Message, die_with_parent
 
 
 def main(target: str) -> int:
-    """Serve the tasks of `module:function`, which makes a Handler from what sends a message."""
+    """Serve the tasks of `module:function`, which makes a Handler from what sends a message.
+
+    Never called in the parent. It ignores SIGINT and SIGTERM, as the parent decides what they mean,
+    and dies with it. What the libraries print goes to the log, since replies have a pipe of their
+    own. 1 where the handler could not be made, after saying why.
+    """
     die_with_parent()
     # The parent decides what Ctrl-C and TERM mean; Slurm signals every process of a step.
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -53,7 +53,11 @@ class Comparison:
 def compare(
     comparison: Comparison, judged_on: Sequence[JudgedViews], tell: Tell = lambda _line: None
 ) -> dict[str, Any]:
-    """Train every set with every seed and judge each on everything; the figures by set and seed."""
+    """Train every set with every seed and judge each on everything; the figures by set and seed.
+
+    With equal views every set is cut to the size of the smallest. Every set has the same plan and
+    the same seeds, so a difference comes from the views. tell hears a line a set.
+    """
     plan, rows = comparison.plan, {}
     loaded = [training_views(each.source, plan) for each in comparison.sets]
     if comparison.equal_views:

@@ -30,7 +30,10 @@ N_SHOWN: Final = 8  # of the worst views, and of the best
 
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
-    """Write the folder; the page's path. Raises BadInput where it cannot be written to."""
+    """Write the folder; the page's path. Raises BadInput where it cannot be written to.
+
+    table.md, evaluation.json and index.html; files of an earlier evaluation are replaced.
+    """
     make_folder(out)
     text = "\n".join([figures_table(run, evaluations), "", *notes(run, evaluations), ""])
     (out / "table.md").write_text(text)

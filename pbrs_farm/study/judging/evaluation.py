@@ -49,7 +49,10 @@ class JudgedViews:
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
-        """(height, width) of each truth."""
+        """(height, width) of each truth.
+
+        Truths of one set may differ in size, as photographs do: predictions are asked for at these.
+        """
         shapes = [next(iter(truth.values())).shape for truth in self.truths]
         return [(int(shape[0]), int(shape[1])) for shape in shapes]
 
@@ -154,7 +157,11 @@ def check_exact(task_name: str, *, exact: bool) -> None:
 
 
 def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
-    """A prediction of each view, of the size of its truth."""
+    """A prediction of each view, of the size of its truth.
+
+    Lazy, in the order of the views; the network's picture is scaled to the truth's size, not the
+    truth to the network's.
+    """
     return predict(run.network, views.colour, run.task, run.plan, views.sizes)
 
 
@@ -175,7 +182,11 @@ def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
 def with_others(
     run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
 ) -> Evaluation:
-    """The evaluation with a column more: what another program says of the same views."""
+    """The evaluation with a column more: what another program says of the same views.
+
+    predictions must be in the order of the views and of their truths' size. BadInput for a name
+    that the evaluation has already.
+    """
     if name in evaluation.rows:
         raise BadInput("--predictions", name, "a second column of this name", hint="NAME=DIR")
     judged = _judged(predictions, run, evaluation.views)

@@ -34,7 +34,11 @@ def shown_figure(figure: str, value: float) -> str:
 
 
 def spread_text(figure: str, values: Sequence[float]) -> str:
-    """Mean and, of several seeds, the standard deviation of a sample."""
+    """Mean and, of several seeds, the standard deviation of a sample.
+
+    The standard deviation is that of a sample (n - 1), and left out for one value. At least one
+    value is needed; NaN gives "-".
+    """
     mean = shown_figure(figure, statistics.fmean(values))
     if len(values) < 2:
         return mean
@@ -55,5 +59,8 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def is_underfit(train_error: float, baseline_error: float) -> bool:
-    """The network hardly knows its own training views: no conclusion may be drawn from it."""
+    """The network hardly knows its own training views: no conclusion may be drawn from it.
+
+    Compared with a baseline that sees no picture. Report such a row as no result, not as a bad one.
+    """
     return train_error > UNDERFIT * baseline_error

@@ -40,7 +40,11 @@ class PhotoCamera:
 
 
 def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
-    """Every pair below a folder, for normals and depth; BadInput for one without intrinsics."""
+    """Every pair below a folder, for normals and depth; BadInput for one without intrinsics.
+
+    All are held in memory, at the plan's size of picture. BadInput also for tasks of which depth
+    says nothing.
+    """
     if plan.task not in ("normals", "depth"):
         text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
         raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")

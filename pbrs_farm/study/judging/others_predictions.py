@@ -51,7 +51,10 @@ class OthersPredictions:
 
 
 def others_predictions(word: str) -> OthersPredictions:
-    """`[NAME=]DIR`. Raises BadInput for what is no folder."""
+    """`[NAME=]DIR`. Raises BadInput for what is no folder.
+
+    Without a NAME the folder's own. Which files are in it is asked later, a view at a time.
+    """
     label, equals, place = word.partition("=")
     folder = Path(place if equals else word)
     if not folder.is_dir():

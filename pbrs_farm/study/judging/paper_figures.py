@@ -68,7 +68,11 @@ def paper_row(task: str, mode: str, n_classes: int = _PAPER_CLASSES) -> PaperRow
 
 
 def tuned_row(task: str, pretrained: str) -> PaperRow:
-    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone."""
+    """The paper's row tuned on NYUv2 from a lighting mode; without one, trained on NYUv2 alone.
+
+    Where the paper has no row of that very light, one of the same kind, MLT or OpenGL; KeyError for
+    a task that the paper does not have.
+    """
     name = _NAMES.get(pretrained)
     rows = PAPER[task]
     tuned = [row for row in rows if row.tuned and name is not None]

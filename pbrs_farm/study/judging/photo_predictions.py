@@ -67,7 +67,11 @@ def photograph_files(words: Sequence[Path]) -> list[Path]:
 
 
 def read_photograph(path: Path, name: str = "") -> Photograph:
-    """The picture, turned as its EXIF orientation says. Raises BadInput naming the file."""
+    """The picture, turned as its EXIF orientation says. Raises BadInput naming the file.
+
+    (H, W, 3) uint8 sRGB. BadInput too for more pixels than are read, before the network is asked.
+    Its name is the file's stem unless one is given.
+    """
     data = read_given(path)
     colour = decode_photo(data, str(path))
     if colour.shape[0] * colour.shape[1] > _MAX_PIXELS:
@@ -77,7 +81,10 @@ def read_photograph(path: Path, name: str = "") -> Photograph:
 
 
 def upright(colour: Srgb8Image, orientation: int) -> Srgb8Image:
-    """The picture as EXIF's orientation 1..8 turns and mirrors it; any other leaves it."""
+    """The picture as EXIF's orientation 1..8 turns and mirrors it; any other leaves it.
+
+    colour is (H, W, 3); 5 to 8 swap height and width. A copy unless nothing changes.
+    """
     if orientation in (5, 6, 7, 8):
         colour = colour.transpose(1, 0, 2)
     if orientation in (2, 3, 6, 7):
@@ -95,7 +102,11 @@ def _orientation(data: bytes) -> int:
 
 
 def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
-    """(height, width) of a photograph for the network: its proportions, near n_pixels, even halves."""
+    """(height, width) of a photograph for the network: its proportions, near n_pixels, even halves.
+
+    Rounded to a multiple that all stages divide, so proportions hold only nearly. A long thin
+    picture keeps at least one multiple across.
+    """
     scale = (n_pixels / (height * width)) ** 0.5
     rows, columns = (max(round(n * scale / _MULTIPLE), 1) * _MULTIPLE for n in (height, width))
     # The deepest stage needs two cells.

@@ -53,7 +53,11 @@ class AngularErrors:
         self._sum_of_squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
-        """Count the pixels (H, W) where valid; the view's own mean in degrees, NaN without any."""
+        """Count the pixels (H, W) where valid; the view's own mean in degrees, NaN without any.
+
+        predicted and truth are (H, W, 3) unit vectors in one frame, valid (H, W) bool. Pixels
+        count, not views: a view with more valid pixels weighs more.
+        """
         errors = angles_deg(predicted[valid], truth[valid])
         self._histogram += np.bincount(
             np.rint(errors / _BIN_DEG).astype(np.intp), minlength=_N_BINS
@@ -64,7 +68,11 @@ class AngularErrors:
         return float(errors.mean()) if errors.size else float("nan")
 
     def score(self) -> NormalScore:
-        """Over all pixels so far; the median to 0.005 degrees. All NaN without a pixel."""
+        """Over all pixels so far; the median to 0.005 degrees. All NaN without a pixel.
+
+        Mean, median and RMS in degrees, and shares below the thresholds of the literature (11.25,
+        22.5 and 30 degrees among them; Fouhey et al. 2013).
+        """
         n = int(self._histogram.sum())
         if n == 0:
             nan = float("nan")

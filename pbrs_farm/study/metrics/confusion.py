@@ -51,7 +51,12 @@ class Confusion:
         return _shares(hits, self.counts.sum(0) + self.counts.sum(1) - hits)
 
     def score(self) -> ClassScore:
-        """Over all pixels so far; all NaN without a pixel."""
+        """Over all pixels so far; all NaN without a pixel.
+
+        Classes without a pixel of truth do not enter the mean accuracy, and those that neither
+        truth nor prediction has do not enter the mean IoU. Weighted by the truth's frequency: Long
+        et al. 2015.
+        """
         n = int(self.counts.sum())
         if n == 0:
             nan = float("nan")

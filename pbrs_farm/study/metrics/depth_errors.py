@@ -49,7 +49,11 @@ class DepthErrors:
         return self._spreads[-1]
 
     def score(self) -> DepthScore:
-        """Over all so far; all NaN without a pixel."""
+        """Over all so far; all NaN without a pixel.
+
+        The scale-invariant error is the mean of the views' own (Eigen et al. 2014); all other
+        figures are over pixels, so larger views weigh more.
+        """
         if not self._n:
             nan = float("nan")
             return DepthScore(nan, nan, nan, nan, 0)

@@ -114,12 +114,19 @@ class EdgeScores:
         self._views: list[EdgeCounts] = []
 
     def add(self, counts: EdgeCounts) -> float:
-        """Take a picture; its own best F."""
+        """Take a picture; its own best F.
+
+        Counts are kept for each picture, as OIS takes the best threshold of each one.
+        """
         self._views.append(counts)
         return float(counts.f().max())
 
     def score(self) -> EdgeScore:
-        """Over all pictures so far; all NaN without one."""
+        """Over all pictures so far; all NaN without one.
+
+        ODS by one threshold for all pictures, OIS by the best of each, AP over thresholds, and
+        recall at half precision (Arbelaez et al. 2011).
+        """
         if not self._views:
             nan = float("nan")
             return EdgeScore(nan, nan, nan, nan, n_views=0)

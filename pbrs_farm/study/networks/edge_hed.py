@@ -55,5 +55,9 @@ class EdgeHed(nn.Module):  # type: ignore[misc]
 
 
 def edges_of_sides(scores: Tensor) -> Tensor:
-    """(B, H, W) edges 0..1 of (B, 6, H, W) scores: the mean of sides 2 to 4, as the paper takes it."""
+    """(B, H, W) edges 0..1 of (B, 6, H, W) scores: the mean of sides 2 to 4, as the paper takes it.
+
+    scores as the network gives them, before the sigmoid: five sides and their fusion; the first,
+    the last and the fusion are left out. The network: Xie and Tu 2015.
+    """
     return torch.sigmoid(scores[:, PAPER_SIDES]).mean(1)

@@ -43,7 +43,10 @@ def start_from(network: nn.Module, init: str) -> dict[str, str]:
 
 
 def credits_of_init(init: str) -> tuple[str, ...]:
-    """Whose works the weights have seen that a training starts from: what their run's record names."""
+    """Whose works the weights have seen that a training starts from: what their run's record names.
+
+    () for weights that are no run's folder.
+    """
     from pbrs_farm.study.training.run_folder import RunFolder
 
     run = Path(init)

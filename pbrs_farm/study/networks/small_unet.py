@@ -77,7 +77,11 @@ def _block(n_in: int, n_out: int) -> nn.Sequential:
 
 
 def rows_and_columns(x: Tensor) -> Tensor:
-    """(B, 2, H, W): -1 to 1 down the rows, and along the columns."""
+    """(B, 2, H, W): -1 to 1 down the rows, and along the columns.
+
+    Of the type and device of x, which is (B, C, H, W). Corners are -1 and 1 exactly, whatever the
+    size.
+    """
     batch, _, height, width = x.shape
     rows = torch.linspace(-1, 1, height, dtype=x.dtype, device=x.device)
     columns = torch.linspace(-1, 1, width, dtype=x.dtype, device=x.device)

@@ -63,5 +63,8 @@ def start_he(module: nn.Module) -> None:
 
 
 def cropped_to(x: Tensor, like: Tensor) -> Tensor:
-    """x without what it has more at the right and the bottom: transposed layers round up."""
+    """x without what it has more at the right and the bottom: transposed layers round up.
+
+    x and like are (B, C, H, W); x must be at least as large. Channels may differ.
+    """
     return x[..., : like.shape[-2], : like.shape[-1]]
