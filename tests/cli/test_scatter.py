@@ -63,8 +63,9 @@ def test_cameras_stand_in_rooms_at_the_distance_asked_for(tmp_path: Path) -> Non
     found = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
     middles = np.array([i.bounds.mean(0) for i in home.house.items if i.pose])
     for one in found:
-        away = np.linalg.norm(middles - one.camera.eye, axis=1).min()
-        assert 0.4 <= away <= 0.91
+        # Of one of the three; the others may be nearer.
+        away = np.linalg.norm(middles - one.camera.eye, axis=1)
+        assert ((away >= 0.6 - 1e-6) & (away <= 0.9 + 1e-6)).any()
         assert one.room == "0_1"
     again = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
     assert [one.id for one in found] == [one.id for one in again]

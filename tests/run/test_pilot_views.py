@@ -12,6 +12,7 @@ from pbrs_farm.run.view_light import pilot_of_view, pilot_view
 from pbrs_farm.sample.house_sampler import add_right_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.view_emitters import ViewEmitters
 
 
 def views() -> dict[str, View]:
@@ -43,8 +44,8 @@ def test_whichever_frame_is_rendered_first_changes_no_picture(
     every = views()
     frames = [every[f"frame_{k:05d}"] for k in (1, 2)]
     n_pilots = []
-    own = LightScene.emitters
-    monkeypatch.setattr(LightScene, "emitters", lambda *args: (n_pilots.append(1), own(*args))[1])
+    own = ViewEmitters.measure
+    monkeypatch.setattr(ViewEmitters, "measure", lambda *args: (n_pilots.append(1), own(*args))[1])
 
     def pictures(order: list[View]) -> dict[str, np.ndarray]:
         scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
