@@ -32,7 +32,11 @@ class DrawMesh:
 
 
 def mesh_from_house(house: House) -> DrawMesh:
-    """The mesh of every surface of house, panes included; non-finite triangles are dropped."""
+    """The mesh of every surface of house, panes included; non-finite triangles are dropped.
+
+    Vertices are not shared between surfaces; draws are in the order of items, so an instance id is
+    the item's number from 1. Materials are numbers into the house's list. Positions stay in metres.
+    """
     vertices: list[F32] = []
     indices: list[NDArray[np.uint32]] = []
     rows: list[tuple[int, int, int, int]] = []

@@ -21,7 +21,10 @@ _MAX_TEXTURE_PX: Final = 4096  # every OpenGL 3.3 driver takes as much
 
 
 def n_samples(context: Any, wanted: int) -> int:
-    """Samples a pixel: as wanted or what the context can give, 2 at least."""
+    """Samples a pixel: as wanted or what the context can give, 2 at least.
+
+    context: a moderngl context; wanted: at least 1.
+    """
     return max(2, min(wanted, int(context.max_samples)))
 
 
@@ -50,7 +53,11 @@ def open_context() -> Any:
 
 
 def texture_from_pixels(context: Any, pixels: NDArray[np.uint8]) -> Any:
-    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top."""
+    """A repeating, mipmapped sRGB texture from (H, W, 3 or 4) uint8, row 0 = top.
+
+    pixels: sRGB bytes; without alpha it is opaque. Larger pictures than OpenGL must accept are
+    thinned by whole steps, not filtered. Lives as long as the context: release both.
+    """
     # Take every n-th texel of what is larger than OpenGL must accept.
     step = -(-max(pixels.shape[:2]) // _MAX_TEXTURE_PX)
     thinned = pixels[::step, ::step]
@@ -92,7 +99,11 @@ class RenderTarget:
         self._drawn.clear(*colour, depth=1.0)
 
     def read(self) -> NDArray[np.float16]:
-        """(H, W, 3) float16 linear colour, row 0 = top."""
+        """(H, W, 3) float16 linear colour, row 0 = top.
+
+        Averages the samples of each pixel first. Waits for the graphics driver. A fresh array that
+        may be kept.
+        """
         self._context.copy_framebuffer(self._resolved, self._drawn)
         raw = self._resolved.read(components=3, dtype="f2", alignment=1)
         pixels = np.frombuffer(raw, np.float16).reshape(*self._size[::-1], 3)
@@ -110,5 +121,9 @@ _SRGB8_OF_HALF: Final = _encoding_table()
 
 
 def srgb8_from_half(linear: NDArray[np.float16]) -> Srgb8Image:
-    """sRGB bytes of linear half floats."""
+    """sRGB bytes of linear half floats.
+
+    linear: (..., 3) float16, contiguous in the last axis. By a table of all half floats, so it is
+    exact and quick.
+    """
     return _SRGB8_OF_HALF[linear.view(np.uint16)]

@@ -32,7 +32,11 @@ def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
 
 
 def far_plane(camera: Camera, low: F64, high: F64) -> float:
-    """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre."""
+    """Depth of a far plane just beyond every box (N, 3) for the camera, and at least a metre.
+
+    low, high: (N, 3) corners of the boxes in the world, metres. Measured to the farthest corner, so
+    it serves all directions of the camera.
+    """
     if not len(low):
         return 1.0
     # Measure to the farthest corner of the box around all boxes.
@@ -56,6 +60,9 @@ def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
 
 
 def distance_to_boxes(eye: F64, low: F64, high: F64) -> F64:
-    """(N,) distance from eye to the nearest point of each box."""
+    """(N,) distance from eye to the nearest point of each box.
+
+    low, high: (N, 3), metres, axis-aligned. 0 for boxes that the eye is in.
+    """
     gap = np.maximum(np.maximum(low - eye, eye - high), 0.0)
     return np.asarray(np.sqrt(np.einsum("nk,nk->n", gap, gap)))

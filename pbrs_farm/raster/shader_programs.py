@@ -24,7 +24,11 @@ _VERSION = "#version 330\n"
 
 
 def surface_program(context: Any, features: Iterable[str], n_lights: int, n_samples: int) -> Any:
-    """Program that lights surfaces. features: MODE_DL or MODE_IL, and any of shader_features."""
+    """Program that lights surfaces. features: MODE_DL or MODE_IL, and any of shader_features.
+
+    n_lights: of a block of lights; n_samples: of the target. Compiled on each call: keep programs
+    by their features. The driver's message is in the error where it does not compile.
+    """
     # Pass constants and features as #defines, so that code without use is not compiled in.
     defines = {
         "N_LIGHTS": n_lights,
@@ -71,7 +75,11 @@ class Feature(IntFlag):
 
 
 def features_of_material(material: Material, *, is_textured: bool = True) -> int:
-    """The features a material needs, as a sum of bits."""
+    """The features a material needs, as a sum of bits.
+
+    is_textured: False where the picture of the texture could not be read. Draws with equal features
+    share a program.
+    """
     features = Feature.TEXTURED if is_textured and material.texture_id is not None else Feature(0)
     if material.shininess > 0 and any(material.specular):
         features |= Feature.GLOSSY

@@ -37,7 +37,11 @@ def _material_block(material: Material) -> list[float]:
 
 
 def light_blocks(house: House, n_best: int) -> F32:
-    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights."""
+    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights.
+
+    Float32, in std140's layout. Row 0 is of instance 0, nothing, and stays 0. A house with fewer
+    lights than n_best fills the rest with 0; how many count is the row's first number.
+    """
     lights = light_table(house)
     block = np.zeros((len(house.items) + 1, _HEADER_FLOATS + LIGHT_FLOATS * n_best), np.float32)
     if len(lights) and house.items:
@@ -51,7 +55,11 @@ def light_blocks(house: House, n_best: int) -> F32:
 
 
 def aligned_rows(rows: F32, alignment_bytes: int) -> F32:
-    """Rows padded so that each starts at a multiple of alignment_bytes."""
+    """Rows padded so that each starts at a multiple of alignment_bytes.
+
+    rows: (N, K) float32; alignment_bytes: what the driver asks of offsets, a multiple of 4. What is
+    added is 0.
+    """
     step = -(-rows.shape[1] * 4 // alignment_bytes) * alignment_bytes // 4
     padded = np.zeros((len(rows), step), np.float32)
     padded[:, : rows.shape[1]] = rows

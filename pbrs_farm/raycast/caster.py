@@ -50,7 +50,11 @@ class Caster:
         return hit_record_from_faces(self.geometry, camera, _faces_of_surface(tracer, camera))
 
     def item_buffer(self, camera: Camera) -> ItemBuffer:
-        """(H, W) uint32 instance id at each pixel's centre, 0 = nothing."""
+        """(H, W) uint32 instance id at each pixel's centre, 0 = nothing.
+
+        What the camera's rays meet first, glass and panes too. The id is the item's number in the
+        house counted from 1. A pixel that a lens does not see is 0.
+        """
         face = _faces_of_surface(self._tracer, camera)
         if not len(self.geometry.face_item):
             return np.zeros(face.shape, np.uint32)

@@ -27,17 +27,29 @@ class RayTracer(Protocol):
     """Rays against one mesh in a Mitsuba variant; distances are in lengths of the direction."""
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        """(H, W) face hit through each pixel's centre, -1 = nothing."""
+        """(H, W) face hit through each pixel's centre, -1 = nothing.
+
+        int32, numbers of the mesh's faces. Pixels that the lens does not see count as nothing.
+        """
         ...
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
-        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing)."""
+        """(N,) distance (inf = nothing) and (N,) face (-1 = nothing).
+
+        origins, directions: (N, 3) float32, of any length but 0; max_distance: (N,) float32,
+        infinite for any. The distance is in lengths of the direction: multiply by its norm for
+        metres.
+        """
         ...
 
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
-        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing."""
+        """(n_cameras, n_labels) pixels of each label; label 0 also counts what hits nothing.
+
+        face_label: (F,) uint32 below n_labels. uint32; rows sum to the pixels of their camera.
+        Pictures need not exist as a whole, so this is the call for scoring thousands of cameras.
+        """
         ...
 
 
@@ -55,19 +67,29 @@ def rays_of_pixels(camera: Camera) -> tuple[F32, F32, Mask | None]:
 
 
 def faces_as_picture(face: I32, camera: Camera, blind: Mask | None) -> I32:
-    """(H, W) of the faces (N,) that the rays of rays_of_pixels hit; -1 where a pixel has no ray."""
+    """(H, W) of the faces (N,) that the rays of rays_of_pixels hit; -1 where a pixel has no ray.
+
+    blind: as `rays_of_pixels` gives it, None for a lens that sees all pixels.
+    """
     picture = face.reshape(camera.intrinsics.height_px, camera.intrinsics.width_px)
     return picture if blind is None else np.where(blind, np.int32(-1), picture)
 
 
 def counted_labels(face: I32, face_label: NDArray[np.uint32], n_labels: int) -> NDArray[np.int64]:
-    """(n_labels,) pixels of each label; label 0 takes the rays that miss."""
+    """(n_labels,) pixels of each label; label 0 takes the rays that miss.
+
+    face: any shape, -1 = miss. Longer than n_labels where a label is not below it.
+    """
     label = np.where(face >= 0, face_label[face], np.uint32(0))
     return np.bincount(label.ravel(), minlength=n_labels)
 
 
 def scene_from_mesh(mi: Any, positions: F32, faces: I32, *, watertight: bool = True) -> Any:
-    """A Mitsuba scene of one mesh. watertight: no ray slips through an edge two faces share."""
+    """A Mitsuba scene of one mesh. watertight: no ray slips through an edge two faces share.
+
+    positions: (V, 3) float32; faces: (F, 3) int32, at least one. mi: the module of the variant.
+    watertight costs some speed and matters to Embree alone: leave it on for labels.
+    """
     mesh = mi.Mesh("house", len(positions), len(faces))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = np.ascontiguousarray(positions, np.float32).ravel()

@@ -41,14 +41,21 @@ def _module(name: str) -> Any:
 
 
 def llvm_version(library: Path) -> tuple[int, ...]:
-    """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown."""
+    """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown.
+
+    Links are followed, so the file must be there for links to name a version.
+    """
     # Resolve links first: libLLVM.so alone names no version.
     match = re.search(r"LLVM(?:-|\.so\.|\.)(\d+(?:\.\d+)*)", library.resolve().name)
     return tuple(int(n) for n in match.group(1).split(".")) if match else ()
 
 
 def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
-    """(version, path) of every libLLVM in the usual places, newest first, one path per file."""
+    """(version, path) of every libLLVM in the usual places, newest first, one path per file.
+
+    For messages and for choosing: none is loaded. The places of Linux distributions, of Homebrew
+    and of the Python environment are looked into; DRJIT_LIBLLVM_PATH is `find_llvm`'s affair.
+    """
     environment = Path(sys.prefix)
     patterns = (*_LIBRARY_PLACES, str(environment / "lib" / "libLLVM*.so*"))
     found: dict[Path, tuple[int, ...]] = {}
@@ -112,7 +119,10 @@ def mitsuba(variant: str | None = None) -> Any:
 
 
 def set_threads(n_threads: int) -> None:
-    """Let Dr.Jit use n_threads cores of this process; raises MachineFailed without Dr.Jit."""
+    """Let Dr.Jit use n_threads cores of this process; raises MachineFailed without Dr.Jit.
+
+    For the process as a whole, from now on: call it once, before rendering.
+    """
     choose_variant()
     importlib.import_module("drjit").set_thread_count(n_threads)
 
@@ -125,7 +135,11 @@ def _has_good_llvm(dr: Any) -> bool:
 
 
 def works(variant: str) -> bool:
-    """The variant traces a ray on this machine."""
+    """The variant traces a ray on this machine.
+
+    Costs a compilation for LLVM and CUDA variants. Every failure that a machine without the driver
+    or library may show is False, none is raised.
+    """
     try:
         mi = mitsuba(variant)
         # Aim at the middle of a square 1 m away.

@@ -85,7 +85,11 @@ def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = Tr
 
 
 def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
-    """A line when all light together leaves the room's floor darker than DARK_LX, else ""."""
+    """A line when all light together leaves the room's floor darker than DARK_LX, else "".
+
+    lux: group of light -> mean illuminance on the floor, lx. The line is made for warnings, as it
+    stands.
+    """
     total = sum(lux.values())
     if total >= DARK_LX:
         return ""
@@ -93,7 +97,11 @@ def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
 
 
 def floor_points(room: Room, n: int, seed: int) -> F64:
-    """(n, 3) points uniform over a room's floor polygon, 5 cm above it."""
+    """(n, 3) points uniform over a room's floor polygon, 5 cm above it.
+
+    n: more than 0; the same seed gives the same points. Furniture is not regarded, so points may
+    lie inside a cupboard. A polygon too thin to be hit gets its middle over and over.
+    """
     # Draw points in the polygon's box and keep those inside, until there are enough.
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
@@ -112,7 +120,11 @@ def floor_points(room: Room, n: int, seed: int) -> F64:
 def illuminance_lx(
     scene: DeviceScene, emitters: Emitters, points: F64, seed: int
 ) -> tuple[float, float]:
-    """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up."""
+    """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up.
+
+    points: metres, away from surfaces (`floor_points`). Monte Carlo with few samples a point: meant
+    for the mean over many points, not for one. The seed makes it repeatable.
+    """
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
     # A white matte surface reflects E / pi: times pi and lm/W it is illuminance.
     radiance = radiosity(scene, emitters, points, up, _SPP, seed)

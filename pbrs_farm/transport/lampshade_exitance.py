@@ -34,7 +34,11 @@ _DEPTH: Final = 3
 def guiding_targets(
     scene: DeviceScene, emitters: Emitters, tables: SceneTables, seed: int
 ) -> GuidingTargets:
-    """The face sides near each lamp that send out more of its light than MIN_EXITANCE."""
+    """The face sides near each lamp that send out more of its light than MIN_EXITANCE.
+
+    Estimated by rays from the faces, repeatable by the seed. `no_targets` where no face is a
+    candidate.
+    """
     faces, lamps = _candidates(tables)
     if not len(faces):
         return no_targets(len(tables.lamps))

@@ -43,7 +43,10 @@ class LightResult:
         return self.outdoor if group is Group.OUTDOOR else self.indoor
 
     def mode(self, mode: Mode) -> RadianceImage:
-        """The sum of the groups that make a lighting mode; ValueError for an OpenGL mode."""
+        """The sum of the groups that make a lighting mode; ValueError for an OpenGL mode.
+
+        A new array where the mode has two groups, else the group's own: do not write into it.
+        """
         groups = GROUPS_OF_MODE[mode]
         if not groups:
             raise ValueError(f"{mode} is no sum of light groups")
@@ -54,7 +57,11 @@ class LightResult:
 
 
 def blacken(result: LightResult, mask: Mask) -> LightResult:
-    """The result with every image 0 where the mask (H, W) is."""
+    """The result with every image 0 where the mask (H, W) is.
+
+    mask: bool. For pixels that a fisheye lens does not see. Views of the old arrays are not written
+    to.
+    """
 
     def cleared(image: F32) -> F32:
         return np.where(mask[..., None], np.float32(0), image)

@@ -31,7 +31,11 @@ class ViewPairRow:
 
 
 def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
-    """A row for each pair of views of a room, rooms and views in the order given."""
+    """A row for each pair of views of a room, rooms and views in the order given.
+
+    views of other rooms are never paired. first_hit: casts rays in the whole house. Time grows with
+    the square of the views of a room.
+    """
     rooms: dict[str, list[View]] = {}
     for view in views:
         rooms.setdefault(view.room_id, []).append(view)

@@ -41,7 +41,11 @@ class Correspondence:
 def correspondence(
     hit: HitRecord, camera: Camera, other: Camera, first_hit: FirstHit
 ) -> Correspondence:
-    """The surface points of a hit record, looked for in another camera's picture."""
+    """The surface points of a hit record, looked for in another camera's picture.
+
+    The hit record is camera's own, and both cameras have the scene at one moment: nothing moves but
+    the camera. Points behind the other camera count as outside.
+    """
     shape = hit.face.shape
     pixels = np.flatnonzero(hit.face.ravel() >= 0)
     # Take the points in double precision, from the ray and the depth along the axis.
@@ -89,7 +93,11 @@ def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:
 
 
 def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
-    """(N,) whether projected points (N, 2) at depths z (N,) lie before a camera and in its picture."""
+    """(N,) whether projected points (N, 2) at depths z (N,) lie before a camera and in its picture.
+
+    px: pixels, (0, 0) the upper left corner of the picture; NaN is outside. What stands between is
+    another question: `reaches`.
+    """
     i = camera.intrinsics
     with np.errstate(invalid="ignore"):
         inside = (px[:, 0] >= 0) & (px[:, 0] < i.width_px)
@@ -98,7 +106,11 @@ def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
 
 
 def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Bools:
-    """(N,) whether a ray from the camera reaches each point, or meets the point's own face."""
+    """(N,) whether a ray from the camera reaches each point, or meets the point's own face.
+
+    points: (N, 3) world, metres; faces: (N,) the face each lies on, so that a grazing ray which
+    meets that very face counts. Slack of float32's rays is allowed for.
+    """
     if not len(points):
         return np.zeros(0, bool)
     to = points - camera.eye
@@ -117,7 +129,11 @@ def flow_label(found: Correspondence) -> F32:
 
 
 def flow_kitti(found: Correspondence) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture."""
+    """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture.
+
+    x to the right, y down, in pixels. 0, 0, 0 where the point is not seen in the other picture, and
+    where the motion is 512 pixels or more, for which the format has no number.
+    """
     steps = np.rint(found.flow * KITTI_FLOW_STEP) + 2**15
     valid = (found.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
     steps = np.where(valid[..., None], np.clip(steps, 0, 65535), 0)
@@ -136,7 +152,11 @@ def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
 
 
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
-    """The partners that a view has among the views of its house (id -> view)."""
+    """The partners that a view has among the views of its house (id -> view).
+
+    "stereo", "next" and "previous", as far as they are there; a view that is neither of a pair nor
+    of a sequence has none. The right views of a stereo sequence have right neighbours.
+    """
     found: dict[Relation, View] = {}
     # The other of a pair: the right view knows the left one, whose id names the right one.
     other = views.get(view.left_id or keys.right_id(view.id))
@@ -157,7 +177,10 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
 def partner_table(
     partners: Mapping[Relation, View], cameras: Mapping[Relation, Camera]
 ) -> dict[str, Any]:
-    """Relation -> id, K, pose and time of the partner, for view.json; cameras: at the picture's size."""
+    """Relation -> id, K, pose and time of the partner, for view.json; cameras: at the picture's size.
+
+    K: 3 x 3; the pose is 4 x 4, OpenCV's axes (x right, y down, z forward), metres.
+    """
     return {
         relation: {
             "view": view.id,

@@ -91,7 +91,11 @@ def transparent_faces(geometry: Geometry, house: House) -> Mask:
 
 
 def source_classes(house: House) -> tuple[str, ...]:
-    """The source's own classes in house, sorted; id k of class_source.png is entry k - 1."""
+    """The source's own classes in house, sorted; id k of class_source.png is entry k - 1.
+
+    Empty where the source has no classes of its own. Depends on the house alone, so ids of two
+    houses do not agree: go by the names.
+    """
     return tuple(sorted({item.source_class for item in house.items if item.source_class}))
 
 
@@ -201,7 +205,11 @@ def _function(name: str) -> Callable[[LabelInputs], NDArray[Any]]:
 
 
 def check_lens(names: Collection[str], lens: Lens) -> None:
-    """Raise BadInput for a named layer that a lens cannot have."""
+    """Raise BadInput for a named layer that a lens cannot have.
+
+    Names that are no layer are passed over here; they are refused elsewhere. Call it before the
+    first view is rendered.
+    """
     for layer in (LAYER[name] for name in names if name in LAYER):
         if layer.needs == "planar depth" and not lens.depth_is_planar:
             what = f"needs depth along the axis, which lens.model {lens.model} has not"
@@ -212,7 +220,10 @@ def check_lens(names: Collection[str], lens: Lens) -> None:
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:
-    """What view.json needs to read the named layers: "materials" and "source_classes" by id."""
+    """What view.json needs to read the named layers: "materials" and "source_classes" by id.
+
+    Keys are ids as text, from 1; 0 in a layer is nothing. Only layers that need a table have one.
+    """
     tables: dict[str, Any] = {}
     if "material" in names:
         tables["materials"] = {

@@ -51,7 +51,10 @@ def normal_label(normal_world: UnitVectors, world_from_camera: Matrix4) -> NDArr
 
 
 def encoded_normal(normal: UnitVectors) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 round((n + 1) 65535 / 2), clipped; halves are rounded to even."""
+    """(H, W, 3) uint16 round((n + 1) 65535 / 2), clipped; halves are rounded to even.
+
+    normal: (H, W, 3) float32 in [-1, 1]; what lies outside is clipped. Back: v * 2 / 65535 - 1.
+    """
     scaled = (normal + np.float32(1)) * np.float32(65535 / 2)
     return np.asarray(np.clip(np.rint(scaled), 0, 65535), np.uint16)
 
@@ -83,7 +86,10 @@ def nyu40_of_instance(house: House) -> NDArray[np.uint8]:
 
 
 def check_instances(house: House) -> None:
-    """Raise BadHouse when instance ids do not fit in 16 bits."""
+    """Raise BadHouse when instance ids do not fit in 16 bits.
+
+    Before rendering: a layer that wraps would be wrong without a word.
+    """
     if len(house.items) > MAX_INSTANCES:
         raise BadHouse(
             house.source.file,

@@ -50,7 +50,13 @@ class Exposure:
 
 
 def choose_exposure(wanted: float, fields: SensorFields) -> Exposure:
-    """The exposure nearest to a wanted factor that shutter and ISO allow: the shutter opens first."""
+    """The exposure nearest to a wanted factor that shutter and ISO allow: the shutter opens first.
+
+    wanted: factor from radiance to the picture's scale, before the compensation of
+    `fields.compensation_ev`. The shutter opens up to its longest first, then ISO rises; where both
+    are at their ends the picture comes out darker or brighter than wanted. A fixed shutter
+    (shutter_s > 0) leaves ISO alone to follow.
+    """
     goal = wanted * 2**fields.compensation_ev
     # What one second at ISO 1 makes of radiance.
     unit = LM_PER_W * math.pi / 4 / fields.f_number**2 / _SATURATION_LX_S * fields.headroom
@@ -88,7 +94,12 @@ class SensorShot:
     times_s: tuple[float, ...] = ()  # of those frames; this one's is 0
 
     def exposure(self, mode: str, wanted: float) -> Exposure:
-        """What it takes a mode's picture with, whose own wanted factor is given."""
+        """What it takes a mode's picture with, whose own wanted factor is given.
+
+        wanted: the factor that the mode's picture would be tone mapped with. Frames before it pull
+        it along by `fields.lag_s`, as an automatic exposure lags; KeyError for a mode that the
+        frames before do not have.
+        """
         path = [frame[mode] for frame in self.before]
         lagged = lag_exposure([*path, wanted], [*self.times_s, 0.0], self.fields.lag_s)
         return choose_exposure(lagged, self.fields)
@@ -121,7 +132,12 @@ def take_by_sensor(
 
 
 def apply_lens(light: F64, sensor: SensorFields) -> F64:
-    """Radiance with lateral chromatic aberration and vignetting, both by the distance from the middle."""
+    """Radiance with lateral chromatic aberration and vignetting, both by the distance from the middle.
+
+    light: (H, W, 3) linear radiance. Red and blue are sampled anew, linearly, at larger and smaller
+    radii; green stays. The same array comes back where both effects are 0; the input is never
+    written to.
+    """
     height, width = light.shape[:2]
     y, x = np.mgrid[0:height, 0:width] + 0.5
     middle = np.array([height / 2, width / 2])
@@ -142,7 +158,11 @@ def apply_lens(light: F64, sensor: SensorFields) -> F64:
 
 
 def mosaic(rgb: F64) -> F64:
-    """(H, W) what the pixels of a Bayer mosaic see: rows RGRG and GBGB."""
+    """(H, W) what the pixels of a Bayer mosaic see: rows RGRG and GBGB.
+
+    rgb: (H, W, 3) linear; the first pixel is red. Odd sizes are fine. Values are taken as they are,
+    without noise: `demosaic` is its inverse but for detail finer than the mosaic.
+    """
     raw = rgb[..., 1].copy()
     raw[0::2, 0::2] = rgb[0::2, 0::2, 0]
     raw[1::2, 1::2] = rgb[1::2, 1::2, 2]
@@ -150,7 +170,11 @@ def mosaic(rgb: F64) -> F64:
 
 
 def demosaic(raw: F64) -> F64:
-    """(H, W, 3) from a mosaic RGGB (H, W), by the linear filters of Malvar, He and Cutler 2004."""
+    """(H, W, 3) from a mosaic RGGB (H, W), by the linear filters of Malvar, He and Cutler 2004.
+
+    raw: linear, the first pixel red, at least 3 x 3. Filters overshoot at edges, so values below 0
+    and above the mosaic's own occur: clip afterwards. The picture is mirrored at its border.
+    """
     padded = np.pad(raw, 2, mode="reflect")
 
     def filtered(kernel: Sequence[Sequence[float]]) -> F64:
@@ -190,7 +214,11 @@ def _electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random
 
 
 def compress_as_jpeg(picture: Srgb8Image, quality: int) -> Srgb8Image:
-    """The picture as it comes out of JPEG of that quality, 1..100."""
+    """The picture as it comes out of JPEG of that quality, 1..100.
+
+    picture: (H, W, 3) uint8 sRGB. Pillow chooses the chroma subsampling. Bytes of the result depend
+    on the version of libjpeg: do not compare them between machines.
+    """
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, "JPEG", quality=quality)
     back: NDArray[np.uint8] = np.array(Image.open(buffer))

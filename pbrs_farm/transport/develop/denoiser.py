@@ -22,7 +22,11 @@ from pbrs_farm.transport.light_result import LightResult
 
 
 def denoise(result: LightResult) -> LightResult:
-    """The same view with each group denoised by itself, so that modes stay exact sums."""
+    """The same view with each group denoised by itself, so that modes stay exact sums.
+
+    Albedo and normal guide both. The light of single lamps (`lamps`) stays as rendered;
+    `lamp_shares` takes it to divide the denoised indoor light.
+    """
     return replace(
         result,
         outdoor=denoise_radiance(result.outdoor, result.albedo, result.normal),

@@ -118,7 +118,11 @@ def _shoulder(rgb: F64, top: F64, knee: float) -> F64:
 
 @functools.cache
 def knee_of(white: float) -> float:
-    """The k for which _SHOULDER + k log(1 + (white - _SHOULDER) / k) is 1."""
+    """The k for which _SHOULDER + k log(1 + (white - _SHOULDER) / k) is 1.
+
+    white: the value that becomes 1, more than _SHOULDER. Found by halving between 1e-4 and 1e4, so
+    a white so near to 1 that no curve bends gives an end of that range.
+    """
     low, high = 1e-4, 1e4
     for _ in range(_HALVINGS):
         k = (low * high) ** 0.5

@@ -38,7 +38,10 @@ class ArrivalCounts(NamedTuple):
     arrived: Any  # those that met nothing on their way
 
     def numpy(self) -> NDArray[np.uint32]:
-        """(2, voxels, N_KINDS)."""
+        """(2, voxels, N_KINDS).
+
+        uint32; row 0 is what was cast, row 1 what arrived. Waits for the kernel that counts.
+        """
         return np.stack([x.numpy().reshape(-1, N_KINDS) for x in self])
 
 
@@ -50,14 +53,21 @@ class ArrivalRates:
         self.set_rates(None)
 
     def set_rates(self, rates: F64 | None) -> None:
-        """Set the rates of a view: (voxels, N_KINDS), None = every ray arrives."""
+        """Set the rates of a view: (voxels, N_KINDS), None = every ray arrives.
+
+        rates: float64 in (0, 1], as `arrival_rates` gives them; one row is broadcast. Stored as
+        float32, and not a part of the compiled kernel, so another view costs no compilation.
+        """
         rows = np.ones((self.grid.n_voxels, N_KINDS), np.float32)
         if rates is not None:
             rows[:] = rates
         self._rows = device_array(mi.Float, rows.ravel())
 
     def of_kind(self, p: Any, kind: Any, active: Any) -> Any:
-        """The rate of one kind at p."""
+        """The rate of one kind at p.
+
+        p: Point3f; kind: UInt32 below N_KINDS. Lanes that are not active get 0.
+        """
         return dr.gather(mi.Float, self._rows, self.grid.voxel(p) * N_KINDS + kind, active)
 
     def of_near_lamps(self, p: Any, active: Any) -> list[Any]:
@@ -79,7 +89,11 @@ class ArrivalRates:
         return ArrivalCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(self, counts: ArrivalCounts, p: Any, kind: Any, is_cast: Any, arrives: Any) -> None:
-        """Count shadow rays from p."""
+        """Count shadow rays from p.
+
+        is_cast, arrives: Bool of each lane. Adds atomically, so it may be called from all lanes at
+        once; a count wraps at 2^32.
+        """
         place = self.grid.voxel(p) * N_KINDS + kind
         # Add in place: a copy for each thread would put the number of voxels into the kernel.
         one, mode = mi.UInt32(1), dr.ReduceMode.Direct
@@ -88,7 +102,12 @@ class ArrivalRates:
 
 
 def arrival_rates(counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
-    """(voxels, N_KINDS) share of the rays that arrive, never 0. counts: ArrivalCounts.numpy()."""
+    """(voxels, N_KINDS) share of the rays that arrive, never 0. counts: ArrivalCounts.numpy().
+
+    Each voxel's rate is drawn towards that of its 26 neighbours and this to the house's,
+    PRIOR_VERTICES strong, since few rays start in a voxel. Kinds without any ray get 0.5. Rounded
+    to six digits, so that pictures do not depend on the last bits.
+    """
     # Of a kind that no ray was of nothing is known.
     rates = np.full(counts.shape[1:], 0.5)
     kinds = np.flatnonzero(counts[0].any(0))

@@ -40,7 +40,10 @@ class Bsdf(NamedTuple):
 
 
 def luminance(rgb: Any) -> Any:
-    """Luminance of linear sRGB."""
+    """Luminance of linear sRGB.
+
+    rgb: Color3f or three numbers; Rec. 709 weights.
+    """
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
@@ -74,18 +77,30 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
 
 
 def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
-    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; both are above."""
+    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; both are above.
+
+    cos_o: cosine of the outgoing direction, > 0. Under a coat it is Ashikhmin and Shirley's diffuse
+    term (2000); times `diffuse_response` of the other direction it is reciprocal.
+    """
     coated = 28 / 23 * (1 - bsdf.f0) * _ashikhmin(cos_o)
     return bsdf.kd * dr.select(bsdf.alpha > 0, coated, 1.0) * (cos_o * dr.inv_pi)
 
 
 def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
-    """What diffuse reflection towards wi is less under a coat."""
+    """What diffuse reflection towards wi is less under a coat.
+
+    has_coat: Bool; cos_i: cosine of the incoming direction, >= 0. 1 for plain matte surfaces.
+    """
     return dr.select(has_coat, _ashikhmin(cos_i), 1.0)
 
 
 def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
-    """A direction wo drawn with the pdf of evaluate_bsdf()."""
+    """A direction wo drawn with the pdf of evaluate_bsdf().
+
+    wi: unit, local, z along the normal. u_lobe in [0, 1) chooses the lobe and is used up by it. The
+    direction may lie below the surface (transmission, or a coat at grazing angles): evaluate the
+    BSDF before it is used.
+    """
     p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
     cosine = mi.warp.square_to_cosine_hemisphere(uv)
     wo = dr.select(u_lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
@@ -95,7 +110,11 @@ def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
 
 
 def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
-    """f |cos wo| of the coat alone; local directions, both above, alpha > 0."""
+    """f |cos wo| of the coat alone; local directions, both above, alpha > 0.
+
+    f0: Color3f at normal incidence; alpha: GGX roughness. Trowbridge-Reitz with height-correlated
+    masking; Schlick's Fresnel.
+    """
     h = dr.normalize(wi + wo)
     fresnel = _schlick(f0, dr.maximum(dr.dot(wi, h), 0))
     shadowed = 1 + _lambda(wi, alpha) + _lambda(wo, alpha)
@@ -103,7 +122,11 @@ def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
 
 
 def is_reconnectable(bsdf: Bsdf) -> Any:
-    """Whether the surface is rough enough that a path through it may be seen from elsewhere."""
+    """Whether the surface is rough enough that a path through it may be seen from elsewhere.
+
+    A coat below the least roughness reflects nearly one direction: a path through it seen from
+    elsewhere would have next to no light.
+    """
     return (bsdf.alpha <= 0) | (bsdf.alpha >= _MIN_RECONNECT_ALPHA)
 
 
@@ -122,7 +145,10 @@ def view_independent_pdf(bsdf: Bsdf, ng: Any, w: Any) -> Any:
 
 
 def thin_glass_reflectance(cos_i: Any) -> Any:
-    """Share that a thin clear pane of index 1.5 reflects, all inner reflections counted."""
+    """Share that a thin clear pane of index 1.5 reflects, all inner reflections counted.
+
+    cos_i: either sign. Nothing is absorbed: the rest goes through.
+    """
     fresnel: Any = mi.fresnel
     r = fresnel(dr.abs(cos_i), mi.Float(1.5))[0]
     return 2 * r / (1 + r)

@@ -52,7 +52,11 @@ class LensCamera(NamedTuple):
 
 
 def device_camera(camera: Camera) -> DeviceCamera | LensCamera:
-    """Device values; of a sharp pin-hole the direction at (u, v) is d0 + u du + v dv."""
+    """Device values; of a sharp pin-hole the direction at (u, v) is d0 + u du + v dv.
+
+    A camera with a lens that bends or with blur gives a LensCamera, which costs a kernel of its
+    own. Values are opaque: another pose runs the same kernel.
+    """
     i, r = camera.intrinsics, camera.world_from_camera[:3, :3]
     if not i.lens.is_pinhole or camera.blur is not None:
         return _lens_camera(camera)

@@ -128,7 +128,12 @@ class DeviceScene:
         return self._interaction(face, bary, d, valid, with_maps=True)
 
     def transmittance(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
-        """Color3f of light let through between o and o + distance d: 0 behind opaque faces."""
+        """Color3f of light let through between o and o + distance d: 0 behind opaque faces.
+
+        o: Point3f, d: unit Vector3f, distance: Float, infinite for the sky. 1 where nothing is
+        between. Where the scene has no transparent face it is one shadow ray; else each lane walks
+        through panes one by one.
+        """
         clear = mi.Bool(active)
         if self._opaque is not None:
             clear &= ~self._opaque.ray_test(_ray(o, d, distance), active)
@@ -174,7 +179,11 @@ class DeviceScene:
         return dr.select(n >= MAX_TRANSPARENT, 0, left)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
-        """(point, unit normal) uniform over a face."""
+        """(point, unit normal) uniform over a face.
+
+        face: UInt32; u: Point2f in [0, 1)^2. The normal is the geometric one, by the order of the
+        corners; the pdf is 1 / area. Values of lanes that are not active mean nothing.
+        """
         bary = mi.warp.square_to_uniform_triangle(u)
         v0, e1, e2 = (self._packet(face, k, active) for k in range(3))
         a, b = vector(e1), vector(e2)
@@ -182,7 +191,11 @@ class DeviceScene:
         return p, dr.normalize(dr.cross(a, b))
 
     def set_guiding_targets(self, faces: Any, front: Any, back: Any, lamps: Any) -> None:
-        """Keep with each of faces (K,) the target_pdf of both its sides and the target_emitter."""
+        """Keep with each of faces (K,) the target_pdf of both its sides and the target_emitter.
+
+        front, back: (K,) pdf per area of each side; lamps: (K,) emitter of which the face sends
+        light. Faces that were set before and are not named keep theirs. Runs a kernel at once.
+        """
         if not len(faces):
             return
         at = device_array(mi.UInt32, faces) * FACE_FLOATS

@@ -111,16 +111,27 @@ class Emitters:
         self._has_group = {Group.OUTDOOR: shines, Group.INDOOR: len(tables.lamps) > 0}
 
     def has_group(self, group: Group) -> bool:
-        """Whether anything of a group shines at all."""
+        """Whether anything of a group shines at all.
+
+        A group that never shines need not be traced: its picture is black.
+        """
         return self._has_group[group]
 
     def set_view(self, portals: F64, weights: EmitterWeights) -> None:
-        """Set the portals and weights of another view; lamps and sky stay."""
+        """Set the portals and weights of another view; lamps and sky stay.
+
+        Cheap: nothing is compiled anew. portals: (N, 4, 3) corners of rectangles, metres, at most
+        MAX_PORTALS.
+        """
         self._set_portals(portals)
         self.set_weights(weights)
 
     def set_weights(self, weights: EmitterWeights) -> None:
-        """Set other weights; the scene stays."""
+        """Set other weights; the scene stays.
+
+        For the second and later passes of a view, when counts of the first say where light comes
+        from. Chances alone change, never what a picture converges to.
+        """
         self._set_lamp_weights(weights.lamps, weights.arrival_rates)
         self._set_outdoor_weights(weights)
         self.nearby.set_guided(weights.is_guided)
@@ -128,12 +139,19 @@ class Emitters:
         self._set_shadow_thresholds(weights)
 
     def set_targets(self, targets: GuidingTargets) -> None:
-        """Set what guided rays aim at."""
+        """Set what guided rays aim at.
+
+        `no_targets` takes them away again.
+        """
         self.targets = TargetSampler(targets)
         self.nearby.set_targets(targets)
 
     def near_lamps(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
-        """The strongest lamps from p on a surface of normal n."""
+        """The strongest lamps from p on a surface of normal n.
+
+        p: Point3f; n: unit Vector3f. counted: number of the one technique that is asked for, -1 for
+        all.
+        """
         rates = self.arrival.of_near_lamps(p, active)
         rates[0] = dr.select(counted >= 0, 1, rates[0])
         return self.nearby.at_vertex(p, n, counted, rates, active)
@@ -141,7 +159,12 @@ class Emitters:
     def sample_lamp(
         self, scene: DeviceScene, near: NearbyLamps, u: Any, uv: Any, counted: Any, active: Any
     ) -> DirectionSample:
-        """A point on a lamp: one of those nearby by the chance of _nearby_share, else by weight alone."""
+        """A point on a lamp: one of those nearby by the chance of _nearby_share, else by weight alone.
+
+        u: Float, uv: Point2f in [0, 1). counted: a lamp's number where only that one is asked for,
+        else -1. The radiance does not say whether anything stands between: cast a shadow ray. valid
+        is False where the point is turned away from p or touches it.
+        """
         # Choose a lamp both ways, and take one.
         active = active & self._has_lamps
         nearby_share = self._nearby_share(near.reference)
@@ -178,7 +201,12 @@ class Emitters:
         counted: Any,
         active: Any,
     ) -> tuple[Any, Any]:
-        """(radiance, pdf of sample_lamp) of a lamp that a ray from the reference point meets."""
+        """(radiance, pdf of sample_lamp) of a lamp that a ray from the reference point meets.
+
+        lamp: NO_LAMP where the ray met none, which gives 0; cos: between ray and the lamp's normal,
+        either sign. For multiple importance sampling: the pdf is per solid angle from the reference
+        point.
+        """
         active = active & (lamp != NO_LAMP)
         radiance, pdf = self._eval_lamp(lamp, reference, distance, dr.abs(cos), counted, active)
         return dr.select(active, radiance, 0), pdf
@@ -210,7 +238,12 @@ class Emitters:
         return dr.select(counts, colour(row), 0), pdf
 
     def sample_outdoor(self, p: Any, u: Any, uv: Any, counted: Any, active: Any) -> DirectionSample:
-        """A direction in which outdoor light may come to p."""
+        """A direction in which outdoor light may come to p.
+
+        The sun, the dome or a portal, by the chances of p's voxel. The distance is infinite;
+        whether anything stands between is not known here. The pdf is over the techniques that can
+        give the direction.
+        """
         active = active & self.has_sky
         chances = self.outdoor_choice.chances(p, active)
         technique, u = choose_technique(chances, u)
@@ -364,7 +397,11 @@ class Emitters:
 
 
 def dome_probabilities(dome: F32) -> F64:
-    """(H, W) probability of each texel: brightness (of it and its neighbours) times solid angle."""
+    """(H, W) probability of each texel: brightness (of it and its neighbours) times solid angle.
+
+    dome: (H, W, 3) float32 radiance, equirectangular. The sum is 1. A twentieth goes to all
+    directions alike, so that none is impossible; a black dome gives that alone.
+    """
     height, width = dome.shape[:2]
     luminance = np.asarray(dome, np.float64) @ LUMINANCE
     # Take the brightest of the texels that the radiance is blended from.

@@ -72,7 +72,12 @@ class GuidedSample(NamedTuple):
 
 
 def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guiding:
-    """The guiding of a vertex that a path of throughput beta has reached."""
+    """The guiding of a vertex that a path of throughput beta has reached.
+
+    beta: Color3f; may_aim: Bool, False where a ray may not be aimed (glass). The share of guided
+    rays is about what roulette would end here anyway, and less where lamps send little light out by
+    way of their interiors.
+    """
     albedo = dr.minimum(bsdf.kd + bsdf.f0 + bsdf.tau, 1)
     # Within a lamp the surface finds the light by itself.
     reference = near.reference
@@ -86,7 +91,10 @@ def guiding_at(near: NearbyLamps, bsdf: Bsdf, beta: Any, may_aim: Any) -> Guidin
 
 
 def survival_boost(near: NearbyLamps) -> Any:
-    """How much less often roulette ends a path here: more than 1 near lamps, where it is bright."""
+    """How much less often roulette ends a path here: more than 1 near lamps, where it is bright.
+
+    1 in views that are not guided.
+    """
     boost = dr.clip(_BOOST_M2 * near.closeness, 1, _MAX_BOOST)
     return dr.select(near.is_guided, boost, 1)
 
@@ -104,7 +112,12 @@ def sample_guided(
     u: Any,
     uv: Any,
 ) -> GuidedSample:
-    """A direction by the second or third technique, where u says so."""
+    """A direction by the second or third technique, where u says so.
+
+    u: in [0, 1) chooses the technique; `u_bsdf` of the answer is what is left of it for the BSDF
+    where none of the two was chosen. A target's direction may meet another face first: compare
+    `face` with what the ray hits.
+    """
     # Choose the technique; use what is left of u for the surface, or for the lamp.
     share, cone_share = guiding.share, guiding.cone_share
     is_guided = u < share
@@ -124,7 +137,10 @@ def sample_guided(
 
 
 def cone_technique_pdf(guiding: Guiding, d: Any) -> Any:
-    """Pdf of the second technique in direction d, its share included."""
+    """Pdf of the second technique in direction d, its share included.
+
+    d: unit Vector3f. Per solid angle; add it to the pdfs of the other techniques.
+    """
     return guiding.share * guiding.cone_share * cone_pdf(guiding.near.cones, d)
 
 

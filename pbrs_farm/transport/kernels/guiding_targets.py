@@ -54,7 +54,11 @@ class TargetSampler:
     def sample(
         self, scene: DeviceScene, p: Any, ng: Any, lamp: Any, u: Any, uv: Any, active: Any
     ) -> TargetSample:
-        """The direction from p, on a face of normal ng, to a point on a target of a lamp."""
+        """The direction from p, on a face of normal ng, to a point on a target of a lamp.
+
+        lamp: UInt32; valid is False for a lamp without targets and for a side that is turned away
+        from p. Aims from the point where the ray is going to start, a little off the surface.
+        """
         # Choose a target of the lamp, then a point on its face.
         first = dr.gather(mi.UInt32, self._first, lamp, active)
         count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
@@ -71,7 +75,10 @@ class TargetSampler:
 
 
 def no_targets(n_lamps: int) -> GuidingTargets:
-    """The targets of lamps that have none."""
+    """The targets of lamps that have none.
+
+    For scenes without shades and for views that are not guided.
+    """
     none, first = np.zeros(0), np.zeros(n_lamps + 1, np.int64)
     interiors = np.zeros((n_lamps, 4))
     return GuidingTargets(none.astype(np.uint32), none, none, first, np.zeros(n_lamps), interiors)

@@ -159,14 +159,21 @@ class NearbyLampSampler:
         return NearbyLamps(reference, lamps, closeness, chances, guided, cones, self._is_guided)
 
     def importance(self, lamp: Any, p: Any, n: Any, counted: Any, active: Any) -> tuple[Any, Any]:
-        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for those that are not among the strongest."""
+        """(importance, guided importance) of one lamp as in NearbyLamps; 0 for those that are not among the strongest.
+
+        lamp: UInt32; p, n: of the vertex, as for `Emitters.near_lamps`; counted: the one technique
+        that is asked for, -1 for all.
+        """
         sphere = dr.gather(mi.Vector4f, self._spheres, lamp, active)
         strength = dr.gather(mi.Vector4f, self._strengths, lamp, active)
         rows = _LampRows(sphere, strength, None)
         return _importance(rows, lamp, p, n, counted, active)
 
     def slot(self, lamp: Any, active: Any) -> tuple[Any, Any]:
-        """(place of a lamp among the strongest or MAX_NEAR, what its importance is times for a chance)."""
+        """(place of a lamp among the strongest or MAX_NEAR, what its importance is times for a chance).
+
+        MAX_NEAR stands for all that are not among the strongest.
+        """
         row = dr.gather(mi.Vector4f, self._strengths, lamp, active)
         return mi.UInt32(row[2]), row[3]
 
@@ -220,7 +227,12 @@ def no_reference(p: Any) -> ReferencePoint:
 
 
 def sample_discrete(values: list[Any], weights: list[Any], total: Any, u: Any) -> tuple[Any, Any]:
-    """(one of values in proportion to its weight, u made uniform again)."""
+    """(one of values in proportion to its weight, u made uniform again).
+
+    values, weights: lists of equal length, weights >= 0, total their sum. u in [0, 1); what is made
+    of it may be used for the next choice. Rounding may leave no candidate: then the first one is
+    given.
+    """
     x = u * total
     value, again, below = values[0], mi.Float(0), mi.Float(0)
     for candidate, weight in zip(values, weights, strict=True):
@@ -232,7 +244,11 @@ def sample_discrete(values: list[Any], weights: list[Any], total: Any, u: Any) -
 
 
 def sample_cones(cones: Cones, u: Any, uv: Any) -> Any:
-    """A direction uniform in one of the cones."""
+    """A direction uniform in one of the cones.
+
+    u: Float, uv: Point2f in [0, 1). A cone is chosen by its importance; cones may overlap, which
+    `cone_pdf` sums over.
+    """
     height, _u = sample_discrete(cones.heights, cones.importances, cones.total, u)
     axis, _u = sample_discrete(cones.axes, cones.importances, cones.total, u)
     h = uv.x * height
@@ -242,7 +258,10 @@ def sample_cones(cones: Cones, u: Any, uv: Any) -> Any:
 
 
 def cone_pdf(cones: Cones, d: Any) -> Any:
-    """Pdf of sample_cones() per solid angle; 0 where there are none."""
+    """Pdf of sample_cones() per solid angle; 0 where there are none.
+
+    d: unit. A hair wider than the cones, so that a direction drawn at the edge never has pdf 0.
+    """
     pdf = mi.Float(0)
     for importance, axis, height in zip(cones.importances, cones.axes, cones.heights, strict=True):
         # |d - axis|^2 is twice the height; what was drawn at the edge must count as inside.

@@ -35,7 +35,11 @@ class LampPointSampler:
     def sample(
         self, scene: DeviceScene, lamp: Any, p: Any, u: Any, uv: Any, active: Any
     ) -> tuple[Any, Any, Any]:
-        """(point on a lamp, unit normal there, whether p can see it), uniform over area_share of it."""
+        """(point on a lamp, unit normal there, whether p can see it), uniform over area_share of it.
+
+        p: from where it is to be seen. The pdf per area is 1 over the lamp's area times
+        `area_share`; a lamp that is its own mirror image is sampled on the half that looks at p.
+        """
         # Choose a triangle by area, and a point on that.
         first = dr.gather(mi.UInt32, self._first, lamp, active)
         count = dr.gather(mi.UInt32, self._first, lamp + 1, active) - first
@@ -61,5 +65,8 @@ class LampPointSampler:
 
 
 def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
-    """Rows and one more on the device, so that a house without lamps has a row, too."""
+    """Rows and one more on the device, so that a house without lamps has a row, too.
+
+    rows: (N, ...), last: (1, ...) of the same shape behind. Flattened; index with row * width.
+    """
     return device_array(kind, np.concatenate([rows, last]).ravel())

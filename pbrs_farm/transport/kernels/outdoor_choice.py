@@ -43,7 +43,10 @@ class TechniqueCounts(NamedTuple):
     brought: Any  # sums of the root of the luminance that it brought the path, in 1 / _STEPS
 
     def numpy(self) -> NDArray[np.uint32]:
-        """(2, voxels, MAX_TECHNIQUES)."""
+        """(2, voxels, MAX_TECHNIQUES).
+
+        uint32; as ArrivalCounts has them, but by technique. Waits for the kernel that counts.
+        """
         return np.stack([x.numpy().reshape(-1, MAX_TECHNIQUES) for x in self])
 
 
@@ -56,7 +59,11 @@ class OutdoorChoice:
         self.set_weights(np.ones(1))
 
     def set_weights(self, weights: F64) -> None:
-        """Set the weights of a view: (techniques,), or (voxels, techniques); rows sum to 1."""
+        """Set the weights of a view: (techniques,), or (voxels, techniques); rows sum to 1.
+
+        One row serves all voxels. Techniques beyond those given get chance 0. Not a part of the
+        compiled kernel.
+        """
         rows = np.zeros((self._grid.n_voxels, MAX_TECHNIQUES), np.float32)
         rows[:, : weights.shape[-1]] = weights
         self._rows = device_array(mi.Float, rows.ravel())
@@ -92,7 +99,10 @@ class OutdoorChoice:
 
 
 def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
-    """(number of a technique, drawn by its chance, u made uniform again)."""
+    """(number of a technique, drawn by its chance, u made uniform again).
+
+    chances: as `OutdoorChoice.chances`, their sum 1; u: Float in [0, 1).
+    """
     numbers = [mi.UInt32(k) for k in range(len(chances))]
     return sample_discrete(numbers, chances, mi.Float(1), dr.minimum(u, 1 - 1e-6))
 

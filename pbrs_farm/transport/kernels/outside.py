@@ -63,7 +63,11 @@ class Outside:
 
     @dr.syntax
     def seen(self, home: DeviceScene, o: Any, d: Any, active: Any) -> Seen:
-        """What rays show that have left the home."""
+        """What rays show that have left the home.
+
+        o: Point3f, d: unit Vector3f of rays that met nothing at home. valid is False where a ray
+        meets nothing outside, and for lanes that are not active.
+        """
         valid, radiance, albedo = mi.Bool(False), mi.Color3f(0), mi.Color3f(0)
         # Branch: packets of lanes whose rays are all at home pass by.
         if active:
@@ -98,7 +102,11 @@ class Outside:
 
 
 def sky_harmonics(sky: Sky) -> F64:
-    """(9, 3) coefficients of the dome, its sun left out, in real spherical harmonics of order 2."""
+    """(9, 3) coefficients of the dome, its sun left out, in real spherical harmonics of order 2.
+
+    Float64, RGB, the integral of radiance times each basis function over the sphere. Enough for the
+    light on matte surfaces (Ramamoorthi and Hanrahan 2001), not for reflections.
+    """
     height, width = sky.dome.shape[:2]
     towards = directions(height, width)
     weight = solid_angles(height, width)[:, None]

@@ -91,7 +91,10 @@ def device_array(kind: Any, values: Any) -> Any:
 
 
 def opaque3(kind: Any, values: Any) -> Any:
-    """A 3-vector of host values that the compiled kernel does not contain."""
+    """A 3-vector of host values that the compiled kernel does not contain.
+
+    kind: Point3f, Vector3f or Color3f; values: three numbers.
+    """
     return kind(*(dr.opaque(mi.Float, float(v)) for v in values))
 
 
@@ -106,7 +109,10 @@ def stream_key(lane: Any, seed: Any) -> Any:
 
 
 def hash32(x: Any) -> Any:
-    """A bijective 32-bit mixer (Wellons's `lowbias32`)."""
+    """A bijective 32-bit mixer (Wellons's `lowbias32`).
+
+    x: UInt32. Neighbouring numbers give unrelated ones; not for cryptography.
+    """
     x = x ^ (x >> 16)
     x = x * mi.UInt32(0x7FEB352D)
     x = x ^ (x >> 15)
@@ -115,7 +121,10 @@ def hash32(x: Any) -> Any:
 
 
 def unit_float(bits: Any) -> Any:
-    """Float in [0, 1) of the top 24 bits."""
+    """Float in [0, 1) of the top 24 bits.
+
+    bits: UInt32. 24 bits, so that no rounding gives 1.
+    """
     return mi.Float(bits >> 8) * (1.0 / (1 << 24))
 
 
@@ -142,7 +151,11 @@ def _pascal(x: Any) -> Any:
 
 
 def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) -> tuple[Any, Any]:
-    """(index, u made uniform again) of an alias table's part [first, first + count)."""
+    """(index, u made uniform again) of an alias table's part [first, first + count).
+
+    alias: Float, rows of `alias_rows`; several tables may lie behind each other; the index counts
+    from `first`. count: at least 1.
+    """
     # Choose an entry, then stay or take its alias.
     x = u * mi.Float(count)
     i = dr.minimum(mi.UInt32(x), count - 1)
@@ -156,7 +169,11 @@ def sample_alias_table(alias: Any, first: Any, count: Any, u: Any, active: Any) 
 
 
 def alias_rows(weights: NDArray[np.floating]) -> F32:
-    """(N, 2) rows (chance to stay, bits of the other index) of Vose's alias method."""
+    """(N, 2) rows (chance to stay, bits of the other index) of Vose's alias method.
+
+    weights: (N,) >= 0, finite; all 0 counts as all equal. Float32: the index is stored by its bits.
+    A Python loop over N, so it is for tables of up to some million entries (Vose 1991).
+    """
     w = np.asarray(weights, np.float64)
     n = len(w)
     total = w.sum()

@@ -86,7 +86,11 @@ class SunPlane:
         return self._middle + x * self._a + y * self._b
 
     def cell(self, p: Any, d: Any) -> tuple[Any, Any]:
-        """(cell that the line through p in direction d crosses, whether a ray through it may meet p)."""
+        """(cell that the line through p in direction d crosses, whether a ray through it may meet p).
+
+        p: Point3f; d: unit Vector3f to the sun. For points too far behind the plane, or beside it,
+        the second answer is False and the cell means nothing.
+        """
         to = p - self._middle
         ahead = dr.dot(to, self._n) / dr.dot(d, self._n)
         q = to - d * ahead

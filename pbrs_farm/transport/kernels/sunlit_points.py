@@ -82,7 +82,11 @@ class SunlitPoints:
             self._used = find_used_cells(scene, sun, self._grid, vertices)
 
     def trace(self, scene: DeviceScene, sun: SunDisc, n_samples: int, seed: int) -> None:
-        """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points."""
+        """Trace rays from the sun for a launch of n_samples, other ones for each seed; 0 = no points.
+
+        Does nothing where view, n_samples and seed are those of the last call. Call it before the
+        launch that uses the points: it runs kernels of its own.
+        """
         vertices = self._vertices if n_samples > 0 and sun.shines else None
         before, self._traced = self._traced, (vertices, n_samples, seed)
         if vertices is None or not vertices.any():
@@ -104,7 +108,11 @@ class SunlitPoints:
         return [weight / dr.maximum(total, 1e-30) for weight in weights]
 
     def sample(self, p: Any, u: Any, active: Any) -> SunlitSample:
-        """One of the points, as it is seen from p."""
+        """One of the points, as it is seen from p.
+
+        p: Point3f; u: Float in [0, 1). The radiance is what the point reflects towards p, but a
+        wall between is not known: cast a shadow ray. Not valid where there are no points.
+        """
         # Choose a group, then one of its points; both in order, so that u's strata are places.
         chances = self.chances(p, active)
         total = sum(chances, mi.Float(0))

@@ -73,7 +73,11 @@ def no_points() -> SunlitTables:
 
 
 def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64) -> UsedCells:
-    """The cells whose light matters. vertices: (voxels,) of a view's paths, not all 0."""
+    """The cells whose light matters. vertices: (voxels,) of a view's paths, not all 0.
+
+    vertices: counts of a first pass. Deterministic: its rays have a seed of their own. Where no ray
+    of the sun lights anything all shares are 0.
+    """
     # Cover the voxels that paths have been to, as the sun sees them.
     centres = grid.centres()[vertices > 0]
     corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * grid.edge_m

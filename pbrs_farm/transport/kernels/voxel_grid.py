@@ -42,7 +42,11 @@ class VoxelGrid:
         return np.asarray(self._host_low + (at + 0.5) * self.edge_m)
 
     def with_neighbours(self, rows: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
-        """(voxels, K) sums of rows over each voxel and the 26 around it, as far as there are any."""
+        """(voxels, K) sums of rows over each voxel and the 26 around it, as far as there are any.
+
+        rows: (voxels, K) unsigned; sums keep the type, and wrap as it does. Borders have fewer
+        neighbours.
+        """
         sums = rows.reshape(*self._host_shape, -1)
         for axis in range(3):
             # Add the voxels before and behind, axis by axis.
@@ -55,7 +59,11 @@ class VoxelGrid:
 
 
 def voxel_grid(positions: F32) -> tuple[F64, NDArray[np.int64], float]:
-    """(lowest corner, number of voxels along each axis, edge in m) of a grid around positions."""
+    """(lowest corner, number of voxels along each axis, edge in m) of a grid around positions.
+
+    positions: (V, 3) float32, rows that are not finite are left out, at least one is. The edge
+    grows by quarters until there are at most _MAX_VOXELS.
+    """
     # Leave out corners that are not finite: their faces are no part of the scene.
     positions = positions[np.isfinite(positions).all(1)]
     low, high = positions.min(0).astype(np.float64), positions.max(0).astype(np.float64)

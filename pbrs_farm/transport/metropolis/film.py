@@ -47,7 +47,11 @@ class Chains(NamedTuple):
 
 
 def sample_film(film: Film, u: Any, is_tent: Any) -> tuple[Any, Any, Any]:
-    """(pixel index, its corner in pixels, offset spread by the filter) of two numbers."""
+    """(pixel index, its corner in pixels, offset spread by the filter) of two numbers.
+
+    u: Point2f in [0, 1)^2, over the whole picture; a mutation of it moves smoothly from pixel to
+    pixel. `sample_pixel` is for a pixel that is given.
+    """
     x, y = u.x * mi.Float(film.width), u.y * mi.Float(film.height)
     column = dr.minimum(mi.UInt32(x), film.width - 1)
     row = dr.minimum(mi.UInt32(y), film.height - 1)
@@ -63,12 +67,20 @@ def sample_pixel(film: Film, pixel: Any, u: Any, is_tent: Any) -> tuple[Any, Any
 
 
 def target_function(film: Film, pixel: Any, light: Any, active: Any = True) -> Any:
-    """What chains are distributed by: the luminance of light at a pixel times its importance."""
+    """What chains are distributed by: the luminance of light at a pixel times its importance.
+
+    light: Color3f of a path; pixel: UInt32. A scalar, >= 0: Metropolis light transport needs no
+    colour to decide by.
+    """
     return luminance(light) * dr.gather(mi.Float, film.importance, pixel, active)
 
 
 def splat(film: Film, chain: Any, pixel: Any, value: Any, active: Any) -> None:
-    """Add a value to a pixel of the half that the chain belongs to."""
+    """Add a value to a pixel of the half that the chain belongs to.
+
+    value: Color3f; chain: UInt32. Even and odd chains have a half each, so that the halves may be
+    compared. Adds atomically.
+    """
     first = ((chain & 1) * (film.width * film.height) + pixel) * 3
     for c in range(3):
         # In this mode the kernel does not depend on the picture's size.
