@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
 
 def summary_of_report(report: RepairReport) -> str:
-    """What was wrong with a house and what was done about it, a sentence per line."""
+    """What was wrong with a house and what was done about it, a sentence per line.
+
+    English, for people; names from the source are cut and cleaned of control characters. A program
+    reads the report's fields instead.
+    """
     if report.was_repaired:
         return f"{report.house_id} was repaired before; nothing was changed."
     lines = [

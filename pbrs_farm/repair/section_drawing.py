@@ -68,7 +68,11 @@ def _xy(point: Sequence[float] | F64) -> str:
 
 
 def section_of_items(items: Sequence[Item], y: float) -> F64:
-    """(N, 2, 2) plan segments in which the items' triangles meet the height y."""
+    """(N, 2, 2) plan segments in which the items' triangles meet the height y.
+
+    (x, z) of both ends, metres. A triangle with a corner exactly at the height counts it as below.
+    Faces that lie in the cut give nothing.
+    """
     corners = corners_of_surfaces(s for i in items for s in i.surfaces)
     # Keep the triangles with corners on both sides of the cut.
     above = corners[:, :, 1] > y
@@ -90,7 +94,11 @@ def _meet(a: F64, b: F64, y: float) -> F64:
 
 
 def solid_polygons(segments: F64) -> list[shapely.Polygon]:
-    """The regions a closed cut bounds that are solid: an odd number of edges lies to their right."""
+    """The regions a closed cut bounds that are solid: an odd number of edges lies to their right.
+
+    segments: (N, 2, 2), of closed surfaces: a gap of more than 10 micrometres leaves a region
+    unbounded and so away. Cells that touch are not joined.
+    """
     if not len(segments):
         return []
     # Snap to 10 micrometres, so that segments of neighbours share their ends.

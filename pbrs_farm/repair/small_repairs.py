@@ -19,7 +19,11 @@ _SQUARE = 1e-6  # axes of a box whose products differ more from 0 and 1 are no f
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
-    """The house without persons and plants, as the recipe says (paper section 3)."""
+    """The house without persons and plants, as the recipe says (paper section 3).
+
+    Each by a field of its own. The second answer names what went; the kind decides, which the
+    reader of the source set.
+    """
     kinds = set()
     if fields.remove_persons:
         kinds.add(ItemKind.PERSON)
@@ -34,12 +38,20 @@ def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[Hous
 
 
 def with_rooms_closed(house: House, fields: RepairFields) -> House:
-    """The house with ceilings over walled rooms that have none, where the recipe asks for them."""
+    """The house with ceilings over walled rooms that have none, where the recipe asks for them.
+
+    Otherwise the house itself. Ceilings that are added carry a tag, by which
+    `rooms_with_added_ceilings` finds them.
+    """
     return with_ceilings(house) if fields.add_ceilings else house
 
 
 def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
-    """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside."""
+    """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside.
+
+    A wall that has a colour or texture of its source keeps it. Other items that share the default
+    material are not painted: walls get a copy of it. The number is for the report.
+    """
     materials = list(house.materials)
     white: dict[int, int] = {}  # material as read -> its white copy
     items: list[Item] = []

@@ -47,17 +47,26 @@ _EDGE, _LAMP, _LAMP_EDGE = "#9aa5b1", "#ffcc33", "#8a6500"
 
 
 def camera_map_svg(house: House, sampling: Sampling) -> str:
-    """The map as SVG; candidates and winners carry titles a browser shows."""
+    """The map as SVG; candidates and winners carry titles a browser shows.
+
+    The candidates are those of sampling.traces. Write the text as UTF-8.
+    """
     return camera_map(house, sampling).svg()
 
 
 def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
-    """The map as (H, W, 3) uint8 sRGB."""
+    """The map as (H, W, 3) uint8 sRGB.
+
+    Painted with Pillow and its own font, so pixels may differ between versions of it.
+    """
     return camera_map(house, sampling).rgb()
 
 
 def camera_map(house: House, sampling: Sampling) -> Drawing:
-    """The map of a house's sampling; x of the world to the right, z down."""
+    """The map of a house's sampling; x of the world to the right, z down.
+
+    For other forms than SVG and pixels. Levels stand side by side.
+    """
     marks, left, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
     # Write the legend and the reasons to the right of the last level.
     notes = _notes(sampling)
@@ -69,7 +78,10 @@ def camera_map(house: House, sampling: Sampling) -> Drawing:
 
 
 def plan_svg(house: House, views: Sequence[View] = ()) -> str:
-    """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given."""
+    """A house's plan as SVG: rooms with their names, outlines of items, lamps, and views if given.
+
+    For a look at a house before cameras are chosen; one drawing of all levels.
+    """
     marks, width, bottom = _levels_to_draw(house, views, (), is_plan=True)
     return Drawing(math.ceil(width), math.ceil(bottom + _MARGIN), tuple(marks)).svg()
 

@@ -44,7 +44,10 @@ class CameraReport(Record):
 
     @property
     def why_none(self) -> str:
-        """One line that says why no room has a view."""
+        """One line that says why no room has a view.
+
+        Only for a report without views. At most three rooms are named.
+        """
         if not self.rooms:
             return "; ".join(self.notes) or "the house has no rooms"
         reasons = [
@@ -57,7 +60,10 @@ class CameraReport(Record):
 
 
 def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
-    """Rule -> rejected candidates over all sectors of all rooms."""
+    """Rule -> rejected candidates over all sectors of all rooms.
+
+    Each candidate counts once, under the first rule that rejected it.
+    """
     total = Counter[str]()
     for room in rooms:
         for sector in room.sectors:

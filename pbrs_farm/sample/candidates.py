@@ -36,7 +36,11 @@ class Candidates:
         return len(self.sector)
 
     def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
-        """The candidates numbered by which (M,), as cameras; intrinsics: those of zoom 1."""
+        """The candidates numbered by which (M,), as cameras; intrinsics: those of zoom 1.
+
+        In the order of which. Each has its own zoom and roll. A camera is an object: make those
+        that are looked at, not all.
+        """
         plain = cameras_looking(
             intrinsics, self.eye[which], self.towards[which], roll=self.roll[which]
         )
@@ -128,7 +132,10 @@ def grid_candidates(grid: Grid, fields: CameraFields, names: tuple[str | int, ..
 
 
 def n_cells(grid: Grid, cell_m: float) -> tuple[int, int]:
-    """Cells along x and z that cover the grid, at least one each."""
+    """Cells along x and z that cover the grid, at least one each.
+
+    A cell that reaches over the edge counts whole; a nanometre over does not make another.
+    """
     return (
         max(1, int(np.ceil((grid.x_max - grid.x_min) / cell_m - 1e-9))),
         max(1, int(np.ceil((grid.z_max - grid.z_min) / cell_m - 1e-9))),

@@ -40,7 +40,10 @@ def cameras(
     counter: ItemCounter,
     depth_of: DepthOf | None = None,
 ) -> tuple[tuple[View, ...], CameraReport]:
-    """The views of a house and why every other candidate was rejected; see sample_cameras."""
+    """The views of a house and why every other candidate was rejected; see sample_cameras.
+
+    For callers that draw no map; `sample_cameras` also gives the traces of all candidates.
+    """
     sampling = sample_cameras(house, fields, seed, counter, depth_of)
     return sampling.views, sampling.report
 

@@ -79,7 +79,10 @@ class RoomCandidates:
     framing: F64
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
-        """Numbers of a sector's candidates that no rule rejected, best first."""
+        """Numbers of a sector's candidates that no rule rejected, best first.
+
+        Equal scores keep the order of number, so the answer is deterministic.
+        """
         mine = (self.candidates.sector == sector) & np.isfinite(self.score)
         which = np.flatnonzero(mine)
         return which[np.argsort(-self.score[which], kind="stable")]

@@ -43,7 +43,11 @@ class PhotoSampler:
     geometry: Geometry
 
     def room_candidates(self, room: Room) -> RoomCandidates:
-        """Every candidate of a room, rejected by a rule or scored."""
+        """Every candidate of a room, rejected by a rule or scored.
+
+        Deterministic by seed, house and room. Small pictures are traced for what the rules about
+        position leave: this is where the time goes.
+        """
         # Reject by position first, and look at what is left through small pictures.
         f = self.fields
         names = (self.seed, self.house.id, room.id)
@@ -67,12 +71,19 @@ class PhotoSampler:
         return RoomCandidates(room, candidates, verdict, score, nyu13, framing)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts."""
+        """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
+
+        rooms: all of the house at once. A sector without a choice may be missing.
+        """
         choice = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), self.depth_of)
         return choice.choose(rooms)
 
     def views(self, scored: RoomCandidates, sector: int, chosen: list[int]) -> list[View]:
-        """The chosen candidates of a sector as views, at the scoring size."""
+        """The chosen candidates of a sector as views, at the scoring size.
+
+        chosen: numbers from `choose`. The pixels of furniture (`objects`) are counted anew at the
+        scoring size.
+        """
         # Count the pixels of furniture again at the size that scores are stored for.
         f = self.fields
         full = self._intrinsics(f.score_width_px, f.score_height_px)
@@ -112,7 +123,10 @@ class PhotoSampler:
 
 
 def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) -> SectorReport:
-    """How many candidates of a sector each rule rejected, and its view."""
+    """How many candidates of a sector each rule rejected, and its view.
+
+    views: of this sector, in order of choice. Call it after `choose`, which writes the verdicts.
+    """
     verdict = scored.verdict[scored.candidates.sector == sector]
     # Count by the first rule that rejected; name the commonest where no view is left.
     tally = Counter(verdict.tolist())

@@ -86,7 +86,10 @@ class PhotoShares:
 
 
 def item_roles(house: House) -> ItemRoles:
-    """Roles by kind and class: openings are no furniture, nor are curtains and built-in parts."""
+    """Roles by kind and class: openings are no furniture, nor are curtains and built-in parts.
+
+    Arrays are indexed by instance id: entry 0 is nothing, item k of the house has k + 1.
+    """
     items = house.items
     return ItemRoles(
         furniture=_flags([_is_furniture(item) for item in items]),
@@ -136,7 +139,10 @@ def _median_depth(depth_m: F32) -> F64:
 
 
 def photo_score(seen: PhotoShares) -> F64:
-    """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost."""
+    """(N,) score: furniture, things and classes count; doors, close-ups and bare walls cost.
+
+    Shares are of the picture, distances metres. Only differences count: zero says nothing.
+    """
     # Reward what people photograph, up to what is enough.
     score = np.minimum(seen.furniture, MOST_FURNITURE)
     score += SCORE_OF_OBJECT * np.minimum(seen.n_objects, MOST_OBJECTS)

@@ -43,7 +43,11 @@ def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> li
 
 
 def with_names(text: str, names: str, file: str) -> str:
-    """The lines of a room_camera.txt, each followed by its line of room_camera_name.txt."""
+    """The lines of a room_camera.txt, each followed by its line of room_camera_name.txt.
+
+    Blank lines of either do not count. Raises BadInput where the numbers of lines differ: SUNCG's
+    two files belong together line by line.
+    """
     lines = [line for line in text.splitlines() if line.strip()]
     named = [line.strip() for line in names.splitlines() if line.strip()]
     if len(lines) != len(named):

@@ -63,7 +63,10 @@ class RoomSampler:
     geometry: Geometry
 
     def explain_rejection(self) -> str:
-        """Why this room is not sampled at all, or ""."""
+        """Why this room is not sampled at all, or "".
+
+        Only a repaired house knows what lights its rooms; before that light is no reason.
+        """
         room = self.room
         if self.house.is_repaired and not room.lit_by:
             return "nothing lights it: neither lamp nor window nor sky"
@@ -78,7 +81,11 @@ class RoomSampler:
         return ""
 
     def run(self) -> tuple[list[View], RoomReport, RoomTrace]:
-        """The room's views, its report and all its candidates."""
+        """The room's views, its report and all its candidates.
+
+        Deterministic by seed, house and room. A room whose candidates are all rejected gives no
+        view and reasons in its report.
+        """
         names = (self.seed, self.house.id, self.room.id)
         candidates = grid_candidates(self._grid(), self.fields, names)
         rules = released_rules if self.fields.preset == "released" else paper_rules

@@ -81,7 +81,11 @@ def views_from_cameras(
 
 
 def room_of(house: House, camera: Camera) -> Room | None:
-    """The room whose polygon holds the eye and whose floor is the nearest below it, or None."""
+    """The room whose polygon holds the eye and whose floor is the nearest below it, or None.
+
+    Rooms over each other: the upper one's floor decides. An eye more than half a metre above the
+    ceiling is in no room.
+    """
     x, y, z = camera.eye
     # Allow for a floor drawn a little high and an eye just above the ceiling.
     holding = [
@@ -94,7 +98,10 @@ def room_of(house: House, camera: Camera) -> Room | None:
 
 
 def sector_of(camera: Camera, n_sectors: int) -> int:
-    """Number of the sector the camera looks into; azimuth counts from +x towards +z."""
+    """Number of the sector the camera looks into; azimuth counts from +x towards +z.
+
+    Sector 0 begins at +x. Straight down or up counts as azimuth 0.
+    """
     x, _y, z = camera.towards
     azimuth = math.atan2(z, x) % (2 * math.pi)
     return min(int(azimuth / (2 * math.pi) * n_sectors), n_sectors - 1)

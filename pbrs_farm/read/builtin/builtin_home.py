@@ -89,7 +89,11 @@ _FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), _Home)
 
 
 def builtin_home() -> House:
-    """The built-in home, unrepaired; the same on every call."""
+    """The built-in home, unrepaired; the same on every call.
+
+    Two rooms, made of code: needs no file and no download, so it suits tests and first steps. Each
+    call makes a fresh House. It is as a reader would give it; rendering wants it repaired.
+    """
     library, index = _materials()
     openings, fillings = _openings(index)
     items = (*_wall_items(index), *_plane_items(index), *fillings, *_furniture_items(index))

@@ -19,7 +19,11 @@ from pbrs_farm.geometry.solids import box_quads, lathe, quads_surface, sphere
 
 
 def png_from_srgb8(rgb_srgb8: NDArray[np.uint8]) -> bytes:
-    """An 8-bit RGB PNG of (H, W, 3) uint8, row 0 on top."""
+    """An 8-bit RGB PNG of (H, W, 3) uint8, row 0 on top.
+
+    Written by hand so that bytes do not depend on a library's version; use Pillow for pictures
+    whose bytes may differ.
+    """
     height, width, _ = rgb_srgb8.shape
     rows = b"".join(b"\0" + row.tobytes() for row in rgb_srgb8)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
@@ -120,7 +124,11 @@ def place_piece(
     name: str, piece: BuiltinPiece, item_id: str, room_id: str, at: Triple, turn_deg: float,
     materials: dict[str, int],
 ) -> Item:  # fmt: skip
-    """The piece as an item, turned about +y and moved to at (3,)."""
+    """The piece as an item, turned about +y and moved to at (3,).
+
+    turn_deg: about +y; materials: name -> index in the house. Turned parts (lathe) are round, so
+    only their place is moved.
+    """
     turn = rotation_y(np.radians(turn_deg))
     origin = np.asarray(at, np.float64)
     surfaces = [_boxes(part, turn, origin, materials) for part in piece.parts]

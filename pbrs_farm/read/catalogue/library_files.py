@@ -70,7 +70,10 @@ class LibraryNotes:
 
 
 def opened_archive(path: Path) -> tuple[ZipResources, str]:
-    """The archive at path, its entries unread, and its sha256; BadHouse where it is damaged."""
+    """The archive at path, its entries unread, and its sha256; BadHouse where it is damaged.
+
+    Raises BadInput where there is no such file. The digest covers the whole file and reads it once.
+    """
     try:
         sha256 = digest_of_regular(path)
         return ZipResources(path, path.name), sha256
@@ -109,7 +112,11 @@ def opened_library(path: Path, catalogue: str, notes: LibraryNotes) -> OpenedLib
 def furniture_library(
     path: Path, notes: LibraryNotes, catalogue: str = FURNITURE
 ) -> Library | None:
-    """The library in a .sh3f (or the program's jar); None and BadInput as opened_library."""
+    """The library in a .sh3f (or the program's jar); None and BadInput as opened_library.
+
+    notes: takes what is left out and why. Entries whose model is missing in the archive are left
+    out with a note. No model is read yet.
+    """
     opened = opened_library(path, catalogue, notes)
     if opened is None:
         return None
@@ -131,7 +138,10 @@ def furniture_library(
 
 
 def licence_of(properties: Mapping[str, str]) -> str:
-    """A library's licence in short: "CC0", "CC-BY 3.0", else as it is written."""
+    """A library's licence in short: "CC0", "CC-BY 3.0", else as it is written.
+
+    "" where the library names none. For showing; what the licence allows is not known here.
+    """
     text = properties.get("license", "")
     for pattern, short in _KNOWN_LICENCES:
         if re.search(pattern, text, re.IGNORECASE):
@@ -184,7 +194,10 @@ def _lights_of_row(row: dict[str, str], size: tuple[float, float, float]) -> tup
 
 
 def rgb_from_hex(text: str) -> tuple[float, float, float]:
-    """`#RRGGBB` (or `#AARRGGBB`) as sRGB 0..1; ValueError for anything else."""
+    """`#RRGGBB` (or `#AARRGGBB`) as sRGB 0..1; ValueError for anything else.
+
+    The leading pair of eight digits, alpha, is passed over.
+    """
     digits = text.removeprefix("#")
     if not re.fullmatch(r"([0-9a-fA-F]{2})?[0-9a-fA-F]{6}", digits):
         raise ValueError(f"{text[:20]!r} is no colour")

@@ -139,7 +139,10 @@ def _with_small_textures(shape: Shape) -> Shape:
 
 
 def small_texture(texture: Texture, edge_px: int) -> Texture:
-    """The texture with no edge above edge_px; JPEG where nothing is cut out of it, else PNG."""
+    """The texture with no edge above edge_px; JPEG where nothing is cut out of it, else PNG.
+
+    The same object where it is small enough. Pillow's errors are passed on for what is no picture.
+    """
     picture: Image.Image = Image.open(io.BytesIO(texture.data))
     if max(picture.size) <= edge_px:
         return texture

@@ -63,7 +63,12 @@ class ModelTable:
 
 
 def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
-    """The table of a folder of models, empty where there is none; what is wrong with it is a note."""
+    """The table of a folder of models, empty where there is none; what is wrong with it is a note.
+
+    Looked for in turn: our own table, 3D-FUTURE's, HSSD's, objathor's, and last a single CSV file
+    that names model files. Damage is a note, never an error: models are then classed by their
+    names.
+    """
     for names, read in (
         ((TABLE,), _own),
         (_INFO, _future),

@@ -63,7 +63,11 @@ class GroupRule:
         return ItemKind.LAMP if NYU40_NAMES[self.nyu40] == _LAMP else ItemKind.OBJECT
 
     def fits(self, category: str, size: Size) -> bool:
-        """Whether a thing of that size in that category may be one of this group."""
+        """Whether a thing of that size in that category may be one of this group.
+
+        category: of the library, "" = unknown, which fits; size: width, depth, height in metres. On
+        a wall the side is the larger of the width and the smaller of depth and height.
+        """
         width, depth, height = size
         side = max(width, height if self.place is Place.WALL and height < depth else depth)
         is_of_category = not self.category or self.category in plain(category).split()

@@ -38,7 +38,11 @@ def parse_properties(data: bytes) -> dict[str, str]:
 
 
 def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
-    """The entries `key#1`, `key#2`, ... of a catalogue, in order of their numbers."""
+    """The entries `key#1`, `key#2`, ... of a catalogue, in order of their numbers.
+
+    Gaps in the numbers do not matter. Keys without a number, or with one of seven digits or more,
+    are passed over.
+    """
     rows: dict[int, dict[str, str]] = {}
     for key, value in properties.items():
         name, mark, number = key.partition("#")

@@ -120,7 +120,11 @@ def _pictures_of_library(
 
 
 def surface_group(name: str, category: str) -> str:
-    """What a surface is of, by whole words of its name, then of its category; "" = unknown."""
+    """What a surface is of, by whole words of its name, then of its category; "" = unknown.
+
+    English words, singular or plural. A category that is a place (as "kitchen") says nothing of the
+    surface.
+    """
     for text in (name, category if plain(category) not in _PLACES else ""):
         words = set(plain(text).replace("-", " ").replace("_", " ").split())
         words |= {w.removesuffix("s") for w in words}

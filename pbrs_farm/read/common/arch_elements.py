@@ -204,7 +204,12 @@ class WallFrame:
 
 
 def wall_frame(e: Element, outline: F64 | None) -> WallFrame | None:
-    """The frame of a wall with an extent, outward from the room's floor; None for all else."""
+    """The frame of a wall with an extent, outward from the room's floor; None for all else.
+
+    outline: (N, 3) of the room's floor in the world, None where it is not known: then it is the
+    right side of the way from the wall's first point to its second, which may be the inner one.
+    None also for a wall without length, height or thickness.
+    """
     if e.kind != "Wall":
         return None
     # Span the wall by its level direction, and look outward.

@@ -198,7 +198,11 @@ def _window_boxes(hole: Hole) -> _Boxes:
 
 
 def merge_holes(holes: list[Hole]) -> list[Hole]:
-    """Each hole once: two that fill one place across a wall are one, as deep as both."""
+    """Each hole once: two that fill one place across a wall are one, as deep as both.
+
+    Two rooms often name the hole between them once each. The first keeps its id and kind; the order
+    stays.
+    """
     found: list[Hole] = []
     for hole in holes:
         same = next((k for k, other in enumerate(found) if _is_same(other, hole)), None)

@@ -45,7 +45,11 @@ def given_class(source: str, name: str) -> GivenClass | None:
 
 
 def class_by_words(*names: str) -> GivenClass | None:
-    """The class of the first name whose words say one, as of a piece of furniture."""
+    """The class of the first name whose words say one, as of a piece of furniture.
+
+    names: the likeliest first. For sources whose vocabulary no table has; a guess, so tables go
+    before it.
+    """
     for name in names:
         piece = class_of_piece("", name)
         if piece.nyu40 is not None:

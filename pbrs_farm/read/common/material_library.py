@@ -101,7 +101,11 @@ class MaterialLibrary:
 
     @property
     def textures(self) -> dict[str, Texture]:
-        """Every texture a material names, by id."""
+        """Every texture a material names, by id.
+
+        A texture that was loaded and that no material uses is left out. Keys are those of
+        Material.texture_id.
+        """
         used = {name for m in self._materials for name in m.texture_ids}
         found = (loaded.texture for loaded in self._loaded.values() if loaded is not None)
         return {t.id: t for t in found if t.id in used}
@@ -114,7 +118,11 @@ class MaterialLibrary:
         return self._materials.setdefault(material, len(self._materials))
 
     def adopted(self, other: MaterialLibrary) -> tuple[int, ...]:
-        """The indices here of the materials of another library, which is taken in with its textures."""
+        """The indices here of the materials of another library, which is taken in with its textures.
+
+        Equal materials become one. Entry k of the answer is the index here of the other's material
+        k: surfaces have to be numbered anew by it.
+        """
         for loaded in other._loaded.values():
             if loaded is not None:
                 self._loaded.setdefault(f"texture {loaded.texture.id}", loaded)
@@ -152,6 +160,9 @@ class MaterialLibrary:
 
 
 def names_glass(name: str) -> bool:
-    """Whether the name of a part of a window or door says that the part is glass."""
+    """Whether the name of a part of a window or door says that the part is glass.
+
+    Words of several languages. A name with a word of a frame ("glass door frame") is no glass.
+    """
     words = words_of(name)
     return bool(words & GLASS_WORDS) and not words & FRAME_WORDS

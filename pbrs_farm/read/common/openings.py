@@ -39,7 +39,11 @@ class _WallFrame:
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
-    """An opening for every door and window that has a box and stands in a wall."""
+    """An opening for every door and window that has a box and stands in a wall.
+
+    items: all of a house, walls among them. A leaf that stands in no wall has no opening, and is
+    not an error. Openings are not cut here: repair does that.
+    """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     found = []
     for item in items:

@@ -28,7 +28,10 @@ _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
-    """World y of the walkable surface: of the highest upward faces; None if there are none."""
+    """World y of the walkable surface: of the highest upward faces; None if there are none.
+
+    surfaces: of one room's floor, metres. Faces that are not level do not count.
+    """
     corners = _faces_looking(surfaces, 1)
     return None if not len(corners) else float(corners[..., 1].mean(1).max())
 
@@ -56,7 +59,10 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | N
 
 
 def covered_share(surface: Surface, polygon: F64) -> float:
-    """Share of a plan polygon (N, 2) that lies under or over the surface's level faces."""
+    """Share of a plan polygon (N, 2) that lies under or over the surface's level faces.
+
+    In [0, 1], 0 for a polygon without area. Faces that lie over each other count once.
+    """
     # A planar ceiling may look either way.
     both = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
     area: Any = shapely.Polygon(polygon)
@@ -107,7 +113,11 @@ def _traces(walls: Sequence[Surface]) -> Any:
 
 
 def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
-    """The largest piece of plan between walls, for a room without a floor; None if there is none."""
+    """The largest piece of plan between walls, for a room without a floor; None if there is none.
+
+    walls: of one room. A guess: where walls do not close, what lies between them and their hull
+    counts as well. (N, 2) world (x, z).
+    """
     # What the walls' hull encloses and no wall covers lies between them.
     footprint = _outline_from_above(
         np.concatenate([_faces_looking(walls, 1), _faces_looking(walls, -1)])
@@ -116,7 +126,11 @@ def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
 
 
 def polygon_of(area: Any) -> F64 | None:
-    """The outline of the largest polygon of a shapely area: simple, counter-clockwise, no holes."""
+    """The outline of the largest polygon of a shapely area: simple, counter-clockwise, no holes.
+
+    (N, 2) float64, the first corner not repeated; holes are dropped. Slivers go and nearly straight
+    corners with them. Pieces of a square centimetre and less are passed over.
+    """
     pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
     if not pieces:
         return None

@@ -21,7 +21,11 @@ _MIN_SHARED_M2: Final = 0.05
 
 
 def check_rooms(rooms: Sequence[Room], file: str) -> None:
-    """Raise BadHouse, naming the file, for too many rooms, or rooms drawn over each other."""
+    """Raise BadHouse, naming the file, for too many rooms, or rooms drawn over each other.
+
+    For readers of strangers' files: overlapping rooms are taken apart pair by pair, which takes
+    long where they are many.
+    """
     by_level: dict[str, list[Points2]] = {}
     for room in rooms:
         by_level.setdefault(room.level_id, []).append(room.polygon)

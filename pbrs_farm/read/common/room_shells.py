@@ -67,7 +67,11 @@ def _is_closed(surfaces: Sequence[Surface]) -> bool:
 
 
 def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
-    """(F,) number of the plane each face lies in, either side up, in order of first appearance."""
+    """(F,) number of the plane each face lies in, either side up, in order of first appearance.
+
+    Over the faces of all surfaces, one after another. Planes that agree to about a degree and a
+    centimetre count as one; the two sides of a plane have one number.
+    """
     p = corners_of_surfaces(surfaces)
     n = area_vectors(p)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
@@ -161,7 +165,10 @@ def _is_large(low: F64, high: F64) -> Bools:
 
 
 def bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
-    """(S, 2, 3) lowest and highest corner of each shell."""
+    """(S, 2, 3) lowest and highest corner of each shell.
+
+    corners: (F, 3, 3); shell_of_face: (F,) from 0, every number up to the largest used.
+    """
     order = np.argsort(shell_of_face, kind="stable")
     starts = np.searchsorted(shell_of_face[order], np.arange(int(shell_of_face.max()) + 1))
     low = np.minimum.reduceat(corners.min(1)[order], starts)
@@ -180,7 +187,11 @@ def _split(item: Item, chosen: Bools) -> list[Bools]:
 
 
 def picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
-    """The item's surfaces with the chosen faces alone, empty ones left out."""
+    """The item's surfaces with the chosen faces alone, empty ones left out.
+
+    chosen: (F,) over the faces of all surfaces of the item, one after another. Vertices that no
+    face uses are left out as `part_of` does.
+    """
     pairs = zip(item.surfaces, _split(item, chosen), strict=True)
     return tuple(part_of(s, s.faces[own], s.name) for s, own in pairs if own.any())
 

@@ -167,7 +167,11 @@ def _surfaces_within(surfaces: Sequence[Surface], low: F64, high: F64) -> list[S
 
 
 def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...]]:
-    """(levels by floor height, from below; the rooms with their ids `<level>_<room>`)."""
+    """(levels by floor height, from below; the rooms with their ids `<level>_<room>`).
+
+    rooms: with floor_y and ceiling_y; ids, levels and empty names are replaced. Rooms keep their
+    order. Split levels within half a metre are one.
+    """
     # Floors within half a metre are one level.
     heights: list[float] = []
     for y in sorted(r.floor_y for r in rooms):

@@ -33,7 +33,11 @@ class RootFolder:
         return joined
 
     def path(self, name: str) -> Path | None:
-        """The regular file of that name, or None if there is none; BadHouse if it lies outside."""
+        """The regular file of that name, or None if there is none; BadHouse if it lies outside.
+
+        name: relative, as a stranger's file names it. Links are followed first, so that none leads
+        out. The path is the real one: do not derive names from it.
+        """
         path = self.root / self.name_from("", name)
         try:
             if not path.is_file():
@@ -87,6 +91,9 @@ class RootFolder:
 
     @property
     def sha256(self) -> str:
-        """Hex digest over the names and the bytes of every file read so far."""
+        """Hex digest over the names and the bytes of every file read so far.
+
+        The same whatever the order of reading. It grows with every file: ask at the end.
+        """
         lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(self._read.items()))
         return hashlib.sha256(lines.encode()).hexdigest()

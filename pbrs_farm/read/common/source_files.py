@@ -79,7 +79,11 @@ class SourceFiles:
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""
 
     def pictures(self, folder: RootFolder, mtl: str) -> tuple[str, ...]:
-        """Names below the root of the pictures that a material library names."""
+        """Names below the root of the pictures that a material library names.
+
+        A library that is missing or damaged has none. Kept, so that several models of one folder
+        read it once.
+        """
         key = (folder.root, mtl)
         if key not in self._pictures:
             try:

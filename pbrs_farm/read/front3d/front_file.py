@@ -93,7 +93,11 @@ class FrontFile:
 
 
 def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
-    """The house of a file's bytes. Raises BadHouse naming the entry that is wrong."""
+    """The house of a file's bytes. Raises BadHouse naming the entry that is wrong.
+
+    data: JSON of 3D-FRONT. notes: takes what is passed over. Models are not read: pieces name them
+    by `jid`.
+    """
     value = checked(dict, bounded_json(data, file), file, error=BadHouse, hint=_HINT)
     scene = value.get("scene")
     if not value.get("mesh") or not isinstance(scene, dict) or not scene.get("room"):
@@ -154,7 +158,10 @@ def _parse_front_rooms(
 
 
 def numbers(value: Any, n: int, file: str, place: str) -> F64:
-    """(n,) finite numbers of a list, or all where n is 0; BadHouse naming the place."""
+    """(n,) finite numbers of a list, or all where n is 0; BadHouse naming the place.
+
+    file, place: for the message. Numbers of 1e12 and more count as damage.
+    """
     try:
         found = np.array(value if isinstance(value, list) else [None], np.float64)
     except (ValueError, TypeError, OverflowError):

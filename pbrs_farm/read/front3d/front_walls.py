@@ -80,7 +80,11 @@ class WallPiece:
 def sheets_of(
     meshes: Sequence[FrontMesh], floors: Mapping[str, Any]
 ) -> tuple[list[Sheet], list[Sheet]]:
-    """(the sheets that look into rooms, the outer ones). floors: room -> plan area."""
+    """(the sheets that look into rooms, the outer ones). floors: room -> plan area.
+
+    3D-FRONT's walls are sheets without thickness, each seen from one side. A sheet that looks into
+    no room is left out.
+    """
     inner: list[Sheet] = []
     outer: list[Sheet] = []
     tree, names = shapely.STRtree(list(floors.values())), list(floors)
@@ -170,7 +174,11 @@ def _looking(sheet: Sheet, floors: Mapping[str, Any], tree: Any, names: list[str
 
 
 def pieces_of(inner: Sequence[Sheet], outer: Sequence[Sheet]) -> list[WallPiece]:
-    """Every inner sheet in stretches of one thickness."""
+    """Every inner sheet in stretches of one thickness.
+
+    What lies behind are parallel sheets within the thickness of a wall, inner or outer; where none
+    is, a stretch has no back.
+    """
     every = [*inner, *outer]
     normals = np.array([s.normal for s in every]).reshape(-1, 3)
     offsets = np.array([s.offset for s in every])
@@ -281,7 +289,10 @@ def _back_corner(piece: WallPiece, s: float, corner: F64, pieces: Sequence[WallP
 
 
 def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
-    """The gaps of the sheets, with the piece that each stands in; kind "open" until more is known."""
+    """The gaps of the sheets, with the piece that each stands in; kind "open" until more is known.
+
+    A gap that the sheet behind fills is none. The hole goes through the wall's whole thickness.
+    """
     by_sheet: dict[int, list[WallPiece]] = {}
     for piece in pieces:
         by_sheet.setdefault(id(piece.sheet), []).append(piece)

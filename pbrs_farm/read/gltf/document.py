@@ -100,7 +100,11 @@ def _parse_gltf(data: bytes, file: str) -> Gltf:
 
 
 def files_of_gltf(data: bytes, file: str) -> list[str]:
-    """Relative names of the buffers and pictures outside a .glb or .gltf; [] if it is damaged."""
+    """Relative names of the buffers and pictures outside a .glb or .gltf; [] if it is damaged.
+
+    Without data URIs and addresses of the net. For digests and copies; whether they exist is not
+    looked at. They may lead out of the folder: open them through a RootFolder.
+    """
     try:
         document = _parse_gltf(data, file).document
     except BadHouse:
@@ -387,7 +391,10 @@ _PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
 
 
 def note_unread(gltf: Gltf, notes: Notes) -> None:
-    """A note for every extension that is not read, and for what meshes and nodes have of such."""
+    """A note for every extension that is not read, and for what meshes and nodes have of such.
+
+    Known extensions without an effect on the picture get none. Call it once per file.
+    """
     used = gltf.document.get("extensionsUsed")
     for name in used if isinstance(used, list) else []:
         if name not in UNDERSTOOD and name not in _UNSEEN:

@@ -38,14 +38,21 @@ class Mapping:
     rows: tuple[tuple[str, NodeClass], ...] = ()
 
     def of(self, name: str) -> NodeClass | None:
-        """The class of a node's name: exact rows first, then patterns, in order."""
+        """The class of a node's name: exact rows first, then patterns, in order.
+
+        Case counts. Patterns are a shell's (`*`, `?`, `[`); None leaves the class to the node's
+        name.
+        """
         exact = (found for pattern, found in self.rows if pattern == name)
         alike = (found for pattern, found in self.rows if fnmatchcase(name, pattern))
         return next(chain(exact, alike), None)
 
 
 def mapping_from_json(data: bytes, file: str) -> Mapping:
-    """The mapping in a JSON file; BadHouse naming the row that is wrong."""
+    """The mapping in a JSON file; BadHouse naming the row that is wrong.
+
+    {"nodes": {"name or pattern": "class"}}; rows keep their order.
+    """
     fields_json = json_from_bytes(data, file)
     nodes = fields_json.get("nodes") if isinstance(fields_json, dict) else None
     if not isinstance(nodes, dict):

@@ -55,7 +55,12 @@ _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", 
 
 
 def read_habitat(given: GivenFile, fields: ReadFields) -> House:
-    """The House of a scene instance. Raises BadHouse naming file and place."""
+    """The House of a scene instance. Raises BadHouse naming file and place.
+
+    given.models: folder of the data set, where it is not above the file. A scene whose light is
+    baked into pictures is refused, and one of which more than a third of the objects are missing;
+    articulated objects are left out with a note.
+    """
     path, models = given.path, given.models
     dataset = _Dataset(path, models)
     scene = dataset.json(dataset.scene)

@@ -63,7 +63,11 @@ _ROOF: Final = frozenset({"roof", "attic", "dach", "dachraum", "dachboden", "lof
 
 
 def read_ifc(given: GivenFile, fields: ReadFields) -> House:
-    """The House of the file. Raises BadHouse naming the place."""
+    """The House of the file. Raises BadHouse naming the place.
+
+    Needs the extra with ifcopenshell: MachineFailed names the command to install it. Lengths become
+    metres, z up becomes y up.
+    """
     need("ifcopenshell")
     return _Building(given.path, fields).house()
 

@@ -26,7 +26,11 @@ _NAMED: Final = ("Name", "Description", "ObjectType", "Tag", "LongName", "Elemen
 
 
 def model_of(path: Path) -> Any:
-    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse naming the row that is wrong."""
+    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse naming the row that is wrong.
+
+    The file is looked through before the library gets it, and damage of the library's own finding
+    is a BadHouse, too. Needs ifcopenshell.
+    """
     import ifcopenshell
 
     data = _bytes_of(path)

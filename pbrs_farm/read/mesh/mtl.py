@@ -27,7 +27,11 @@ class ObjMaterial:
 
 
 def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
-    """The materials in the order of the file; lines that cannot be read are passed over."""
+    """The materials in the order of the file; lines that cannot be read are passed over.
+
+    Bytes that are no UTF-8 are replaced. Pictures are named, not opened. A name that comes twice is
+    there twice.
+    """
     materials: list[ObjMaterial] = []
     fields: dict[str, object] | None = None
     for raw in data.decode("utf-8", "replace").splitlines():
@@ -100,7 +104,10 @@ def _picture_name(words: list[str], raw: str) -> str:
 
 @cache
 def builtin_materials() -> dict[str, ObjMaterial]:
-    """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL."""
+    """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL.
+
+    Read once and kept: do not write into the answer.
+    """
     text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
     table = {}
     for name, m in json.loads(text).items():

@@ -79,7 +79,11 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
 
 
 def companions_digest(path: Path) -> str:
-    """Digest of the files beside a model that reading it opens; "" where there are none."""
+    """Digest of the files beside a model that reading it opens; "" where there are none.
+
+    Empty, too, for a plain mesh that names no other file. It changes with the bytes of each of
+    them, so that a changed picture gives another digest.
+    """
     if _is_plain(path):
         return ""
     own = ObjectModel(path.stem, path.stem, "", 0, path, path.parent)

@@ -96,7 +96,11 @@ def model_surfaces(
 
 
 def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
-    """Names below the model's root of all files beside its own that reading it may open."""
+    """Names below the model's root of all files beside its own that reading it may open.
+
+    Names as the files give them, normalised below the root; some may not exist. A damaged model
+    yields what was found before.
+    """
     if model.entry:
         return  # in a furniture library, which is one file
     folder, name = RootFolder(model.root), model.path.relative_to(model.root).as_posix()
@@ -154,7 +158,10 @@ def _obj(
 
 
 def material_library(folder: RootFolder, name: str) -> str:
-    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none."""
+    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` where it has none.
+
+    Only looks for the line: the library may not exist. A name with blanks is taken whole.
+    """
     data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"
     at = data.find(b"mtllib ")

@@ -124,7 +124,11 @@ class SceneDocument:
 
 
 def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
-    """The document of a file's bytes. Raises BadHouse naming the element that is wrong."""
+    """The document of a file's bytes. Raises BadHouse naming the element that is wrong.
+
+    data: JSON of the Scene State format; notes: takes elements of unknown types. Lengths become
+    metres.
+    """
     value = bounded_json(data, file)
     # Some exports nest the scene twice.
     for _ in range(2):

@@ -30,7 +30,13 @@ _N_MOVES = 400  # random places tried
 
 
 def with_bulbs(house: House, fields: RepairFields) -> tuple[House, list[SourceRepair]]:
-    """Every light source of every lamp with an emitting surface, and what was done for each."""
+    """Every light source of every lamp with an emitting surface, and what was done for each.
+
+    The surfaces that a source names become emitting; where it names none with faces, a sphere is
+    set that fits in the lamp, smaller or moved if need be. A piece with a light becomes a lamp in
+    kind; items without stay as they are. The materials of emitting surfaces are added at the end,
+    so numbers of the others stay.
+    """
     materials = _BulbMaterials(house.materials)
     items = []
     sources: list[SourceRepair] = []
@@ -132,7 +138,11 @@ def _distance_to_lamp(point: F64, corners: F64) -> float:
 def icosphere(
     name: str, centre: F64, radius: float, material: int, *, n_splits: int = 2
 ) -> Surface:
-    """A closed sphere of 20 * 4^n_splits triangles whose corners lie on it, smooth normals."""
+    """A closed sphere of 20 * 4^n_splits triangles whose corners lie on it, smooth normals.
+
+    centre: (3,) metres; material: index into the house's materials. Faces look outwards; there are
+    no uvs. Inscribed: its volume is a little less than the sphere's.
+    """
     # Place the 12 vertices of an icosahedron by the golden ratio.
     g = (1 + 5**0.5) / 2
     points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]

@@ -94,7 +94,11 @@ def place_of_lamp(house: House, room: Room) -> F64:
 
 
 def heights_above(house: House, room: Room, places: F64) -> F64:
-    """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none."""
+    """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none.
+
+    places: world (x, z), metres. Structure of all storeys counts, furniture does not; looked at
+    from a little above the floor.
+    """
     surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
     triangles = corners_of_surfaces(surfaces)
     return lowest_above(places, triangles, room.floor_y + _ABOVE_FLOOR_M)

@@ -32,7 +32,12 @@ def with_shades(
     fields: RepairFields,
     occluder_from: Callable[[House], Occluder],
 ) -> tuple[House, list[SourceRepair]]:
-    """The light output ratio of every source; shades where it is below fields.min_escape."""
+    """The light output ratio of every source; shades where it is below fields.min_escape.
+
+    The ratio is what share of a bulb's light leaves the lamp. sources: of `with_bulbs`, in whose
+    report the ratios go. Only whole connected parts of a surface become shades; LightPart.escape
+    carries the ratio afterwards.
+    """
     scene = lamp_scene_of_house(house, occluder_from)
     shades, measured = _measure_sources(scene, fields)
     materials = list(house.materials)

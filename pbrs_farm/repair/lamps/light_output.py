@@ -54,7 +54,12 @@ class LightOutput:
 
 
 def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]) -> LampScene:
-    """Lay out the house's lamps, glass and bulbs left out, and build their ray caster."""
+    """Lay out the house's lamps, glass and bulbs left out, and build their ray caster.
+
+    Lamps stand apart in a grid, so that one caster measures all of them and none lights another;
+    structure near a lamp comes with it. The caster is None where no opaque face is in it or near
+    it.
+    """
     lamps = [k for k, item in enumerate(house.items) if item.lights]
     side = max(int(np.ceil(np.sqrt(len(lamps)))), 1)
     items: list[Item] = []
@@ -173,7 +178,11 @@ def _rays_of_source(
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
-    """n rays (origins, unit directions) that leave the surfaces' fronts as a diffuse emitter's."""
+    """n rays (origins, unit directions) that leave the surfaces' fronts as a diffuse emitter's.
+
+    surfaces: with some area; rng: its state is used up, so equal seeds give equal rays. float64 (n,
+    3) each. Origins lie a little off the face, so that a ray does not meet its own.
+    """
     corners = corners_of_surfaces(surfaces)
     areas, normals = face_areas(corners), unit_normals(corners)
     # Choose faces by area, points uniformly on them.

@@ -44,7 +44,10 @@ class Space:
         return not self.reasons
 
     def explain(self, room_id: str) -> str:
-        """Why that room is open: its own reason, or the room it opens into."""
+        """Why that room is open: its own reason, or the room it opens into.
+
+        "" when the space is closed.
+        """
         own = dict(self.reasons).get(room_id)
         if own is not None or not self.reasons:
             return own or ""
@@ -128,7 +131,11 @@ def _open_sides_of_room(
 
 
 def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
-    """Points (N, 2) along the edge of area, _STEP_M apart, and unit vectors (N, 2) out of it."""
+    """Points (N, 2) along the edge of area, _STEP_M apart, and unit vectors (N, 2) out of it.
+
+    Holes have edges, too; their vectors point into the hole. Sides shorter than a step get one
+    point.
+    """
     points, outward = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for polygon in polygons_of(area):
         oriented = shapely.orient_polygons(polygon)
@@ -203,7 +210,11 @@ def _open_above_or_below(
 def bare_area(
     room: Room, rooms: Sequence[Room], covers: Sequence[Cover], *, above: bool
 ) -> plan.Shape:
-    """Plan area of room with neither a cover above (or below) it nor a room of the next storey."""
+    """Plan area of room with neither a cover above (or below) it nor a room of the next storey.
+
+    covers: floors and ceilings of the house. A part that a room of the next storey lies over counts
+    as covered, since its floor closes it. Small gaps at the edge of that room are forgiven.
+    """
     bare = plan.without(plan.polygon_of_room(room.polygon), *_covers_of(room, covers, above=above))
     beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]
     return plan.without(bare, *(plan.grown(plan.polygon_of_room(p), GAP_M) for p in beyond))

@@ -38,7 +38,11 @@ class RoomInterior:
 def interiors_of_room(
     room: Room, uprights: Sequence[Wall], surfaces: Sequence[PlanarSurface]
 ) -> list[RoomInterior]:
-    """Between the walls, above the floor, a part below each plane of the ceiling."""
+    """Between the walls, above the floor, a part below each plane of the ceiling.
+
+    uprights: walls and baseboards of all storeys; surfaces: floors and ceilings. Empty where walls
+    leave nothing of the room. Where no ceiling lies above, the room's nominal height counts.
+    """
     outline = plan.polygon_of_room(room.polygon)
     near = [
         # Take the walls that stand at the height of this room, in it or beside it.

@@ -57,7 +57,11 @@ class TagTable:
         self._tags: dict[int, Tag] = {}
 
     def reserve(self, tags: Sequence[Tag]) -> NDArray[np.uint32]:
-        """A new original id for each tag."""
+        """A new original id for each tag.
+
+        Ids are manifold3d's and of the whole process: they are never used twice, and differ from
+        run to run, so store none.
+        """
         first = Manifold.reserve_ids(len(tags))
         for k, tag in enumerate(tags):
             self._tags[first + k] = tag
@@ -113,7 +117,11 @@ def _manifold_of(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Ma
 
 
 def faces_of_patches(patches: Sequence[Patch]) -> I64:
-    """(F, 3) faces of all patches, corners numbered through the concatenated vertices."""
+    """(F, 3) faces of all patches, corners numbered through the concatenated vertices.
+
+    patches: at least one. The vertices are not welded: equal places of two patches have two
+    numbers.
+    """
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     return np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
 
@@ -146,12 +154,19 @@ def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
 
 
 def unite(solids: Iterable[Manifold]) -> Manifold:
-    """The union of solids; faces inside it are gone, of coinciding faces one is left."""
+    """The union of solids; faces inside it are gone, of coinciding faces one is left.
+
+    Ids of the input survive on the faces, by which `patches_from_solid` gives each back to its
+    item. No solid at all gives the empty one.
+    """
     return Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
 
 
 def subtract(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
-    """solid without what lies in any of the cutters."""
+    """solid without what lies in any of the cutters.
+
+    The faces of the hole carry the cutters' ids. Cutters may overlap.
+    """
     if not cutters:
         return solid
     return Manifold.batch_boolean([solid, *cutters], manifold3d.OpType.Subtract)
@@ -168,12 +183,18 @@ def bounds(solid: Manifold) -> F64:
 
 
 def overlap_of_bounds(a: F64, b: F64) -> F64:
-    """(3,) extents of the common box of two (2, 3) bounds; negative where they are apart."""
+    """(3,) extents of the common box of two (2, 3) bounds; negative where they are apart.
+
+    All three above 0 means that the boxes overlap: a cheap test before a boolean.
+    """
     return np.asarray(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]))
 
 
 def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
-    """The solid's surface by tag, in order of item and surface; positions are float32 values."""
+    """The solid's surface by tag, in order of item and surface; positions are float32 values.
+
+    Slivers are left out. Each patch has vertices of its own; the uv are what booleans interpolated.
+    """
     mesh = solid.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)
     # Pad a result without properties, as of an empty solid.

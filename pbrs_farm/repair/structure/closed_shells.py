@@ -38,7 +38,11 @@ ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was 
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
-    """The surface in double precision, tagged with its item; metric uv where it has none."""
+    """The surface in double precision, tagged with its item; metric uv where it has none.
+
+    item: number of the item in the house. Normals that are missing are 0, which
+    `surface_from_patch` leaves out again.
+    """
     positions = surface.positions.astype(np.float64)
     uvs = surface.uvs.astype(np.float64) if surface.uvs is not None else positions[:, [0, 2]]
     normals = (
@@ -51,7 +55,11 @@ def patch_from_surface(surface: Surface, item: int) -> Patch:
 
 
 def surface_from_patch(patch: Patch) -> Surface | None:
-    """The patch in single precision, faces of no area left out; None if nothing is left."""
+    """The patch in single precision, faces of no area left out; None if nothing is left.
+
+    Faces keep their order; vertices that no face uses go. Single precision may make a thin face
+    flat: that is why area is asked for after rounding.
+    """
     positions = patch.positions.astype(np.float32)
     keep = faces_with_area(triangle_corners(positions, patch.faces), MIN_AREA_M2)
     if not keep.any():
@@ -108,7 +116,11 @@ def _shows_a_room(patches: Sequence[Patch]) -> bool:
 
 
 def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
-    """Those connected parts of the item that are closed solids."""
+    """Those connected parts of the item that are closed solids.
+
+    Closed means that manifold3d takes it for a solid: every edge has two faces that run against
+    each other. Sheets, leaves and open boxes are not among the answers.
+    """
     patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
     if not patches:
         return []
@@ -120,7 +132,11 @@ def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
 
 
 def components(patches: Sequence[Patch]) -> list[I64]:
-    """For each patch the shell (F,) of each face; shells are faces joined at their corners."""
+    """For each patch the shell (F,) of each face; shells are faces joined at their corners.
+
+    patches: at least one, with faces. Corners that round to one multiple of WELD_M are one place.
+    Numbers run over all patches together, with gaps, so two patches may share a shell.
+    """
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
     _, node = numbered_points(np.round(positions / WELD_M))
@@ -164,7 +180,11 @@ def _part(patch: Patch, faces: I64) -> Patch:
 
 
 def flat_patch(item: Item, index: int) -> FlatPatch | None:
-    """The item as one flat patch of its first surface's tag; None if it lies in no one plane."""
+    """The item as one flat patch of its first surface's tag; None if it lies in no one plane.
+
+    index: of the item in the house. A patch that is folded, or has a back as well as a front, is
+    none: its normals cancel out.
+    """
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None

@@ -40,7 +40,10 @@ class WallPart:
 
 
 def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
-    """Plan area of the openings that reach down to the foot of the wall they stand in."""
+    """Plan area of the openings that reach down to the foot of the wall they stand in.
+
+    Doors, and windows down to the floor. Openings that begin higher do not count.
+    """
     areas = []
     for opening in house.openings:
         cutter = opening.cutter

@@ -87,7 +87,11 @@ def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
 
 
 def along_and_across(footprint: plan.Shape) -> F64:
-    """(2, 2) rows: unit vectors in plan along the longest side of a footprint, and across it."""
+    """(2, 2) rows: unit vectors in plan along the longest side of a footprint, and across it.
+
+    Of the smallest rectangle around it, so a bent wall has the direction of its whole. The second
+    row is the first turned by a quarter.
+    """
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(footprint))
     sides = np.diff(corners[:3], axis=0)
     along = sides[int(np.linalg.norm(sides, axis=1).argmax())]

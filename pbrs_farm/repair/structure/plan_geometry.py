@@ -24,7 +24,11 @@ GRID_M = 1e-6
 
 
 def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
-    """The plan area (a polygon, several or none) that triangles cover, seen from above."""
+    """The plan area (a polygon, several or none) that triangles cover, seen from above.
+
+    positions: (V, 3) metres; faces: (F, 3). Triangles that look down count as those that look up.
+    An empty shape where all stand upright.
+    """
     # Leave out triangles that stand upright: they cover no plan.
     corners = positions[:, [0, 2]][faces]
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -33,12 +37,19 @@ def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
 
 
 def polygon_of_room(outline: Points2) -> Shape:
-    """The room's outline as a valid plan polygon."""
+    """The room's outline as a valid plan polygon.
+
+    outline: (N, 2), three corners at least. An outline that crosses itself falls into its parts.
+    """
     return on_grid(shapely.make_valid(shapely.Polygon(outline)))
 
 
 def on_grid(shape: Shape) -> Shape:
-    """shape with coordinates rounded to GRID_M, valid."""
+    """shape with coordinates rounded to GRID_M, valid.
+
+    Lines and points that rounding leaves are dropped. What is left may be a polygon, several, or
+    empty.
+    """
     return _areal(shapely.set_precision(shape, GRID_M))
 
 
@@ -51,27 +62,44 @@ def _areal(shape: Shape) -> Shape:
 
 
 def union(shapes: Iterable[Shape]) -> Shape:
-    """The plan area any of shapes covers; empty for none."""
+    """The plan area any of shapes covers; empty for none.
+
+    Shapes off the grid are rounded to it. Overlaps and shared edges are gone; parts that do not
+    touch stay apart (a MultiPolygon).
+    """
     return _areal(shapely.union_all(list(shapes), grid_size=GRID_M))
 
 
 def grown(shape: Shape, by_m: float) -> Shape:
-    """shape with its edges moved outward (inward when negative), corners kept sharp."""
+    """shape with its edges moved outward (inward when negative), corners kept sharp.
+
+    Corners sharper than the mitre limit are cut off. Moving inward may leave nothing, or several
+    parts. The answer is not rounded to the grid: `union` or `common` does that.
+    """
     return shapely.buffer(shape, by_m, join_style="mitre", mitre_limit=3.0)
 
 
 def closed(shape: Shape, gap_m: float) -> Shape:
-    """shape with gaps narrower than gap_m filled; its other edges stay where they are."""
+    """shape with gaps narrower than gap_m filled; its other edges stay where they are.
+
+    Morphological closing, united with the shape, so that none of it is lost.
+    """
     return union([grown(grown(shape, gap_m / 2), -gap_m / 2), shape])
 
 
 def opened(shape: Shape, width_m: float) -> Shape:
-    """shape without parts narrower than width_m; its other edges stay where they are."""
+    """shape without parts narrower than width_m; its other edges stay where they are.
+
+    Morphological opening. Empty where all of it is narrow.
+    """
     return common(grown(grown(shape, -width_m / 2), width_m / 2), shape)
 
 
 def without(shape: Shape, *others: Shape) -> Shape:
-    """shape less all others."""
+    """shape less all others.
+
+    Rounded to the grid; an empty shape among the others costs nothing.
+    """
     for other in others:
         if not shapely.is_empty(other):
             shape = _areal(shapely.difference(shape, other, grid_size=GRID_M))
@@ -81,7 +109,11 @@ def without(shape: Shape, *others: Shape) -> Shape:
 def near_to(
     shape: Shape, things: Sequence[T], area: Callable[[T], Shape], within_m: float
 ) -> list[T]:
-    """The things whose plan area comes within within_m of shape, in order."""
+    """The things whose plan area comes within within_m of shape, in order.
+
+    area: plan area of a thing. Touching counts; distances are exact, not those of boxes. One pass
+    over all things.
+    """
     areas = np.array([area(x) for x in things], object)
     if not len(areas):
         return []
@@ -90,5 +122,8 @@ def near_to(
 
 
 def common(a: Shape, b: Shape) -> Shape:
-    """The area both cover."""
+    """The area both cover.
+
+    Edges and points that two shapes merely share are not in it: the answer is an area or empty.
+    """
     return _areal(shapely.intersection(a, b, grid_size=GRID_M))

@@ -68,7 +68,11 @@ class FloorsAndCeilings:
 
 
 def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCeilings:
-    """Sort every floor, ceiling and ground item into planar, solid, or neither."""
+    """Sort every floor, ceiling and ground item into planar, solid, or neither.
+
+    What is neither is named with the reason and stays as it was read. The ground outside is taken
+    only where it is solid.
+    """
     found = FloorsAndCeilings([], {}, {}, [])
     for index, item in enumerate(house.items):
         if item.kind not in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND):

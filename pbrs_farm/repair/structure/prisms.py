@@ -31,7 +31,10 @@ class Plane:
     c: float
 
     def at(self, plan: F64) -> F64:
-        """(N,) heights above plan points (N, 2)."""
+        """(N,) heights above plan points (N, 2).
+
+        In metres; the plane is infinite, so any point has a height.
+        """
         return np.asarray(self.a * plan[:, 0] + self.b * plan[:, 1] + self.c)
 
     def raised(self, by_m: float) -> Plane:
@@ -45,7 +48,11 @@ def level_plane(y: float) -> Plane:
 
 
 def plane_of_points(points: F64) -> Plane | None:
-    """The plane through points (N, 3), exactly level where they are; None if they are on none."""
+    """The plane through points (N, 3), exactly level where they are; None if they are on none.
+
+    points: at least three, metres. "On" means within _ON_PLANE_M. A plane that stands upright has
+    no height over the plan: None.
+    """
     # Answer exactly for a level surface: least squares would tilt it.
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
     if high - low <= 1e-6:
@@ -58,7 +65,11 @@ def plane_of_points(points: F64) -> Plane | None:
 
 
 def affine_uv_map(positions: F64, uvs: F64) -> tuple[UvMap, float]:
-    """The affine map of x and z that fits uvs (N, 2) best, and the most it is off by."""
+    """The affine map of x and z that fits uvs (N, 2) best, and the most it is off by.
+
+    positions: (N, 3), of which x and z count. The error is in units of uv: large where the texture
+    is laid on in another way, and the map is then not to be used.
+    """
     affine = np.linalg.lstsq(_affine_columns(positions), uvs, rcond=None)[0]
 
     def uv(positions: F64) -> F64:

@@ -106,7 +106,12 @@ def slab(
     thickness_m: float,
     table: TagTable,
 ) -> list[Manifold]:
-    """The surface's slab as solids that overlap: the layer with its face, and the base behind it."""
+    """The surface's slab as solids that overlap: the layer with its face, and the base behind it.
+
+    own: plan area in which its face is seen; footprint: what the slab reaches under, walls too.
+    thickness_m: away from the room. They overlap on purpose: `unite` makes one of them without a
+    seam.
+    """
     away = 1.0 if surface.is_ceiling else -1.0
     hidden, face = surface.tag("hidden"), surface.tag(surface.name)
     solids = []
@@ -125,7 +130,10 @@ def slab(
 def bridge_gaps(
     surfaces: Sequence[PlanarSurface], thickness_m: float, table: TagTable
 ) -> list[Manifold]:
-    """Solids that join the planes of one ceiling behind its creases, where slabs only abut."""
+    """Solids that join the planes of one ceiling behind its creases, where slabs only abut.
+
+    surfaces: of all items; only those of one item are joined. The solids stay behind what is seen.
+    """
     solids = []
     for k, surface in enumerate(surfaces):
         others = [s.area for j, s in enumerate(surfaces) if j != k and s.item == surface.item]

@@ -50,7 +50,11 @@ class Structure:
 
 
 def repaired_structure(house: House, thickness_m: float) -> Structure:
-    """Thicken what is planar, join, cut, united. Faces keep item, surface name, material and uv."""
+    """Thicken what is planar, join, cut, united. Faces keep item, surface name, material and uv.
+
+    thickness_m: of slabs, and of walls without one. The house is not changed: `with_structure` puts
+    the answer in. What cannot be made solid stays as read and is named in the report.
+    """
     # Read walls, floors and ceilings; give stairwells without a room the covers they lack.
     table, rooms = TagTable(), plan.union(plan.polygon_of_room(r.polygon) for r in house.rooms)
     uprights, left = walls_from_house(house, table, rooms, thickness_m)
@@ -161,7 +165,10 @@ def _surfaces_by_item(solid: Manifold, table: TagTable) -> dict[int, tuple[Surfa
 
 
 def with_structure(house: House, structure: Structure) -> tuple[House, list[Removed]]:
-    """The house with its new structure; items of which no face is left are taken out."""
+    """The house with its new structure; items of which no face is left are taken out.
+
+    Materials, rooms and lights stay; item order stays. The second answer is for the report.
+    """
     items: list[Item] = []
     removed = []
     for index, item in enumerate(house.items):

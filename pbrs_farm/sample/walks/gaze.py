@@ -42,7 +42,11 @@ class WalkThings:
 
 
 def things_of(house: House) -> WalkThings:
-    """The house's furniture and things, by the size of their boxes."""
+    """The house's furniture and things, by the size of their boxes.
+
+    Doors, windows, structure and items without faces are left out; so are those too small to be
+    looked at and those that are as large as a room. Weights grow with the square root of the size.
+    """
     ids, middles, weights = [], [], []
     for number, item in enumerate(house.items, start=1):
         if item.kind.is_structure or is_door_item(item) or not item.n_faces:

@@ -92,7 +92,11 @@ def trajectory_views(
     geometry: Geometry,
     first_hit: FirstHit,
 ) -> tuple[View, ...]:
-    """A view for each pose, in time. Raises BadInput, naming the row, for an eye inside a wall."""
+    """A view for each pose, in time. Raises BadInput, naming the row, for an eye inside a wall.
+
+    All views have the recipe's field of view at the scoring size. An eye that is in no room belongs
+    to "outside". file: for the message.
+    """
     eyes = np.array([pose.world_from_camera[:3, 3] for pose in poses])
     inside = np.flatnonzero(inside_walls(house, eyes, geometry, first_hit))
     if len(inside):
@@ -121,7 +125,11 @@ def trajectory_views(
 
 
 def inside_walls(house: House, eyes: F64, geometry: Geometry, first_hit: FirstHit) -> Bools:
-    """(N,) whether an eye (N, 3) is inside a wall: most looks along the axes meet a wall's back."""
+    """(N,) whether an eye (N, 3) is inside a wall: most looks along the axes meet a wall's back.
+
+    A ray that meets the back of a wall's face starts within that wall; openings and odd models fool
+    single rays, so several axes vote. Needs walls that are closed: call it after repair.
+    """
     if not len(geometry.faces):
         return np.zeros(len(eyes), bool)
     is_wall = np.array([False, *(item.kind is ItemKind.WALL for item in house.items)])

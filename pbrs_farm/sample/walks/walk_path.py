@@ -31,7 +31,11 @@ class Motion:
 
 
 def relax_path(way: F64, space: WalkSpace) -> F64:
-    """The way (M, 2) with its corners rounded; no point comes nearer to anything than half a way."""
+    """The way (M, 2) with its corners rounded; no point comes nearer to anything than half a way.
+
+    way: world (x, z), metres; its ends stay. The answer has points about CELL_M apart, not the same
+    number.
+    """
     places = _resampled(way, CELL_M)
     # Move each point towards its neighbours' middle, where that stays clear; the ends stay.
     for _round in range(_ROUNDS if len(places) > 2 else 0):
