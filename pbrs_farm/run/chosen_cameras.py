@@ -47,8 +47,9 @@ def check_camera_file(fields: CameraFields) -> None:
 def with_lens(view: View, lens: LensFields) -> View:
     """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold.
 
-    The picture's size stays; focal lengths and the principal point become those of the lens. The
-    pose stays, and with it what the view was chosen for.
+    Size, focal lengths and principal point become those that the lens states; one that states none
+    keeps the view's. The pose stays. BadInput too for a fisheye without a focal length or field of
+    view.
     """
     try:
         intrinsics = lens.intrinsics(view.camera.intrinsics)

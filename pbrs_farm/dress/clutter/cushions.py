@@ -53,7 +53,12 @@ def around_thing(
 
 
 def put_as_it_is(placing: Placing, made: Model, surfaces: list[Surface]) -> None:
-    """Add a thing whose surfaces (in the order of its shape's) stand in the world already."""
+    """Add a thing whose surfaces (in the order of its shape's) stand in the world already.
+
+    For cloth and cushions that were bent to where they lie: nothing moves or turns them again.
+    Their normals stay, and their materials are those of the shape. Not checked against other
+    things.
+    """
     piece, shape = made
     kept = tuple(
         replace(surface, material=old.material)
@@ -76,7 +81,11 @@ class Seat:
 
 
 def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -> int:
-    """Lean up to `most` cushions on the back of items[index]; how many."""
+    """Lean up to `most` cushions on the back of items[index]; how many.
+
+    0, with its reason counted, where no seat with a back is found. Cushions stand at the corners
+    first, then anywhere that is free along the back.
+    """
     rng = placing.rng
     seat = find_seat(scene, index, placing.room.floor_y)
     if seat is None:
@@ -105,7 +114,11 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
 
 
 def find_seat(scene: SceneTriangles, index: int, floor_y: float) -> Seat | None:
-    """The seat of items[index] and where its back begins; None where there is none."""
+    """The seat of items[index] and where its back begins; None where there is none.
+
+    floor_y in world metres. The back is the side whose border is highest, the box's own back where
+    sides are alike.
+    """
     corners = scene.of_item(index)
     points = corners.reshape(-1, 3)
     if not len(points):

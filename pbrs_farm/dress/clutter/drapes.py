@@ -57,7 +57,11 @@ class Ground:
         return Ground(grid, np.asarray(ndimage.maximum_filter(tight, size=3)), tight, corners)
 
     def at(self, x: F64, z: F64, *, is_tight: bool = False) -> F64:
-        """(...) heights under places of the frame."""
+        """(...) heights under places of the frame.
+
+        x and z are metres in the frame, of any one shape; places beyond the grid take its border's
+        height. is_tight takes the heights grown by half a thickness alone.
+        """
         heights = self.tight if is_tight else self.heights
         row = np.clip((z / self.grid.cell_m).astype(np.int64), 0, heights.shape[0] - 1)
         column = np.clip((x / self.grid.cell_m).astype(np.int64), 0, heights.shape[1] - 1)
@@ -176,7 +180,11 @@ def _pull_slants(at: F64, length: float) -> None:
 def add_folds(
     net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator
 ) -> F64:
-    """The net with random ridges, as of cloth that nobody smoothed; no vertex sinks into the ground."""
+    """The net with random ridges, as of cloth that nobody smoothed; no vertex sinks into the ground.
+
+    net is (R, C, 3) float64 metres in the ground's frame; a new one comes back. thick_m is the
+    cloth's thickness. Ridges are drawn from rng, so the same generator gives the same folds.
+    """
     size = np.array([_length(net, 0), _length(net, 1)])
     v, u = np.meshgrid(
         *(np.linspace(0, x, n) for x, n in zip(size, net.shape[:2], strict=True)), indexing="ij"
@@ -232,7 +240,12 @@ def sheet_of(name: str, net: F64, ground: Ground, thick_m: float) -> Surface:
 def flat_net(
     size: tuple[float, float], thread_m: float, middle: tuple[float, float, float], turn_rad: float
 ) -> tuple[F64, tuple[float, float]]:
-    """A level net (R, C, 3) of width and depth about a middle, and its threads' lengths."""
+    """A level net (R, C, 3) of width and depth about a middle, and its threads' lengths.
+
+    At least 3 x 3 vertices. Rows run along z and columns along x before the turn about +y; metres,
+    in the ground's frame. Threads' lengths are (between rows, between columns), as `drop_net` takes
+    them.
+    """
     n = [max(3, round(s / thread_m) + 1) for s in size]
     x, z = np.meshgrid(*(np.linspace(-s / 2, s / 2, k) for s, k in zip(size, n, strict=True)))
     c, s = np.cos(turn_rad), np.sin(turn_rad)

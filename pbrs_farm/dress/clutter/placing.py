@@ -27,7 +27,12 @@ _MOST_IN_ROOM = 4
 
 
 def separate_pair(made: Model, rng: np.random.Generator, mess: float) -> Model:
-    """A pair of things that stand side by side, each turned and moved by itself."""
+    """A pair of things that stand side by side, each turned and moved by itself.
+
+    Parts left and right of the middle move apart as wholes; mess 0 leaves them as they were. The
+    piece's size follows, and normals are dropped, since parts were turned. For shoes and the like
+    whose pair lies along x.
+    """
     piece, shape = made
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
     quarter = piece.size[0] / 4
@@ -82,7 +87,11 @@ class Placing:
     )  # triangles of what fell here: cloth lies on cloth
 
     def put(self, made: Model, at: F64, turn_rad: float) -> None:
-        """Add the thing with the middle of its base at (3,) world metres, turned about +y; unchecked."""
+        """Add the thing with the middle of its base at (3,) world metres, turned about +y; unchecked.
+
+        Whoever calls has asked whether the place is free: nothing is tested here, and nothing is
+        marked as taken.
+        """
         piece, shape = made
         low, high = shape.bounds
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -132,7 +141,11 @@ class Placing:
         return True
 
     def drop_near(self, top: Worktop, made: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
-        """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit."""
+        """Put the thing at a plan place (2,), or within 6 cm of it; False where it does not fit.
+
+        at holds world x and z. The spot is taken from the worktop where it fits; nothing is counted
+        where it does not.
+        """
         low, high = made[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
         rows, columns, n = top.spots(turned_size(high - low, turn_rad), margin_m=0.01)
@@ -150,7 +163,11 @@ class Placing:
 
 
 def take_for_room(placing: Placing, kind: str) -> Model | None:
-    """A thing of that kind; None, with its reason counted, where the room has enough of them."""
+    """A thing of that kind; None, with its reason counted, where the room has enough of them.
+
+    A thing that is taken counts even if it is then not put down. Draws from the placing's generator
+    only where the room may have one more.
+    """
     if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
         placing.refuse(f"enough of {kind} in the room")
         return None

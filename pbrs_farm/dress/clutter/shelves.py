@@ -45,7 +45,11 @@ def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
 
 
 def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:
-    """Fill one shelf from left to right; how many things were put there."""
+    """Fill one shelf from left to right; how many things were put there.
+
+    Every thing put down takes its cells from the worktop. Gaps are left by chance, so a full shelf
+    is no error and an empty one neither.
+    """
     rng = placing.rng
     n, column = 0, top.columns[0]
     free = top.free_height()

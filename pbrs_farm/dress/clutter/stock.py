@@ -55,7 +55,12 @@ class Stock:
         self._faces: Counter[str] = Counter()  # of the things taken so far, by piece
 
     def take(self, rng: np.random.Generator, kind: str, style: Style) -> Model | None:
-        """A thing of that kind; None where there is none that can be used."""
+        """A thing of that kind; None where there is none that can be used.
+
+        Books and magazines are always generated; other things are taken from the catalogue or
+        generated. A design with many triangles is taken few times a home, since all of them are
+        rendered.
+        """
         if kind == "book":
             # One or a pile; now and then one lies open.
             n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))

@@ -78,7 +78,11 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
 
 
 def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
-    """Put a thing of each of the kinds on the worktop, the largest first."""
+    """Put a thing of each of the kinds on the worktop, the largest first.
+
+    Kinds of which the room has enough, and things that no longer fit, are left out and counted with
+    their reason.
+    """
     things: list[tuple[str, Model]] = []
     for kind in kinds:
         made = take_for_room(placing, kind)

@@ -54,7 +54,11 @@ class WindowSide:
         return float(np.arctan2(self.inward[0], self.inward[2]))
 
     def bounds(self, x0: float, x1: float, y0: float, y1: float, out: float) -> tuple[F64, F64]:
-        """Low and high corner in the world of the box before the wall."""
+        """Low and high corner in the world of the box before the wall.
+
+        x0 and x1 along the window from its middle, y0 and y1 in the world, out from the wall: all
+        metres. The box begins 4 mm before the wall.
+        """
         ends = [
             self.origin + self.along * x + self.inward * z for x in (x0, x1) for z in (0.004, out)
         ]
@@ -66,7 +70,10 @@ class WindowSide:
 def window_side(
     house: MutableHouse, space: HouseSpace, room: RoomSpace, window: Passage
 ) -> WindowSide | None:
-    """The window from the room; None where it has cloth already or nothing fits before it."""
+    """The window from the room; None where it has cloth already or nothing fits before it.
+
+    None as well for a window narrower than 0.35 m, or of another room.
+    """
     side = window.side_of(room.room.id)
     if side is None or window.width < 0.35:
         return None
@@ -100,7 +107,11 @@ def hang_curtains(
     house: MutableHouse, space: HouseSpace, room: RoomSpace, seen: WindowSide, cloth: Cloth,
     rng: np.random.Generator,
 ) -> bool:  # fmt: skip
-    """A rod and two panels; False, with its reason counted, where they do not fit."""
+    """A rod and two panels; False, with its reason counted, where they do not fit.
+
+    Both panels or none. What is hung is added to the house; the space does not follow and must be
+    asked anew.
+    """
     window = seen.window
     rod_y = min(window.top_y + _OVER_WINDOW_M, seen.ceiling_y - _UNDER_CEILING_M)
     depth = float(rng.uniform(0.026, 0.038))
@@ -163,7 +174,11 @@ def _panel_place(
 
 
 def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:
-    """Whether the wall's face at x across the window is where it is at the window."""
+    """Whether the wall's face at x across the window is where it is at the window.
+
+    free is the plan area that no wall takes. Ask it on both sides of what is to hang, lest a rod
+    end in a corner.
+    """
     at = seen.origin + seen.along * x
     before, behind = at + seen.inward * _FLAT_M, at - seen.inward * _FLAT_M
     return bool(
