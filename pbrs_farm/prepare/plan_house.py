@@ -49,7 +49,7 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
         notes.add(
             "told-left-out", "", f"{n_lost} told things are not drawn: by their class, or no box"
         )
-    its_source = Source(PLAN, str(path), digest_of_regular(path))
+    its_source = Source(PLAN, path.name, digest_of_regular(path))
     return replace(
         house, name=path.stem, source=its_source, cameras=(),
         items=(*house.items, *items), notes=(*house.notes, *notes.all()),

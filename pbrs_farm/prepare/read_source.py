@@ -60,10 +60,8 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
     entry = source.format
     if entry is None:
         raise BadHouse(source.location, "", f"is of a kind that is not read here: {source.kind}")
-    house = entry.read(source.given, fields)
-    # A plugin and a plan know nothing of ids.
-    is_named = source.kind != "reader" and not entry.has_parts
-    return house if is_named else replace(house, id=home_id(source))
+    # The source alone names its house: what a reader makes of its file's name is no matter.
+    return replace(entry.read(source.given, fields), id=home_id(source))
 
 
 def _with_far_noted(house: House, fields: ReadFields) -> House:

@@ -17,7 +17,9 @@ def test_a_home_reads_back_equal_from_its_data_set(tmp_path: Path) -> None:
     root = stored(tmp_path / "root", house)
     assert main(["export", str(root), "--to", "habitat", "--out", str(tmp_path / "out")]) == 0
     (path,) = (tmp_path / "out").glob("*/scenes/*.json")
-    got = read_house(resolve(str(path)), ReadFields())
+    source = resolve(str(path))
+    got = read_house(source, ReadFields())
+    assert got.id == source.house_id, "the home can be run"
     said = [d for d in differences(house, got) if not d.startswith("room ")]
     assert said == []
     assert [(r.name, len(r.polygon)) for r in got.rooms] == [

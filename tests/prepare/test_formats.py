@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -12,9 +13,11 @@ from typing import Final
 import pytest
 
 from pbrs_farm.commands.arguments import home_arguments
+from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadHouse, MachineFailed
+from pbrs_farm.core.house import House
 from pbrs_farm.core.plugins import Plugin
-from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.core.recipe import ReadFields, Recipe, recipe_from_name
 from pbrs_farm.prepare import formats as table
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.formats import (
@@ -28,10 +31,18 @@ from pbrs_farm.prepare.formats import (
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import SourceRef, resolve, words_of_homes
 from pbrs_farm.read.common.format import PLAN
+from pbrs_farm.repair.repair_report import RepairReport
+from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
 from tests.inputs.sound_files import sound_files
 from tests.read import textured_sources
+from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments, is_left_in_place, upload
+from workers.ids import GEOMETRY, job_key
+from workers.node import house_runner
+from workers.runner import Request
 
 _FEW_TRIANGLES: Final = 2_000
 _NO_PICTURE: Final = b""
@@ -102,6 +113,35 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
         assert ref.companions or not own.travels
     else:
         assert store.get(placed.location) == path.read_bytes()
+
+
+@each_format
+def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
+    tmp_path: Path, title: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Repair takes a minute of such houses, and knows nothing of formats.
+    monkeypatch.setattr("pbrs_farm.repair.repair", _declared_repaired)
+    monkeypatch.setattr(house_runner, "steps_before_views", lambda _spec, _house: ("house",))
+    path = WRITERS[title](tmp_path)
+    ((entry, ref),) = entries_from_arguments([str(path)])
+    recipe = recipe_from_name("preview")
+    here, farm = MemoryStore(), MemoryStore()
+    run_step("house", Work(here, recipe, ref.house_id, HouseCache(), source=resolve(str(path))))
+    # Submit it, and let a worker make it of what is in the store.
+    _houses, spec = completed([entry], new_spec(recipe, modes=("opengl_dl",)))
+    farm.put(job_key(spec.job_id), spec.model_dump_json().encode())
+    upload(farm, [ref])
+    request = Request(
+        job_id=spec.job_id, house=entry.house_id, unit="-", stage=GEOMETRY, source=entry.source
+    )
+    house_runner.HouseRunner(farm, n_threads=1).run(request, lambda _text: None)
+    name = keys.house_key(ref.house_id, "house.json")
+    assert json.loads(here.get(name))["id"] == ref.house_id
+    assert here.get(name) == farm.get(name)
+
+
+def _declared_repaired(house: House, **_given: object) -> tuple[House, RepairReport]:
+    return replace(house, is_repaired=True), RepairReport(house_id=house.id)
 
 
 def test_a_range_and_a_folder_are_one_word_a_home(tmp_path: Path) -> None:
