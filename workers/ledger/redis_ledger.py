@@ -158,7 +158,11 @@ class RedisLedger:
         return str(self._run("create", spec.job_id, spec.n_houses, rules.shard_size, *flat))
 
     def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
-        """Append fresh houses to the job's order; `first` is the index of the first of them."""
+        """Append fresh houses to the job's order; `first` is the index of the first of them.
+
+        The caller counts `first` on from call to call; nothing checks it, and repeating a call adds
+        the houses twice. For a job that is still loading: `open` follows.
+        """
         p = self._p(job)
         with self.errors():
             # Chunks bound the size of a transaction, which blocks Redis while it runs.
@@ -174,7 +178,11 @@ class RedisLedger:
                 pipe.execute()
 
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
-        """Enter houses as storage has them, in the job's order; how many were new."""
+        """Enter houses as storage has them, in the job's order; how many were new.
+
+        A house that the ledger knows already is left as it is, so a call that was cut off may be
+        repeated. For `recover`: fresh houses are added with `add_houses`.
+        """
         # Many calls in one round trip; each script is one house, and atomic.
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
@@ -191,7 +199,11 @@ class RedisLedger:
         return n_new
 
     def open(self, job: str, priority: int) -> None:
-        """The job is loaded; the coordinator may dispatch it."""
+        """The job is loaded; the coordinator may dispatch it.
+
+        priority: 0 goes first. Called last of create, add_houses or load_houses, and open: until
+        then nothing of the job is sent. A coordinator that waits wakes up.
+        """
         with self.errors():
             pipe = self.client.pipeline(transaction=True)
             pipe.hset(f"{self._p(job)}job", "state", "running")
@@ -201,7 +213,11 @@ class RedisLedger:
             pipe.execute()
 
     def forget(self, job: str) -> None:
-        """Remove all the ledger knows of the job; storage is not touched."""
+        """Remove all the ledger knows of the job; storage is not touched.
+
+        For a job that is over: tasks that run are not waited for. Scans all keys of the job, so it
+        takes long for a large one, but never blocks Redis.
+        """
         with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
@@ -222,7 +238,11 @@ class RedisLedger:
         return str(self._run("steer", job, what, reason))
 
     def retry(self, job: str, task: str) -> bool:
-        """Fresh attempts for a task that failed for good; False when it had not."""
+        """Fresh attempts for a task that failed for good; False when it had not.
+
+        Its house and, where they had ended, its merges and the job open again. Tasks that a
+        quarantine of the house had cancelled are ready again, too.
+        """
         return bool(self._run("retry", job, task))
 
     # One task
@@ -247,7 +267,10 @@ class RedisLedger:
         return [Claim(verdict, detail, inputs, token) for verdict, detail, inputs in answers]
 
     def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
-        """claim_many of one task."""
+        """claim_many of one task.
+
+        A slot prefers `claim_many`, which takes all tasks of a message in one round trip.
+        """
         return self.claim_many(job, [task], token=token, recipe=recipe, direct=direct)[0]
 
     def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str:
@@ -279,51 +302,88 @@ class RedisLedger:
         return {task: Claim(v, detail, inputs, token) for task, v, detail, inputs in rows}
 
     def fail(self, job: str, task: str, token: str, fault: Fault, *, delay_s: float) -> str:
-        """Ended badly: stale, handed back, retry, failed (for good) or cancelled."""
+        """Ended badly: stale, handed back, retry, failed (for good) or cancelled.
+
+        "stale" says that the lease is somebody else's by now and nothing was changed. A class of
+        UNCOUNTED gives the attempt back ("handed back"), "data" fails for good at once, all others
+        when the job's attempts are used up. delay_s: before the task may be tried again.
+        """
         args = (fault.fault, fault.fingerprint, fault.json(), self.config.worker)
         return str(self._run("fail", job, task, token, *args, delay_s, self.config.cooldown_s))
 
     # The coordinator
 
     def lead(self, token: str) -> bool:
-        """Take or keep the lead for 15 seconds."""
+        """Take or keep the lead for 15 seconds.
+
+        token: of this coordinator, the same at each call. False while another one holds the lead;
+        it falls free when its holder does not ask for it in time, or resigns.
+        """
         return bool(self._run("lead", "", token, _LEAD_S))
 
     def resign(self, token: str) -> None:
-        """Give up the lead, if it is ours."""
+        """Give up the lead, if it is ours.
+
+        A standby may lead at once, it need not wait for the lead to run out.
+        """
         with self.errors():
             if self.client.get(f"{self._g}leader") == token:
                 self.client.delete(f"{self._g}leader")
 
     def reap(self, token: str) -> int:
-        """End leases that ran out; how many, -1 when not leading."""
+        """End leases that ran out; how many, -1 when not leading.
+
+        Tasks whose slots have not sent a heartbeat count as lost and are tried elsewhere. Some
+        hundred at most in one call: call it again at the next turn.
+        """
         return int(self._run("reap", "", token, _REAP_MOST, *POOLS))
 
     def dispatch(
         self, job: str, token: str, *, max_open: int, room: Mapping[str, int]
     ) -> list[str] | None:
-        """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading."""
+        """Admit houses and take ready tasks to be sent, at most room[stage]; None: not leading.
+
+        max_open: of houses of the job in work at once. Tasks of the answer are queued from now on:
+        what the caller cannot send, `resend` finds again. Of a job that does not run only its last
+        merge is given.
+        """
         pairs = [x for pair in room.items() for x in pair]
         return _tasks(self._run("dispatch", job, token, max_open, *pairs))
 
     def resend(self, job: str, token: str, stage: str, age_s: float) -> list[str] | None:
-        """Tasks whose message was sent age_s ago and never claimed; None: not leading."""
+        """Tasks whose message was sent age_s ago and never claimed; None: not leading.
+
+        Some hundred at most, which count as sent now. Call it only where the queue is empty: a
+        message that waits there is not lost.
+        """
         return _tasks(self._run("resend", job, token, stage, age_s, _RESEND_MOST))
 
     def set_blocked(self, job: str, queues: Sequence[str], why: str) -> None:
-        """Let no worker that takes one of these queues claim the job's tasks, until the next call."""
+        """Let no worker that takes one of these queues claim the job's tasks, until the next call.
+
+        queues: () lets every worker claim again; (EVERYWHERE,) stops all. why: shown by `status`.
+        Tasks that run go on.
+        """
         with self.errors():
             if self.client.exists(f"{self._p(job)}job"):
                 fields = {"blocked": ",".join(queues), "blocked_why": why}
                 self.client.hset(f"{self._p(job)}job", mapping=fields)
 
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
-        """Let these tasks end at their next heartbeat; how many shall that did not before, -1: not leading."""
+        """Let these tasks end at their next heartbeat; how many shall that did not before, -1: not leading.
+
+        holds: of `holds`, the tokens of which are compared, so a task that was claimed again
+        meanwhile is spared. They end by themselves at their next heartbeat, and their attempts are
+        given back.
+        """
         pairs = [x for hold in holds for x in (hold.task, hold.token)]
         return int(self._run("preempt", job, token, *pairs))
 
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
-        """Keep stage -> tasks per second for whoever asks."""
+        """Keep stage -> tasks per second for whoever asks.
+
+        Stages that are not named keep theirs. The leader measures them; `view` carries them.
+        """
         if rates:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
@@ -348,7 +408,10 @@ class RedisLedger:
     # Reading
 
     def view(self, job: str) -> JobView | None:
-        """The job as it is now; a handful of O(1) reads whatever its size."""
+        """The job as it is now; a handful of O(1) reads whatever its size.
+
+        None for a job that the ledger does not know. The answer does not follow later changes.
+        """
         p = self._p(job)
         with self.errors():
             pipe = self.client.pipeline(transaction=False)
@@ -375,12 +438,18 @@ class RedisLedger:
             return list(self.client.zrange(f"{self._g}known", 0, -1))
 
     def unit_states(self, job: str, house: str) -> dict[str, str]:
-        """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i."""
+        """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i.
+
+        Empty for a house that the job has not, or that is not admitted yet. letter: of STATES.
+        """
         with self.errors():
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
     def finished(self, job: str, houses: Iterable[str]) -> list[str]:
-        """Those of the houses that are done."""
+        """Those of the houses that are done.
+
+        A round trip for each thousand houses. A house that is quarantined is not among them.
+        """
         done: list[str] = []
         for chunk in _in_chunks(houses):
             with self.errors():
@@ -397,7 +466,11 @@ class RedisLedger:
             return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
-        """What is known of one task beside its state: claim, attempts, tried, not before, fault."""
+        """What is known of one task beside its state: claim, attempts, tried, not before, fault.
+
+        Only what is known is there: "claim", "attempts", "tried" (workers, by commas), "fault"
+        (JSON), "not_before" and "sent" (Redis' clock, seconds), all as text.
+        """
         p = self._p(job)
         with self.errors():
             pipe = self.client.pipeline(transaction=False)
@@ -409,19 +482,30 @@ class RedisLedger:
         return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
 
     def lease_left_s(self, job: str, task: str, lease: str) -> float | None:
-        """Seconds until the lease of a running task ends, by the queue's name; None without one."""
+        """Seconds until the lease of a running task ends, by the queue's name; None without one.
+
+        lease: light on GPUs has a name of its own. Negative where it ran out and was not reaped
+        yet.
+        """
         with self.errors():
             end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
             return None if end is None else float(end) - self.now()
 
     def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
-        """Every task that failed for good."""
+        """Every task that failed for good.
+
+        In no order; read as the caller iterates, so a fault that comes or goes meanwhile may be
+        missed or come twice.
+        """
         with self.errors():
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
                 yield task, fault_from_json(text)
 
     def holds(self, job: str) -> list[Hold]:
-        """Every task of the job that runs now, or waits in a slot for others it was claimed with."""
+        """Every task of the job that runs now, or waits in a slot for others it was claimed with.
+
+        One read of all claims of the job: as many as there are slots, at most a few more.
+        """
         with self.errors():
             found = self.client.hgetall(f"{self._p(job)}claims")
         return [hold_from_text(job, task, text) for task, text in found.items()]
@@ -455,7 +539,11 @@ class RedisLedger:
                 time.sleep(_AWAY_S)
 
     def now(self) -> float:
-        """Redis' own clock, the only one the farm goes by."""
+        """Redis' own clock, the only one the farm goes by.
+
+        Seconds since 1970. Machines' clocks may differ by minutes, so never subtract time.time()
+        from it.
+        """
         seconds, micros = self.client.time()
         return float(seconds) + float(micros) / 1e6
 
@@ -471,7 +559,11 @@ class RedisLedger:
 
     @contextmanager
     def errors(self) -> Iterator[None]:
-        """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line."""
+        """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line.
+
+        Use it around every call of `client`. Other errors of Redis, as of a script, pass through:
+        they are bugs.
+        """
         try:
             yield
         # From the special to the general; the URL is shown without its password.

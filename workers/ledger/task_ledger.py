@@ -86,7 +86,10 @@ class Fault:
 
 
 def fault_from_json(text: str) -> Fault:
-    """The fault that JSON text holds; names it does not know are left out."""
+    """The fault that JSON text holds; names it does not know are left out.
+
+    So a fault that a later version wrote can be read by an older one.
+    """
     known = {f.name for f in fields(Fault)}
     return Fault(**{name: value for name, value in json.loads(text).items() if name in known})
 
@@ -345,7 +348,10 @@ class Users(Protocol):
 
 
 def batches_from_text(text: str) -> tuple[tuple[str, ...], ...]:
-    """ "a,b;c" -> (("a", "b"), ("c",))."""
+    """ "a,b;c" -> (("a", "b"), ("c",)).
+
+    "" gives (). `text_from_batches` is the way back; names hold neither comma nor semicolon.
+    """
     return tuple(tuple(batch.split(",")) for batch in text.split(";") if batch)
 
 

@@ -39,13 +39,20 @@ class UserTable:
         self._audit = f"{ledger.config.prefix}audit"
 
     def all(self) -> dict[str, User]:
-        """Every user by name; {} on a farm that asks nobody who he is."""
+        """Every user by name; {} on a farm that asks nobody who he is.
+
+        One read of the whole table; names are in order. Raises LedgerUnavailable.
+        """
         with self._ledger.errors():
             rows = self._ledger.client.hgetall(self._key)
         return {name: user_from_row(json.loads(row)) for name, row in sorted(rows.items())}
 
     def named_by(self, token: str) -> User | None:
-        """Whose token it is; takes the same time for every wrong one of a table."""
+        """Whose token it is; takes the same time for every wrong one of a table.
+
+        None where no user has it. Tokens themselves are kept nowhere, only their digests are
+        compared.
+        """
         digest, found = token_digest(token), None
         for user in self.all().values():
             if hmac.compare_digest(user.token_sha256, digest):
@@ -53,13 +60,21 @@ class UserTable:
         return found
 
     def save(self, users: Mapping[str, User], store: Store) -> None:
-        """Let these be the farm's users: in the store first, then in Redis."""
+        """Let these be the farm's users: in the store first, then in Redis.
+
+        users: all of them: whoever is missing is removed. Two admins who save at once lose one
+        change: the last one counts.
+        """
         rows = {name: json.dumps(asdict(user)) for name, user in sorted(users.items())}
         store.put(KEY, f"{json.dumps([json.loads(r) for r in rows.values()], indent=1)}\n".encode())
         self._enter(rows)
 
     def restore(self, store: Store) -> bool:
-        """Take the store's users where Redis has none; whether there were any."""
+        """Take the store's users where Redis has none; whether there were any.
+
+        A table in Redis is never overwritten, even if the store's is another. Called when a
+        coordinator starts and by `recover`.
+        """
         if self.all():
             return False
         try:
@@ -79,7 +94,10 @@ class UserTable:
             pipe.execute()
 
     def spent_h(self) -> dict[str, float]:
-        """User -> slot-hours that his jobs' tasks took in the last SPENT_DAYS days, those that are done."""
+        """User -> slot-hours that his jobs' tasks took in the last SPENT_DAYS days, those that are done.
+
+        Days are those of UTC. Users who took nothing are missing. Raises LedgerUnavailable.
+        """
         client = self._ledger.client
         with self._ledger.errors():
             today = int(self._ledger.now() // _DAY_S)
@@ -96,7 +114,11 @@ class UserTable:
         return found
 
     def note(self, row: Mapping[str, str]) -> None:
-        """Keep a line of who changed what."""
+        """Keep a line of who changed what.
+
+        Only the last _MOST_CHANGES lines are kept. row: flat, text to text; `changes` gives it
+        back.
+        """
         with self._ledger.errors():
             pipe = self._ledger.client.pipeline(transaction=False)
             pipe.lpush(self._audit, json.dumps(dict(row)))
@@ -116,7 +138,11 @@ def user_from_row(row: Mapping[str, Any]) -> User:
 
 
 def new_user(name: str, **limits: Any) -> tuple[User, str]:
-    """A user and the token that names him, which is kept nowhere. Raises BadInput for a bad name."""
+    """A user and the token that names him, which is kept nowhere. Raises BadInput for a bad name.
+
+    limits: fields of User. The token is shown once to whoever asked; a lost one cannot be found
+    again, only replaced. Nothing is saved here.
+    """
     if not _NAME.fullmatch(name):
         hint = "a letter or digit, then letters, digits, _ . -; 40 at most, no capitals"
         raise BadInput("users", repr(name[:60]), "is no name of a user", hint=hint)
@@ -125,7 +151,10 @@ def new_user(name: str, **limits: Any) -> tuple[User, str]:
 
 
 def known_user(users: Mapping[str, User], name: str) -> User:
-    """The user of that name; BadInput where there is none."""
+    """The user of that name; BadInput where there is none.
+
+    users: as `UserTable.all` gives them. The error offers a name that is spelt nearly so.
+    """
     if name not in users:
         raise BadInput("users", repr(name[:60]), "no such user", hint=did_you_mean(name, users))
     return users[name]

@@ -77,7 +77,11 @@ class Registry:
             return bool(was_drained)
 
     def leave(self) -> None:
-        """This worker is gone on purpose."""
+        """This worker is gone on purpose.
+
+        Its tasks must have ended before: they are not handed back here. A worker that dies is told
+        by its silence instead.
+        """
         config, client = self._ledger.config, self._ledger.client
         with self._ledger.errors():
             for name in ("workers", *(f"workers:{s}" for q in QUEUES for s in stages_of_queue(q))):
@@ -85,7 +89,11 @@ class Registry:
             client.delete(f"{self._g}worker:{config.worker}")
 
     def drain(self, worker: str, *, undo: bool = False) -> bool:
-        """Ask a worker to finish what it runs and leave; False when there is no such worker."""
+        """Ask a worker to finish what it runs and leave; False when there is no such worker.
+
+        undo: take the request back. It holds for the worker's name for some time, so a machine that
+        starts the worker again does not take work either.
+        """
         client, drained = self._ledger.client, self._drained(worker)
         with self._ledger.errors():
             is_there = client.zscore(f"{self._g}workers", worker) is not None
@@ -109,13 +117,20 @@ class Registry:
         return f"{self._g}drained:{worker}"
 
     def note_rejection(self, reason: str) -> None:
-        """This worker rejected a task of another version; `workers` and `status` show it."""
+        """This worker rejected a task of another version; `workers` and `status` show it.
+
+        reason: a line that names the job; a later one replaces it.
+        """
         with self._ledger.errors():
             key = f"{self._g}worker:{self._ledger.config.worker}"
             self._ledger.client.hset(key, mapping={"refuses": reason})
 
     def workers(self) -> list[WorkerView]:
-        """Every worker seen in the last hour, by name."""
+        """Every worker seen in the last hour, by name.
+
+        With dead ones: `age_s` says when each was seen last, by Redis' clock. Those not seen for an
+        hour are forgotten.
+        """
         client = self._ledger.client
         with self._ledger.errors():
             now = self._ledger.now()
@@ -135,7 +150,11 @@ class Registry:
         )
 
     def slots(self) -> dict[str, int]:
-        """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once."""
+        """Stage -> tasks that workers seen in the last ALIVE_S seconds can run at once.
+
+        A stage that nobody serves is missing. Slots that serve several stages count for each, so
+        the sum is more than the farm has.
+        """
         # A worker's slots serve every stage of every queue it takes.
         slots: dict[str, int] = {}
         for worker in self.workers():
@@ -146,13 +165,19 @@ class Registry:
         return slots
 
     def open_breaker(self, reason: str) -> None:
-        """Storage is unhealthy: no claims and no messages until the breaker closes by itself."""
+        """Storage is unhealthy: no claims and no messages until the breaker closes by itself.
+
+        reason: cut to 300 characters. Called again it stays open for as long from then on.
+        """
         with self._ledger.errors():
             self._ledger.client.set(
                 f"{self._g}breaker", reason[:300], ex=self._ledger.config.breaker_s
             )
 
     def breaker(self) -> str:
-        """Why nothing is claimed, "" while storage is healthy."""
+        """Why nothing is claimed, "" while storage is healthy.
+
+        Coordinators and slots ask before they send or claim; commands show it.
+        """
         with self._ledger.errors():
             return str(self._ledger.client.get(f"{self._g}breaker") or "")
