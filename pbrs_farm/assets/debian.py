@@ -49,7 +49,11 @@ class Deb:
     note: str = ""  # what is odd about it
 
     def members(self, wanted: Callable[[str], bool]) -> dict[str, bytes]:
-        """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged."""
+        """Path in the package -> bytes of every wanted file; MachineFailed if it is damaged.
+
+        wanted: asked with each path, without a leading "./". Held in memory: ask for what is
+        needed. The package is never installed and no script of it runs.
+        """
         try:
             for name, content in _ar_members(self.path.read_bytes()):
                 if name.startswith("data.tar"):
@@ -64,7 +68,11 @@ class Deb:
 
 
 def cached_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb | None:
-    """The package if it was fetched before, the tested version if there is a choice; else None."""
+    """The package if it was fetched before, the tested version if there is a choice; else None.
+
+    folder: None = the cache. None says that `fetch` has to be run; nothing is downloaded here, and
+    the file's digest is not compared.
+    """
     # The tested version goes last, where it is taken.
     debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
     debs.sort(key=lambda p: version_of(p) == tested_version)

@@ -48,7 +48,10 @@ def example_homes() -> tuple[ExampleHome, ...]:
 
 
 def exact_name(word: str) -> str:
-    """The example home that a word names, letters' case apart; raises BadInput naming the nearest."""
+    """The example home that a word names, letters' case apart; raises BadInput naming the nearest.
+
+    word: with or without ".xml". The package need not be there: the names are known without it.
+    """
     known = {h.name.lower(): h.name for h in _HOMES}
     exact = known.get(word.lower().removesuffix(".xml"))
     if exact is None:
@@ -72,7 +75,10 @@ class Package:
         return f"{PACKAGE} {self.version} (Debian, sha256 {self.deb_sha256})"
 
     def home(self, name: str) -> tuple[bytes, str]:
-        """The XML of an example home and its file name; BadInput for an unknown name."""
+        """The XML of an example home and its file name; BadInput for an unknown name.
+
+        name: as `exact_name` takes it. Opens the jar at each call.
+        """
         exact = exact_name(name)
         with zipfile.ZipFile(self.jar) as jar:
             try:
@@ -93,7 +99,10 @@ class JarResources:
         self._zip: zipfile.ZipFile | None = None
 
     def read(self, name: str) -> bytes | None:
-        """The content's bytes, or None if there is none of that name."""
+        """The content's bytes, or None if there is none of that name.
+
+        name: path within the jar. The jar stays open for the next call.
+        """
         if self._zip is None:
             self._zip = zipfile.ZipFile(self._jar)
         try:

@@ -60,7 +60,11 @@ PINS: Final = {
 
 
 def download_pinned(pin: Pin, folder: Path) -> Path:
-    """The pinned file, downloaded into a folder and checked; raises MachineFailed, saying what to do."""
+    """The pinned file, downloaded into a folder and checked; raises MachineFailed, saying what to do.
+
+    From PBRS_DEBIAN_MIRROR where it is set. Size and sha256 are compared, so no signature is
+    needed; a file that differs is removed. One try, with a time limit.
+    """
     mirror = os.environ.get("PBRS_DEBIAN_MIRROR", "") or DEFAULT_MIRROR
     url, path = f"{mirror.rstrip('/')}/{pin.path}", folder / pin.file_name
     digest, size = hashlib.sha256(), 0

@@ -123,7 +123,11 @@ class PlanWall:
     def corners(
         self, *, to_start: bool = True, to_end: bool = True
     ) -> tuple[Point, Point, Point, Point]:
-        """The corners of its ground; an end that meets a wall is drawn out by half of its thickness."""
+        """The corners of its ground; an end that meets a wall is drawn out by half of its thickness.
+
+        (x, z) metres. to_start, to_end: False leaves that end as it is, for a wall that ends
+        freely.
+        """
         (nx, nz), half = self.normal, self.thickness / 2
         a, b = self.at(-half * to_start), self.at(self.length + half * to_end)
         nx, nz = nx * half, nz * half
@@ -135,7 +139,10 @@ class PlanWall:
         )
 
     def at(self, along: float) -> Point:
-        """The point of the middle line `along` metres from its start."""
+        """The point of the middle line `along` metres from its start.
+
+        Beyond its ends the line goes on. ZeroDivisionError for a wall without length.
+        """
         t = along / self.length
         (x0, z0), (x1, z1) = self.start, self.end
         return x0 + t * (x1 - x0), z0 + t * (z1 - z0)
@@ -223,12 +230,20 @@ def ground(piece: PlacedPiece) -> Rect:
 
 
 def turned_upright(plan: Plan) -> Plan:
-    """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright."""
+    """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright.
+
+    Corners are rounded to millimetres. Openings are given along their walls, so they turn with
+    these.
+    """
     return turned_by(plan, upright_angle(plan.rooms))
 
 
 def upright_angle(rooms: Sequence[PlanRoom]) -> float:
-    """Radians by which rooms are turned about the origin so that most of their walls are upright."""
+    """Radians by which rooms are turned about the origin so that most of their walls are upright.
+
+    At most 45 degrees either way. Sides count by their length, in bins of a tenth of a degree;
+    ValueError without any room.
+    """
     ways: dict[float, float] = {}
     for (x0, z0), (x1, z1) in (edge for room in rooms for edge in room.edges):
         angle = math.degrees(math.atan2(z1 - z0, x1 - x0)) % 90
@@ -239,7 +254,10 @@ def upright_angle(rooms: Sequence[PlanRoom]) -> float:
 
 
 def turned_by(plan: Plan, angle_rad: float) -> Plan:
-    """The plan turned about its origin."""
+    """The plan turned about its origin.
+
+    angle_rad: from x towards z. Corners are rounded to millimetres, so turning back is not exact.
+    """
     if angle_rad == 0:
         return plan
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)

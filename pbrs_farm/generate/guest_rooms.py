@@ -41,7 +41,11 @@ Cut = tuple[IntRect, tuple[IntRect, ...]]  # the guest, and what is left of its 
 
 
 def hosts_of(programme: Programme) -> dict[int, int]:
-    """Small room -> the room it is cut from: each host has one guest at most."""
+    """Small room -> the room it is cut from: each host has one guest at most.
+
+    Rooms of the types in _CUT_FROM, but for the first bathroom, are not laid out by themselves but
+    cut from a larger one. A room that wishes a neighbour is never cut from another.
+    """
     hosts: dict[int, int] = {}
     bathrooms = (i for i, wish in enumerate(programme.rooms) if wish.type is RoomType.BATHROOM)
     first = next(bathrooms, -1)

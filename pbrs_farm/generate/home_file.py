@@ -81,7 +81,11 @@ class Paints:
 
 
 def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
-    """Three paints of a family for walls, doors and windows of one paint."""
+    """Three paints of a family for walls, doors and windows of one paint.
+
+    Colours are RRGGBB, sRGB. rng: its state moves on, so the order of drawing is part of what a
+    seed means.
+    """
     chosen = [family.walls[i] for i in rng.permutation(len(family.walls))[:3]]
     wood = family.opening_paints[int(rng.integers(len(family.opening_paints)))]
     red, green, blue = (int(wood[k : k + 2], 16) / 255 for k in (0, 2, 4))

@@ -23,7 +23,11 @@ _GROUPS: Final = {
 
 
 def model_files(shape: Shape) -> dict[str, bytes]:
-    """model.obj, model.mtl and the textures of a shape, by file name; equal shapes, equal bytes."""
+    """model.obj, model.mtl and the textures of a shape, by file name; equal shapes, equal bytes.
+
+    The textures are as the shape has them, not encoded anew. The caller writes the files side by
+    side: the OBJ names its MTL, and that its pictures.
+    """
     pictures = {
         texture_id: f"texture{k}.{_ENDINGS.get(texture.media_type, 'png')}"
         for k, (texture_id, texture) in enumerate(sorted(shape.textures.items()))

@@ -32,7 +32,11 @@ _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 
 
 def plan_faults(plan: Plan) -> list[str]:
-    """What is wrong with a plan, a line each."""
+    """What is wrong with a plan, a line each.
+
+    Rooms that need daylight and have none, and rooms that nobody can reach; empty for a good plan.
+    Furniture and widths of doors are not looked at.
+    """
     return [*_dark_rooms(plan), *_unreached_rooms(plan)]
 
 

@@ -50,7 +50,11 @@ class WallRun:
 
 
 def runs_of(layout: Layout) -> list[WallRun]:
-    """Every stretch between two different neighbours, outside included; in a fixed order."""
+    """Every stretch between two different neighbours, outside included; in a fixed order.
+
+    The order is fixed, so draws by seed over it repeat. A run is as long as both its neighbours
+    stay the same.
+    """
     # Paint the owners on the grid, with a rim of outside.
     owner = np.full((layout.depth + 2, layout.width + 2), OUTSIDE, np.int32)
     for number, parts in enumerate(layout.parts):
@@ -84,7 +88,10 @@ def thickness(run: WallRun, types: list[RoomType]) -> float:
 
 
 def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
-    """The walls: runs of one line and thickness joined; none between rooms that are open."""
+    """The walls: runs of one line and thickness joined; none between rooms that are open.
+
+    runs: of `runs_of`. Stretches of unequal thickness stay two walls, although they are in line.
+    """
     types = [wish.type for wish in layout.programme.rooms]
     is_open = open_pairs(layout)
     standing = [(r, thickness(r, types)) for r in runs if r.rooms not in is_open]
@@ -117,7 +124,11 @@ def open_pairs(layout: Layout) -> frozenset[frozenset[int]]:
 
 
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
-    """The rooms: their rectangles without what the walls stand on."""
+    """The rooms: their rectangles without what the walls stand on.
+
+    (x, z) metres; a room is what is free between the faces of its walls, its largest part where a
+    wall divides it.
+    """
     ground = unary_union([Polygon(wall.corners()) for wall in walls])
     count: dict[RoomType, int] = {}
     types = [wish.type for wish in layout.programme.rooms]
@@ -137,7 +148,10 @@ def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...
 
 
 def corners(shape: BaseGeometry) -> tuple[Point, ...]:
-    """The corners of a shape's largest part, anticlockwise, without those on a straight side."""
+    """The corners of a shape's largest part, anticlockwise, without those on a straight side.
+
+    Rounded to a tenth of a millimetre; holes are dropped. () for a shape without an area.
+    """
     if isinstance(shape, MultiPolygon):
         shape = max(shape.geoms, key=lambda part: part.area)
     simple = shape.simplify(1e-6)
@@ -161,7 +175,11 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def largest_rectangle(polygon: Polygon) -> Rect:
-    """The largest rectangle inside a polygon with upright sides; its bounds where there is none."""
+    """The largest rectangle inside a polygon with upright sides; its bounds where there is none.
+
+    Tries all pairs of corners' lines: for polygons of a room's size of corners, not for outlines of
+    hundreds.
+    """
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
     x0, z0, x1, z1 = polygon.bounds
@@ -176,7 +194,11 @@ def largest_rectangle(polygon: Polygon) -> Rect:
 
 
 def balcony(run: WallRun, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall, ...]]:
-    """A balcony before the outer run, between two coordinates of its axis in metres."""
+    """A balcony before the outer run, between two coordinates of its axis in metres.
+
+    low, high: metres on the run's axis, parapet included. The room and its parapet's walls; the
+    door to it is an opening of the run's wall, drawn elsewhere.
+    """
     outwards = -1.0 if run.before == OUTSIDE else 1.0
     face = run.line * STEP_M + outwards * OUTER_M / 2
     rim = face + outwards * BALCONY_DEPTH_M

@@ -122,7 +122,11 @@ class Wishes:
 
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
-    """A programme by seed: studio to four bedrooms, closed or open kitchen, WC, store, wardrobe."""
+    """A programme by seed: studio to four bedrooms, closed or open kitchen, WC, store, wardrobe.
+
+    wishes: None for any. 64 programmes are drawn; where none has the wished area, the last one's
+    rooms are scaled to it, which keeps their shares.
+    """
     wishes = with_family(wishes or Wishes(), rng)
     # Draw until the area is as wished; then scale the rooms to it.
     for _ in range(64):

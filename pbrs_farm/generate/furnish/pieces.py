@@ -44,7 +44,10 @@ MAX_CHOICES = 6  # pieces of a kind that are tried at every place, the preferred
 
 
 def style_of(name: str, rng: np.random.Generator) -> str:
-    """The style of that name; one by seed for none. Raises BadInput for an unknown one."""
+    """The style of that name; one by seed for none. Raises BadInput for an unknown one.
+
+    The draw is made even where a name is given, so that all later draws of the seed are the same.
+    """
     if name and name not in STYLES:
         raise BadInput("--style", name, "no such style", hint=f"one of {', '.join(STYLES)}")
     drawn = sorted(STYLES)[int(rng.integers(len(STYLES)))]

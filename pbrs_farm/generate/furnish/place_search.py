@@ -30,7 +30,10 @@ class Arrangement:
 
     @property
     def bodies(self) -> list[Rect]:
-        """Of everything that stands on the floor."""
+        """Of everything that stands on the floor.
+
+        Plan rectangles (x0, z0, x1, z1), metres; what hangs above the floor is not among them.
+        """
         return [rect for place in self.standing for rect in place.bodies]
 
     @property

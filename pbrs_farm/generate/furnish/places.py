@@ -57,7 +57,11 @@ class Places:
         return Standing(template, WallFrame(x, z, dx, dz), float(self.scores[k]))
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
-        """Which of the places stay possible when something stands."""
+        """Which of the places stay possible when something stands.
+
+        alive: (N,) bool of what was possible before; a copy comes back. Bodies may not meet bodies
+        or what is to stay free, but free areas may share ground.
+        """
         bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
         # Look again only at those that are possible still.
@@ -68,7 +72,11 @@ class Places:
         return left
 
     def best(self, alive: Bools, n: int = _BEST) -> list[Standing]:
-        """The best places, no two of a wall closer than 0.4 m while others are there."""
+        """The best places, no two of a wall closer than 0.4 m while others are there.
+
+        Best first; where too few are far enough apart, those beside them follow. Equal scores keep
+        their order.
+        """
         order = np.argsort(-self.scores, kind="stable")
         rows = order[alive[order]]
         names = [template.name for template in self.templates]

@@ -76,7 +76,11 @@ class FurnishSpace:
 
 
 def room_space(plan: Plan, number: int) -> FurnishSpace:
-    """The space of a room of the plan."""
+    """The space of a room of the plan.
+
+    Doors, windows and sides that are open to a neighbour are part of it, each with what has to stay
+    free before it. Furniture is not: see `with_bodies`.
+    """
     room = plan.rooms[number]
     polygon = Polygon(room.polygon)
     neighbours = _open_neighbours(plan, number)
@@ -123,7 +127,11 @@ def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
 
 
 def outside_of(polygon: Polygon) -> F64:
-    """(N, 4) rectangles: the rim around a rectilinear polygon, and what its bounds hold beyond it."""
+    """(N, 4) rectangles: the rim around a rectilinear polygon, and what its bounds hold beyond it.
+
+    The rim is 3 m wide, so that a piece which sticks out of the room meets it. Slanted sides count
+    as outside as far as their cells reach.
+    """
     x0, z0, x1, z1 = polygon.bounds
     far = 3.0
     rects = [

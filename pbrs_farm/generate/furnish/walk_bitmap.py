@@ -41,7 +41,10 @@ class WalkMap:
         self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
 
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
-        """The middles that are left where something stands on rectangles."""
+        """The middles that are left where something stands on rectangles.
+
+        free: (H, W) bool; a copy comes back. A man is a circle of _REACH_M around his middle.
+        """
         left = free.copy()
         for x0, z0, x1, z1 in rects:
             # Look at the cells of the rectangle around what is near; round its corners off.
@@ -57,7 +60,11 @@ class WalkMap:
         return left
 
     def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
-        """(H, W) middles of a man who came in by the doors; None where a door or front is cut off."""
+        """(H, W) middles of a man who came in by the doors; None where a door or front is cut off.
+
+        None is the answer that rejects an arrangement: some front, or one of the doors, cannot be
+        walked to.
+        """
         region = self._region(free, self._start)
         if region is None:
             return None

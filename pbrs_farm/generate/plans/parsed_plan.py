@@ -112,7 +112,11 @@ def footprint(shape: Polygon) -> Footprint:
 
 
 def footprints(shape: Polygon) -> list[Footprint]:
-    """The rectangles that make up a shape: one, or several of an L or a U."""
+    """The rectangles that make up a shape: one, or several of an L or a U.
+
+    At most four. A shape that fills its own rectangle nearly, or has very many corners, gives that
+    rectangle.
+    """
     whole = footprint(shape)
     ground = largest_part(shape.simplify(0.03)) or shape
     area = whole.width * whole.depth
@@ -153,7 +157,10 @@ def ring_of(shape: Polygon) -> list[list[float]]:
 def opening(
     shape: Footprint, kind: str, *, sill: float | None = None, height: float | None = None
 ) -> dict[str, Any]:
-    """The row of a door or window whose ground is given; its width is the longer side."""
+    """The row of a door or window whose ground is given; its width is the longer side.
+
+    "at" is the middle, metres. A sill or height that is not given is left out of the row.
+    """
     row: dict[str, Any] = {"at": [shape.x, shape.z], "width": shape.width, "kind": kind}
     if height is not None:
         row["height"] = height

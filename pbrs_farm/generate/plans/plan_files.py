@@ -60,7 +60,10 @@ class PlanFile:
 
 @cache
 def plan_formats() -> tuple[PlanFormat, ...]:
-    """The formats of plans, each at the end of its module beside this one, in their order."""
+    """The formats of plans, each at the end of its module beside this one, in their order.
+
+    A new format needs its module alone. Imports all of them.
+    """
     names = [module.name for module in pkgutil.iter_modules(plans.__path__)]
     modules = [import_module(f"{plans.__name__}.{name}") for name in names]
     found = [m.FORMAT for m in modules if isinstance(getattr(m, "FORMAT", None), PlanFormat)]
@@ -158,7 +161,10 @@ def _choose_storeys(
 
 
 def upright(file: PlanFile) -> PlanFile:
-    """The storeys turned about their origin so that most walls of the home run along x or z."""
+    """The storeys turned about their origin so that most walls of the home run along x or z.
+
+    One angle for all storeys, so that they stay upon each other; furniture turns with them.
+    """
     angle = upright_angle([room for storey in file.storeys for room in storey.plan.rooms])
     cos, sin = math.cos(angle), math.sin(angle)
 

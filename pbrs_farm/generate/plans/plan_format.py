@@ -28,7 +28,10 @@ class Part:
 
 
 def part_of(word: str) -> Part:
-    """The part that a word names, `apartment=ID`, `floor=K`, both with a comma. Raises BadInput."""
+    """The part that a word names, `apartment=ID`, `floor=K`, both with a comma. Raises BadInput.
+
+    "" is the whole file. Whether the file has such a part is its reader's question.
+    """
     part = Part()
     for option in filter(None, word.split(",")):
         key, _, value = option.partition("=")
