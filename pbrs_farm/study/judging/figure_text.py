@@ -36,8 +36,8 @@ def shown_figure(figure: str, value: float) -> str:
 def spread_text(figure: str, values: Sequence[float]) -> str:
     """Mean and, of several seeds, the standard deviation of a sample.
 
-    The standard deviation is that of a sample (n - 1), and left out for one value. At least one
-    value is needed; NaN gives "-".
+    The standard deviation is that of a sample (n - 1), and left out for one value, where NaN is "-".
+    At least one value is needed.
     """
     mean = shown_figure(figure, statistics.fmean(values))
     if len(values) < 2:
