@@ -207,8 +207,44 @@ def room_at(x: float, z: float, axis: str) -> str:
     raise ValueError(f"no room at {x}, {z}, {axis}")
 
 
-def wall_face(a: tuple[float, float], b: tuple[float, float], *, flip: bool = False) -> Any:
-    """The triangles of a wall's face between two corners, less the holes that it has."""
+def tile_walls(house: dict[str, Any], rooms: tuple[str, ...]) -> dict[str, Any]:
+    """The house with each wall of some rooms drawn as two meshes: its tiles, and the grout between."""
+    of_room = {
+        child["ref"]: room for room in house["scene"]["room"] for child in room["children"]
+    }  # fmt: skip
+    meshes: list[dict[str, Any]] = []
+    for mesh in house["mesh"]:
+        room = of_room.get(mesh["uid"])
+        if mesh["type"] != "WallInner" or room is None or room["instanceid"] not in rooms:
+            meshes.append(mesh)
+            continue
+        corners = np.reshape(mesh["xyz"], (-1, 3))
+        a, b = corners[:, [0, 2]].min(0), corners[:, [0, 2]].max(0)
+        room["children"] = [c for c in room["children"] if c["ref"] != mesh["uid"]]
+        for part in ("tiles", "grout"):
+            uid = f"{mesh['uid']}/{part}"
+            xyz = wall_face(tuple(a), tuple(b), part=part).reshape(-1, 3)
+            row = {"uid": uid, "xyz": xyz.ravel().tolist(), "faces": list(range(len(xyz)))}
+            meshes.append({**mesh, **row, "normal": None, "material": part})
+            place = {"pos": [0, 0, 0], "rot": [0, 0, 0, 1], "scale": [1, 1, 1]}
+            room["children"].append({"ref": uid, "instanceid": uid, **place})
+    materials = [
+        {"uid": "tiles", "color": [20, 90, 160, 255], "useColor": True},
+        {"uid": "grout", "color": [200, 200, 200, 255], "useColor": True},
+    ]
+    return {**house, "mesh": meshes, "material": [*house["material"], *materials]}
+
+
+_TILE_M, _JOINT_M = (0.6, 0.3), 0.004
+
+
+def wall_face(
+    a: tuple[float, float], b: tuple[float, float], *, flip: bool = False, part: str = ""
+) -> Any:
+    """The triangles of a wall's face between two corners, less the holes that it has.
+
+    part: "tiles" or "grout" alone of a tiled wall, "" = a plain one.
+    """
     along = "x" if a[1] == b[1] else "z"
     k, across = (0, a[1]) if along == "x" else (1, a[0])
     low, high = sorted((a[k], b[k]))
@@ -219,11 +255,19 @@ def wall_face(a: tuple[float, float], b: tuple[float, float], *, flip: bool = Fa
             gaps.append((middle[k] - width / 2, middle[k] + width / 2, y0, y1))
     ss = sorted({low, high, *(g[0] for g in gaps), *(g[1] for g in gaps)})
     ys = sorted({0.0, HEIGHT, *(g[2] for g in gaps), *(g[3] for g in gaps)})
+    if part:
+        ss, ys = (
+            sorted({*lines, *(v for v in _joints(lines[0], lines[-1], size) if v < lines[-1])})
+            for lines, size in zip((ss, ys), _TILE_M, strict=True)
+        )
     triangles = []
     for s0, s1 in pairwise(ss):
         for y0, y1 in pairwise(ys):
             s, y = (s0 + s1) / 2, (y0 + y1) / 2
             if any(g[0] < s < g[1] and g[2] < y < g[3] for g in gaps):
+                continue
+            in_joint = _is_joint(s - low, _TILE_M[0]) or _is_joint(y, _TILE_M[1])
+            if part and in_joint != (part == "grout"):
                 continue
             p = [
                 [v, h, across] if along == "x" else [across, h, v]
@@ -232,6 +276,19 @@ def wall_face(a: tuple[float, float], b: tuple[float, float], *, flip: bool = Fa
             triangles += [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
     found = np.array(triangles)
     return found[:, ::-1] if flip else found
+
+
+def _joints(low: float, high: float, size: float) -> list[float]:
+    """The edges of the joints of tiles of a size."""
+    return [
+        low + k * size + side * _JOINT_M
+        for k in range(int((high - low) / size) + 1)
+        for side in ((1,) if k == 0 else (-1, 1))
+    ]
+
+
+def _is_joint(at: float, size: float) -> bool:
+    return abs(at - size * round(at / size)) < _JOINT_M
 
 
 def level_face(

@@ -1,7 +1,8 @@
 """The walls of a 3D-FRONT house: sheets towards rooms -> solids as thick as what is behind, and their holes.
 
-No effects. Winding and normals are not believed: a sheet looks into the room beside it. A hole is a
-gap of a sheet; the sheet behind has it, too, or it is a niche. Solids meet in mitres, and repair
+No effects. Winding and normals are not believed: a sheet looks into the room beside it. Sheets in one
+plane of a room (tiles and their grout) are one wall: a hole is a gap of all of them; the sheets behind
+have it, too, or it is a niche. Solids meet in mitres, and repair
 cuts the holes, so that jambs are there whether a file has them or not.
 """
 
@@ -29,6 +30,9 @@ _DEPTHS_M: Final = (0.03, 0.5)  # from a sheet to the one behind it
 _DEPTH_M: Final = 0.12  # where nothing is behind
 _COLUMN_M: Final = 0.7  # a stretch without a sheet behind is no longer where a wall meets this one
 _LEAST_M: Final = 0.02
+_COPLANAR: Final = 0.9998  # least |cosine| of the normals of sheets in one plane: 1.1 degrees
+_WITHIN_M: Final = 0.03  # a sheet that stands out no further beyond another's bounds lies on it
+_SEAM_M: Final = 0.002  # between the meshes of one wall
 _HOLE_M: Final = 0.2  # least width and height
 _FILLED: Final = 0.8  # share of a gap that the sheet behind fills: a niche
 _SAME_END_M: Final = 0.03
@@ -47,6 +51,14 @@ class Sheet:
     outline: Any  # shapely, (along, up)
     room: str
     uv: F64 | None  # (3, 2) of (along, up, 1)
+    filled: Any = (
+        None  # shapely: its outline and those of the other sheets of its plane; None: alone
+    )
+
+    @property
+    def cover(self) -> Any:
+        """All that is wall in its plane: a place beyond it is a gap."""
+        return self.outline if self.filled is None else self.filled
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -99,7 +111,68 @@ def sheets_of(
             looking = _looking(sheet, floors, tree, names)
             if looking is not None:
                 inner.append(looking)
-    return inner, outer
+    return _join_coplanar(inner), _join_coplanar(outer)
+
+
+def _join_coplanar(sheets: Sequence[Sheet]) -> list[Sheet]:
+    """The sheets, those that lie upon a larger one of their plane and room joined with it.
+
+    A wall of tiles is two meshes: the tiles, and the net of grout between them. Each is full of gaps
+    that the other fills. A sheet beside another (tiles below, paint above) stays a wall of its own,
+    and knows what the other fills.
+    """
+    normals = np.array([s.normal for s in sheets]).reshape(-1, 3)
+    offsets = np.array([s.offset for s in sheets])
+    rooms = np.unique([s.room for s in sheets], return_inverse=True)[1]
+    areas = np.array([s.outline.area for s in sheets])
+    joined: dict[int, Sheet] = {}
+    is_upon = np.zeros(len(sheets), np.bool_)
+    # The largest is the wall that the others lie upon; of equal ones the first.
+    for k in np.argsort(-areas, kind="stable").tolist():
+        sheet = sheets[k]
+        if is_upon[k]:
+            continue
+        cosine = normals @ sheet.normal
+        # Sheets of one room look the same way; an outer one is drawn from either side.
+        aligned = np.abs(cosine) if not sheet.room else cosine
+        apart = np.abs(sheet.offset - np.sign(cosine) * offsets)
+        near = (rooms == rooms[k]) & (aligned > _COPLANAR) & (apart < _DEPTHS_M[0])
+        near[k] = False
+        others = {j: _outline_upon(sheets[j], sheet) for j in np.flatnonzero(near).tolist()}
+        others = {j: o for j, o in others.items() if sheet.outline.envelope.intersects(o.envelope)}
+        if not others:
+            joined[k] = sheet
+            continue
+        upon = [j for j, o in others.items() if not is_upon[j] and _lies_upon(o, sheet.outline)]
+        is_upon[upon] = True
+        joined[k] = replace(
+            sheet,
+            outline=_united([sheet.outline, *(others[j] for j in upon)]),
+            filled=_united([sheet.outline, *others.values()]),
+        )
+    return [joined[k] for k in sorted(joined)]
+
+
+def _outline_upon(other: Sheet, sheet: Sheet) -> Any:
+    """Another sheet's outline in the axes of this one."""
+
+    def turned(points: F64) -> F64:
+        world = points[:, :1] * other.along + other.normal * other.offset
+        return np.column_stack([world @ sheet.along, points[:, 1]])
+
+    return shapely.transform(other.outline, turned)
+
+
+def _lies_upon(outline: Any, wall: Any) -> bool:
+    """Whether an outline's bounds are within those of a wall."""
+    bounds = shapely.box(*wall.bounds).buffer(_WITHIN_M, join_style="mitre")
+    return bool(bounds.contains(shapely.box(*outline.bounds)))
+
+
+def _united(outlines: Sequence[Any]) -> Any:
+    """The outlines as one, the seams between them closed."""
+    wide = shapely.buffer(np.array(outlines, object), _SEAM_M, join_style="mitre")
+    return shapely.simplify(shapely.union_all(wide).buffer(-_SEAM_M, join_style="mitre"), 1e-3)
 
 
 def _upright_planes(mesh: FrontMesh) -> list[tuple[F64, F64 | None]]:
@@ -316,7 +389,7 @@ def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
 
 def _gaps(sheet: Sheet) -> list[tuple[float, float, float, float]]:
     s0, y0, s1, y1 = sheet.bounds
-    rest = shapely.box(s0, y0, s1, y1).difference(sheet.outline)
+    rest = shapely.box(s0, y0, s1, y1).difference(sheet.cover)
     # Slivers along the edge are no holes.
     rest = rest.buffer(-0.02, join_style="mitre").buffer(0.02, join_style="mitre")
     found = []
@@ -332,4 +405,4 @@ def _is_filled(back: Sheet, sheet: Sheet, gap: tuple[float, float, float, float]
     s0, y0, s1, y1 = gap
     ends = [float(sheet.point(s, 0.0) @ back.along) for s in (s0, s1)]
     area = shapely.box(min(ends), y0, max(ends), y1)
-    return bool(back.outline.intersection(area).area > _FILLED * area.area)
+    return bool(back.cover.intersection(area).area > _FILLED * area.area)

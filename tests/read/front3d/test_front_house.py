@@ -55,6 +55,53 @@ def test_a_repaired_house_of_each_generation_leaks_no_ray_and_keeps_walls_and_op
     assert {str(room.enclosure) for room in repaired.rooms} == {"closed"}
 
 
+@pytest.mark.parametrize("generation", ["0.11", "0.11 gaps"])
+def test_walls_of_tiles_and_grout_have_the_openings_of_plain_ones(
+    tmp_path: Path, generation: files.Generation
+) -> None:
+    # Tiled from one side and from both: each mesh alone is full of gaps.
+    tiled = files.tile_walls(
+        files.front_house(generation), ("Bathroom-5", "SecondBedroom-6", "Kitchen-2")
+    )
+    house = read(written(tmp_path, tiled))
+    plain = read(written(tmp_path, files.front_house(generation)))
+    assert [o.id for o in house.openings] == [o.id for o in plain.openings]
+    for one, other in zip(house.openings, plain.openings, strict=True):
+        np.testing.assert_allclose(one.quad, other.quad, atol=0.01)
+    walls = [i for i in house.items if i.kind is ItemKind.WALL]
+    assert len(walls) == 24
+    # The larger mesh paints the wall.
+    painted = {house.materials[s.material].name for i in walls for s in i.surfaces}
+    assert painted == {"paint", "tiles"}
+
+
+def test_a_wall_of_two_meshes_beside_each_other_has_no_hole_where_one_fills_the_other(
+    tmp_path: Path,
+) -> None:
+    # Paint in the form of an L round a panel in its upper corner, from either side of one wall.
+    given = files.front_house("0.11 gaps")
+    for z, name in ((4.0, "LivingRoom-1"), (4.12, "Hallway-3")):
+        room = next(r for r in given["scene"]["room"] if r["instanceid"] == name)
+        refs = {c["ref"] for c in room["children"]}
+        mesh = next(
+            m
+            for m in given["mesh"]
+            if m["uid"] in refs and m["type"] == "WallInner" and set(m["xyz"][2::3]) == {z}
+        )
+        corners = np.reshape(mesh["xyz"], (-1, 3, 3))
+        is_panel = (corners[..., 0].max(1) < 1.6) & (corners[..., 1].min(1) > 2)
+        assert is_panel.any()
+        for part, own in (("paint", ~is_panel), ("panel", is_panel)):
+            xyz = corners[own].reshape(-1, 3)
+            row = {"uid": f"{name}/{part}", "xyz": xyz.ravel().tolist()}
+            given["mesh"].append({**mesh, **row, "faces": list(range(len(xyz)))})
+            child = next(c for c in room["children"] if c["ref"] == mesh["uid"])
+            room["children"].append({**child, "ref": f"{name}/{part}"})
+        given["mesh"].remove(mesh)
+    plain = read(written(tmp_path, files.front_house("0.11 gaps")))
+    assert len(read(written(tmp_path, given)).openings) == len(plain.openings)
+
+
 def test_rooms_have_the_types_and_areas_of_the_file(tmp_path: Path) -> None:
     house = read(written(tmp_path, files.front_house()))
     for room, (kind, x0, z0, x1, z1) in zip(house.rooms, files.ROOMS.values(), strict=True):
