@@ -1,7 +1,8 @@
 """A home drawn with react-planner (its JSON) -> a ParsedPlan; no effects.
 
 layers.<id> holds vertices, lines (walls), holes, areas and items; y is up on the page, lengths are in the
-file's unit (cm). A hole lies at `offset`, a share of its line.
+file's unit (cm). A hole lies at `offset`, a share of its line, or where its `coordinates` are. Where a file
+was traced from a picture, `scale` is square units a square pixel; properties are in units all the same.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class _Layer(BaseModel):
 
 class _File(BaseModel):
     unit: str = "cm"
-    scale: float = 1.0
+    scale: float = Field(1.0, gt=1e-12, lt=1e12)
     layers: dict[str, _Layer] = Field(min_length=1, max_length=50)
 
 
@@ -56,7 +57,7 @@ def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
     left_out = LeftOut()
     layers = sorted(given.layers.items(), key=lambda row: row[1].altitude)
     drawn = [
-        _Drawing(path, f"layers.{key}"[:60], layer, _METRES[given.unit], given.scale)
+        _Drawing(path, f"layers.{key}"[:60], layer, _METRES[given.unit], math.sqrt(given.scale))
         for key, layer in layers if layer.lines
     ]  # fmt: skip
     if not drawn:
@@ -65,7 +66,7 @@ def plan_of_react_planner(path: Path, value: Any) -> ParsedPlan:
 
 
 class _Drawing:
-    """A layer in metres."""
+    """A layer in metres. metres: of a unit. scale: units of a length as it is drawn."""
 
     def __init__(self, path: Path, place: str, layer: _Layer, metres: float, scale: float) -> None:
         self.path, self.place, self.layer = path, place, layer
@@ -107,6 +108,8 @@ class _Drawing:
             names = row.get("vertices") if isinstance(row, dict) else None
             points = [self._vertex(n) for n in names] if isinstance(names, list) else []
             ring = [p for p in points if p is not None]
+            if not points and isinstance(row, dict):
+                ring = self._ring(row.get("coords")) or self._ring(row.get("coordinates"))
             if len(ring) < 3 or len(ring) < len(points):
                 left_out.add("an area names no three corners", f"{self.place}.areas.{key}"[:80])
                 continue
@@ -125,7 +128,7 @@ class _Drawing:
         if isinstance(names, list) and len(names) >= 2:
             a, b = self._vertex(names[0]), self._vertex(names[1])
             return (a, b) if a and b and a != b else None
-        points = [q for p in row.get("coordinates") or () if (q := self._point(p, self.scale))]
+        points = self._ring(row.get("coordinates"))
         if len(points) < 3:
             return None
         box = footprint(Polygon(points))
@@ -133,15 +136,26 @@ class _Drawing:
         return (box.x - dx, box.z - dz), (box.x + dx, box.z + dz)
 
     def _vertex(self, name: object) -> tuple[float, float] | None:
-        return self._point(self.layer.vertices.get(str(name)), 1.0)
+        return self._point(self.layer.vertices.get(str(name)))
 
-    def _point(self, given: Any, scale: float) -> tuple[float, float] | None:
+    def _ring(self, given: Any) -> list[tuple[float, float]]:
+        """The corners of an outline, [] where it is none: [[x, y], ...], or that within lists (GeoJSON)."""
+        for _ in range(3):
+            if not isinstance(given, list) or not given:
+                return []
+            if self._point(given[0]) is not None:
+                break
+            given = given[0]
+        points = [q for p in given if (q := self._point(p))] if isinstance(given, list) else []
+        return points if len(points) == len(given) else []
+
+    def _point(self, given: Any) -> tuple[float, float] | None:
         x, y = (given.get("x"), given.get("y")) if isinstance(given, dict) else (None, None)
         if isinstance(given, list) and len(given) >= 2:
             x, y = given[:2]
         if not _is_number(x) or not _is_number(y):
             return None
-        factor = self.metres * scale
+        factor = self.metres * self.scale
         return float(x) * factor, -float(y) * factor
 
     def _length(self, row: Any, name: str, usual: float) -> float:
@@ -161,27 +175,54 @@ class _Drawing:
         if line is None:
             left_out.add("a hole names no line", f"{self.place}.holes.{key}"[:80])
             return None
-        offset = row.get("offset", 0.5)
-        t = float(offset) if _is_number(offset) and 0 <= offset <= 1 else 0.5
         (x0, z0), (x1, z1) = line
+        offset, ring = row.get("offset"), self._ring(row.get("coordinates"))
+        # Along a wall its length; what is called width beside a length is its thickness.
+        width = self._length(row, "length", self._length(row, "width", 0.9))
+        if _is_number(offset) and 0 <= offset <= 1:
+            t = float(offset)
+        elif len(ring) >= 2:
+            along = [
+                ((x - x0) * (x1 - x0) + (z - z0) * (z1 - z0)) / math.dist(*line) ** 2
+                for x, z in ring
+            ]
+            t = min(max((min(along) + max(along)) / 2, 0.0), 1.0)
+            width = (max(along) - min(along)) * math.dist(*line)
+        else:
+            t = 0.5
+            left_out.add(
+                "a hole has no place: it is put in the middle of its line, a guess",
+                f"{self.place}.holes.{key}"[:80],
+            )
         kind = str(row.get("type", "door")).lower()
-        width = self._length(row, "width", self._length(row, "length", 0.9))
         found: dict[str, Any] = {
             "at": [x0 + t * (x1 - x0), z0 + t * (z1 - z0)], "width": max(width, 0.3), "kind": "door",
         }  # fmt: skip
         if "window" in kind or "curtain" in kind:
-            found |= {
-                "kind": "window", "height": max(self._length(row, "height", 1.3), 0.3),
-                "sill": max(self._length(row, "altitude", 0.9), 0.0),
-            }  # fmt: skip
+            sill, height = self._sill_and_height(row)
+            found |= {"kind": "window", "height": max(height, 0.3), "sill": max(sill, 0.0)}
         elif "entrance" in kind:
             found["kind"] = "entrance"
         else:
             found["height"] = max(min(self._length(row, "height", 2.05), 2.4), 1.6)
         return found
 
+    def _sill_and_height(self, row: dict[str, Any]) -> tuple[float, float]:
+        """Of a window: by its edges where it has a property for them, else as react-planner has it."""
+        properties = row.get("properties")
+        edges = properties.get("heights") if isinstance(properties, dict) else None
+        if not isinstance(edges, dict):
+            return self._length(row, "altitude", 0.9), self._length(row, "height", 1.3)
+        low, high = edges.get("lower_edge"), edges.get("upper_edge")
+        sill = float(low) * self.metres if _is_number(low) else 0.9
+        return sill, float(high) * self.metres - sill if _is_number(high) else 1.3
+
     def _thing(self, key: str, row: Any, left_out: LeftOut) -> Thing | None:
-        at = self._point(row, 1.0)
+        at = self._point(row)
+        ring = self._ring(row.get("coordinates")) if isinstance(row, dict) else []
+        if at is None and len(ring) >= 3:
+            box = footprint(Polygon(ring))
+            at = box.x, box.z
         name = str(row.get("type", "")) if isinstance(row, dict) else ""
         size = usual_size(name) or (0.6, 0.8, 0.6)
         if at is None or name.lower() in ("stairs", "elevator", "shaft"):
