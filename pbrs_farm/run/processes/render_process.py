@@ -124,7 +124,7 @@ class RenderProcess:
     def kill(self, cause: str, text: str) -> Ended:
         """End the running task and its process.
 
-        cause is the word that retries are decided by, text the sentence for people. The next task
+        cause is a word as of Ended, text the sentence for people. The next task
         starts a new process.
         """
         self.stop()
