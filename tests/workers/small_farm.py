@@ -38,8 +38,9 @@ class SmallFarm:
 
     def __init__(
         self, folder: Path, redis: RedisServer, *, s3: Store | None = None,
-        runner: str = FAKE_RUNNER, **settings: object,
+        runner: str = FAKE_RUNNER, redis_url: str = "", **settings: object,
     ) -> None:  # fmt: skip
+        self.redis_url = redis_url or redis.url  # the processes' way to it
         self.folder = folder
         self.redis = redis
         self.runner = runner
@@ -72,7 +73,7 @@ class SmallFarm:
         scratch = self.folder / "scratch"
         scratch.mkdir(exist_ok=True)
         return env | {
-            "PBRS_REDIS_URL": self.redis.url,
+            "PBRS_REDIS_URL": self.redis_url,
             "PBRS_STORE": self.store.url,
             "PBRS_FARM_RUNNER": self.runner,
             "PBRS_FARM_WORKER": worker,

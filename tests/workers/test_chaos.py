@@ -18,7 +18,9 @@ from pathlib import Path
 import pytest
 
 from tests.workers.redis_server import RedisServer
+from tests.workers.refusals import REFUSALS, configured
 from tests.workers.small_farm import SmallFarm
+from tests.workers.stalling_proxy import StallingProxy
 from tests.workers.test_farm import renderers
 
 pytestmark = pytest.mark.chaos
@@ -347,3 +349,87 @@ def test_drain_lets_a_worker_leave(farm: SmallFarm) -> None:
     left_s = time.monotonic() - began
     farm.wait_done()
     note("drain (seconds: until it left)", farm, farm.check_complete(n_repeats=0), left_s)
+
+
+@pytest.mark.parametrize("prefix", REFUSALS)
+def test_redis_refuses_for_a_while(farm: SmallFarm, prefix: str) -> None:
+    begin(farm)
+    with REFUSALS[prefix](farm.redis):
+        time.sleep(8)
+    seconds = farm.wait_done(120)
+    assert all(process.poll() is None for process in farm.processes.values())
+    note(f"Redis answers {prefix} for 8 s", farm, farm.check_complete(n_repeats=2), seconds)
+    logs = "".join(log.read_text() for log in farm.folder.glob("*.log"))
+    assert f" refuses for now: {prefix} " in logs
+    assert "Traceback" not in logs
+
+
+@pytest.mark.parametrize("prefix", REFUSALS)
+def test_a_farm_that_starts_at_a_redis_that_refuses(farm: SmallFarm, prefix: str) -> None:
+    with REFUSALS[prefix](farm.redis):
+        farm.coordinator()
+        farm.worker("w1")
+        time.sleep(6)
+        assert all(process.poll() is None for process in farm.processes.values())
+    farm.submit(2)
+    seconds = farm.wait_done(120)
+    note(f"started while Redis answers {prefix}", farm, farm.check_complete(n_repeats=0), seconds)
+
+
+@pytest.mark.parametrize("prefix", REFUSALS)
+def test_redis_refuses_for_a_while_a_farm_without_work(farm: SmallFarm, prefix: str) -> None:
+    # Its workers wait in a blocking read of the queues.
+    begin(farm, n_houses=1, slow_s=0.0)
+    farm.wait_done()
+    with REFUSALS[prefix](farm.redis):
+        time.sleep(6)
+        assert all(process.poll() is None for process in farm.processes.values())
+    farm.submit(2, prefix="later")
+    seconds = farm.wait_done(120)
+    for log in farm.folder.glob("*.log"):
+        assert "Traceback" not in log.read_text(), log
+    assert set(farm.starts().values()) <= {1, 2}  # the job's own task is of either job
+    note(f"Redis answers {prefix} for 6 s to an idle farm", farm, 0, seconds)
+
+
+def test_every_connection_to_redis_is_dropped_again_and_again(farm: SmallFarm) -> None:
+    begin(farm)
+    for _ in range(12):
+        farm.redis.client.client_kill_filter(_type="normal")
+        time.sleep(0.5)
+    seconds = farm.wait_done(120)
+    assert all(process.poll() is None for process in farm.processes.values())
+    note(
+        "CLIENT KILL TYPE normal, 12 times in 6 s", farm, farm.check_complete(n_repeats=2), seconds
+    )
+
+
+def test_redis_closes_connections_that_are_idle_for_a_second(farm: SmallFarm) -> None:
+    with configured(farm.redis, "timeout", "1"):
+        begin(farm)
+        seconds = farm.wait_done(120)
+        assert all(process.poll() is None for process in farm.processes.values())
+    repeated = farm.check_complete(n_repeats=2)
+    note("Redis closes connections idle for 1 s", farm, repeated, seconds)
+
+
+def test_a_proxy_before_redis_stalls(tmp_path: Path) -> None:
+    (tmp_path / "redis").mkdir()
+    server = RedisServer(tmp_path / "redis")
+    server.start()
+    with StallingProxy(server.port) as proxy:
+        farm = SmallFarm(tmp_path, server, redis_url=proxy.url)
+        try:
+            begin(farm, n_houses=10)
+            # Connections that are there are open and dead from now on; new ones are well.
+            proxy.stall()
+            n_before = sum(farm.starts().values())
+            # BRPOP's health check finds it after 26 to 51 s, a call of the ledger after 30.
+            farm.wait(lambda: sum(farm.starts().values()) > n_before + 4, 100, "it goes on")
+            seconds = farm.wait_done(120)
+            assert all(process.poll() is None for process in farm.processes.values())
+            repeated = farm.check_complete(n_repeats=6)
+            note("a proxy stalls all connections for ever", farm, repeated, seconds)
+        finally:
+            farm.close()
+            server.end()

@@ -252,7 +252,11 @@ def celery_sender(app: Any) -> Send:
     recipe). The function raises LedgerUnavailable where the broker takes no message; some of the
     batch may have gone out.
     """
-    from kombu.exceptions import OperationalError
+    import redis
+    from kombu.exceptions import BatchPublishError, OperationalError
+
+    # A connection that is lost under a batch is no OperationalError.
+    away = (OperationalError, BatchPublishError, redis.ConnectionError, redis.TimeoutError, OSError)
 
     def send(messages: Iterable[tuple[str, str, str, str]]) -> None:
         try:
@@ -264,8 +268,9 @@ def celery_sender(app: Any) -> Send:
                         "pbrs.run", args=(job, task, recipe), queue=queue, producer=producer,
                         **_MESSAGE_OPTIONS,
                     )  # fmt: skip
-        except (OperationalError, OSError) as error:
+        except away as error:
             # What was not sent stays "q" in the ledger, and is sent again when it is old.
-            raise LedgerUnavailable(f"the broker took no message: {error}") from error
+            why = error.__cause__ if isinstance(error, BatchPublishError) else error
+            raise LedgerUnavailable(f"the broker took no message: {why}") from error
 
     return send

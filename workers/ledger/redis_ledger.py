@@ -20,6 +20,7 @@ from redis.retry import Retry
 
 from workers.config import FarmConfig, shown_url
 from workers.ids import LIGHT_GPU, POOLS, STAGES
+from workers.ledger.redis_connections import BY_SCHEME, RefusedForNow
 from workers.ledger.task_ledger import (
     ALIVE_S,
     EVERYWHERE,
@@ -58,12 +59,15 @@ _REAP_MOST: Final = 200  # in one script, which nobody else can interrupt
 _RESEND_MOST: Final = 500
 
 
-def redis_client(config: FarmConfig) -> Any:
-    """A client that tries again for a few seconds and never hangs on a half-open connection.
+def redis_client(config: FarmConfig, n_retries: int = 5) -> Any:
+    """A client that tries again for a few seconds, also where Redis refuses for now, and never hangs
+    on a half-open connection.
 
     Typed Any: redis-py types every answer as str, bytes, None or an awaitable.
     """
     url = config.redis_url.reveal()
+    scheme = url.partition(":")[0]
+    kind = {"connection_class": BY_SCHEME[scheme]} if scheme in BY_SCHEME else {}
     # TLS with a checked certificate, or none at all.
     ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
     tls: dict[str, Any] = {"ssl_cert_reqs": "required", **ca} if url.startswith("rediss:") else {}
@@ -74,9 +78,10 @@ def redis_client(config: FarmConfig) -> Any:
         socket_connect_timeout=5,
         socket_keepalive=True,
         health_check_interval=25,
-        retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), 5),
+        retry=Retry(ExponentialWithJitterBackoff(cap=2.0, base=0.05), n_retries),
         retry_on_error=[redis.ConnectionError, redis.TimeoutError],
         client_name="pbrs-ledger",
+        **kind,
         **tls,
     )
 
@@ -111,7 +116,7 @@ def script_text(name: str) -> str:
 class RedisLedger:
     """Implements workers.ledger.task_ledger.Ledger in one Redis; one per process, safe after a fork.
 
-    All methods raise LedgerUnavailable where Redis is away, refuses the password or is out of memory. Each
+    All methods raise LedgerUnavailable where Redis is away, refuses for now or refuses the password. Each
     change is one Lua script (ledger/lua), whole or not at all; `common.lua` lists the keys. Times are Redis'.
 
     client: a redis-py client that decodes its answers; made from the configuration by default.
@@ -571,13 +576,13 @@ class RedisLedger:
             raise LedgerUnavailable(f"{self._where} refuses these credentials: {error}") from error
         except redis.exceptions.NoPermissionError as error:
             raise LedgerUnavailable(f"{self._where} denies: {error}") from error
+        except RefusedForNow as error:
+            is_full = error.prefix == "OOM"
+            hint = "raise maxmemory" if is_full else "it passes, or Redis' own log says why"
+            raise LedgerUnavailable(f"{self._where} refuses for now: {error}", hint=hint) from error
         except (redis.ConnectionError, redis.TimeoutError) as error:
             hint = "is it running? PBRS_REDIS_URL names it"
             raise LedgerUnavailable(f"no Redis at {self._where}: {error}", hint=hint) from error
-        except redis.exceptions.OutOfMemoryError as error:
-            raise LedgerUnavailable(
-                f"{self._where} is out of memory: {error}", hint="raise maxmemory"
-            ) from error
 
 
 def _tasks(answer: object) -> list[str] | None:

@@ -21,6 +21,7 @@ from pbrs_farm.run.processes.child_process import die_with_parent
 from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES
+from workers.liveness import touch
 
 MAX_MESSAGE: Final = 2048  # bytes
 _VISIBILITY_S: Final = 6 * 3600  # a message unacknowledged for so long is delivered again
@@ -116,6 +117,15 @@ def _forget_tasks_of_celery(**_: object) -> None:
     """Only ours is run: a message that names chords, backend_cleanup or another is rejected."""
     for name in [name for name in app.tasks if name.startswith("celery.")]:
         app.tasks.unregister(name)
+
+
+@worker_init.connect  # type: ignore[untyped-decorator]
+def _be_seen_alive_while_the_broker_is_away(**_: object) -> None:
+    """Celery's loop stands still while it tries to connect, for longer than the liveness probe waits."""
+    from workers.queue.redis_transport import Transport
+
+    file = config_from_environment().heartbeat_file
+    Transport.on_try = staticmethod(lambda: touch(file))
 
 
 @worker_process_init.connect  # type: ignore[untyped-decorator]

@@ -3,16 +3,19 @@
 kombu makes a redis-py client, with a table of some hundred callbacks, for each message taken and
 each acknowledged: a fifth of what a worker's parent process does for a short task. An element of a
 queue that is no JSON, or no envelope, would end the worker that takes it: it is dropped, and said.
+So would a Redis that refuses writes for a while: it is a broker that is away until it takes them again.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from json import JSONDecodeError
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 from kombu.transport import redis as kombu_redis
+
+from workers.ledger.redis_connections import Connection, SSLConnection
 
 _log = logging.getLogger("pbrs.worker")
 _ENVELOPE: Final = {"body": str, "headers": dict, "properties": dict}
@@ -22,7 +25,19 @@ _PROPERTIES: Final = {"delivery_tag": str, "delivery_info": dict}
 class Channel(kombu_redis.Channel):  # type: ignore[misc]
     """kombu's channel; its client is kept as long as the pool of connections it draws from."""
 
+    connection_class = Connection
+    connection_class_ssl = SSLConnection
     _kept: Any = None
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        # A channel to a Redis that refuses writes would be lost at its first message, and made again at once:
+        # without it there is no connection yet, and Celery waits longer from try to try.
+        try:
+            self.client.set("takes-writes", "1", px=1)
+        except self.connection_errors:
+            self.close()
+            raise
 
     def _create_client(self, asynchronous: bool = False) -> Any:
         if asynchronous:
@@ -43,6 +58,11 @@ class Transport(kombu_redis.Transport):  # type: ignore[misc]
     """kombu's transport with our channel."""
 
     Channel = Channel
+    on_try: ClassVar[Callable[[], object]] = staticmethod(lambda: None)  # at each try to connect
+
+    def establish_connection(self) -> Any:
+        type(self).on_try()
+        return super().establish_connection()
 
     def _deliver(self, message: Any, queue: str) -> None:
         if _has(message, _ENVELOPE) and _has(message["properties"], _PROPERTIES):
