@@ -159,6 +159,8 @@ def corners(shape: BaseGeometry) -> tuple[Point, ...]:
         return ()
     ring = list(simple.exterior.normalize().coords)[:-1]
     points = [(round(x, 4), round(z, 4)) for x, z in ring]
+    # Leave out all but one of those at one place: beside itself no corner turns, and it would go.
+    points = [p for i, p in enumerate(points) if p != points[i - 1]]
     # Leave out what lies on a straight side: three points that turn by nothing.
     kept = [
         p

@@ -15,6 +15,7 @@ from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
+from pbrs_farm.generate.plan_walls import corners
 from pbrs_farm.generate.plans.closed_rings import closed_rings
 from pbrs_farm.generate.plans.parsed_plan import footprint, footprints
 from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file, upright
@@ -235,6 +236,30 @@ def test_a_hole_without_a_place_is_a_guess_and_a_note(tmp_path: Path) -> None:
     del holes["h0"]["offset"]
     (line,) = plan_from_file(_written(path, value)).left_out
     assert line.startswith("layers.layer-1.holes.h0: a hole has no place")
+
+
+def test_a_stub_of_wall_is_as_thick_as_it_is_drawn(tmp_path: Path) -> None:
+    # 11 cm thick, 1.2 m long, from the wall above; the ring ends where it begins, but for rounding.
+    path = write_zind(tmp_path)
+    value = json.loads(path.read_text())
+    ring = [(0, 0), (5, 0), (5, 4), (2.11, 4), (2.11, 2.8), (2, 2.8), (2, 4), (0, 4), (1e-9, 2e-9)]
+    scale = value["scale_meters_per_coordinate"]["floor_01"]
+    room = {"vertices": [[x / scale, -z / scale] for x, z in ring]}
+    value["redraw"] = {"floor_01": {"room_00": room}}
+    plan = plan_from_file(_written(path, value)).plan
+    (found,) = plan.rooms
+    assert Polygon(found.polygon).symmetric_difference(Polygon(ring[:-1])).area < 1e-3
+    (stub,) = [w for w in plan.walls if not w.is_outer]
+    assert (stub.thickness, stub.length) == pytest.approx((0.11, 1.2))
+    # No wall runs across: all are level or upright.
+    assert all(
+        min(abs(a - b) for a, b in zip(w.start, w.end, strict=True)) < 1e-6 for w in plan.walls
+    )
+
+
+def test_a_corner_drawn_twice_stays() -> None:
+    square = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (2.0, 1.00002), (0.0, 1.0)]
+    assert set(corners(Polygon(square))) == {(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)}
 
 
 def test_an_l_of_cabinets_is_two_boxes() -> None:

@@ -1,7 +1,8 @@
 """Room polygons become walls between them and around them; no effects.
 
 Rooms may touch or leave room for the walls between: a wall of INNER_M stands on a shared side, one as
-thick as the gap in it, one of OUTER_M around. A balcony gets parapets.
+thick as the gap in it, one of OUTER_M around. A stub of wall that a room goes round is as thick as it
+is drawn. A balcony gets parapets.
 """
 
 from __future__ import annotations
@@ -82,6 +83,12 @@ def _walls_of(
                 free = _without(free, low, high)
                 if other > number:
                     found.append(side.wall(low, high, max(gap, INNER_M), gap / 2))
+        # Of the two sides of a thin stub the first has the wall: outer ones would be thicker than it.
+        for low, high, gap, j in side.shared_sides(rings[number]):
+            if gap < outer:
+                free = _without(free, low, high)
+                if j > k:
+                    found.append(side.stub(low, high, max(gap, INNER_M), gap / 2))
         for low, high in free:
             if high - low < _TOUCH_M:
                 continue
@@ -118,6 +125,10 @@ class _Side:
 
     def shared(self, ring: _Ring) -> list[tuple[float, float, float]]:
         """(from, to, gap) where a side of another room faces this one, metres along it."""
+        return [row[:3] for row in self.shared_sides(ring)]
+
+    def shared_sides(self, ring: _Ring) -> list[tuple[float, float, float, int]]:
+        """(from, to, gap, number of the side) of each side of a ring that faces this one."""
         gaps = ((ring.from_ + ring.to) / 2 - self.start) @ self.out
         faces = (ring.ways @ self.along <= -_PARALLEL) & (gaps >= -_TOUCH_M) & (gaps <= _THICKEST_M)
         found = []
@@ -126,7 +137,7 @@ class _Side:
             low, high = max(float(ends.min()), 0.0), min(float(ends.max()), self.length)
             if high - low > 0.05:
                 gap = float(gaps[k])
-                found.append((low, high, gap if gap > _TOUCH_M else 0.0))
+                found.append((low, high, gap if gap > _TOUCH_M else 0.0, k))
         return found
 
     def wall(
@@ -136,6 +147,15 @@ class _Side:
         if not is_outer:
             # Reach into the walls at its ends.
             low, high = low - OUTER_M / 4, high + OUTER_M / 4
+        return self._wall_between(low, high, thickness, out, is_outer=is_outer)
+
+    def stub(self, low: float, high: float, thickness: float, out: float) -> PlanWall:
+        """A wall with a room on either side and at its ends: as long as it is drawn."""
+        return self._wall_between(low, high, thickness, out, is_outer=False)
+
+    def _wall_between(
+        self, low: float, high: float, thickness: float, out: float, *, is_outer: bool
+    ) -> PlanWall:
         ends = [self.start + self.along * t + self.out * out for t in (low, high)]
         a, b = ((round(float(x), 4), round(float(z), 4)) for x, z in ends)
         return PlanWall(a, b, round(thickness, 4), is_outer)
