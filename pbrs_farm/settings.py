@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_regular
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_regular, text_from_bytes
 from pbrs_farm.store.s3 import S3Settings
 from pbrs_farm.store.secret import Secret
 from pbrs_farm.store.url import StoreSettings
@@ -59,6 +59,6 @@ def value_or_file(environment: Mapping[str, str], name: str) -> str:
     if not file:
         return environment.get(name, "")
     try:
-        return read_regular(Path(file), MAX_TEXT_BYTES).decode("utf-8").strip()
+        return text_from_bytes(read_regular(Path(file), MAX_TEXT_BYTES)).strip()
     except (OSError, UnicodeDecodeError) as error:
         raise BadInput(file, f"{name}_FILE", f"cannot be read: {error}") from None

@@ -8,8 +8,17 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.formats.recipe_toml import recipe_from_toml
 from pbrs_farm.prepare.source import resolve
-from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular, real_path
+from pbrs_farm.regular_files import (
+    digest_of_regular,
+    fault_of,
+    read_regular,
+    real_path,
+    text_from_bytes,
+    text_given,
+)
 
 
 def _device(path: Path) -> None:
@@ -46,3 +55,22 @@ def test_a_link_to_itself_is_a_bad_house_and_no_runtime_error(name, tmp_path):
     assert real_path(path) == path
     with pytest.raises(BadHouse):
         resolve(str(path))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_text_of_any_system_is_read_without_its_byte_order_mark(encoding, tmp_path):
+    path = tmp_path / "list.txt"
+    path.write_bytes("Küche\n".encode(encoding))
+    assert text_given(path) == "Küche\n"
+
+
+def test_text_that_is_damaged_is_read_as_far_as_it_goes_where_that_is_wanted():
+    assert text_from_bytes(b"a\xffb", "replace") == "a\ufffdb"
+    with pytest.raises(UnicodeDecodeError):
+        text_from_bytes(b"a\xffb")
+
+
+def test_a_recipe_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('recipe = "preview"\n', encoding="utf-8-sig")
+    assert recipe_from_toml(path, {}).image == recipe_from_name("preview").image

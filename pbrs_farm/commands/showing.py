@@ -101,10 +101,10 @@ def _say(options: BoardOptions, token: Secret, *, is_own_token: bool) -> None:
 
 def _token(path: Path) -> Secret:
     """The token in a file; BadInput where it cannot be read or is too short to keep anybody out."""
-    from pbrs_farm.regular_files import fault_of, read_regular
+    from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
 
     try:
-        text = read_regular(path, 4096).decode("utf-8").strip()
+        text = text_from_bytes(read_regular(path, 4096)).strip()
     except OSError as error:
         raise BadInput(path, "", fault_of(error)) from None
     except UnicodeDecodeError:

@@ -7,6 +7,7 @@ pydantic say of a fault is translated here alone: the place in the file, and wha
 from __future__ import annotations
 
 import json
+from codecs import BOM_UTF8
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Annotated, Any, Final, TypeVar
@@ -75,7 +76,7 @@ def checked(
     adapter: TypeAdapter[T] = kind if isinstance(kind, TypeAdapter) else _adapter_of(kind)
     try:
         if isinstance(data, bytes):
-            return adapter.validate_json(data)
+            return adapter.validate_json(data.removeprefix(BOM_UTF8))
         return adapter.validate_python(data)
     except ValidationError as fault:
         # Name the first fault: the others may follow from it.

@@ -68,7 +68,7 @@ def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
 
 def _read(path: Path, kind: type[_T], parse: Callable[[str], Any]) -> _T:
     try:
-        raw = parse(path.read_text("utf-8"))
+        raw = parse(path.read_text("utf-8-sig"))
     except (OSError, ValueError, csv.Error) as error:
         raise BadInput(path.name, "", str(error)) from error
     try:

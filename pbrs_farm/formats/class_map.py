@@ -146,7 +146,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
 
 def _cells(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     """Line and cells by column of each row; blank lines and those that begin with # are none."""
-    text = text_given(path).removeprefix("\ufeff")
+    text = text_given(path)
     lines = ["" if line.startswith("#") else line for line in text.splitlines()]
     reader = csv.reader(lines, strict=True)
     columns: list[str] | None = None

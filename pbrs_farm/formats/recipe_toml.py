@@ -18,7 +18,7 @@ from typing import Final
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, changed_recipe
 from pbrs_farm.core.shown_text import hint_of_choice, shown
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
 
 ENDING: Final = ".toml"
 _MAX_BYTES: Final = 2**20
@@ -32,7 +32,7 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
     file that cannot be read, is no TOML, is too large, or sets what no recipe has.
     """
     try:
-        fields = tomllib.loads(read_regular(path, _MAX_BYTES).decode())
+        fields = tomllib.loads(text_from_bytes(read_regular(path, _MAX_BYTES)))
     except OSError as error:
         raise BadRecipe(f"{path}: {fault_of(error)}") from None
     # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.

@@ -23,7 +23,7 @@ from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.prepare import passes
 from pbrs_farm.prepare.source import SourceRef
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.object_store import Store, put_done
@@ -177,12 +177,12 @@ def camera_file_text(fields: CameraFields) -> str:
     path = Path(fields.file)
     names = path.with_name("room_camera_name.txt")
     try:
-        text = read_regular(path, MAX_TEXT_BYTES).decode("utf-8")
+        text = text_from_bytes(read_regular(path, MAX_TEXT_BYTES))
         if path.name != "room_camera.txt" or not names.exists():
             return text
         from pbrs_farm.sample.room_camera_file import with_names
 
-        return with_names(text, read_regular(names, MAX_TEXT_BYTES).decode("utf-8"), str(names))
+        return with_names(text, text_from_bytes(read_regular(names, MAX_TEXT_BYTES)), str(names))
     except OSError as error:
         raise BadInput(fields.file or "cameras.file", "", fault_of(error)) from None
     except UnicodeDecodeError:

@@ -77,3 +77,4 @@ def test_what_fits_is_read_as_it_stands():
     part = {"name": "a", "at": [1, 2.5, 3], "share": 0}
     assert checked(Part, part, "a.json") == Part(name="a", at=(1.0, 2.5, 3.0), share=0.0)
     assert checked(TypeAdapter(list[Finite]), b"[1, 2.5]", "a.json") == [1.0, 2.5]
+    assert checked(TypeAdapter(list[Finite]), b"\xef\xbb\xbf[1]", "a.json") == [1.0]

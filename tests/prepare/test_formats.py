@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import sys
 from collections.abc import Callable, Iterator
@@ -142,6 +143,36 @@ def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
 
 def _declared_repaired(house: House, **_given: object) -> tuple[House, RepairReport]:
     return replace(house, is_repaired=True), RepairReport(house_id=house.id)
+
+
+@each_format
+def test_a_byte_order_mark_before_a_text_changes_nothing(tmp_path: Path, title: str) -> None:
+    path = WRITERS[title](tmp_path)
+    before = _what_is_read(path)
+    for file in filter(Path.is_file, tmp_path.rglob("*")):
+        if _is_text(file.read_bytes()):
+            file.write_bytes(codecs.BOM_UTF8 + file.read_bytes())
+    if title == "OpenUSD":
+        # The library refuses such a file, and says why.
+        with pytest.raises(BadHouse, match="BOM"):
+            _what_is_read(path)
+        return
+    assert _what_is_read(path) == before
+
+
+def _is_text(data: bytes) -> bool:
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return bool(data) and b"\0" not in data
+
+
+def _what_is_read(path: Path) -> list[object]:
+    house = read_house(resolve(str(path)), ReadFields())
+    items = [(i.id, i.name, i.kind, i.nyu40, len(i.surfaces), len(i.lights)) for i in house.items]
+    rooms = [(room.id, room.name, room.polygon.tolist()) for room in house.rooms]
+    return [items, rooms, house.notes, [(m.kind, m.diffuse) for m in house.materials]]
 
 
 def test_a_range_and_a_folder_are_one_word_a_home(tmp_path: Path) -> None:

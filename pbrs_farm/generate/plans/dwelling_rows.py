@@ -112,7 +112,7 @@ def _read_rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
     csv.field_size_limit(_LONGEST_FIELD)
     try:
         with open_regular(path, MAX_DIGEST_BYTES) as file:
-            reader = csv.reader(io.TextIOWrapper(file, "utf-8"))
+            reader = csv.reader(io.TextIOWrapper(file, "utf-8-sig"))
             names = ["geometry" if n == "geom" else n for n in next(reader, [])]
             missing = [c for c in _NEEDED if c not in names]
             if missing:

@@ -22,7 +22,7 @@ from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.read.catalogue.library_files import LibraryNotes
 from pbrs_farm.read.common.bounded_json import bounded_json
 from pbrs_farm.read.common.given_classes import given_class
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
 
 Size = tuple[float, float, float]
 
@@ -105,13 +105,14 @@ def _read_model_table(path: Path, name: str, read: Any, notes: LibraryNotes) -> 
 def _names_files(file: Path) -> bool:
     try:
         with file.open("rb") as stream:
-            return b"file" in stream.readline(4096).lower().strip().split(b",")
+            head = text_from_bytes(stream.readline(4096), "replace")
+            return "file" in head.lower().strip().split(",")
     except OSError:
         return False
 
 
 def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
-    text = read_regular(path / name, MAX_TEXT_BYTES).decode("utf-8-sig")
+    text = text_from_bytes(read_regular(path / name, MAX_TEXT_BYTES))
     rows = list(csv.DictReader(text.splitlines()))
     if rows and "file" not in rows[0]:
         raise ValueError("has no column `file`")
@@ -184,7 +185,7 @@ def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
 
 def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     """HSSD: an id a row and its category; models in objects/, by the id's first character."""
-    rows = csv.reader(io.StringIO(_data(path / name).decode("utf-8", "replace")))
+    rows = csv.reader(io.StringIO(text_from_bytes(_data(path / name), "replace")))
     head = [h.strip().lower() for h in next(rows, [])]
     at_id = head.index("id") if "id" in head else 0
     at_class = next((head.index(h) for h in ("main_category", "category") if h in head), 14)

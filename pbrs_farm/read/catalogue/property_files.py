@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Final
 
+from pbrs_farm.regular_files import text_from_bytes
+
 _ESCAPE: Final = re.compile(r"\\(u[0-9a-fA-F]{4}|.)", re.DOTALL)
 _LETTERS: Final = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
 _ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
@@ -16,7 +18,7 @@ def parse_properties(data: bytes) -> dict[str, str]:
     Text is UTF-8 where it decodes, else Latin-1; a line that ends in a backslash goes on.
     """
     try:
-        text = data.decode("utf-8-sig")
+        text = text_from_bytes(data)
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     found = {}

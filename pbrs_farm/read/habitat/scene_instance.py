@@ -40,7 +40,7 @@ from pbrs_farm.read.gltf.document import (
 )
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene import house_of_gltf
-from pbrs_farm.regular_files import MAX_SCENE_BYTES
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
 
 _CONFIG: Final = "*.scene_dataset_config.json"
 _LEVELS_UP: Final = 6  # from a scene to its data set's config
@@ -184,7 +184,7 @@ class _Dataset:
             self._classes = {}
             for name in self.named("*objects.csv"):
                 data = self.folder.read(name, max_bytes=_MOST_JSON_BYTES) or b""
-                for row in csv.DictReader(io.StringIO(data.decode("utf-8", "replace"))):
+                for row in csv.DictReader(io.StringIO(text_from_bytes(data, "replace"))):
                     words = [row.get(k) for k in ("main_category", "category", "name")]
                     known = next((w for w in words if w), "")
                     self._classes[next(iter(row.values())) or ""] = str(known)

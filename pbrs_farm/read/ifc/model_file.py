@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.resources import ZipResources
-from pbrs_farm.regular_files import read_given
+from pbrs_farm.regular_files import read_given, text_from_bytes
 
 _MOST_BYTES: Final = 512 * 2**20
 _MOST_ROWS: Final = 5_000_000
@@ -36,7 +36,7 @@ def model_of(path: Path) -> Any:
     data = _bytes_of(path)
     _check_step_file(data, path)
     try:
-        model = ifcopenshell.file.from_string(data.decode("utf-8", "replace"))
+        model = ifcopenshell.file.from_string(text_from_bytes(data, "replace"))
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
         text = " ".join(str(error).split())[:200] or "the library cannot parse it"
         raise BadHouse(path, "", f"damaged: {text}") from None

@@ -10,6 +10,8 @@ from importlib.resources import files
 
 import numpy as np
 
+from pbrs_farm.regular_files import text_from_bytes
+
 Rgb = tuple[float, float, float]
 
 
@@ -34,7 +36,7 @@ def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
     """
     materials: list[ObjMaterial] = []
     fields: dict[str, object] | None = None
-    for raw in data.decode("utf-8", "replace").splitlines():
+    for raw in text_from_bytes(data, "replace").splitlines():
         words = raw.split()
         if not words:
             continue

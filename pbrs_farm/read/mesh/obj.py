@@ -6,6 +6,7 @@ usemtl, mtllib and line continuations; everything else (l, p, free-form surfaces
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,6 +72,7 @@ def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjM
     Raises BadHouse for a number that is none or not finite, a face index out of range, or more
     than max_triangles triangles.
     """
+    data = data.removeprefix(BOM_UTF8)
     # Bound the work by counting lines before any is looked at.
     for key, most in ((b"\nf", max_triangles), (b"\nv ", 3 * max_triangles)):
         if data.count(key) > most:

@@ -34,7 +34,7 @@ from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.scenestate.scene_document import PlacedModel
-from pbrs_farm.regular_files import MAX_SCENE_BYTES
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
 
 _TABLES: Final = (
     "objects.csv", "semantics/objects.csv", "metadata/objects.csv", "semantics/hssd-hab_semantics_objects.csv",
@@ -213,7 +213,7 @@ def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
 
 
 def _parse_objects_csv(data: bytes) -> dict[str, _Row]:
-    rows = csv.reader(io.StringIO(data.decode("utf-8", "replace")))
+    rows = csv.reader(io.StringIO(text_from_bytes(data, "replace")))
     found: dict[str, _Row] = {}
     try:
         head = [h.strip().lower() for h in next(rows, [])]

@@ -26,6 +26,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.regular_files import text_from_bytes
 
 if TYPE_CHECKING:
     from pbrs_farm.read.usd.stage_files import StageFolder
@@ -102,7 +103,7 @@ def _credit(stage: Any) -> str:
 def _material_text(folder: StageFolder, asset: Any) -> str:
     """The text of a material's own file, "" where it is not there."""
     data = folder.picture(asset) if asset is not None and hasattr(asset, "resolvedPath") else None
-    return "" if data is None else data[: 2**20].decode("utf-8", "replace")
+    return "" if data is None else text_from_bytes(data[: 2**20], "replace")
 
 
 def _name_beside_stage(folder: StageFolder, path: Path, name: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,15 @@ from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
 
 MAX_ROWS: Final = 100_000
 ORIGIN: Final = "trajectory"
+_HEAD: Final = ["timestamp", "tx", "ty"]  # a first row that names its columns begins so
+_UNITS: Final = (
+    (1e17, 10**9),
+    (1e14, 10**6),
+    (1e11, 10**3),
+)  # least stamp since 1970, units a second
+_MOST_GAP_S: Final = (
+    10_000.0  # between frames: more is a smaller unit that is not counted from 1970
+)
 _UNIT: Final = 0.01  # a quaternion's length may differ from 1 by so much
 _AXES: Final = np.concatenate([np.eye(3), -np.eye(3)])
 _BACKS: Final = 4  # of six rays along the axes: so many backs of walls mean an eye inside one
@@ -36,24 +46,47 @@ class Pose:
 
 
 def poses_from_tum(text: str, file: str) -> list[Pose]:
-    """The poses of the rows `t x y z qx qy qz qw`, metres and seconds; lines from # on are comments.
+    """The poses of the rows `t x y z qx qy qz qw`, metres and seconds; what follows a # is a comment.
+
+    Stamps since 1970 in milli-, micro- or nanoseconds are known by their size and become seconds.
 
     The world is the home's, y up; the quaternion turns camera axes x right, y down, z forward
     (TUM's, OpenCV's) into it. Raises BadInput with the file, the row's line and the reason.
     """
     poses: list[Pose] = []
+    stamps: list[str] = []  # as they are written
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.partition("#")[0].replace(",", " ").split()
-        if not words:
+        if not words or (not poses and words[:3] == _HEAD):
             continue
         if len(poses) == MAX_ROWS:
             raise BadInput(file, f"line {number}", f"more than {MAX_ROWS} rows")
         poses.append(_pose_of_line(words, number, file))
+        stamps.append(words[0])
         if len(poses) > 1 and poses[-1].time_s <= poses[-2].time_s:
-            text = f"time {poses[-1].time_s:g} is not after {poses[-2].time_s:g} of the row before"
-            raise BadInput(file, f"line {number}", text)
+            text = f"time {stamps[-1]} is not after {stamps[-2]} of the row before"
+            hint = "write it with all its digits" if "e" in stamps[-1].lower() else ""
+            raise BadInput(file, f"line {number}", text, hint=hint)
     if not poses:
         raise BadInput(file, "", "holds no row", hint="rows are t x y z qx qy qz qw")
+    return _in_seconds(poses, stamps, file)
+
+
+def _in_seconds(poses: list[Pose], stamps: list[str], file: str) -> list[Pose]:
+    """The poses with times in seconds: stamps since 1970 in a smaller unit are known by their size."""
+    times = np.array([pose.time_s for pose in poses])
+    largest = np.abs(times).max()
+    per_second = next((per for least, per in _UNITS if largest >= least), 1)
+    if per_second > 1:
+        # Divide what is written: a float of as many nanoseconds is good to 256 of them.
+        return [
+            replace(pose, time_s=float(Decimal(stamp) / per_second))
+            for pose, stamp in zip(poses, stamps, strict=True)
+        ]
+    gap = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    if gap > _MOST_GAP_S:
+        text = f"rows are {gap:g} apart: times are seconds, or a smaller unit counted from 1970"
+        raise BadInput(file, f"line {poses[1].line}", text, hint="divide the first column")
     return poses
 
 
@@ -61,6 +94,8 @@ def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
     place = f"line {line}"
     if len(words) != 8:
         hint = "t x y z qx qy qz qw"
+        if len(words) == 12:
+            hint = f"KITTI's rows of 12 are poses without times; wanted is {hint}"
         raise BadInput(file, place, f"expected 8 numbers, got {len(words)}", hint=hint)
     try:
         numbers = np.array([float(word) for word in words])

@@ -16,6 +16,16 @@ from pbrs_farm.read.mesh.triangulate import triangulated_corners
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
 
+@pytest.mark.parametrize("first", ["mtllib m.mtl\n", "v 9 9 9\n", "# a remark\n"])
+def test_a_byte_order_mark_hides_no_line(first: str) -> None:
+    text = f"{first}{QUAD}usemtl a\nf -4 -3 -2\n"
+    plain, marked = (parse_obj(text.encode(e), "m.obj") for e in ("utf-8", "utf-8-sig"))
+    assert marked.mtllibs == plain.mtllibs
+    np.testing.assert_array_equal(marked.meshes[0].positions, plain.meshes[0].positions)
+    (material,) = parse_mtl("newmtl a\nKd 1 0 0\n".encode("utf-8-sig"))
+    assert (material.name, material.kd) == ("a", (1.0, 0.0, 0.0))
+
+
 def one(text: str) -> Mesh:
     (mesh,) = parse_obj(text.encode(), "m.obj").meshes
     return mesh

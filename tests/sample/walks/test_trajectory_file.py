@@ -1,5 +1,8 @@
 """A user's trajectory: read as TUM writes it, and rejected with file, row and reason."""
 
+import codecs
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +10,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
 from tests.sample.sampled_rooms import room_house, shell
 
@@ -25,6 +29,7 @@ def test_a_row_is_a_time_and_a_pose_of_opencv_axes() -> None:
     ("row", "reason"),
     [
         ("1 2 3", "expected 8 numbers, got 3"),
+        ("1 0 0 2 0 -1 0 1.5 0 0 -1 3", "got 12.*KITTI"),
         ("1 1 1.5 2 1 0 0 zero", "expected numbers"),
         ("1 1 nan 2 1 0 0 0", "y is not finite"),
         ("1 1 1.5 2 0 0 0 0", "no rotation: its length is 0"),
@@ -37,6 +42,49 @@ def test_a_row_that_is_no_pose_is_rejected_with_its_line(row: str, reason: str) 
     with pytest.raises(BadInput, match=reason) as caught:
         poses_from_tum(f"0.5 1 1.5 2 {ALONG_Z}\n{row}\n", "way.txt")
     assert "way.txt: line 2" in str(caught.value)
+
+
+def test_stamps_that_do_not_grow_are_shown_as_they_are_written() -> None:
+    rows = f"1305031102.2091 1 1.5 2 {ALONG_Z}\n1305031102.2091 1 1.5 2 {ALONG_Z}\n"
+    with pytest.raises(BadInput, match=r"time 1305031102\.2091 is not after 1305031102\.2091 of"):
+        poses_from_tum(rows, "way.txt")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "expected"),
+    [
+        (("1305031102175800064", "1305031102209133312"), (1305031102.1758, 1305031102.209133312)),
+        (("1305031102175800", "1305031102209133"), (1305031102.1758, 1305031102.209133)),
+        (("1305031102175.8", "1305031102209"), (1305031102.1758, 1305031102.209)),
+        (("1305031102.1758", "1305031102.2091"), (1305031102.1758, 1305031102.2091)),
+        (("0", "9000"), (0.0, 9000.0)),
+    ],
+)
+def test_the_unit_of_stamps_since_1970_is_known_by_their_size(
+    stamps: tuple[str, str], expected: tuple[float, float]
+) -> None:
+    poses = poses_from_tum("".join(f"{t} 1 1.5 2 {ALONG_Z}\n" for t in stamps), "way.txt")
+    np.testing.assert_allclose([pose.time_s for pose in poses], expected, rtol=0, atol=3e-7)
+
+
+def test_stamps_of_an_unknown_unit_are_refused() -> None:
+    rows = "".join(f"{k * 33_333_333} 1 1.5 2 {ALONG_Z}\n" for k in range(3))
+    with pytest.raises(BadInput, match=r"way\.txt: line 2: rows are 3\.33333e\+07 apart"):
+        poses_from_tum(rows, "way.txt")
+
+
+def test_a_row_that_names_the_columns_is_passed_over() -> None:
+    rows = f"timestamp,tx,ty,tz,qx,qy,qz,qw\n0.5,1,1.5,2,{ALONG_Z.replace(' ', ',')}\n"
+    (pose,) = poses_from_tum(rows, "way.csv")
+    assert (pose.line, pose.time_s) == (2, 0.5)
+
+
+def test_a_byte_order_mark_and_ends_of_lines_of_windows_change_nothing(tmp_path: Path) -> None:
+    rows = f"0.5 1 1.5 2 {ALONG_Z}\n0.6 1 1.5 2 {ALONG_Z}\n"
+    (tmp_path / "way.txt").write_bytes(codecs.BOM_UTF8 + rows.replace("\n", "\r\n").encode())
+    fields = CameraFields(source="trajectory", file=str(tmp_path / "way.txt"))
+    poses = poses_from_tum(camera_file_text(fields), fields.file)
+    assert [pose.time_s for pose in poses] == [0.5, 0.6]
 
 
 def test_a_file_without_a_row_is_rejected() -> None:
