@@ -28,7 +28,10 @@ Handler = Callable[[argparse.Namespace], int]
 Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
 
 # Help of arguments that name a home, and a view.
-HOME: Final = "file, SUNCG house folder, example home's name, `builtin`, or `made:SEED`"
+HOME: Final = (
+    "file of a home or a folder of homes (`inputs` lists the formats), example home's name, `builtin`,"
+    " `made:SEED`, or `plugin:NAME,SEED`"
+)
 _MAX_LINE: Final = 1500  # characters of a warning: a command that reproduces a fault fits
 MAX_SEEDS: Final = 100_000  # of one command
 VIEW: Final = "a view's folder: OUT/houses/<house>/views/<view>"

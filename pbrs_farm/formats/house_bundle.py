@@ -16,22 +16,12 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item, Material
+from pbrs_farm.core.house import House, Item
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
 from pbrs_farm.formats.serialise import json_from_value, pretty_json, value_from_json
 
 FORMAT: Final = "pbrs_farm house 1"
-
-# Fields that came after houses were stored, and what leaving them out means: a house that uses
-# none has the bytes it always had.
-_LATER_FIELDS: Final = {
-    "roughness": None,
-    "roughness_texture_id": None,
-    "normal_texture_id": None,
-    "normal_scale": 1.0,
-}
-_LATER_FIELDS_OF_LIGHTS: Final = {"is_coloured": False, "is_bare": False}
 
 
 def bundle_from_house(house: House) -> tuple[bytes, bytes]:
@@ -55,7 +45,7 @@ def _json_of_house(house: House) -> dict[str, Any]:
         for name in House.__slots__
         if name not in ("items", "textures", "materials")
     }
-    data["materials"] = [_json_of_material(m) for m in house.materials]
+    data["materials"] = [json_from_value(m) for m in house.materials]
     data["items"] = [_json_of_item(item, i + 1) for i, item in enumerate(house.items)]
     data["textures"] = [
         {"key": key, "id": t.id, "name": t.name, "media_type": t.media_type}
@@ -64,21 +54,10 @@ def _json_of_house(house: House) -> dict[str, Any]:
     return data
 
 
-def _json_of_material(material: Material) -> dict[str, Any]:
-    return _without_unused(json_from_value(material), _LATER_FIELDS)
-
-
-def _without_unused(values: dict[str, Any], later: dict[str, Any]) -> dict[str, Any]:
-    return {k: v for k, v in values.items() if k not in later or v != later[k]}
-
-
 def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
     data = {
         name: json_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
     }
-    if item.pose is None:
-        del data["pose"]
-    data["lights"] = [_without_unused(x, _LATER_FIELDS_OF_LIGHTS) for x in data["lights"]]
     data["surfaces"] = [
         {
             "name": s.name,

@@ -697,8 +697,8 @@ def load(
 ) -> Home:
     """A home by any word of `pbrs-farm run`.
 
-    home: a .sh3d, .glb or .gltf file, a SUNCG house folder, an example home's name ("Studio"),
-    "builtin", or "made:7". models: the folder of the models that a scene of HSSD, 3D-FRONT or
+    home: a file of any format that `pbrs-farm inputs` lists, a SUNCG house folder, an example home's
+    name ("Studio"), "builtin", "made:7", or a plugin's "plugin:NAME,7". models: the folder of the models that a scene of HSSD, 3D-FRONT or
     Holodeck names. recipe: preview, fast, paper, released, a .toml file or a Recipe.
     settings: recipe fields to override: pf.load("Studio", **{"light.spp": 64}).
 

@@ -108,8 +108,6 @@ class TrainingPlan:
 
 # Fields that change neither weights nor figures: a run may go on with others.
 _FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views")
-# Fields that came later and change nothing at 0: left out there, so that runs of before go on.
-_LATER: Final = ("hue", "average")
 
 _CHOICES: Final = {
     "task": TASKS,
@@ -228,11 +226,7 @@ def plan_as_json(plan: TrainingPlan) -> dict[str, Any]:
 
 def plan_as_trained(plan: TrainingPlan) -> dict[str, Any]:
     """Every field that weights or figures depend on: what a run that goes on must share."""
-    return {
-        name: value
-        for name, value in asdict(plan).items()
-        if name not in _FREE and (value or name not in _LATER)
-    }
+    return {name: value for name, value in asdict(plan).items() if name not in _FREE}
 
 
 def plan_from_json(row: dict[str, Any], file: str) -> TrainingPlan:

@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House, Material, geometry_from_house
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
@@ -131,11 +131,12 @@ def test_roughness_and_maps_read_back_and_stand_where_gltf_viewers_look() -> Non
     assert material["normalTexture"] == {"index": 0, "scale": 0.5}
 
 
-def test_a_house_without_maps_has_the_bytes_it_had_before_there_were_any() -> None:
-    text = bundle_from_house(full_house())[1].decode()
-    assert "roughness" not in text
-    assert "normal_texture_id" not in text
-    assert "normal_scale" not in text
+def test_house_json_names_every_field_of_a_material_and_a_lamp() -> None:
+    row = json.loads(bundle_from_house(full_house())[1])
+    assert set(row["materials"][0]) == set(Material.__slots__)
+    lamp = next(item for item in row["items"] if item["lights"])
+    assert {"is_coloured", "is_bare"} <= set(lamp["lights"][0])
+    assert lamp["pose"] is None
 
 
 def test_house_json_is_readable_and_says_everything_but_arrays() -> None:
