@@ -76,7 +76,7 @@ def _check_hha(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tall
     points, normals, _rays = _points_and_normals(view, arrays)
     seen, height_cm = depth > 0, points[..., 1] * 100
     if not seen.any():
-        _tell(view, "hha", np.asarray(~stored.any(axis=-1)), tally)
+        _tally_pixels(view, "hha", np.asarray(~stored.any(axis=-1)), tally)
         return
     lowest = float(height_cm[seen].min())
     # At the limit between a floor that is seen and one that is assumed, either is right.
@@ -92,7 +92,7 @@ def _check_hha(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tall
         expected = np.clip(np.stack([near, height_cm - floor, angle], axis=-1), 0, 255)
         right |= (np.abs(stored - expected) <= slack).all(axis=-1)
     right |= depth >= _SATURATED_MM
-    _tell(view, "hha", np.where(seen, right, ~stored.any(axis=-1)), tally)
+    _tally_pixels(view, "hha", np.where(seen, right, ~stored.any(axis=-1)), tally)
 
 
 def _check_matching(
@@ -116,7 +116,7 @@ def _check_matching(
         is_flat = (high - low < _FLAT_SIGMAS * noise) & (depth > 0)
         # Depths that noise does not push out of reach.
         is_flat &= (fb / true > nearest * 1.1) & (fb / true < farthest * 0.8)
-    _tell(view, f"{name}: values", ~measured | (fits & reach & near), tally)
+    _tally_pixels(view, f"{name}: values", ~measured | (fits & reach & near), tally)
     _check_statistics(view, name, (found - true) / noise, measured, is_flat, tally)
 
 
@@ -138,7 +138,7 @@ def _check_tof(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tall
         # It measures the pixel itself, so that a slant moves nothing.
         is_flat = (high - low < _SLANT_SIGMAS * sigma) & (depth > 0)
         is_flat &= (true > _TOF_REACH_M[0] * 1.1) & (true < _TOF_REACH_M[1] * 0.9)
-    _tell(view, "depth_sensor_tof: values", ~measured | (reach & near), tally)
+    _tally_pixels(view, "depth_sensor_tof: values", ~measured | (reach & near), tally)
     _check_statistics(view, "depth_sensor_tof", (found - true) / sigma, measured, is_flat, tally)
 
 
@@ -188,7 +188,7 @@ def _check_statistics(
     tally.expect(check, view.place, _SPREAD[0] <= spread <= _SPREAD[1], what)
 
 
-def _tell(view: StoredView, check: str, right: NDArray[np.bool_], tally: Tally) -> None:
+def _tally_pixels(view: StoredView, check: str, right: NDArray[np.bool_], tally: Tally) -> None:
     tally.add(check, right.size)
     if not right.all():
         row, column = np.argwhere(~right)[0]

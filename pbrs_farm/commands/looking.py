@@ -1,4 +1,7 @@
-"""Verbs that tell: doctor, inputs, skies, recipes, layers, completion. Effects: print; skies downloads."""
+"""Verbs that print what the program and the machine are: doctor, inputs, skies, recipes, layers, completion.
+
+Effects: print; skies downloads.
+"""
 
 from __future__ import annotations
 

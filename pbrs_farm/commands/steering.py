@@ -265,8 +265,8 @@ def _gc(args: argparse.Namespace) -> int:
             f"{g.kind:<22}{len(g.found):>9} objects {g.n_bytes / 1e6:>10.1f} MB" for g in found
         ]
         lines += [f"    {key}" for g in found for key in g.found[:3]]
-        told = f"{n} objects removed" if args.yes else "nothing is removed: --yes does it"
-        return "\n".join([*lines, told])
+        message = f"{n} objects removed" if args.yes else "nothing is removed: --yes does it"
+        return "\n".join([*lines, message])
 
     _show(args, {"found": rows, "removed": n}, text)
     return 0
@@ -308,14 +308,14 @@ def _users(args: argparse.Namespace) -> int:
     answer: dict[str, Any] = {"user": args.name, "what": args.what}
     if args.what == "add":
         answer["token"] = add_user(farm, args.name, limits)
-        told = f"{args.name}'s token, kept nowhere: {answer['token']}"
+        message = f"{args.name}'s token, kept nowhere: {answer['token']}"
     elif args.what == "limit":
         change_user(farm, args.name, limits)
-        told = f"{args.name} changed"
+        message = f"{args.name} changed"
     else:
         remove_user(farm, args.name)
-        told = f"{args.name} removed"
-    _show(args, answer, lambda: told)
+        message = f"{args.name} removed"
+    _show(args, answer, lambda: message)
     return 0
 
 

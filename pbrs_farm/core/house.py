@@ -207,12 +207,12 @@ Light is not scattered by it; labels and pictures have it behind glass.
 LIT: Final = "lit"
 """Begins the name of a material of such an item that shines by itself: windows at night."""
 
-BOX_ONLY: Final = "told"
-"""Tag of an item without surfaces of which the source tells class and box alone.
+BOX_ONLY: Final = "box-only"
+"""Tag of an item without surfaces of which the source gives class and box alone.
 
 box: its axes are right, up, front (columns). A piece of furniture stands in for it (prepare/stand_ins.py).
 """
-FRONT_GIVEN: Final = "front-told"
+FRONT_GIVEN: Final = "front-given"
 """Tag beside BOX_ONLY: the box's front is the source's own, else it is guessed from what is near."""
 
 

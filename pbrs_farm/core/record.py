@@ -33,8 +33,8 @@ Nyu40 = Annotated[int, BeforeValidator(_nyu40)]
 """A class of NYU40, by its name in tables."""
 
 
-def _several(told: object) -> object:
-    return told.split("|") if isinstance(told, str) else told
+def _several(value: object) -> object:
+    return value.split("|") if isinstance(value, str) else value
 
 
 _Of = TypeVar("_Of")

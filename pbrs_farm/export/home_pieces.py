@@ -30,15 +30,15 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.geometry.convex_parts import hulls_of_parts
 
-COLLISION: Final = "the convex hull of each part that hangs together"
+COLLISION: Final = "the convex hull of each connected part"
 COLLIDES: Final = f"things collide as {COLLISION}"
 _MOST_PARTS: Final = 12  # of an item
 _KG_PER_M3: Final = 100.0  # of collision volume: furniture is mostly air
 _LEAST_KG, _MOST_KG = 0.1, 150.0
 _RESTING_M: Final = 0.03  # between a thing and what it stands on
 WALKER_M: Final = 0.2  # radius of what moves on the navigable floor
-_HEAD_M: Final = 1.6  # what begins higher above the floor is passed under
-_STEP_M: Final = 0.05  # what ends lower is passed over: rugs
+_HEAD_M: Final = 1.6  # the height of the walker: what hangs higher is walked under
+_STEP_M: Final = 0.05  # what is lower is stepped over: rugs
 
 # Kinds that are the building: they stand still and are met as they are.
 BUILDING: Final = (

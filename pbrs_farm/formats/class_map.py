@@ -35,7 +35,9 @@ _COLUMNS: Final = ("from", "id", "name")
 _MAX_ID: Final = 65535
 _MAX_ROWS: Final = 100_000
 _WILD: Final = frozenset("*?[")
-_MISSPELT: Final = 0.8  # likeness of letters from which a word is a class of NYU40 misspelt
+_MISSPELT: Final = (
+    0.8  # similarity (difflib's ratio) from which a word counts as a misspelt NYU40 class
+)
 _KINDS: Final = tuple(str(kind) for kind in ItemKind)
 _FIELDS: Final = ("class", "kind", "source_class", "name")  # of an instance, that a word may say
 _NAMES: Final = ("name", "source_class")  # of an instance, that a pattern may fit
@@ -116,7 +118,7 @@ def class_map(table: str | Path | ClassMap) -> ClassMap:
 
     Raises BadInput, naming file and line, for a file that cannot be read, a missing column, an id
     that is no whole number of 0..65535, an id with two names or a name with two ids, a `from` that
-    stands twice, and one that is a class of NYU40 misspelt.
+    stands twice, and one that is a misspelt NYU40 class.
     """
     if isinstance(table, ClassMap):
         return table
@@ -201,7 +203,7 @@ def _table_row(path: Path, line: int, cells: dict[str, str]) -> ClassRule:
         raise BadInput(path, place, what, hint=f"at most {MAX_NAME} characters")
     known = (*NYU40_NAMES, *_KINDS)
     if _WILD.isdisjoint(word) and word not in known:
-        # A word that is nearly a class is one misspelt; any other is a source's or an item's.
+        # A word that is nearly a class is a misspelt one; any other is a source's or an item's.
         near = get_close_matches(word[:MAX_NAME], NYU40_NAMES, n=1, cutoff=_MISSPELT)
         if near:
             hint = f"{question(near)} a pattern such as {shown(word)}* says items of that name"

@@ -233,9 +233,14 @@ def _set_light(house: House, edit: SetLight, _fields: ReadFields) -> House:
 
 def _shining(light: LightPart, edit: SetLight) -> LightPart:
     rgb = light.rgb_linear if edit.rgb_linear is None else edit.rgb_linear
-    told = light.is_coloured or edit.rgb_linear is not None
+    is_coloured = light.is_coloured or edit.rgb_linear is not None
     return replace(
-        light, power=edit.lm, unit=PowerUnit.LUMEN, rgb_linear=rgb, is_coloured=told, is_bare=False
+        light,
+        power=edit.lm,
+        unit=PowerUnit.LUMEN,
+        rgb_linear=rgb,
+        is_coloured=is_coloured,
+        is_bare=False,
     )
 
 

@@ -165,7 +165,7 @@ def _formats_of_plans() -> tuple[Format, ...]:
     return tuple(
         Format(
             **{name: getattr(one, name) for name in names}, kind=PLAN, read=_read_plan,
-            companions=_companions_of_plan, has_parts=True, tells_boxes=True,
+            companions=_companions_of_plan, has_parts=True, has_box_only_items=True,
         )
         for one in plan_formats()
     )  # fmt: skip

@@ -47,7 +47,9 @@ def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
     n_lost = sum(len(s.things) for s in file.storeys) - len(items)
     if n_lost:
         notes.add(
-            "told-left-out", "", f"{n_lost} told things are not drawn: by their class, or no box"
+            "box-only-left-out",
+            "",
+            f"{n_lost} named things are not drawn: by their class, or no box",
         )
     its_source = Source(PLAN, path.name, digest_of_regular(path))
     return replace(
@@ -75,7 +77,7 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
         for k, t in enumerate(storey.things):
             centre = (t.x, level.elevation + t.low + t.height / 2, t.z)
             item = box_only_item(
-                f"told_{number}_{k}", t.vocabulary, t.name, centre, (t.width, t.height, t.depth),
+                f"box_{number}_{k}", t.vocabulary, t.name, centre, (t.width, t.height, t.depth),
                 t.turn_rad, is_front_given=t.is_front_given, level_id=level.id,
             )  # fmt: skip
             if item is not None:
@@ -113,11 +115,11 @@ def _pieces_of_things(file: PlanFile, catalogue: Catalogue) -> list[list[PlacedP
         return found
     house = _walls_of_plan(file, "home", ReadFields())
     items = box_only_items(house, file.storeys)
-    stood = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
+    furnished = with_stand_ins(replace(house, items=(*house.items, *items)), catalogue, "pieces")
     pieces = {f"piece:{p.id}": p for p in catalogue.pieces}
     levels = sorted(house.levels, key=lambda level: level.elevation)
     number = {level.id: k for k, level in enumerate(levels)}
-    for item in stood.items:
+    for item in furnished.items:
         piece = next((pieces[tag] for tag in item.tags if tag in pieces), None)
         if piece is None or item.box is None:
             continue

@@ -1,8 +1,8 @@
-"""Furniture for what a source tells by class and box alone: scans, plans, scenes without their models.
+"""Furniture for things of which a source gives class and box alone: scans, plans, scenes without their models.
 
-No effects but the catalogue's. A told thing (an item tagged BOX_ONLY, without surfaces) gets the piece of
-the catalogue that fits its box best, scaled, on the floor or where it is told, its front by what is
-near; else a plain box, or nothing.
+No effects but the catalogue's. A box-only thing (an item tagged BOX_ONLY, without surfaces) gets the
+piece of the catalogue that fits its box best, scaled, on the floor or at the box's height, its front
+by what is near; else a plain box, or nothing.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.catalogue.piece_groups import group_rule
 
 STAND_IN: Final = "stand-in"
-"""Tag of an item that stands where the source told a box."""
+"""Tag of an item that stands in place of a box-only thing."""
 
 How = Literal["pieces", "boxes", "none"]
 
@@ -43,7 +43,7 @@ _BOARDS: Final = frozenset({
 _NEAR_WALL_M: Final = 0.25  # a back that stands nearer to a wall than this stands at it
 _THIN_M: Final = 0.12
 _AT_TABLE_M: Final = 1.5  # from a chair to the middle of its table
-_ON_FLOOR_M: Final = 0.35  # what stands on floors and is told to begin lower stands on the floor
+_ON_FLOOR_M: Final = 0.35  # what stands on floors and whose box begins lower stands on the floor
 _MOST_IN_WALL_M: Final = 0.15  # boxes of scans reach into walls
 _IN_WALL_SHARE: Final = 0.06  # of a footprint that may stay outside its room
 _SEATS: Final = frozenset({"chair", "stool", "office_chair"})
@@ -64,27 +64,29 @@ class _Fit(NamedTuple):
 
 
 def has_box_only_items(house: House) -> bool:
-    """Whether the source tells things by class and box alone."""
+    """Whether there are things of which the source gives class and box alone."""
     return any(BOX_ONLY in item.tags for item in house.items)
 
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
-    """The house with a piece, a box or nothing for each told thing; notes say what was left out.
+    """The house with a piece, a box or nothing for each box-only thing; notes say what was left out.
 
     Pieces come from the catalogue, and their credits go into the source's attribution. Without such
     things it is the house itself. how "none" leaves them out, and a note says how many; catalogue
     is read only for "pieces".
     """
-    told = [item for item in house.items if BOX_ONLY in item.tags]
-    if not told:
+    box_only = [item for item in house.items if BOX_ONLY in item.tags]
+    if not box_only:
         return house
     left = replace(house, items=tuple(i for i in house.items if BOX_ONLY not in i.tags))
     if how == "none":
-        text = f"{len(told)} things that are told by their boxes alone are left out"
-        return replace(left, notes=(*house.notes, Note("told-left-out", house.source.file, text)))
+        text = f"{len(box_only)} things that are given by their boxes alone are left out"
+        return replace(
+            left, notes=(*house.notes, Note("box-only-left-out", house.source.file, text))
+        )
     with closing(MutableHouse(left, 0)) as mutable:
         scene = _Scene(house, catalogue if how == "pieces" else None)
-        for item in told:
+        for item in box_only:
             _stand_in(mutable, item, scene)
         mutable.notes += scene.notes()
         made = mutable.frozen()
@@ -99,7 +101,7 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
 
 
 class _Place(NamedTuple):
-    """A room as told things meet it."""
+    """A room as box-only things meet it."""
 
     room: Room
     outline: Polygon
@@ -133,7 +135,7 @@ class _Scene:
         found = []
         for kind, text, names in (
             ("stand-in-box", "have no piece that fits and are plain boxes", self.boxes),
-            ("told-left-out", "reach into walls and are left out", self.in_walls),
+            ("box-only-left-out", "reach into walls and are left out", self.in_walls),
         ):
             if names:
                 most = ", ".join(f"{n} {name}" for name, n in names.most_common(5))
@@ -142,7 +144,7 @@ class _Scene:
         return found
 
     def place_of(self, item: Item) -> _Place | None:
-        """The room that a told thing names, else the nearest one on its storey; None = out of all."""
+        """The room that a box-only thing names, else the nearest one on its storey; None = out of all."""
         assert item.box is not None
         x, y, z = (float(v) for v in item.box.centre)
         here, best = Point(x, z), None
@@ -173,11 +175,11 @@ class _Scene:
 def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
     assert item.box is not None
     place = scene.place_of(item)
-    told = _inside(_between(item.box, place.room), place.area) if place else item.box
-    if told is None:
+    target = _inside(_between(item.box, place.room), place.area) if place else item.box
+    if target is None:
         scene.in_walls[item.name] += 1
         return
-    found = _chosen(item, told, place, scene) if scene.catalogue else None
+    found = _chosen(item, target, place, scene) if scene.catalogue else None
     if found is not None and scene.catalogue is not None:
         turned, fit = found
         shape = scene.catalogue.shape(fit.piece)
@@ -186,15 +188,17 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
             return
     if scene.catalogue is not None:
         scene.boxes[item.name] += 1
-    mutable.add(_plain_box(mutable, item, told, place), "stand_ins")
+    mutable.add(_plain_box(mutable, item, target, place), "stand_ins")
 
 
-def _chosen(item: Item, told: Box, place: _Place | None, scene: _Scene) -> tuple[Box, _Fit] | None:
+def _chosen(
+    item: Item, target: Box, place: _Place | None, scene: _Scene
+) -> tuple[Box, _Fit] | None:
     """The piece that fits best, and the box as it looks; None where no piece fits either way."""
     assert scene.catalogue is not None
     group = _group_of(item)
     best: tuple[float, Box, _Fit] | None = None
-    for turned in _turned(told, is_front_given=FRONT_GIVEN in item.tags):
+    for turned in _turned(target, is_front_given=FRONT_GIVEN in item.tags):
         fit = _best(scene.catalogue, group, item, turned)
         if fit is None:
             continue
@@ -205,7 +209,7 @@ def _chosen(item: Item, told: Box, place: _Place | None, scene: _Scene) -> tuple
 
 
 def _group_of(item: Item) -> str:
-    """The catalogue's group of a told thing, by its name, then by its class; "" = none."""
+    """The catalogue's group of a box-only thing, by its name, then by its class; "" = none."""
     assert item.box is not None
     width, height, depth = (float(2 * h) for h in item.box.half)
     names = (item.name, item.source_class, NYU40_NAMES[item.nyu40] if 0 < item.nyu40 < 38 else "")
@@ -218,27 +222,27 @@ def _group_of(item: Item) -> str:
     return ""
 
 
-def _best(catalogue: Catalogue, group: str, item: Item, told: Box) -> _Fit | None:
+def _best(catalogue: Catalogue, group: str, item: Item, target: Box) -> _Fit | None:
     """The piece of the group, else of the class, that needs the least stretching."""
     by_class = 0 < item.nyu40 < 38
     for pieces in (
         catalogue.of(group) if group else (),
         [p for p in catalogue.pieces if by_class and p.nyu40 == item.nyu40],
     ):
-        fits = [fit for p in pieces if p.place is not Place.OPENING and (fit := _fit(p, told))]
+        fits = [fit for p in pieces if p.place is not Place.OPENING and (fit := _fit(p, target))]
         if fits:
             return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id))
     return None
 
 
-def _fit(piece: Piece, told: Box) -> _Fit | None:
+def _fit(piece: Piece, target: Box) -> _Fit | None:
     """How a piece is scaled to a box; None where it would have to be stretched beyond the limits."""
     size = np.array([piece.size[0], piece.size[2], piece.size[1]])  # width, height, depth
     if size.min() <= 0:
         return None
-    scale = np.maximum(2 * told.half, 0.01) / size
+    scale = np.maximum(2 * target.half, 0.01) / size
     # What is thin, a picture, a rug, a flat screen, says little by its thickness.
-    is_thin = (size < _THIN_M) | (2 * told.half < _THIN_M)
+    is_thin = (size < _THIN_M) | (2 * target.half < _THIN_M)
     scale = np.where(is_thin, np.clip(scale, *_SCALES), scale)
     thick = scale[~is_thin] if not is_thin.all() else scale
     most = _STRETCH_OF_BOARDS if piece.group in _BOARDS else _STRETCH
@@ -248,69 +252,69 @@ def _fit(piece: Piece, told: Box) -> _Fit | None:
     return _Fit(piece, scale, float(np.ptp(logs) + 0.3 * np.abs(logs.mean())))
 
 
-def _between(told: Box, room: Room) -> Box:
-    """The box between its room's floor and ceiling: what is told to begin a little off the floor stands."""
-    low, high = (float(told.centre[1] + side * told.half[1]) for side in (-1, 1))
+def _between(target: Box, room: Room) -> Box:
+    """The box between its room's floor and ceiling: what begins a little off the floor stands on it."""
+    low, high = (float(target.centre[1] + side * target.half[1]) for side in (-1, 1))
     bottom = max(low, room.floor_y)
     top = min(high, room.ceiling_y - 0.005)
     if top - bottom < 0.01:
-        # Told to lie outside: keep its height and stand it on the floor.
+        # The box lies outside: keep its height and stand it on the floor.
         bottom, top = room.floor_y, room.floor_y + min(high - low, room.ceiling_y - room.floor_y)
-    centre, half = told.centre.copy(), told.half.copy()
+    centre, half = target.centre.copy(), target.half.copy()
     centre[1], half[1] = (bottom + top) / 2, (top - bottom) / 2
-    return replace(told, centre=centre, half=half)
+    return replace(target, centre=centre, half=half)
 
 
-def _ground(told: Box) -> Polygon:
-    across, front = told.axes[[0, 2], 0] * told.half[0], told.axes[[0, 2], 2] * told.half[2]
-    middle = told.centre[[0, 2]]
+def _ground(target: Box) -> Polygon:
+    across, front = target.axes[[0, 2], 0] * target.half[0], target.axes[[0, 2], 2] * target.half[2]
+    middle = target.centre[[0, 2]]
     corners = [middle + a * across + b * front for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return Polygon([(float(x), float(z)) for x, z in corners])
 
 
-def _inside(told: Box, area: Polygon) -> Box | None:
+def _inside(target: Box, area: Polygon) -> Box | None:
     """The box moved off the walls of its room by the least step; None where none is small enough."""
-    ground = _ground(told)
+    ground = _ground(target)
     if area.contains(ground):
-        return told
+        return target
     steps = sorted(
         product((0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15), repeat=2), key=lambda s: math.hypot(*s)
     )
-    x_axis, z_axis = told.axes[[0, 2], 0], told.axes[[0, 2], 2]
+    x_axis, z_axis = target.axes[[0, 2], 0], target.axes[[0, 2], 2]
     for across, along in steps:
         dx, dz = across * x_axis + along * z_axis
         moved = Polygon([(x + dx, z + dz) for x, z in ground.exterior.coords])
         if moved.difference(area).area <= 1e-4 + _IN_WALL_SHARE * ground.area * (
             across == along == 0.0
         ):
-            return replace(told, centre=told.centre + np.array([dx, 0.0, dz]))
+            return replace(target, centre=target.centre + np.array([dx, 0.0, dz]))
     outside = ground.difference(area).area
-    return told if outside <= 0.3 * ground.area else None
+    return target if outside <= 0.3 * ground.area else None
 
 
-def _turned(told: Box, *, is_front_given: bool) -> Iterator[Box]:
-    """The box with its front as told, or in each of the four ways that it may look."""
-    yield told
+def _turned(target: Box, *, is_front_given: bool) -> Iterator[Box]:
+    """The box with its front as given, or in each of the four ways that it may look."""
+    yield target
     if is_front_given:
         return
     for quarter in (1, 2, 3):
-        right, up, front = told.axes.T
+        right, up, front = target.axes.T
         for _ in range(quarter):
             right, front = front, -right
-        half = told.half[[2, 1, 0]] if quarter % 2 else told.half
-        yield Box(told.centre, half, np.stack([right, up, front], 1))
+        half = target.half[[2, 1, 0]] if quarter % 2 else target.half
+        yield Box(target.centre, half, np.stack([right, up, front], 1))
 
 
-def _front_cost(told: Box, group: str, place: _Place | None, scene: _Scene) -> float:
+def _front_cost(target: Box, group: str, place: _Place | None, scene: _Scene) -> float:
     """0 where its back is at a wall or it looks at its table, more where it looks the wrong way."""
     if place is None:
         return 0.0
-    front = told.axes[[0, 2], 2]
-    middle = told.centre[[0, 2]]
-    back = middle - front * told.half[2]
-    before = Point(*(middle + front * (told.half[2] + _NEAR_WALL_M)))
+    front = target.axes[[0, 2], 2]
+    middle = target.centre[[0, 2]]
+    back = middle - front * target.half[2]
+    before = Point(*(middle + front * (target.half[2] + _NEAR_WALL_M)))
     blocked = 0.0 if place.outline.contains(before) else 1.0
-    table = scene.table_near(middle, float(told.centre[1])) if group in _SEATS else None
+    table = scene.table_near(middle, float(target.centre[1])) if group in _SEATS else None
     if table is not None:
         way = table - middle
         return 1 - float(way @ front) / max(float(np.linalg.norm(way)), 1e-6) + blocked
@@ -322,25 +326,25 @@ def _front_cost(told: Box, group: str, place: _Place | None, scene: _Scene) -> f
 
 
 def _placed(
-    mutable: MutableHouse, item: Item, told: Box, fit: _Fit, shape: Shape, place: _Place | None
+    mutable: MutableHouse, item: Item, target: Box, fit: _Fit, shape: Shape, place: _Place | None
 ) -> Item:
     size = np.ptp(shape.bounds, axis=0)
     wanted = fit.scale * np.array([fit.piece.size[0], fit.piece.size[2], fit.piece.size[1]])
     scale = wanted / np.maximum(size, 1e-6)
-    front = told.axes[:, 2]
+    front = target.axes[:, 2]
     turn_rad = float(np.arctan2(front[0], front[2]))
     low, high = shape.bounds * scale
     # Bring the middle of its base to the middle of the box's, its back to the box's back where it is
-    # deeper than told; what hangs keeps its top.
+    # deeper than the box; what hangs keeps its top.
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     mx, mz = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
-    base = float(told.centre[1] - told.half[1])
+    base = float(target.centre[1] - target.half[1])
     if fit.piece.place is Place.CEILING:
-        base = float(told.centre[1] + told.half[1]) - float(high[1] - low[1])
+        base = float(target.centre[1] + target.half[1]) - float(high[1] - low[1])
     elif place is not None and _stands(fit.piece) and base - place.room.floor_y < _ON_FLOOR_M:
         base = place.room.floor_y
-    deeper = max(float(high[2] - low[2]) / 2 - float(told.half[2]), 0.0)
-    at = told.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
+    deeper = max(float(high[2] - low[2]) / 2 - float(target.half[2]), 0.0)
+    at = target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
     at[1] = base - low[1]
     placed = mutable.placed(
         fit.piece, shape, at, turn_rad, item_id=item.id, room_id=_room_id(item, place),
@@ -348,7 +352,7 @@ def _placed(
     )  # fmt: skip
     return replace(
         placed, name=item.name, nyu40=item.nyu40 or placed.nyu40, source_class=item.source_class,
-        box=told, tags=(*_kept(item), STAND_IN, f"piece:{fit.piece.id}"),
+        box=target, tags=(*_kept(item), STAND_IN, f"piece:{fit.piece.id}"),
     )  # fmt: skip
 
 
@@ -365,20 +369,20 @@ def _level_id(item: Item, place: _Place | None) -> str:
 
 
 def _kept(item: Item) -> tuple[str, ...]:
-    """The tags of a told thing that say more than that it is told."""
+    """The tags of a box-only thing that say more than that it is one."""
     return tuple(tag for tag in item.tags if tag not in (BOX_ONLY, FRONT_GIVEN))
 
 
-def _plain_box(mutable: MutableHouse, item: Item, told: Box, place: _Place | None) -> Item:
+def _plain_box(mutable: MutableHouse, item: Item, target: Box, place: _Place | None) -> Item:
     name = NYU40_NAMES[item.nyu40] if item.nyu40 else ""
     r, g, b = _COLOURS.get(name, _PLAIN)
     material = mutable.material(Material(f"stand-in {name}".strip(), diffuse=(r, g, b)))
-    half = np.maximum(told.half, 0.005)
+    half = np.maximum(target.half, 0.005)
     # Off the floor by a hair, so that no face of it coincides with the floor's.
-    centre = told.centre + np.array([0.0, 0.001, 0.0])
-    surface = box("box", centre, half, material, axes=_right_handed(told.axes))
+    centre = target.centre + np.array([0.0, 0.001, 0.0])
+    surface = box("box", centre, half, material, axes=_right_handed(target.axes))
     return replace(
-        item, surfaces=(surface,), box=told, room_id=_room_id(item, place),
+        item, surfaces=(surface,), box=target, room_id=_room_id(item, place),
         level_id=_level_id(item, place), tags=(*_kept(item), STAND_IN, "piece:box"),
     )  # fmt: skip
 

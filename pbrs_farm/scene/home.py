@@ -210,8 +210,8 @@ class Home:
             5.0
         """
         fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
-        told = {name: value for name, value in fields.items() if value is not None}
-        return self.set(**{"sky.kind": "sunsky", **told})
+        given = {name: value for name, value in fields.items() if value is not None}
+        return self.set(**{"sky.kind": "sunsky", **given})
 
     def sky(self, panorama: str | Path) -> Home:
         """The home under a latitude-longitude HDR picture (.hdr or .exr), or one of a folder of them.
@@ -462,8 +462,8 @@ class Home:
             >>> len(home.cameras("photo", n=2))
             2
         """
-        told = {"preset": preset, **fields} if preset is not None else fields
-        home = self.set(**{f"cameras.{name}": value for name, value in told.items()})
+        given = {"preset": preset, **fields} if preset is not None else fields
+        home = self.set(**{f"cameras.{name}": value for name, value in given.items()})
         data = self.renderer.sampled(self.source, home.recipe)
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]

@@ -210,7 +210,7 @@ def test_kinds_without_files_have_no_format() -> None:
     assert format_of_kind("nothing") is None
     plan = format_of_kind(PLAN)
     assert plan is not None
-    assert plan.tells_boxes
+    assert plan.has_box_only_items
 
 
 def test_a_format_that_lacks_its_library_stays_in_the_table_with_what_to_type() -> None:

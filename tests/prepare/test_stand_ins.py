@@ -1,4 +1,4 @@
-"""Things told by class and box alone: the piece that fits best, off the walls, its front to the room."""
+"""Things given by class and box alone: the piece that fits best, off the walls, its front to the room."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material
 from pbrs_farm.generate.floor_plan import Plan, PlanRoom, PlanWall, RoomType
-from pbrs_farm.generate.generated_home import furnish_plan
+from pbrs_farm.generate.generated_home import furnish_storeys
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
 from pbrs_farm.read.common.box_only_items import box_only_item
@@ -22,7 +22,7 @@ BED, CHAIR, TABLE = 4, 5, 7
 
 
 def shape_of(piece: Piece) -> Shape:
-    """A box of the piece's size; a lower one in front, so that its front can be told."""
+    """A box of the piece's size; a lower one in front, so that its front can be seen."""
     w, d, h = piece.size
     quads = box_quads(np.array([0.0, h / 2, -d / 4]), np.array([w, h, d / 2]) / 2)
     low = box_quads(np.array([0.0, h / 4, d / 4]), np.array([w, h / 2, d / 2]) / 2)
@@ -53,10 +53,10 @@ def empty_room() -> House:
     )
     inner = ((0.01, 0.01), (4.99, 0.01), (4.99, 3.99), (0.01, 3.99))
     plan = Plan((PlanRoom(RoomType.BEDROOM, "Room", inner),), walls, (), 2.5)
-    return read_home(furnish_plan(plan, EMPTY, seed=1).data, "room.sh3d")
+    return read_home(furnish_storeys([plan], ((),), EMPTY, "room", seed=1).data, "room.sh3d")
 
 
-def told(
+def box_only(
     name: str,
     at: tuple[float, float, float],
     size: tuple[float, float, float],
@@ -66,25 +66,25 @@ def told(
     is_front_given: bool = False,
 ) -> Item:
     item = box_only_item(
-        f"told_{number}", "spatiallm", name, at, size, turn, is_front_given=is_front_given
+        f"box_{number}", "spatiallm", name, at, size, turn, is_front_given=is_front_given
     )
     assert item is not None
     return item
 
 
-def stood(*items: Item, shelf: Catalogue = PIECES, how: str = "pieces") -> House:
+def furnished(*items: Item, shelf: Catalogue = PIECES, how: str = "pieces") -> House:
     house = empty_room()
-    with_told = house.with_items((*house.items, *items))
-    return with_stand_ins(with_told, shelf, how)  # type: ignore[arg-type]
+    with_box_only = house.with_items((*house.items, *items))
+    return with_stand_ins(with_box_only, shelf, how)  # type: ignore[arg-type]
 
 
 def of(house: House, number: int = 0) -> Item:
-    (item,) = (i for i in house.items if i.id == f"told_{number}")
+    (item,) = (i for i in house.items if i.id == f"box_{number}")
     return item
 
 
-def test_the_piece_whose_proportions_fit_best_stands_scaled_in_the_told_box() -> None:
-    item = of(stood(told("bed", (1.0, 0.4, 2.5), (0.9, 0.8, 2.2))))
+def test_the_piece_whose_proportions_fit_best_stands_scaled_in_the_given_box() -> None:
+    item = of(furnished(box_only("bed", (1.0, 0.4, 2.5), (0.9, 0.8, 2.2))))
     assert f"piece:{PIECES.pieces[1].id}" in item.tags
     assert STAND_IN in item.tags
     np.testing.assert_allclose(item.bounds.mean(0), [1.0, 0.4, 2.5], atol=2e-3)
@@ -92,8 +92,8 @@ def test_the_piece_whose_proportions_fit_best_stands_scaled_in_the_told_box() ->
     assert (item.nyu40, item.source_class, item.kind) == (BED, "bed", ItemKind.OBJECT)
 
 
-def test_the_told_box_is_kept_as_the_items_box() -> None:
-    box = of(stood(told("bed", (1.0, 0.4, 2.5), (0.9, 0.8, 2.2)))).box
+def test_the_given_box_is_kept_as_the_items_box() -> None:
+    box = of(furnished(box_only("bed", (1.0, 0.4, 2.5), (0.9, 0.8, 2.2)))).box
     assert box is not None
     np.testing.assert_allclose(np.sort(2 * box.half), [0.8, 0.9, 2.2])
 
@@ -110,7 +110,7 @@ def test_the_told_box_is_kept_as_the_items_box() -> None:
 def test_a_back_at_a_wall_turns_the_front_into_the_room(
     at: tuple[float, float, float], size: tuple[float, float, float], front: tuple[int, int]
 ) -> None:
-    item = of(stood(told("bed", at, size)))
+    item = of(furnished(box_only("bed", at, size)))
     assert item.box is not None
     np.testing.assert_allclose(item.box.axes[[0, 2], 2], front, atol=1e-9)
     # The mesh turns with the box: its high half is at the back.
@@ -122,66 +122,71 @@ def test_a_back_at_a_wall_turns_the_front_into_the_room(
 @pytest.mark.parametrize("way", [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)])
 def test_chairs_look_at_the_nearest_table(way: tuple[float, float]) -> None:
     x, z = 2.5 - 0.9 * way[0], 2.0 - 0.7 * way[1]
-    table = told("dining_table", (2.5, 0.37, 2.0), (1.4, 0.75, 0.8), number=1)
-    chair = of(stood(told("dining_chair", (x, 0.45, z), (0.45, 0.9, 0.48)), table))
+    table = box_only("dining_table", (2.5, 0.37, 2.0), (1.4, 0.75, 0.8), number=1)
+    chair = of(furnished(box_only("dining_chair", (x, 0.45, z), (0.45, 0.9, 0.48)), table))
     assert chair.box is not None
     np.testing.assert_allclose(chair.box.axes[[0, 2], 2], way, atol=1e-9)
 
 
-def test_a_told_front_is_kept() -> None:
-    item = of(stood(told("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_given=True)))
+def test_a_given_front_is_kept() -> None:
+    item = of(
+        furnished(box_only("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_given=True))
+    )
     assert item.box is not None
     np.testing.assert_allclose(item.box.axes[[0, 2], 2], [0, -1], atol=1e-9)
 
 
 def test_a_box_that_reaches_into_a_wall_moves_inwards_by_the_overlap() -> None:
-    item = of(stood(told("bed", (0.95 / 2 - 0.1, 0.4, 2.0), (0.95, 0.8, 2.05))))
+    item = of(furnished(box_only("bed", (0.95 / 2 - 0.1, 0.4, 2.0), (0.95, 0.8, 2.05))))
     assert -0.011 <= item.bounds[0, 0] - 0.01 <= 0.06
 
 
-def test_a_box_that_lies_mostly_in_a_wall_is_left_out_and_told() -> None:
-    house = stood(told("bed", (-0.1, 0.4, 2.0), (0.95, 0.8, 2.05)))
+def test_a_box_that_lies_mostly_in_a_wall_is_left_out_with_a_note() -> None:
+    house = furnished(box_only("bed", (-0.1, 0.4, 2.0), (0.95, 0.8, 2.05)))
     assert not any(STAND_IN in i.tags for i in house.items)
     assert [n.text for n in house.notes] == ["1 things reach into walls and are left out: 1 bed"]
 
 
 def test_what_no_piece_fits_is_a_plain_box_of_its_size_with_a_note() -> None:
-    house = stood(told("bed", (2.5, 0.15, 2.0), (4.0, 0.3, 0.5)))
+    house = furnished(box_only("bed", (2.5, 0.15, 2.0), (4.0, 0.3, 0.5)))
     item = of(house)
     assert "piece:box" in item.tags
     np.testing.assert_allclose(np.ptp(item.bounds, axis=0), [4.0, 0.3, 0.5], atol=1e-6)
     assert [n.kind for n in house.notes] == ["stand-in-box"]
 
 
-def test_what_is_told_to_begin_below_the_floor_or_a_little_above_stands_on_it() -> None:
+def test_what_begins_below_the_floor_or_a_little_above_stands_on_it() -> None:
     for y in (0.2, 0.6):
-        assert of(stood(told("bed", (2.5, y, 2.0), (1.6, 0.8, 2.1)))).bounds[0, 1] == pytest.approx(
-            0.0, abs=1e-3
-        )
+        assert of(furnished(box_only("bed", (2.5, y, 2.0), (1.6, 0.8, 2.1)))).bounds[
+            0, 1
+        ] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_nothing_reaches_through_the_ceiling() -> None:
-    tall = told("bed", (2.5, 1.4, 2.0), (1.0, 3.0, 1.0))
-    assert of(stood(tall)).bounds[1, 1] <= 2.5
+    tall = box_only("bed", (2.5, 1.4, 2.0), (1.0, 3.0, 1.0))
+    assert of(furnished(tall)).bounds[1, 1] <= 2.5
 
 
 @pytest.mark.parametrize(("how", "expected"), [("boxes", 1), ("none", 0)])
 def test_the_recipe_may_ask_for_boxes_or_for_nothing(how: str, expected: int) -> None:
-    house = stood(told("bed", (2.5, 0.4, 2.0), (1.6, 0.8, 2.1)), how=how)
+    house = furnished(box_only("bed", (2.5, 0.4, 2.0), (1.6, 0.8, 2.1)), how=how)
     assert sum("piece:box" in i.tags for i in house.items) == expected
     assert not has_box_only_items(house)
-    assert [n.kind for n in house.notes] == ["told-left-out"] * (how == "none")
+    assert [n.kind for n in house.notes] == ["box-only-left-out"] * (how == "none")
 
 
 def test_whoever_made_the_piece_is_credited() -> None:
-    assert "Ada, CC-BY 3.0" in stood(told("bed", (2.5, 0.4, 2), (1.6, 0.8, 2.1))).source.attribution
+    assert (
+        "Ada, CC-BY 3.0"
+        in furnished(box_only("bed", (2.5, 0.4, 2), (1.6, 0.8, 2.1))).source.attribution
+    )
 
 
 def test_a_thing_stands_in_the_room_that_holds_it_not_in_the_one_it_is_near() -> None:
     house = empty_room()
     (room,) = house.rooms
     beside = replace(room, id="0_0", polygon=room.polygon - np.array([5.02, 0], np.float32))
-    item = told("chair", (0.3, 0.45, 2.0), (0.45, 0.9, 0.5))
+    item = box_only("chair", (0.3, 0.45, 2.0), (0.45, 0.9, 0.5))
     both = replace(house, rooms=(beside, replace(room, id="0_1")), items=(*house.items, item))
     assert of(with_stand_ins(both, PIECES, "pieces")).room_id == "0_1"
 

@@ -36,7 +36,9 @@ from workers.ids import (
 from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, User
 
 _log = logging.getLogger("pbrs.coordinator")
-_AHEAD_S: Final = 20.0  # of work on a queue; a standby leads after 15
+_AHEAD_S: Final = (
+    20.0  # of work that waits on a queue: outlasts a failover, in which a standby leads after 15 s
+)
 _WITHOUT_SLOTS: Final = 8  # messages of a stage that nobody takes yet
 # Nothing to be declared (a message goes to a queue by its name), and no repr of its arguments.
 _MESSAGE_OPTIONS: Final[dict[str, Any]] = {"declare": (), "argsrepr": "", "kwargsrepr": ""}
@@ -82,9 +84,9 @@ class Dispatcher:
         }
         # Send each job what it is given. Not all of it may be there: a ready task may wait until it may be
         # tried again. So what one job leaves goes to the next, and in the end to whoever has more.
-        n_sent, hungry = self._send_round(views, given, spare, ceilings)
+        n_sent, with_more = self._send_round(views, given, spare, ceilings)
         if any(spare.values()):
-            n_sent += self._send_round(hungry, {}, spare, ceilings)[0]
+            n_sent += self._send_round(with_more, {}, spare, ceilings)[0]
         return n_sent
 
     def send_lost_again(self, views: Sequence[JobView]) -> int:
@@ -120,7 +122,7 @@ class Dispatcher:
         given: job -> pool -> tasks. spare: pool -> tasks that may be sent of any job; reduced by what is
         sent beyond what was given, and raised by what a job leaves.
         """
-        n_sent, hungry = 0, []
+        n_sent, with_more = 0, []
         for view in views:
             own = given.get(view.job_id, {})
             most = {pool: n + own.get(pool, 0) for pool, n in spare.items()}
@@ -129,8 +131,8 @@ class Dispatcher:
             ceilings.count(view, sent.total())
             spare.update({pool: n - sent[pool] for pool, n in most.items()})
             if any(sent[pool] == n and n_ready(view, pool) > n for pool, n in most.items()):
-                hungry.append(view)
-        return n_sent, hungry
+                with_more.append(view)
+        return n_sent, with_more
 
     def _send_job(self, view: JobView, most: Mapping[str, int]) -> Counter[str]:
         """Send tasks of one job, at most most[pool]; pool -> how many were."""

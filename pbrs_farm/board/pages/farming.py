@@ -23,9 +23,9 @@ from pbrs_farm.core.errors import PbrsError
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
-_EVERY_S: Final = 2.0  # between two looks of a page that listens
-_BEAT_S: Final = 15.0  # a line that says nothing, so that proxies keep the stream
-_LIFE_S: Final = 3600.0  # of a stream; browsers open it again
+_EVERY_S: Final = 2.0  # between two reads of the farm for an event stream
+_BEAT_S: Final = 15.0  # between keep-alive comments, without which proxies close an idle stream
+_LIFE_S: Final = 3600.0  # an event stream is closed after this; browsers connect again
 
 # What may be done -> whether it is done to a job or a worker, and the words of its question.
 _OF_JOBS: Final = {
@@ -191,7 +191,7 @@ def _do(farm: Farm, what: str, of: str, to: str) -> str:
         }  # fmt: skip
         return act[what](of)
     farm.drain(of, undo=what == "undrain")
-    return "told"
+    return "asked"
 
 
 def _prices(request: Request) -> dict[str, Any]:

@@ -22,10 +22,10 @@ function start() {
   const boxes = plane.addBoxes();
   const seam = document.createElement("div");
   seam.className = "seam";
-  const told = [document.createElement("span"), document.createElement("span")];
-  told[0].className = "told";
-  told[1].className = "told right";
-  stage.append(seam, ...told);
+  const captions = [document.createElement("span"), document.createElement("span")];
+  captions[0].className = "caption";
+  captions[1].className = "caption right";
+  stage.append(seam, ...captions);
   const probe = new Probe(by("probe"), stage.dataset.base, stage.dataset.version, instances);
 
   left.addEventListener("load", () => {
@@ -106,9 +106,9 @@ function start() {
     seam.style.left = `${100 * state.wipe}%`;
     over.style.opacity = state.opacity / 100;
     boxes.style.display = state.boxes ? "" : "none";
-    told[0].textContent = known.get(state.left)?.title ?? "";
-    told[1].textContent = known.get(state.right)?.title ?? "";
-    told[0].hidden = told[1].hidden = !isTwo;
+    captions[0].textContent = known.get(state.left)?.title ?? "";
+    captions[1].textContent = known.get(state.right)?.title ?? "";
+    captions[0].hidden = captions[1].hidden = !isTwo;
     keepInAddress(state);
   }
 }

@@ -51,6 +51,6 @@ class Format(DataFormat):
     """Digest of every other file that reading opens, "" where there is none. Never raises."""
     main_file: str = ""  # that makes a folder a home; its id is then the folder's name
     has_parts: bool = False  # FILE#part names a part of the file
-    tells_boxes: bool = False  # it may have things by class and box alone, without a mesh
+    has_box_only_items: bool = False  # it may have things by class and box alone, without a mesh
     travels: bool = True  # a file that has no companions goes to the store of a farm
     uses_packages: bool = False  # its companions are Debian packages, which go there by themselves

@@ -82,7 +82,7 @@ class FrontModels:
             return None
         model = self._model(piece)
         if model is None:
-            return self._told(piece, vocabulary, name, seen, item_id)
+            return self._box_only(piece, vocabulary, name, seen, item_id)
         surfaces = []
         for mesh, slot in zip(model.meshes, model.slots, strict=True):
             mtl = model.mtl[slot] if slot >= 0 else None
@@ -95,7 +95,7 @@ class FrontModels:
             )
             surfaces += [surface] if surface is not None else []
         if not surfaces:
-            return self._told(piece, vocabulary, name, seen, item_id)
+            return self._box_only(piece, vocabulary, name, seen, item_id)
         is_trim = seen.kind in _STRUCTURE
         kind = ItemKind.OBJECT if is_trim else seen.item_kind
         tags = ["mirrored"] if np.linalg.det(piece.world_from_model[:3, :3]) < 0 else []
@@ -134,7 +134,7 @@ class FrontModels:
             return None
         return None if model is None else _without_shadow(model)
 
-    def _told(
+    def _box_only(
         self, piece: FrontPiece, vocabulary: str, name: str, seen: GivenClass, item_id: str
     ) -> Item | None:
         self.n_missing += 1
@@ -195,8 +195,8 @@ def light_items(
     kept: list[FrontLight] = []
     for light in lights:
         near = [p for p in lamps if np.linalg.norm((p - light.at)[[0, 2]]) < 0.3]
-        is_told = any(np.linalg.norm(o.at - light.at) < 0.05 for o in kept)
-        if light.room in areas and not near and not is_told:
+        is_listed = any(np.linalg.norm(o.at - light.at) < 0.05 for o in kept)
+        if light.room in areas and not near and not is_listed:
             kept.append(light)
     found = []
     for k, light in enumerate(kept):

@@ -159,13 +159,13 @@ class SceneMaterials:
         )
         rgb = triple(np.maximum(factor, 0.0) / factor.max())
         # Our own files paint bulbs that have no colour white.
-        is_told = object_at(fields_json, "extras").get("kind") != MaterialKind.BULB.value
+        is_given = object_at(fields_json, "extras").get("kind") != MaterialKind.BULB.value
         if "emissiveStrength" not in strength:
-            return Emission(0.0, rgb, is_told)
+            return Emission(0.0, rgb, is_given)
         # Take luminance for the strength: its Rec. 709 weights.
         (value,) = numbers(self._gltf, [strength["emissiveStrength"]], 1, f"{place}: emission")
         luminance = float(value * (np.maximum(factor, 0.0) @ LUMINANCE))
-        return Emission(luminance, rgb, is_told) if luminance > 0 else None
+        return Emission(luminance, rgb, is_given) if luminance > 0 else None
 
     def _fraction(self, holder: dict[str, Any], key: str, default: float, place: str) -> float:
         (value,) = numbers(self._gltf, [holder.get(key, default)], 1, f"{place}: {key}")

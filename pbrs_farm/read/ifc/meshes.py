@@ -107,8 +107,8 @@ def _mesh_of_shape(shape: Any) -> ProductMesh | None:
 def _style(row: Any) -> Style:
     colour = row.diffuse
     rgb = tuple(float(c) for c in getattr(colour, "components", colour)) if colour else ()
-    is_told = len(rgb) == 3 and bool(np.isfinite(rgb).all())
+    is_given = len(rgb) == 3 and bool(np.isfinite(rgb).all())
     passes = float(row.transparency)
     clear = float(np.clip(passes, 0, 1)) if np.isfinite(passes) else 0.0
-    r, g, b = (float(np.clip(c, 0, 1)) for c in rgb) if is_told else (0.0, 0.0, 0.0)
-    return Style(str(row.name)[:100], (r, g, b) if is_told else None, clear)
+    r, g, b = (float(np.clip(c, 0, 1)) for c in rgb) if is_given else (0.0, 0.0, 0.0)
+    return Style(str(row.name)[:100], (r, g, b) if is_given else None, clear)

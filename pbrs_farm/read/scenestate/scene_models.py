@@ -99,7 +99,7 @@ class SceneModels:
         seen = class_by_words(row.category) if row else None
         surfaces = self._surfaces(one.model, one.place)
         if not surfaces:
-            return self._told(one, row, seen, item_id)
+            return self._box_only(one, row, seen, item_id)
         meshes = [_mesh_of_surface(s) for s in surfaces]
         world = one.world_from_scene @ one.scene_from_model @ _scene_from_file(one, meshes)
         found = [
@@ -120,7 +120,7 @@ class SceneModels:
         )  # fmt: skip
         return replace(item, lights=(assumed_light(item),)) if kind is ItemKind.LAMP else item
 
-    def _told(
+    def _box_only(
         self, one: PlacedModel, row: _Row | None, seen: GivenClass | None, item_id: str
     ) -> Item | None:
         name = NYU40_NAMES[seen.nyu40] if seen and 0 <= seen.nyu40 < len(NYU40_NAMES) else ""

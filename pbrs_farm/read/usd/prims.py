@@ -297,8 +297,8 @@ class StageNodes:
         if "mesh" in node and flux is None:
             return  # its own surface shines
         node.pop("mesh", None)
-        rgb, is_told = _light_colour(prim)
-        row: _Row = {"type": "point", "extras": {}} | ({"color": list(rgb)} if is_told else {})
+        rgb, is_given = _light_colour(prim)
+        row: _Row = {"type": "point", "extras": {}} | ({"color": list(rgb)} if is_given else {})
         radius = prim.GetAttribute("inputs:radius").Get(self._time)
         scale = float(UsdGeom.GetStageMetersPerUnit(self._stage))
         if radius is not None and np.isfinite(radius) and radius > 0:

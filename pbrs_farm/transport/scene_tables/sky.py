@@ -141,9 +141,9 @@ def _sun_of_house(recipe: Recipe, house_id: str) -> tuple[float, float, bool]:
     elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))
     azimuth = _uniform(house_id, recipe.seed, "azimuth") * 2 * math.pi
     time, is_overcast = str(fields.time), fields.overcast
-    is_told = fields.hour is not None or fields.sun_elevation_deg is not None
+    is_sun_given = fields.hour is not None or fields.sun_elevation_deg is not None
     # The recipe gives the sun: dusk, night and clouds are then as it says, not drawn.
-    if time == "drawn" and not is_told:
+    if time == "drawn" and not is_sun_given:
         time, drawn_overcast = drawn_time(house_id, recipe.seed)
         is_overcast |= drawn_overcast
     if time == "dusk":

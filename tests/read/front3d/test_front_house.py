@@ -197,10 +197,10 @@ def test_without_models_every_piece_is_told_by_its_size_and_one_note_says_so(
     tmp_path: Path,
 ) -> None:
     house = read(files.write_house(tmp_path, with_models=False))
-    told = [i for i in house.items if BOX_ONLY in i.tags]
-    assert len(told) == files.N_DRAWN
-    assert all(FRONT_GIVEN in i.tags for i in told)
-    sofa = next(i for i in told if "sofa" in i.source_class)
+    box_only = [i for i in house.items if BOX_ONLY in i.tags]
+    assert len(box_only) == files.N_DRAWN
+    assert all(FRONT_GIVEN in i.tags for i in box_only)
+    sofa = next(i for i in box_only if "sofa" in i.source_class)
     assert sofa.box is not None
     np.testing.assert_allclose(2 * sofa.box.half, [2.1, 0.8, 0.9])
     np.testing.assert_allclose(sofa.box.centre, [1.2, 0.4, 3.4], atol=1e-9)

@@ -76,9 +76,9 @@ def test_a_model_stands_where_its_matrix_says_turned_with_the_scene(tmp_path: Pa
 
 def test_without_models_the_category_and_size_of_the_table_stand_in(tmp_path: Path) -> None:
     house = read(files.hssd_like(tmp_path, with_models=False))
-    told = [i for i in house.items if BOX_ONLY in i.tags]
-    assert len(told) == 20
-    sofa = next(i for i in told if i.name == "couch")
+    box_only = [i for i in house.items if BOX_ONLY in i.tags]
+    assert len(box_only) == 20
+    sofa = next(i for i in box_only if i.name == "couch")
     assert sofa.box is not None
     np.testing.assert_allclose(2 * sofa.box.half, [2.0, 0.8, 0.9], atol=1e-6)
     with_models = read(files.hssd_like(tmp_path / "b"))
