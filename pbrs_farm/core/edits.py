@@ -78,7 +78,7 @@ class CoverItems(Record):
 
 
 class SetLight(Record):
-    """Give lamps another flux, and a colour where one is told."""
+    """Give lamps another flux, and a colour where one is given."""
 
     do: Literal["light"] = "light"
     items: tuple[str, ...]
@@ -130,21 +130,6 @@ def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
     `edits_digest`.
     """
     return f"{house_id}{SUFFIX}{edits_digest(edits)[:8]}" if edits else house_id
-
-
-def files_of_edits(edits: Sequence[Edit]) -> dict[str, str]:
-    """Path -> sha256 of every file that edits read.
-
-    Models that are placed and pictures that cover items; the digests are those of the time when the
-    edit was made. A path that two edits name appears once, with the digest of the last.
-    """
-    found = {}
-    for edit in edits:
-        if isinstance(edit, PlaceModel):
-            found[edit.model.path] = edit.model.sha256
-        elif isinstance(edit, CoverItems):
-            found[edit.path] = edit.sha256
-    return found
 
 
 def rows_of_matrix(matrix: Matrix4) -> Rows:

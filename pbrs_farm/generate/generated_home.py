@@ -12,7 +12,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
-from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey, turned_upright
+from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.home_file import home_file
 from pbrs_farm.generate.programme import Programme, Wishes
@@ -54,19 +54,6 @@ def origin_of_home(home: MadeHome, catalogue: Catalogue, programme: Programme | 
     shelf = catalogue if home.furniture else EMPTY
     digest = keys.digest("made", home.version, home.word, repr(programme), shelf.digest)
     return f"{home.word} {digest}"
-
-
-def furnish_plan(
-    plan: Plan, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
-) -> GeneratedHome:
-    """A user's own plan, furnished by a seed: turned so that most of its walls run along x or z.
-
-    What would stand through a skewed wall is left out.
-    """
-    own = ((),)
-    return furnish_storeys(
-        [turned_upright(plan)], own, catalogue, repr(plan), seed=seed, style=style, name=name
-    )
 
 
 def furnish_storeys(

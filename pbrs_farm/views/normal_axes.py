@@ -1,4 +1,4 @@
-"""Normals as stored (16 bits) <-> unit vectors in camera axes by name; no effects.
+"""Normals as stored (16 bits) -> unit vectors in camera axes by name; no effects.
 
 Stored normals are round((n + 1) 65535 / 2) in the published axes (docs/formats.md).
 """
@@ -57,18 +57,3 @@ def decode_normal(
     if not valid.all():
         normal[~valid] = 0
     return normal
-
-
-def encode_normal(
-    normal: NDArray[np.float32], valid: NDArray[np.bool_], axes: str
-) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 as views store them, of normals in the axes of that name; 32768 if not valid.
-
-    normal is (H, W, 3) of unit vectors; components beyond -1..1 are clipped. The inverse of
-    `decode_normal` up to half a step of 65535.
-    """
-    stored = np.full(normal.shape, 32768, np.uint16)
-    for axis, (channel, sign) in enumerate(AXES[axes]):
-        scaled = (sign * normal[..., axis].astype(np.float64) + 1) * (65535 / 2)
-        stored[..., channel][valid] = np.clip(np.rint(scaled), 0, 65535).astype(np.uint16)[valid]
-    return stored

@@ -11,9 +11,9 @@ import pytest
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.floor_plan import OpeningKind, RoomType
-from pbrs_farm.generate.generated_home import furnish_plan
 from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file
 from pbrs_farm.generate.plans.plan_format import Part
+from pbrs_farm.prepare.plan_house import furnish_plan_file
 from pbrs_farm.read.sweethome3d.home import read_home
 
 COLUMNS = (
@@ -90,7 +90,7 @@ def test_an_opening_that_fits_no_wall_is_left_out_and_told(tmp_path: Path) -> No
 
 
 def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
-    house = read_home(furnish_plan(plan(tmp_path).plan, EMPTY, seed=1).data, "a1.sh3d")
+    house = read_home(furnish_plan_file(plan(tmp_path), EMPTY, seed=1).data, "a1.sh3d")
     assert [len(house.rooms), len(house.openings)] == [4, 3]
 
 

@@ -22,7 +22,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
     turned_upright,
 )
-from pbrs_farm.generate.generated_home import furnish_plan
+from pbrs_farm.generate.generated_home import furnish_storeys
 from pbrs_farm.generate.plans.plan_files import plan_from_file
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
@@ -70,7 +70,8 @@ def plan(folder: Path, value: object) -> Plan:
 
 @pytest.mark.parametrize("value", [TOUCHING, APART, SKEWED], ids=["touching", "apart", "skewed"])
 def test_the_home_of_a_plan_is_closed(tmp_path: Path, value: object) -> None:
-    home = furnish_plan(plan(tmp_path, value), EMPTY, seed=1)
+    upright = turned_upright(plan(tmp_path, value))
+    home = furnish_storeys([upright], ((),), EMPTY, "plan", seed=1)
     house = read_home(home.data, "home.sh3d")
     assert len(house.openings) == 5
     repaired, report = repair(

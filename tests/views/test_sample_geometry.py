@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.views.normal_axes import AXES, axes_from_axes, decode_normal, encode_normal
+from pbrs_farm.views.normal_axes import AXES, axes_from_axes, decode_normal
 from pbrs_farm.views.sample_changes import crop, flip, resize, with_axes
 from pbrs_farm.views.view_sample import Sample
 
@@ -90,14 +90,15 @@ def test_axes_are_where_their_names_say():
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_stored_normals_decode_and_encode_to_the_same_bits(axes):
+def test_stored_normals_decode_to_vectors_that_round_to_the_same_bits(axes):
     rng = np.random.default_rng(4)
     n = rng.normal(size=(9, 8, 3))
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
     valid = rng.random((9, 8)) > 0.2
     stored = np.where(valid[..., None], np.rint((n + 1) * 65535 / 2), 32768).astype(np.uint16)
     decoded = decode_normal(stored, valid, axes)
-    assert (encode_normal(decoded, valid, axes) == stored).all()
+    published = decoded.astype(np.float64) @ axes_from_axes("published", axes).T
+    assert (np.rint((published + 1) * 65535 / 2) == stored).all()
     assert (decoded[~valid] == 0).all()
     assert np.abs(np.linalg.norm(decoded[valid], axis=-1) - 1).max() < 3e-5
     assert decoded[valid] @ axes_from_axes("published", axes).T == pytest.approx(n[valid], abs=2e-5)

@@ -29,7 +29,6 @@ from pbrs_farm.geometry.plan_grid import PlanGrid, top_heights
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
 _DOUBLE_M = 1.08  # a mattress at least this wide gets two pillows
-_PILLOW_UP_M = 0.06  # whatever rises more above the mattress is a pillow or a board
 _PILLOW_SUNK = 0.45  # height of a pillow's middle above what it lies on, in half thicknesses
 
 

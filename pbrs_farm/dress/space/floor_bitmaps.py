@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.walkable import CELL_M, HEAD_M, STEP_M, WALK_M, FloorGrid, connected_ways
@@ -33,12 +32,6 @@ class FloorBitmap:
         other end.
         """
         return FloorGrid(self.origin, self.inside.shape).cells(places)
-
-    @property
-    def walkable_share(self) -> float:
-        """Share of the floor that a way 0.6 m wide covers; 0 for no floor."""
-        free = ndimage.distance_transform_edt(self.ways == 0) * CELL_M <= WALK_M / 2
-        return float((free & self.inside).sum() / max(self.inside.sum(), 1))
 
 
 def floor_bitmap(

@@ -95,11 +95,6 @@ class Maker:
         return self.style.wood.dark
 
     @property
-    def wood_name(self) -> str:
-        """The species of the home's wood."""
-        return self.style.wood.name
-
-    @property
     def accent(self) -> Rgb:
         """The loud colour of the style."""
         return self.style.accent
