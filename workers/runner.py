@@ -20,7 +20,7 @@ from workers.job import JobSpec
 OnText = Callable[[str], None]
 
 
-class Request(Record):
+class TaskRequest(Record):
     """A task for the runner, as it crosses to the render process.
 
     unit: "-" for the house or job as a whole, a number for a batch of views, "s3" for shard 3
@@ -55,7 +55,7 @@ class Survey:
 class StepRunner(Protocol):
     """Runs the steps of a task; raises the errors of pbrs_farm.core.errors."""
 
-    def run(self, request: Request, on_step: OnText) -> Result:
+    def run(self, request: TaskRequest, on_step: OnText) -> Result:
         """Do what the markers say is missing. on_step: called with the name of each step begun.
 
         May be called again for a task that was cut off at any moment. Raises BadInput and its kin

@@ -10,7 +10,7 @@ from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig
 from workers.ids import GEOMETRY
 from workers.job import JobSpec
-from workers.runner import OnText, Request, Result, Survey
+from workers.runner import OnText, Result, Survey, TaskRequest
 
 # 45,622 houses of 17 or 18 views are the paper's 779,342.
 N_HOUSES = 45_622
@@ -40,7 +40,7 @@ class NoopRunner:
         self._store = store
         self._sleep_s = float(os.environ.get("PBRS_BENCH_SLEEP", "0"))
 
-    def run(self, request: Request, _on_step: OnText) -> Result:
+    def run(self, request: TaskRequest, _on_step: OnText) -> Result:
         time.sleep(self._sleep_s)
         name = f"{request.unit}_{request.stage}" if request.unit != "-" else request.stage
         if request.house != "-":

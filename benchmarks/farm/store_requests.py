@@ -25,7 +25,7 @@ from workers.client.farm_client import completed, new_spec
 from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import HouseEntry, JobSpec, lines_from_houses
 from workers.node.house_runner import HouseRunner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 N_VIEWS = 12  # all of the builtin home; a home of the paper has 17
 STAGES = (GEOMETRY, GL, LIGHT, REDUCE, SHARD, JOB)
@@ -127,17 +127,17 @@ def _worker(counted: CountedStore, *, packs: bool) -> HouseRunner:
 
 def _requests(
     spec: JobSpec, house: str, stage: str, source: str, batches: tuple[tuple[str, ...], ...]
-) -> Iterator[Request]:
+) -> Iterator[TaskRequest]:
     if stage in (GL, LIGHT):
         for number, views in enumerate(batches):
-            yield Request(
+            yield TaskRequest(
                 job_id=spec.job_id, house=house, unit=str(number), stage=stage, views=views
             )
     elif stage == SHARD:
-        yield Request(job_id=spec.job_id, house="-", unit="s0", stage=stage)
+        yield TaskRequest(job_id=spec.job_id, house="-", unit="s0", stage=stage)
     else:
         at = "-" if stage == JOB else house
-        yield Request(job_id=spec.job_id, house=at, unit="-", stage=stage, source=source)
+        yield TaskRequest(job_id=spec.job_id, house=at, unit="-", stage=stage, source=source)
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments, is_left_in_place, upload
 from workers.ids import GEOMETRY, job_key
 from workers.node import house_runner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 _FEW_TRIANGLES: Final = 2_000
 _NO_PICTURE: Final = b""
@@ -132,7 +132,7 @@ def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
     _houses, spec = completed([entry], new_spec(recipe, modes=("opengl_dl",)))
     farm.put(job_key(spec.job_id), spec.model_dump_json().encode())
     upload(farm, [ref])
-    request = Request(
+    request = TaskRequest(
         job_id=spec.job_id, house=entry.house_id, unit="-", stage=GEOMETRY, source=entry.source
     )
     house_runner.HouseRunner(farm, n_threads=1).run(request, lambda _text: None)

@@ -21,7 +21,7 @@ from pbrs_farm.store.object_store import put_done
 from pbrs_farm.store.retrying import RetryingStore
 from workers.config import FarmConfig
 from workers.job import JobSpec
-from workers.runner import OnText, Request, Result, Survey
+from workers.runner import OnText, Result, Survey, TaskRequest
 
 
 def control_folder() -> Path:
@@ -99,7 +99,7 @@ class FakeRunner:
         self._store = store
         self._control = control
 
-    def run(self, request: Request, on_step: OnText) -> Result:
+    def run(self, request: TaskRequest, on_step: OnText) -> Result:
         with (self._control / "starts").open("a") as file:
             file.write(f"{request.house}/{request.unit}/{request.stage}\n")
         self._misbehave(request)
@@ -149,7 +149,7 @@ class FakeRunner:
         if slow.exists():
             time.sleep(float(slow.read_text() or 0))
 
-    def _misbehave(self, request: Request) -> None:
+    def _misbehave(self, request: TaskRequest) -> None:
         def is_asked(what: str) -> bool:
             return (self._control / f"{what}.{request.house}").exists() and request.stage == "gl"
 

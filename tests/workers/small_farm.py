@@ -26,7 +26,7 @@ from tests.workers.redis_server import RedisServer
 from workers.client.farm_client import Farm, new_spec
 from workers.config import FarmConfig
 from workers.job import HouseEntry
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 FAKE_RUNNER = "tests.workers.fake_runner:runner"
 REAL_RUNNER = "workers.node.house_runner:runner"
@@ -172,7 +172,7 @@ class SmallFarm:
         runner = FakeRunner(store, folder / "control")
 
         def run(house: str, unit: str, stage: str, views: tuple[str, ...] = ()) -> None:
-            request = Request(job_id="0" * 12, house=house, unit=unit, stage=stage, views=views)
+            request = TaskRequest(job_id="0" * 12, house=house, unit=unit, stage=stage, views=views)
             runner.run(request, lambda _step: None)
 
         for house in self.houses:

@@ -22,7 +22,7 @@ from workers.house_files import entries_from_arguments, needed_plugins
 from workers.ids import GEOMETRY, GL, LIGHT, REDUCE, job_key
 from workers.job import JobSpec
 from workers.node.house_runner import HouseRunner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 WORDS = ["made:1,rooms=0..1,furniture=none", "made:2,rooms=0..1,furniture=none"]
 
@@ -42,7 +42,7 @@ def farmed(store: Store, recipe: Recipe) -> JobSpec:
     store.put(job_key(spec.job_id), spec.model_dump_json().encode())
     for house in houses:
         worker = HouseRunner(store, n_threads=1)
-        request = Request(job_id=spec.job_id, house=house.house_id, unit="-", stage=GEOMETRY)
+        request = TaskRequest(job_id=spec.job_id, house=house.house_id, unit="-", stage=GEOMETRY)
         first = request.model_copy(update={"source": house.source})
         for number, views in enumerate(worker.run(first, lambda _text: None).batches):
             for stage in (GL, LIGHT):
@@ -108,7 +108,7 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     store.put(f"jobs/sources/{name}", b"deb")
     _houses, spec = completed([entry], new_spec(small(), modes=("opengl_dl",)))
     store.put(job_key(spec.job_id), spec.model_dump_json().encode())
-    request = Request(
+    request = TaskRequest(
         job_id=spec.job_id, house=entry.house_id, unit="-", stage=GEOMETRY, source=entry.source
     )
     HouseRunner(store, n_threads=1).run(request, lambda _text: None)

@@ -19,7 +19,7 @@ from workers.house_files import (
     upload,
 )
 from workers.node.house_runner import HouseRunner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 
 @pytest.fixture
@@ -92,7 +92,7 @@ def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.Mo
     _houses, spec = completed([entry], new_spec(recipe, modes=("opengl_dl",)))
     store = MemoryStore()
     store.put(job_key(spec.job_id), spec.model_dump_json().encode())
-    request = Request(
+    request = TaskRequest(
         job_id=spec.job_id, house=entry.house_id, unit="-", stage=GEOMETRY, source=entry.source
     )
     HouseRunner(store, n_threads=1).run(request, lambda _text: None)

@@ -14,7 +14,7 @@ from workers.client.farm_client import completed, new_spec
 from workers.ids import job_key
 from workers.job import HouseEntry, lines_from_houses
 from workers.node.house_runner import HouseRunner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 KEY = "jobs/sources/references/r.npz"
 
@@ -31,7 +31,7 @@ def test_a_job_with_a_reference_selects_and_says_which_house_is_missing() -> Non
     runner = HouseRunner(store, n_threads=1)
     steps: list[str] = []
     for house, unit, stage in (("a", "-", "reduce"), ("-", "s0", "shard"), ("-", "-", "job")):
-        request = Request(job_id=spec.job_id, house=house, unit=unit, stage=stage)
+        request = TaskRequest(job_id=spec.job_id, house=house, unit=unit, stage=stage)
         runner.run(request, steps.append)
     assert "histograms" in steps
     alone = MemoryStore()

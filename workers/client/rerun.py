@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from pbrs_farm.core.errors import BadInput
 from workers.ids import GEOMETRY, TaskId, job_key, task_from_text
 from workers.job import houses_from_lines
-from workers.runner import Request, Result, runner_maker
+from workers.runner import Result, TaskRequest, runner_maker
 
 if TYPE_CHECKING:
     from workers.client.farm_client import Farm
@@ -25,7 +25,7 @@ def rerun(farm: Farm, job: str, text: str, on_step: Callable[[str], None]) -> Re
     """
     task = task_from_text(text)
     farm.check_task(job, task)
-    request = Request(
+    request = TaskRequest(
         job_id=job,
         house=task.house,
         unit=task.unit,

@@ -36,7 +36,7 @@ from workers.ids import GEOMETRY, GL, JOB, LIGHT, REDUCE, SHARD, job_key
 from workers.job import JobSpec
 from workers.node.merging import merge_job, merge_shard
 from workers.node.view_batches import batches_from_views
-from workers.runner import OnText, Request, Result, Survey
+from workers.runner import OnText, Result, Survey, TaskRequest
 
 _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 
@@ -74,7 +74,7 @@ class HouseRunner:
         self._house_cache = HouseCache()
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
-    def run(self, request: Request, on_step: OnText) -> Result:
+    def run(self, request: TaskRequest, on_step: OnText) -> Result:
         """One task; raises what its steps raise.
 
         on_step: called with each step's name when it begins, for the log and the watchdog. What is
@@ -85,7 +85,7 @@ class HouseRunner:
         with one_task(self._store, reads_whole=request.stage in (GL, LIGHT)) as store:
             return self._run(store, request, spec, on_step)
 
-    def _run(self, store: Store, request: Request, spec: JobSpec, on_step: OnText) -> Result:
+    def _run(self, store: Store, request: TaskRequest, spec: JobSpec, on_step: OnText) -> Result:
         if request.stage == GEOMETRY:
             return self._geometry(store, request, spec, on_step)
         if request.stage in (GL, LIGHT):
@@ -127,7 +127,9 @@ class HouseRunner:
         has_manifest = self._store.head(keys.house_key(house, keys.MANIFEST)) is not None
         return Survey(batches=batches, missing=units, reduced=finished and has_manifest)
 
-    def _geometry(self, store: Store, request: Request, spec: JobSpec, on_step: OnText) -> Result:
+    def _geometry(
+        self, store: Store, request: TaskRequest, spec: JobSpec, on_step: OnText
+    ) -> Result:
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
             source = self._source(request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
@@ -185,7 +187,7 @@ class HouseRunner:
     def _step(
         self,
         store: Store,
-        request: Request,
+        request: TaskRequest,
         spec: JobSpec,
         on_step: OnText,
         step: str,

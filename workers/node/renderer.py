@@ -1,6 +1,6 @@
 """What a render process of the farm does with a task: the configured runner's work.
 
-Effects: the runner's. A request is a workers.runner.Request as JSON; the last message's body is a
+Effects: the runner's. A request is a workers.runner.TaskRequest as JSON; the last message's body is a
 Result, or the class and fingerprint of the fault.
 """
 
@@ -11,7 +11,7 @@ import traceback
 from pbrs_farm.run.processes.child_process import Handler, Message, Send
 from workers.config import config_from_environment
 from workers.node.faults import class_of, fingerprint, one_line
-from workers.runner import Request, StepRunner, runner_maker
+from workers.runner import StepRunner, TaskRequest, runner_maker
 
 HANDLER = f"{__name__}:make_handler"
 
@@ -20,7 +20,7 @@ def make_handler(send: Send) -> Handler:
     """The handler of the runner that this machine's configuration names.
 
     Runs in the render process, not in the slot: it reads the environment and loads what the runner
-    imports. send: the way back to the slot. The handler takes a Request as a line of JSON.
+    imports. send: the way back to the slot. The handler takes a TaskRequest as a line of JSON.
     """
 
     # The supervisor of this process stops its clocks, the slot opens the breaker.
@@ -29,10 +29,10 @@ def make_handler(send: Send) -> Handler:
 
     config = config_from_environment()
     runner = runner_maker(config.runner)(config, on_waiting)
-    return lambda line: _run_task(runner, Request.model_validate_json(line), send)
+    return lambda line: _run_task(runner, TaskRequest.model_validate_json(line), send)
 
 
-def _run_task(runner: StepRunner, request: Request, send: Send) -> Message:
+def _run_task(runner: StepRunner, request: TaskRequest, send: Send) -> Message:
     try:
         result = runner.run(request, lambda step: send(Message("step", step)))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - reported, by class

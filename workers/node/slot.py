@@ -37,7 +37,7 @@ from workers.ledger.task_ledger import (
     batches_from_text,
 )
 from workers.node.faults import without_numbers
-from workers.runner import Request, Result
+from workers.runner import Result, TaskRequest
 
 T = TypeVar("T")
 _log = logging.getLogger("pbrs.slot")
@@ -200,7 +200,7 @@ class Slot:
             )
             self._retry(give)
 
-    def _render(self, held: _Claimed, request: Request, waiting: Sequence[_Claimed]) -> Ended:
+    def _render(self, held: _Claimed, request: TaskRequest, waiting: Sequence[_Claimed]) -> Ended:
         """Have the task run, and keep its lease and those of what waits for it meanwhile."""
         self._upload_at = self._clock() + _LOG_EVERY_S
         deadline_s = self._config.limits.deadline_s(held.task.stage)
@@ -340,11 +340,11 @@ class Slot:
                 self._sleep(random.uniform(1.0, 3.0))
 
 
-def _request(held: _Claimed) -> Request:
+def _request(held: _Claimed) -> TaskRequest:
     task, inputs = held.task, held.claim.inputs
     # Only geometry reads the home itself; later stages find its bundle in the store.
     is_geometry = task.unit == WHOLE and task.stage == GEOMETRY
-    return Request(
+    return TaskRequest(
         job_id=held.job,
         house=task.house,
         unit=task.unit,

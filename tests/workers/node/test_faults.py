@@ -20,7 +20,7 @@ from workers.house_files import entries_from_arguments, is_left_in_place
 from workers.ids import job_key
 from workers.node.faults import class_of, fingerprint, without_numbers
 from workers.node.house_runner import HouseRunner
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_worker_that_does_not_see_a_suncg_folder_is_itself_at_fault(tmp_path: 
     store = MemoryStore()
     _houses, job = completed([entry], new_spec(recipe_from_name("preview")))
     store.put(job_key(job.job_id), job.model_dump_json().encode())
-    request = Request(
+    request = TaskRequest(
         job_id=job.job_id, house=entry.house_id, unit="-", stage="geometry", source=entry.source
     )
     (house / "house.json").rename(tmp_path / "moved.json")

@@ -30,7 +30,7 @@ from workers.node.renderer import HANDLER
 from workers.node.slot import Slot
 from workers.queue import task as queued_task
 from workers.queue.celery_app import make_app
-from workers.runner import Request
+from workers.runner import TaskRequest
 
 SMALL = {
     "image.width_px": "64", "image.height_px": "48", "light.spp": "4", "light.denoise": "false",
@@ -46,7 +46,7 @@ def labelled(store: FolderStore) -> tuple[JobSpec, str, tuple[str, ...]]:
     )
     store.put(job_key(spec.job_id), spec.model_dump_json().encode())
     runner = HouseRunner(store, n_threads=1)
-    ask = partial(Request, job_id=spec.job_id, house=house.house_id)
+    ask = partial(TaskRequest, job_id=spec.job_id, house=house.house_id)
     whole = ask(unit="-", stage=GEOMETRY, source=house.source)
     views = runner.run(whole, lambda _step: None).batches[0]
     runner.run(ask(unit="0", stage=GL, views=views), lambda _step: None)
