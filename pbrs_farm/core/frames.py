@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, Matrix4
 
 M_FROM_CM = 0.01
+# Share of the largest scale: a direction that shrinks by more is lost in double precision.
+_FLAT_SHARE = 1e-11
 
 # Camera axes x right, y down, z forward  <-  x right, y up, z backward.
 OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -60,6 +62,18 @@ def rotation_z(angle_rad: float) -> F64:
 # Quarter turns that are exact: what stands upright lies with its top along +x, or along +z.
 LYING_ALONG_X: F64 = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+def is_flattening(matrix: F64) -> bool:
+    """Whether a linear map (D, D) leaves less than D dimensions, so that nothing undoes it.
+
+    How much it shrinks does not count, which a determinant mixes with it: a scale of 1e-5 (quantized
+    vertices, millimetres within millimetres) has one of 1e-15, and is as good as any other.
+    """
+    if not np.isfinite(matrix).all():
+        return False  # what it moves is refused where it lands
+    sizes = np.linalg.svd(np.asarray(matrix, np.float64), compute_uv=False)
+    return bool(sizes[-1] <= _FLAT_SHARE * sizes[0])
 
 
 def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:

@@ -21,6 +21,7 @@ from pydantic import (
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, exactly
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import is_flattening
 
 # What a model or a texture may be called; a file name that stays in its folder.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
@@ -52,7 +53,7 @@ def affine(column_major: F64) -> F64:
     m = column_major.reshape(4, 4).T
     if (np.abs(m[3] - _LAST_ROW) > 1e-6 + 1e-5 * _LAST_ROW).any():
         raise ValueError("is not affine (column-major)")
-    if abs(np.linalg.det(m[:3, :3])) < 1e-12:
+    if is_flattening(m[:3, :3]):
         raise ValueError("flattens the model (determinant 0)")
     return m
 

@@ -14,6 +14,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import CEILING, FLOOR, OTHERPROP, WALL
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.core.house import (
     House,
     Item,
@@ -191,7 +192,7 @@ class _Paints:
             matrix = np.array(turn, np.float64).reshape(3, 3)[:2, :2]
         except (ValueError, TypeError):
             return mesh.uvs
-        is_sound = np.isfinite(matrix).all() and 1e-6 < abs(np.linalg.det(matrix)) < 1e6
+        is_sound = bool(np.isfinite(matrix).all()) and not is_flattening(matrix)
         return mesh.uvs @ matrix.T if is_sound else mesh.uvs
 
     def _material(self, uid: str) -> Material:

@@ -8,9 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.frames import is_flattening, transform_points
 from pbrs_farm.core.house import (
     MAX_INSTANCES,
     Box,
@@ -34,6 +35,7 @@ from pbrs_farm.read.gltf.scene_lights import emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
 from pbrs_farm.read.mesh.obj import Mesh
 
+_LEAST_EXTENT_M: Final = 1e-6  # below it float32 cannot tell a thing from a point
 _UNMAPPED: Final = NodeClass(
     OTHERPROP, ItemKind.OBJECT, is_tagged=False
 )  # class of a thing whose name says nothing
@@ -243,7 +245,7 @@ def _box_of_thing(
     is_opening = thing.seen.kind in (ItemKind.WINDOW, ItemKind.DOOR)
     # An item of several meshes has a box of its own where its file says so.
     has_frame = is_opening or thing.extras.get("has_frame") is True
-    if not filled or not has_frame or abs(np.linalg.det(world[:3, :3])) < 1e-12:
+    if not filled or not has_frame or is_flattening(world[:3, :3]):
         return None
     # Bring a frame and its panes into the frame of the node that holds them.
     node_from_world = np.linalg.inv(world).astype(np.float64)
@@ -276,14 +278,26 @@ def _meshes(
         node = entry(gltf, "nodes", part.index)
         if "mesh" not in node:
             continue
-        if abs(np.linalg.det(part.world_from_node[:3, :3])) < 1e-12:
+        if is_flattening(part.world_from_node[:3, :3]):
             notes.add("flat-node", f"nodes[{part.index}]", "its scale is 0; left out")
             continue
         entry(gltf, "meshes", node["mesh"])
         if node["mesh"] not in known:
             most = fields.max_model_triangles
             known[node["mesh"]] = meshes_of(gltf, node["mesh"], max_triangles=most)
-        yield part, known[node["mesh"]]
+        meshes = known[node["mesh"]]
+        if meshes and _extent_m(meshes, part.world_from_node) < _LEAST_EXTENT_M:
+            notes.add("flat-node", f"nodes[{part.index}]", "nothing is left of it; left out")
+            continue
+        yield part, meshes
+
+
+def _extent_m(meshes: Sequence[tuple[int | None, Mesh]], world_from_node: F64) -> float:
+    """The longest side of the box around meshes where they stand."""
+    placed_points = [transform_points(world_from_node, m.positions) for _, m in meshes]
+    low = np.min([p.min(0) for p in placed_points], 0)
+    high = np.max([p.max(0) for p in placed_points], 0)
+    return float((high - low).max())
 
 
 def _finish_item(

@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -62,7 +63,7 @@ def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
 def _transformed(mesh: Mesh, matrix: F64) -> Mesh:
     """The mesh moved by a 3 x 4 matrix; as it is where the matrix flattens it."""
     linear = matrix[:, :3]
-    if abs(np.linalg.det(linear)) < 1e-9:
+    if is_flattening(linear):
         return mesh
     # Normals take the inverse transpose; a mirror turns the faces over.
     normals = mesh.normals @ np.linalg.inv(linear)

@@ -15,6 +15,7 @@ from pxr import Kind, Usd, UsdGeom, UsdLux, UsdShade
 from pbrs_farm.core.arrays import I64
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.core.house import MAX_INSTANCES, ItemKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter, Gltf
@@ -113,7 +114,7 @@ class StageNodes:
             cache = UsdGeom.XformCache(self._time)
             world = np.array(cache.GetLocalToWorldTransform(prim))
             parent = np.array(cache.GetParentToWorldTransform(prim))
-            if abs(np.linalg.det(parent)) < 1e-12:
+            if is_flattening(parent[:3, :3]):
                 return world
             return world @ np.linalg.inv(parent)
         return np.array(xformable.GetLocalTransformation(self._time))

@@ -77,6 +77,32 @@ def test_transforms_compose_down_the_tree() -> None:
     assert sorted(bed.box.half) == pytest.approx([0.5, 0.5, 1.0])
 
 
+def test_things_far_smaller_than_their_nodes_units_are_there_and_flat_ones_are_noted() -> None:
+    scene = two_rooms()
+    for name, size, scale in (
+        ("Jug", 2_000.0, [1e-4] * 3),
+        ("Table", 16_384.0, [6.1e-5] * 3),  # as KHR_mesh_quantization places 16 bits
+        ("Chair", 1e8, [1e-8] * 3),
+        ("Poster", 1.0, [1.0, 1.0, 1e-9]),
+        ("Sofa", 1.0, [1.0, 1.0, 0.0]),
+        ("Bed", 1.0, [1e-9] * 3),
+    ):
+        mesh = scene.box([0.0] * 3, [size] * 3)
+        scene.node(name, mesh=mesh, scale=scale, translation=[1.0, 0.5, 1.0])
+    vase = scene.node("Vase", mesh=scene.box([0.0] * 3, [20_000.0] * 3), scale=[1e-2] * 3)
+    scene.node("Root", children=[vase], scale=[1e-3] * 3, translation=[1.0, 0.5, 1.0])
+    house = read(scene)
+    sizes = {
+        name: np.ptp(item(house, name).bounds, axis=0) for name in ("Jug", "Table", "Chair", "Vase")
+    }
+    for name, size in (("Jug", 0.2), ("Table", 0.9994), ("Chair", 1.0), ("Vase", 0.2)):
+        np.testing.assert_allclose(sizes[name], size, rtol=1e-3)
+        assert item(house, name).box is not None
+    np.testing.assert_allclose(np.ptp(item(house, "Poster").bounds, axis=0), [1, 1, 0], atol=1e-6)
+    assert not {"Sofa", "Bed"} & {i.name for i in house.items}
+    assert [n.kind for n in house.notes if n.kind == "flat-node"] == ["flat-node"] * 2
+
+
 def test_mirrored_nodes_keep_their_fronts_outside() -> None:
     s = two_rooms()
     s.node("Chair", mesh=s.box([0, 0, 0], [1, 2, 3]), scale=[-1, 1, 1], translation=[3, 0, 0])
