@@ -218,6 +218,9 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
         text = message if message.startswith(what) else f"{what}: {message}"
         # A step that failed has printed its message when it happened.
         warn(f"{what} failed; reproduce: {command}" if command else text)
+    if summary.taken_out:
+        kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
+        echo(f"{kinds} taken out: `removed` in repair.json (repair.remove_persons, remove_plants)")
     # End with what was lost or guessed while the houses were read.
     if summary.notes:
         kinds = ", ".join(f"{n} {kind}" for kind, n in summary.notes.most_common(8))

@@ -51,4 +51,5 @@ class Summary:
     leaks: list[tuple[str, str]] = field(default_factory=list)  # house, rays that reached the sky
     walls_lost: list[tuple[str, str]] = field(default_factory=list)  # house, walls repair lost
     notes: Counter[str] = field(default_factory=Counter)  # of the houses, by kind
+    taken_out: Counter[str] = field(default_factory=Counter)  # "person", "plant": how many
     dark: list[tuple[str, str]] = field(default_factory=list)  # house/view, how dark it is

@@ -182,6 +182,7 @@ class Schedule:
         summary, facts = self._summary, event.facts
         summary.houses.append(event.house_id)
         summary.notes.update(facts.get("note_kinds", {}))
+        summary.taken_out.update(facts.get("taken_out", {}))
         if "leaks" in facts:
             n_sky, n_rays = facts["leaks"]
             line = f"{n_sky} of {n_rays} rays from closed rooms reached the sky"

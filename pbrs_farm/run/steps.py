@@ -85,6 +85,9 @@ def _house(work: Work) -> StepOutput:
         name: len(getattr(repaired, name)) for name in ("rooms", "items", "notes")
     }
     facts["note_kinds"] = dict(Counter(note.kind for note in repaired.notes))
+    taken_out = Counter(r.reason for r in report.removed if r.reason in ("person", "plant"))
+    if taken_out:
+        facts["taken_out"] = dict(taken_out)
     if report.leaks is not None and report.leaks.n_sky:
         facts["leaks"] = [report.leaks.n_sky, report.leaks.n_rays]
     if lost := [f"{n.place}: {n.text}" for n in repaired.notes if n.kind == "wall-lost"]:

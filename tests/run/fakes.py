@@ -13,6 +13,7 @@ from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, run_unless_done
 SPOILT = {
     "note_kinds": {"missing-texture": 3, "wall-lost": 1},
     "leaks": [833, 20_000],
+    "taken_out": {"plant": 2, "person": 1},
     "walls_lost": ["w3: repair left 0.5 of 24.0 m2 of it"],
 }
 """Facts of a house that lost something."""

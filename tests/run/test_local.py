@@ -138,6 +138,7 @@ def test_leaks_notes_and_lost_walls_are_told_also_by_a_run_that_finds_them_done(
         assert "LIGHT LEAKS IN: 833 of 20000 rays" in told.err
         assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in told.err
         assert "2 views: 1 wall LOST, " in told.out
+        assert "1 person and 2 plants taken out: " in told.out
         assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in told.out.splitlines()[-1]
 
 

@@ -67,6 +67,8 @@ _SIZES: Final[Mapping[str, tuple[float, float, float, float]]] = {
 # What stands on floors must be twice the least size where its bottom is at the height of a table
 # or a shelf: a doll's bed.
 _RAISED_M: Final = (0.6, 1.8)  # above the floor of the level
+_LEAST_LAWN_M: Final = 1.0  # shorter side of grass that is ground
+_FLATTEST_PLANT: Final = 0.1  # height over shorter side: what is flatter covers the ground
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
 
@@ -182,7 +184,15 @@ def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
     return None
 
 
+def is_a_cover_of_ground(width: float, height: float, depth: float) -> bool:
+    """Whether a thing whose name is a plant's lies as grass does: wide and flat, metres."""
+    side = min(width, depth)
+    return side >= _LEAST_LAWN_M and height <= _FLATTEST_PLANT * side
+
+
 def _fits_its_size(label: str, place: PieceSize | None) -> bool:
+    if label == _PLANT and place is not None:
+        return not is_a_cover_of_ground(place.width, place.height, place.depth)
     if place is None or label not in _SIZES:
         return True
     long_min, long_max, height_min, height_max = _SIZES[label]

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import LAMP, OTHERPROP
+from pbrs_farm.core.classes import FLOOR, LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening, transform_points
 from pbrs_farm.core.house import (
@@ -23,6 +23,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.read.common.furniture_classes import is_a_cover_of_ground
 from pbrs_farm.read.common.material_library import PANE_OPACITY, names_glass
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass
 from pbrs_farm.read.common.notes import Notes
@@ -307,6 +308,12 @@ def _finish_item(
     if lights and not surfaces:
         # A light without a shape is a lamp.
         seen = replace(seen, kind=ItemKind.LAMP, nyu40=LAMP)
+    if seen.kind is ItemKind.PLANT and not seen.is_tagged and surfaces:
+        corners = np.concatenate([s.positions for s in surfaces])
+        width, height, depth = np.ptp(corners.astype(np.float64), axis=0).tolist()
+        if is_a_cover_of_ground(width, height, depth):
+            # Ground called Grass is no plant, which repair would take out.
+            seen = replace(seen, kind=ItemKind.GROUND, nyu40=FLOOR)
     tags = [UNMAPPED] if seen is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
         tags.append("mirrored")

@@ -125,3 +125,10 @@ def test_a_name_of_megabytes_is_its_beginning() -> None:
 
 def test_accents_and_case_part_no_words() -> None:
     assert plain("KüchenSchrank TVUnit") == "kuchen schrank tv unit"
+
+
+def test_grass_that_lies_wide_and_flat_is_no_plant() -> None:
+    lawn = class_of_piece("", "Grass", place=PieceSize(8.0, 0.02, 6.0))
+    assert (lawn.nyu40, lawn.word) == (None, "")
+    assert class_of_piece("", "Grass", place=PieceSize(0.4, 0.3, 0.4)).word == "plant"
+    assert class_of_piece("", "Hedge", place=PieceSize(4.0, 1.0, 0.5)).word == "plant"

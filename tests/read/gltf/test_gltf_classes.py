@@ -4,9 +4,22 @@ import json
 
 import pytest
 
+from pbrs_farm.core.classes import FLOOR
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from tests.read.gltf.gltf_scenes import item, read, two_rooms
+
+
+def test_ground_that_is_called_grass_is_ground_and_a_tuft_of_it_a_plant() -> None:
+    scene = two_rooms()
+    scene.node("Grass", mesh=scene.box([-6, -0.3, -6], [10, -0.13, -0.13]))
+    scene.node("Grass.001", mesh=scene.box([1, 0, 1], [1.3, 0.4, 1.3]))
+    scene.node("Hedge", mesh=scene.box([-6, 0, -6], [10, 1.2, -5]))
+    scene.node("Turf", extras={"class": "plant"}, mesh=scene.box([-6, -0.3, -6], [10, -0.13, -1]))
+    house = read(scene)
+    kinds = {i.name: (str(i.kind), i.nyu40) for i in house.items}
+    assert kinds["Grass"] == ("ground", FLOOR)
+    assert [kinds[n][0] for n in ("Grass.001", "Hedge", "Turf")] == ["plant"] * 3
 
 
 def test_names_tell_classes_and_unknown_ones_are_otherprop_and_said_so() -> None:
