@@ -215,8 +215,9 @@ def _format_at(path: Path) -> Format:
     if path.is_dir():
         text, hint = _of_folder(path)
         raise BadHouse(path, "", text, hint=hint)
-    if path.name == "house.json":
-        raise BadHouse(path, "", "is no house by itself", hint=_ROOT_HINT)
+    if suffix == ".json" and path.is_file():
+        hint = f"read are {summary()}; {_ROOT_HINT}"
+        raise BadHouse(path, "", "is no house by itself", hint=hint)
     if suffix in _MODEL_SUFFIXES:
         hint = f"`pbrs-farm objects {path} --out DIR` renders single models"
         raise BadHouse(str(path), "", "is a model or a library of models, no home", hint=hint)
@@ -224,8 +225,7 @@ def _format_at(path: Path) -> Format:
         hint = f"export it as .glb; read are {summary()}"
         raise BadHouse(str(path), "", f"{path.suffix} files are not read", hint=hint)
     if path.is_file() and not any(suffix in one.suffixes for one in formats()):
-        text = "is a JSON file of no format that is read" if suffix == ".json" else "is no home"
-        raise BadHouse(path, "", text, hint=f"read are {summary()}")
+        raise BadHouse(path, "", "is no home", hint=f"read are {summary()}")
     # A file that is not there is missing in its format's words.
     named = (one for one in formats() if suffix in one.suffixes)
     default = format_of_kind(_DEFAULT_KIND)
