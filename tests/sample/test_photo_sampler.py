@@ -194,20 +194,3 @@ def test_the_same_house_and_seed_give_the_same_views() -> None:
     assert all(
         (x.camera.world_from_camera == y.camera.world_from_camera).all() for x, y in zip(a, b)
     )
-
-
-@pytest.mark.parametrize("name", ["paper", "released"])
-def test_the_papers_recipes_keep_the_digest_they_had_before_the_preset(name: str) -> None:
-    before = {
-        "paper": "17a8747542bd93162ce2ce591c1437be",
-        "released": "3cb9b128bce13c48429f225ddef11fcd",
-    }
-    assert recipe_from_name(name).digest("cameras") == before[name]
-
-
-@pytest.mark.parametrize("name", ["preview", "fast"])
-def test_a_root_of_before_likeness_keeps_its_cameras(name: str) -> None:
-    before = recipe_from_name(
-        name, {"cameras.likeness": "0", "cameras.tilt_sd_deg": "6", "cameras.roll_sd_deg": "0"}
-    )
-    assert before.digest("cameras") == "4c5973062bed425210868640775f3b46"
