@@ -53,7 +53,7 @@ def test_the_first_page_shows_pictures_and_is_light(tab: Any, base: str) -> None
     with loaded_kb(tab) as loaded:
         tab.goto(base, wait_until="networkidle")
     assert tab.locator(".card").count() == 2
-    assert tab.evaluate("[...document.images].every((i) => i.naturalWidth > 0)")
+    until(tab, "[...document.images].every((i) => i.naturalWidth > 0)")
     assert loaded() < 300
 
 
