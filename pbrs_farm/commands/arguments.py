@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -68,6 +69,15 @@ def counted(n: int, noun: str) -> str:
     noun: in the singular, with a plural in -s.
     """
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def echo_notes(notes: Counter[str], out: str) -> None:
+    """Print how many notes of each kind the houses of an output have; nothing where there is none."""
+    if notes:
+        kinds = ", ".join(f"{n} {kind}" for kind, n in notes.most_common(8))
+        echo(
+            f"{counted(notes.total(), 'note')} ({kinds}): `notes` in {out}/houses/<house>/house.json"
+        )
 
 
 def dress_seeds(text: str | None) -> tuple[int, ...]:

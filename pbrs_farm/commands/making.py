@@ -17,6 +17,7 @@ from pbrs_farm.commands.arguments import (
     counted,
     dress_seeds,
     echo,
+    echo_notes,
     home_arguments,
     recipe_of,
     warn,
@@ -221,13 +222,7 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
     if summary.taken_out:
         kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
         echo(f"{kinds} taken out: `removed` in repair.json (repair.remove_persons, remove_plants)")
-    # End with what was lost or guessed while the houses were read.
-    if summary.notes:
-        kinds = ", ".join(f"{n} {kind}" for kind, n in summary.notes.most_common(8))
-        echo(
-            f"{counted(summary.notes.total(), 'note')} ({kinds}): `notes` in"
-            f" {args.out}/houses/<house>/house.json"
-        )
+    echo_notes(summary.notes, args.out)
 
 
 def _summary_line(summary: Any, seconds: float) -> str:

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import HOME, Verb, at_least, counted, dress_seeds, echo, recipe_of
+from pbrs_farm.commands.arguments import (
+    HOME,
+    Verb,
+    at_least,
+    counted,
+    dress_seeds,
+    echo,
+    echo_notes,
+    recipe_of,
+    warn,
+)
 from pbrs_farm.commands.options import add_options
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import ends_of
@@ -61,18 +73,23 @@ def _scatter(args: argparse.Namespace) -> int:
         at_least(f"--{name}", getattr(args, name), 1)
     nearest, farthest = (_metres(end) for end in ends_of(args.distance))
     distance = nearest, farthest
-    found = [
-        model
-        for pattern in args.models
-        for model in models(
-            pattern, unit=args.unit, size_m=args.size_m, up=args.up, credit=args.credit
-        )
-    ]
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always", UserWarning)
+        found = [
+            model
+            for pattern in args.models
+            for model in models(
+                pattern, unit=args.unit, size_m=args.size_m, up=args.up, credit=args.credit
+            )
+        ]
+    for one in heard:
+        warn(str(one.message))
     recipe = recipe_of(args)
     size, k = (recipe.image.width_px, recipe.image.height_px), None
     if args.camera is not None:
         size, k = camera_of_bop(args.camera)
     seeds = dress_seeds(args.dress)
+    notes: Counter[str] = Counter()
     there = finished_views(store_from_url(args.out))
     n_made = n_kept = 0
     n_scenes = len(args.homes) * max(1, len(seeds)) * args.scenes
@@ -88,6 +105,7 @@ def _scatter(args: argparse.Namespace) -> int:
                     n=args.views, distance_m=distance, min_visible=args.visible, size=size,
                     K=k, seed=seed,
                 )  # fmt: skip
+                notes.update(note.kind for note in scene.house.notes)
                 left = [c for c in cameras if (scene.id, c.id) not in there]
                 n_kept += len(cameras) - len(left)
                 # One by one, so that a killed command loses one view at most.
@@ -100,6 +118,7 @@ def _scatter(args: argparse.Namespace) -> int:
                     tell(n_made + n_kept, n_scenes * args.views)
     total = counted(n_made + n_kept, "view")
     echo(f"{args.out}: {total}, {n_kept} already there; `pbrs-farm export {args.out} --to bop`")
+    echo_notes(notes, args.out)
     return 0
 
 

@@ -96,6 +96,8 @@ def _place(house: House, edit: PlaceModel, fields: ReadFields) -> House:
         materials=(*house.materials, *shape.materials),
         textures={**house.textures, **shape.textures},
         source=source,
+        # Once for a model, however many of it are placed.
+        notes=tuple(dict.fromkeys((*house.notes, *shape.notes))),
     )
 
 

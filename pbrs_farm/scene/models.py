@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.edits import ModelRef
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Note
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.read.common.furniture_classes import nyu40_of
@@ -78,6 +80,15 @@ class Model:
         """
         return _UP[self.up]
 
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What of its file is missing or guessed, as `notes` of house.json has it.
+
+        >>> can.notes
+        ()
+        """
+        return self.shape.notes
+
     def __repr__(self) -> str:
         size = " x ".join(f"{v:.3g}" for v in self.size_m)
         return f"<Model {self.id}: {NYU40_NAMES[self.ref.nyu40]}, {size} m>"
@@ -100,7 +111,8 @@ def model(
     whatever its unit; else unit: m, cm, mm or inch a unit of the file. up: the axis that points up,
     x, y or z; y for glTF and OBJ, z for the others. credit: a line that pictures must carry.
 
-    Raises BadInput, naming the file, for a mesh that is missing, empty, not finite or 900 m large.
+    Raises BadInput, naming the file, for a mesh that is missing, empty, not finite or 900 m large. What
+    of it is missing or guessed, a picture for instance, is a warning, and `notes` of the model and of homes.
 
         >>> pf.model("can.ply", category="bottle", size_m=0.2).size_m[2]
         0.2...
@@ -128,7 +140,11 @@ def model(
         extent = float(np.ptp(model_shape(known, ReadFields()).bounds, axis=0).max())
         known = known.model_copy(update={"scale": 1e-3 * size_m / extent})
     found = Model(known, up)
-    _ = found.shape  # read it now: a bad file is an error here, not in a run
+    # Read it now: a bad file is an error here, not in a run.
+    if notes := found.notes:
+        more = f"; and {len(notes) - 1} more: model.notes" if notes[1:] else ""
+        text = f"{notes[0].place}: {notes[0].text} ({notes[0].kind}){more}"
+        warnings.warn(f"{path.parent}/{text}", stacklevel=2)
     return found
 
 

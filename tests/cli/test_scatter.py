@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,27 @@ def test_scattered_models_are_seen_and_kept(
         seen = [row for row in frame.instances if row.get("model") == "can"]
         assert max(row["visible_fraction"] for row in seen) >= 0.5
     assert verify(tmp_path / "out").is_clean
+
+
+def test_what_a_model_lacks_is_a_line_and_a_note_of_the_home(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mug.mtl").write_text("newmtl a\nmap_Kd none.png\n")
+    (tmp_path / "mug.obj").write_text(
+        "mtllib mug.mtl\nusemtl a\nv 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nvt 0 0\n"
+        "f 1/1 2/1 3/1\nf 1/1 3/1 4/1\nf 1/1 4/1 2/1\nf 2/1 4/1 3/1\n"
+    )
+    words = [
+        "scatter", "builtin", "--models", str(tmp_path / "mug.obj"), "--count", "2", "--views", "1",
+        "--on", "dining table", "--out", str(tmp_path / "out"), "--recipe", "preview", "--modes",
+        "opengl_dl", *FIELDS,
+    ]  # fmt: skip
+    assert main(words) == 0
+    printed = capsys.readouterr()
+    assert "mug.obj: none.png does not exist" in printed.err
+    assert "1 note (1 missing-texture)" in printed.out
+    (file,) = (tmp_path / "out").glob("houses/*/house.json")
+    assert [note["kind"] for note in json.loads(file.read_bytes())["notes"]] == ["missing-texture"]
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,16 @@
 """A mesh of the user's own in its own frame, in metres: GLB, glTF, OBJ, PLY, STL, OFF.
 
 Effects: reads the file and its pictures. Colours a vertex become one colour a triangle, kept in a
-small picture, since a surface has one material.
+small picture, since a surface has one material. What is left out or guessed is a note of the shape.
 """
 
 from __future__ import annotations
 
 import io
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -19,20 +23,22 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.edits import ModelRef
 from pbrs_farm.core.errors import BadHouse, BadInput
-from pbrs_farm.core.house import Material, Surface, Texture, corners_of_surfaces
+from pbrs_farm.core.house import Material, Note, Surface, Texture, corners_of_surfaces
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
+from pbrs_farm.read.common.model_materials import MAX_TEXTURE_BYTES
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.objects.single_object import model_surfaces, object_companions
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular, read_regular
 
 SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 MAX_EXTENT_M: Final = 100.0
 """A model larger than that is a slip of its unit."""
 _MIN_EXTENT_M: Final = 1e-4
+_PLY_HEADER_BYTES: Final = 65_536  # a header that is longer names no picture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +48,7 @@ class ModelShape:
     surfaces: tuple[Surface, ...]  # materials index into materials
     materials: tuple[Material, ...]
     textures: dict[str, Texture]
+    notes: tuple[Note, ...] = ()  # what is missing or guessed; places begin with the file's name
 
     @property
     def points(self) -> F64:
@@ -74,62 +81,125 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
         raise BadInput(path, "", fault_of(error)) from None
     if (keys.sha256(data), companions_digest(path)) != (model.sha256, model.companions):
         raise BadInput(path, "", "changed since the home was made", hint="make the home again")
-    shape = _from_trimesh(path, data) if _is_plain(path) else _from_reader(path, model, fields)
+    notes = Notes(path.name, strict=fields.strict)
+    read = _from_trimesh if _is_plain(path) else _from_reader
+    try:
+        shape = read(path, data, model, fields, notes)
+    except BadHouse as error:
+        raise BadInput(path, error.place, error.message.partition(": ")[2] or str(error)) from None
+    # Its class is the caller's category, whatever its nodes are called.
+    own = [note for note in notes.all() if note.kind != "unmapped-class"]
+    shape = replace(shape, notes=tuple(_with_file(note, path.name) for note in own))
     return _check_shape_limits(path, _scaled(shape, model.scale), fields)
+
+
+def _with_file(note: Note, file: str) -> Note:
+    """The note with the file before its place: in a home it stands among notes of other files."""
+    return note if note.place.startswith(file) else replace(note, place=f"{file}: {note.place}")
 
 
 def companions_digest(path: Path) -> str:
     """Digest of the files beside a model that reading it opens; "" where there are none.
 
-    Empty, too, for a plain mesh that names no other file. It changes with the bytes of each of
-    them, so that a changed picture gives another digest.
+    It changes with the bytes of each of them, so that a changed picture gives another digest.
     """
+    files, folder = SourceFiles(), RootFolder(path.parent)
     if _is_plain(path):
-        return ""
+        return files.digest(folder, _pictures_of_ply(path))
     own = ObjectModel(path.stem, path.stem, "", 0, path, path.parent)
-    files = SourceFiles()
-    return files.digest(RootFolder(path.parent), object_companions(own, files))
+    return files.digest(folder, object_companions(own, files))
 
 
 def _is_plain(path: Path) -> bool:
     return path.suffix.lower() in (".ply", ".stl", ".off")
 
 
-def _from_reader(path: Path, model: ModelRef, fields: ReadFields) -> ModelShape:
+def _pictures_of_ply(path: Path) -> list[str]:
+    """Names of the pictures in a PLY's header, as it gives them; [] of every other file."""
+    try:
+        with open_regular(path, MAX_SCENE_BYTES) as file:
+            header, end, _data = file.read(_PLY_HEADER_BYTES).partition(b"end_header")
+    except OSError:
+        return []  # the reader says what is wrong with it
+    if not end or not header.startswith(b"ply"):
+        return []
+    lines = (line.split(None, 2) for line in header.decode("utf-8", "replace").splitlines())
+    return [
+        words[2].strip()
+        for words in lines
+        if len(words) == 3 and words[0] == "comment" and words[1].lower() == "texturefile"
+    ]
+
+
+def _from_reader(
+    path: Path, _data: bytes, model: ModelRef, fields: ReadFields, notes: Notes
+) -> ModelShape:
     """glTF and OBJ go through the readers that know materials and hostile files."""
     own = ObjectModel(model.id, model.id, model.category, model.nyu40, path, path.parent)
-    notes = Notes(path.name, strict=fields.strict)
-    try:
-        surfaces, library, _sha = model_surfaces(own, notes, fields)
-    except BadHouse as error:
-        raise BadInput(path, error.place, error.message.partition(": ")[2] or str(error)) from None
+    surfaces, library, _sha = model_surfaces(own, notes, fields)
     return ModelShape(tuple(surfaces), library.materials, library.textures)
 
 
-def _from_trimesh(path: Path, data: bytes) -> ModelShape:
+def _from_trimesh(
+    path: Path, data: bytes, _model: ModelRef, _fields: ReadFields, notes: Notes
+) -> ModelShape:
     import trimesh
 
+    library = MaterialLibrary(notes)
+    picture = _picture_of_ply(path, library, notes)
     try:
-        resolver = trimesh.resolvers.FilePathResolver(str(path))
-        loaded: Any = trimesh.load(
-            io.BytesIO(data), file_type=path.suffix[1:].lower(), resolver=resolver,
-            force="mesh", process=False,
-        )  # fmt: skip
-        points = np.asarray(loaded.vertices, np.float64)
-        faces = np.asarray(loaded.faces, np.int64)
+        with _quiet_trimesh():
+            # Its pictures are ours to open: they may be missing, or lead out of the folder.
+            loaded: Any = trimesh.load(
+                io.BytesIO(data), file_type=path.suffix[1:].lower(), force="mesh", process=False,
+                skip_materials=True,
+            )  # fmt: skip
+            points = np.asarray(loaded.vertices, np.float64)
+            faces = np.asarray(loaded.faces, np.int64)
     except Exception as error:  # noqa: BLE001  whatever the library meets in a foreign file
         raise BadInput(path, "", f"cannot be read as a mesh: {type(error).__name__}") from None
     if not len(points) or not len(faces):
         raise BadInput(path, "", "has no triangle")
     if faces.min() < 0 or faces.max() >= len(points):
         raise BadInput(path, "", "a face names a vertex that does not exist")
-    library = MaterialLibrary(Notes(path.name, strict=False))
+    if data.lstrip()[:4] == b"COFF":
+        notes.add("unread-part", path.name, "its colours are not read: it is grey")
     surface = Surface(path.stem, points.astype(np.float32), faces.astype(np.int32), 0)
     normals = _normals_of(loaded, data)
     if normals is not None:
         surface = replace(surface, normals=normals)
-    surface = _coloured(surface, loaded.visual, library, path)
+    surface = _coloured(surface, loaded.visual, picture, library, path)
     return ModelShape((surface,), library.materials, library.textures)
+
+
+@contextmanager
+def _quiet_trimesh() -> Iterator[None]:
+    """Without what trimesh logs and NumPy warns of in a foreign file: what matters of it is raised."""
+    log = logging.getLogger("trimesh")
+    was = log.disabled
+    log.disabled = True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.disabled = was
+
+
+def _picture_of_ply(path: Path, library: MaterialLibrary, notes: Notes) -> Image.Image | None:
+    """The picture that a PLY is covered with; None, with a note, where it cannot be read."""
+    names = _pictures_of_ply(path)
+    if not names:
+        return None
+    if len(names) > 1:
+        text = f"names {len(names)} pictures; all of it has the last, {names[-1]}"
+        notes.add("unread-part", path.name, text)
+    name, folder = names[-1], RootFolder(path.parent)
+    found = library.texture(
+        name, name=name, place=path.name,
+        load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+    )  # fmt: skip
+    return None if found is None else Image.open(io.BytesIO(found.texture.data))
 
 
 def _normals_of(mesh: Any, data: bytes) -> Any:
@@ -147,9 +217,10 @@ def _normals_of(mesh: Any, data: bytes) -> Any:
     return (normals / length).astype(np.float32)
 
 
-def _coloured(surface: Surface, visual: Any, library: MaterialLibrary, path: Path) -> Surface:
+def _coloured(
+    surface: Surface, visual: Any, picture: Image.Image | None, library: MaterialLibrary, path: Path
+) -> Surface:
     """The surface with its picture, its vertex colours as one, or a plain grey."""
-    picture = getattr(getattr(visual, "material", None), "image", None)
     uvs = getattr(visual, "uv", None)
     if picture is not None and uvs is not None and np.isfinite(uvs).all():
         texture = _add_vertex_colours(library, picture.convert("RGB"), path.stem)
