@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+
+import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 
@@ -108,6 +110,9 @@ class PlanWall:
     thickness: float
     is_outer: bool = False
     height: float | None = None  # of a parapet; None = the storey's
+    tops: tuple[Point, ...] = field(default=(), repr=False)
+    """(metres from its start, height) along its upper edge where that is not level; () = level. Not in
+    its repr, from which the colours of plans are drawn."""
 
     @property
     def length(self) -> float:
@@ -137,6 +142,12 @@ class PlanWall:
             (b[0] - nx, b[1] - nz),
             (a[0] - nx, a[1] - nz),
         )
+
+    def top_over(self, low: float, high: float) -> float:
+        """The least height between two places along it, of a wall whose upper edge is not level."""
+        places, heights = (np.array(v) for v in zip(*self.tops, strict=True))
+        ends = np.interp([low, high], places, heights)
+        return float(min(*ends, *heights[(places > low) & (places < high)]))
 
     def at(self, along: float) -> Point:
         """The point of the middle line `along` metres from its start.

@@ -25,7 +25,8 @@ import math
 import zipfile
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 from xml.etree import ElementTree as ET
 
@@ -53,6 +54,7 @@ AUTHOR: Final = "pbrs_farm"
 VERSION: Final = "7000"
 _ZIP_TIME: Final = (2000, 1, 1, 0, 0, 0)  # of every entry: the same home has the same bytes
 _EYE_M: Final = 1.6
+_STEP_M: Final = 0.01  # where an upper edge steps up or down, no wall stands
 _FIELD_OF_VIEW_RAD: Final = 1.1
 _LAMP_POWER: Final = 0.5
 _DOOR_NAMES: Final = {
@@ -346,21 +348,39 @@ def _add_light_sources(element: ET.Element, shape: Shape) -> None:
 
 
 def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, str]) -> None:
-    joints = _joints(plan.walls)
+    walls = tuple(part for wall in plan.walls for part in _straight_parts(wall))
+    joints = _joints(walls)
     first = len(home.findall("wall"))
-    for number, wall in enumerate(plan.walls):
+    for number, wall in enumerate(walls):
         (x0, z0), (x1, z1) = wall.start, wall.end
+        level_top = wall.height or plan.height
+        tops = [height for _, height in wall.tops] or [level_top, level_top]
         element = ET.SubElement(home, "wall", {
             "id": f"wall-{first + number}", "xStart": _cm(x0), "yStart": _cm(z0), "xEnd": _cm(x1),
-            "yEnd": _cm(z1), "height": _cm(wall.height or plan.height),
+            "yEnd": _cm(z1), "height": _cm(tops[0]),
             "thickness": _cm(wall.thickness), "pattern": "hatchUp",
         } | level)  # fmt: skip
+        if tops[1] != tops[0]:
+            element.set("heightAtEnd", _cm(tops[1]))
         for attribute, end in (("wallAtStart", 0), ("wallAtEnd", 1)):
             if (number, end) in joints:
                 element.set(attribute, f"wall-{first + joints[number, end]}")
         for side, outwards in (("leftSideColor", -1), ("rightSideColor", 1)):
             room = _room_beside(plan, wall, outwards)
             element.set(side, f"FF{_wall_colour(plan, room, paints)}")
+
+
+def _straight_parts(wall: PlanWall) -> list[PlanWall]:
+    """The walls that together are this one, each with a straight upper edge from end to end."""
+    if not wall.tops:
+        return [wall]
+    return [
+        replace(
+            wall, start=wall.at(low), end=wall.at(high), tops=((0.0, here), (high - low, there))
+        )
+        for (low, here), (high, there) in pairwise(wall.tops)
+        if high - low > _STEP_M
+    ]
 
 
 def _joints(walls: tuple[PlanWall, ...]) -> dict[tuple[int, int], int]:

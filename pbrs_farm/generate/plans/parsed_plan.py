@@ -17,6 +17,7 @@ from shapely import affinity
 from shapely.geometry import MultiPolygon, Polygon
 
 from pbrs_farm.generate.plan_walls import largest_rectangle
+from pbrs_farm.generate.plans.wall_tops import WallTop
 
 MAX_THINGS: Final = 3_000
 _FILLED: Final = 0.85  # a shape that fills less of its rectangle is made of several boxes
@@ -46,6 +47,7 @@ class ParsedStorey:
     value: dict[str, Any]
     things: tuple[Thing, ...] = ()
     name: str = ""
+    tops: tuple[WallTop, ...] = ()  # of all walls where one is sloped, below a roof; () = level
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,8 @@ def _of_machine(path: Path, parsed: ParsedPlan, part: Part) -> PlanFile:
     storeys = []
     x, z = _origin(parsed)
     for storey in parsed.storeys:
-        plan = plan_of_value(path, _moved_value(storey.value, -x, -z), left_out)
+        tops = [top.moved(-x, -z) for top in storey.tops]
+        plan = plan_of_value(path, _moved_value(storey.value, -x, -z), left_out, tops)
         things = [t._replace(x=t.x - x, z=t.z - z) for t in storey.things if _is_sound(t)]
         n_lost = len(storey.things) - len(things[:MAX_THINGS])
         for _ in range(min(n_lost, 1)):

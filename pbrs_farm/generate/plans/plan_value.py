@@ -6,6 +6,7 @@ an opening that fits no wall are left out, a line each.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -30,6 +31,7 @@ from pbrs_farm.generate.floor_plan import (
 from pbrs_farm.generate.plan_walls import corners
 from pbrs_farm.generate.plans.parsed_plan import LeftOut, largest_part
 from pbrs_farm.generate.plans.plan_format import PlanFormat
+from pbrs_farm.generate.plans.wall_tops import WallTop, with_tops
 from pbrs_farm.generate.plans.walled_rooms import DrawnRoom, walled
 
 MAX_ROOMS: Final = 60
@@ -38,6 +40,7 @@ _MOST_SIDES: Final = 120  # most sides of an outline after simplification
 _TOLERANCES_M: Final = (1e-3, 0.01, 0.02, 0.05, 0.1)  # by which a curve is made of straight walls
 _FAR_M: Final = 200.0
 _LEAST_M2: Final = 0.5
+_LEAST_TALL_M: Final = 0.3  # of an opening
 _REACH_M: Final = 0.6  # from an opening to its wall
 _SIZES: Final = {
     OpeningKind.DOOR: (0.9, 2.1, 0.0), OpeningKind.ENTRANCE: (0.95, 2.1, 0.0),
@@ -70,7 +73,7 @@ class _OpeningFields(BaseModel):
     kind: Any = None
     entrance: Any = None
     width: Annotated[_Length, Field(ge=0.3)] = 0.9
-    height: Annotated[_Length, Field(ge=0.3)] = 2.1
+    height: Annotated[_Length, Field(ge=_LEAST_TALL_M)] = 2.1
     sill: _Length = 0.0
 
 
@@ -91,10 +94,12 @@ class _PlanFields(BaseModel):
     walls: list[Any] = Field(default_factory=list, max_length=500)
 
 
-def plan_of_value(path: Path, value: Any, left_out: LeftOut | None = None) -> Plan:
+def plan_of_value(
+    path: Path, value: Any, left_out: LeftOut | None = None, tops: Sequence[WallTop] = ()
+) -> Plan:
     """The plan of a value. left_out: of a machine's plan, collects what does not fit; None = a person's.
 
-    Raises BadInput, naming the room or opening.
+    tops: upper edges of its walls where some are sloped. Raises BadInput, naming the room or opening.
     """
     given = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
     # Walls stand between the drawn rooms; openings then find their wall.
@@ -112,6 +117,7 @@ def plan_of_value(path: Path, value: Any, left_out: LeftOut | None = None) -> Pl
     if not drawn:
         raise BadInput(path, "rooms", f"no room of {_LEAST_M2} m2 or more is left")
     walls, rooms = walled(drawn)
+    walls = with_tops(walls, tops)
     for room, built in zip(drawn, rooms, strict=True):
         if len(built.polygon) < 3 and left_out is None:
             raise BadInput(path, f"{room.place} ({room.name})", "has no floor beside its walls")
@@ -284,6 +290,11 @@ class _Openings:
         wall = self.walls[number]
         along = self._lines[number].project(at)
         along = min(max(along, width / 2 + 0.02), wall.length - width / 2 - 0.02)
+        if wall.tops:
+            # Below a sloping edge: as high as the wall is over the whole width.
+            tall = min(tall, wall.top_over(along - width / 2, along + width / 2) - 0.03 - sill)
+            if tall < _LEAST_TALL_M:
+                raise BadInput(self.path, place, "is higher than its wall")
         if self.is_of_machine:
             for other in self.found:
                 if other.wall == number and abs(other.along - along) < (other.width + width) / 2:

@@ -12,20 +12,31 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 from pydantic import BaseModel, Field
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
-from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, Thing, value_of
+from pbrs_farm.generate.plans.closed_rings import closed_rings
+from pbrs_farm.generate.plans.parsed_plan import (
+    LeftOut,
+    ParsedPlan,
+    ParsedStorey,
+    Thing,
+    largest_part,
+    value_of,
+)
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
+from pbrs_farm.generate.plans.wall_tops import WallTop, upper_edge
 
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
 _SPURIOUS_M: Final = 12.0
+_SAME_HEIGHT_M: Final = 0.15  # of walls: larger differences are told
+_UPRIGHT: Final = 0.98  # y of a wall's own up, at least: others lean
 _KINDS: Final = {"door": "door", "window": "window", "opening": "passage"}
 
 
@@ -66,7 +77,10 @@ def plan_of_room_plan(path: Path, value: Any) -> ParsedPlan:
     stories = sorted({_story(s.story) for s in (*scan.walls, *scan.floors)})
     if not scan.walls:
         raise BadInput(path, "walls", "has no wall")
-    storeys = [_storey_of_scan(path, _of(scan, story), left_out) for story in stories]
+    storeys = [
+        _storey_of_scan(path, _of(scan, story), left_out, is_top=story == stories[-1])
+        for story in stories
+    ]
     return ParsedPlan(tuple(storeys), left_out.lines())
 
 
@@ -82,18 +96,31 @@ def _of(scan: _Scan, story: int) -> _Scan:
     return scan.model_copy(update=parts)
 
 
-def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ParsedStorey:
-    walls, lines = [], []
+def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool) -> ParsedStorey:
+    walls, lines, tops = [], [], []
     for k, surface in enumerate(scan.walls, 1):
         pose = _parse_pose(path, f"wall {k}", surface)
         edges = surface.completedEdges
         if surface.dimensions[0] > _SPURIOUS_M and edges is not None and len(edges) < 2:
             left_out.add(f"a wall over {_SPURIOUS_M:g} m with fewer than two edges is no wall")
             continue
+        if abs(pose[1, 1]) < _UPRIGHT:
+            left_out.add("a wall that leans stands upright")
         walls.append((surface, pose))
-        lines.append(_line_of_surface(surface, pose))
+        top = _upper_edge_of(path, f"wall {k}", surface, pose)
+        tops.append(top)
+        lines.append((top.places[0], top.places[-1]))
     floor = _floor_height(path, scan, walls)
     height = statistics.median([w.dimensions[1] for w, _ in walls] or [2.6])
+    tops = [t._replace(heights=tuple(y - floor for y in t.heights)) for t in tops]
+    if not any(top.is_sloped for top in tops):
+        _note_heights(tops, height, left_out)
+        tops = []
+    elif not is_top:
+        left_out.add("walls rise to a roof below another storey: its ceilings are level")
+        tops = []
+    else:
+        height = max(y for top in tops for y in top.heights)
     outlines = [
         shape for k, f in enumerate(scan.floors, 1)
         if len(f.polygonCorners) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
@@ -110,7 +137,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut) -> ParsedStorey:
     areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
     windows = [o for o in openings if o["kind"] == "window"]
     rooms = typed_rooms("roomplan", areas, things, windows, left_out)
-    return ParsedStorey(value_of(rooms, openings, height), tuple(things))
+    return ParsedStorey(value_of(rooms, openings, height), tuple(things), tops=tuple(tops))
 
 
 def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:
@@ -125,10 +152,28 @@ def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:
     return pose if np.allclose(pose[3], [0, 0, 0, 1]) and pose[:3, 3].any() else pose.T
 
 
-def _line_of_surface(surface: _Surface, pose: F64) -> Line:
-    half = surface.dimensions[0] / 2 * pose[:3, 0]
-    a, b = pose[:3, 3] - half, pose[:3, 3] + half
-    return (float(a[0]), float(a[2])), (float(b[0]), float(b[2]))
+def _upper_edge_of(path: Path, place: str, surface: _Surface, pose: F64) -> WallTop:
+    """The upper edge in the plan, heights in the scan's own y: of its outline, else of its rectangle."""
+    half_width, half_height = (v / 2 for v in surface.dimensions[:2])
+    edge = [(-half_width, half_height), (half_width, half_height)]
+    corners = [(*c, 0.0, 0.0)[:2] for c in surface.polygonCorners]
+    if len(corners) >= 3:
+        outline = largest_part(shapely.make_valid(Polygon(corners)))
+        if outline is None:
+            raise BadInput(path, f"{place}, polygonCorners", "has no area")
+        edge = upper_edge(outline)
+    world = np.array([(x, y, 0.0) for x, y in edge]) @ pose[:3, :3].T + pose[:3, 3]
+    places = tuple((float(x), float(z)) for x, _, z in world)
+    return WallTop(places, tuple(float(y) for y in world[:, 1]))
+
+
+def _note_heights(tops: list[WallTop], height: float, left_out: LeftOut) -> None:
+    """A note where walls of one storey have no one height: its ceiling has."""
+    heights = [max(top.heights) for top in tops]
+    if max(heights, default=0.0) - min(heights, default=0.0) > _SAME_HEIGHT_M:
+        low, high = min(heights), max(heights)
+        text = f"walls of {low:.2f} to {high:.2f} m have one ceiling, at {height:.2f} m"
+        left_out.add(f"{text}: the scan tells of no slope between them")
 
 
 def _floor_height(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) -> float:

@@ -51,6 +51,11 @@ class CeilingHeights:
         found = np.array([_nearest_wall_top(p, *edges) for p in points])
         return np.full(len(points), found.max()) if is_flat else found
 
+    def highest(self, level: PlanLevel, ring: Points2, *, is_flat: bool) -> float:
+        """The height of the ceiling's highest place over an outline (N, 2), a gable's ridge too."""
+        bent = self._with_kinks(level, ring, is_flat)
+        return float(self.heights(level, bent, is_flat).max())
+
     def surface(
         self, level: PlanLevel, parts: Sequence[Sequence[Points2]], material: int, *, is_flat: bool
     ) -> Surface:

@@ -141,8 +141,7 @@ def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, .
         rest = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
         outline = rest[0] if len(rest) == 1 and not rest[0].interiors else room.outline
         polygon = counter_clockwise(_ring(outline.exterior))
-        # The room is as high as its ceiling is anywhere.
-        height = float(np.max(ceilings.heights(room.level, polygon, room.plan.is_ceiling_flat)))
+        height = ceilings.highest(room.level, polygon, is_flat=room.plan.is_ceiling_flat)
         nouns.append(Room(
             id=room.id, name=room.plan.name, level_id=room.level_id, polygon=polygon,
             floor_y=room.level.elevation, ceiling_y=room.level.elevation + height,

@@ -42,6 +42,11 @@ def test_a_ceiling_follows_a_gable() -> None:
     assert (mesh.face_normals[:, 1] < 0).all()
 
 
+def test_a_room_under_a_gable_is_as_high_as_its_ridge() -> None:
+    (room,) = read(GABLE).rooms
+    assert room.ceiling_y == pytest.approx(3.0, abs=0.01)
+
+
 def test_a_gable_over_a_room_with_a_niche_keeps_its_ridge() -> None:
     niche = ROOM.replace(
         "<point x='395' y='5'/>",

@@ -1,0 +1,146 @@
+"""Scans of RoomPlan: attics below a roof, whole homes in one scan."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import Enclosure, House, ItemKind, geometry_from_house
+from pbrs_farm.core.recipe import ReadFields, Recipe
+from pbrs_farm.generate.plans.plan_files import plan_from_file
+from pbrs_farm.prepare.read_source import read_house
+from pbrs_farm.prepare.source import resolve
+from pbrs_farm.raycast.caster import Caster
+from pbrs_farm.repair import repair
+
+Place = tuple[float, float]
+KNEE_M, RIDGE_M = 1.2, 3.0
+FLOOR: list[Place] = [(-2, -1.5), (2, -1.5), (2, 1.5), (-2, 1.5)]
+
+
+def surface(
+    kind: str, a: Place, b: Place, low: float, high: float, corners: Sequence[Place] = ()
+) -> dict[str, Any]:
+    """A surface from a to b of the plan; corners: its outline in its own frame, y from its middle."""
+    length = math.dist(a, b)
+    x, z = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+    middle = (a[0] + b[0]) / 2, (low + high) / 2, (a[1] + b[1]) / 2
+    return {
+        "category": {kind: {}}, "dimensions": [length, high - low, 0],
+        "transform": [x, 0, z, 0, 0, 1, 0, 0, -z, 0, x, 0, *middle, 1],
+        "polygonCorners": [[*c, 0] for c in corners], "completedEdges": [], "story": 0,
+    }  # fmt: skip
+
+
+def floor(ring: Sequence[Place]) -> dict[str, Any]:
+    return {
+        "category": {"floor": {}}, "dimensions": [1, 1, 0], "story": 0,
+        "transform": [1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1],
+        "polygonCorners": [[x, z, 0] for x, z in ring],
+    }  # fmt: skip
+
+
+def scan(folder: Path, **surfaces: list[dict[str, Any]]) -> Path:
+    value: dict[str, Any] = {k: [] for k in ("walls", "doors", "windows", "openings", "objects")}
+    path = folder / "room.json"
+    path.write_text(json.dumps(value | surfaces))
+    return path
+
+
+def gable(a: Place, b: Place) -> dict[str, Any]:
+    """A wall that rises from the knee walls' height to the ridge in its middle."""
+    half, up = math.dist(a, b) / 2, RIDGE_M / 2
+    outline = [(-half, KNEE_M - up), (0, up), (half, KNEE_M - up), (half, -up), (-half, -up)]
+    return surface("wall", a, b, 0, RIDGE_M, outline)
+
+
+def attic(folder: Path) -> Path:
+    """4 m by 3 m below a roof; a door in one gable, a window in the other."""
+    nw, ne, se, sw = FLOOR
+    walls = [surface("wall", nw, ne, 0, KNEE_M), surface("wall", se, sw, 0, KNEE_M),
+             gable(ne, se), gable(sw, nw)]  # fmt: skip
+    return scan(
+        folder, walls=walls, floors=[floor(FLOOR)],
+        doors=[surface("door", (2, -0.4), (2, 0.4), 0, 2)],
+        windows=[surface("window", (-2, -0.45), (-2, 0.45), 1.15, 2.05)],
+    )  # fmt: skip
+
+
+def house_of(path: Path) -> House:
+    return read_house(resolve(str(path)), ReadFields())
+
+
+def test_an_attic_has_a_ceiling_from_its_knee_walls_to_the_ridge(tmp_path: Path) -> None:
+    house = house_of(attic(tmp_path))
+    (ceiling,) = (i.surfaces[0] for i in house.items if i.kind is ItemKind.CEILING)
+    away = np.abs(ceiling.positions[:, 2] - 1.5)
+    np.testing.assert_allclose(
+        ceiling.positions[:, 1], RIDGE_M - away / 1.5 * (RIDGE_M - KNEE_M), atol=1e-3
+    )
+    assert np.ptp(ceiling.positions[:, 1]) == pytest.approx(RIDGE_M - KNEE_M, abs=1e-3)
+    assert house.rooms[0].ceiling_y == pytest.approx(RIDGE_M, abs=1e-3)
+    assert not house.notes
+
+
+def test_an_attic_keeps_its_window_and_door_and_no_light_leaks_in(tmp_path: Path) -> None:
+    house = house_of(attic(tmp_path))
+    heights = sorted((float(o.quad[:, 1].min()), float(o.quad[:, 1].max())) for o in house.openings)
+    np.testing.assert_allclose(heights, [(0, 2), (1.15, 2.05)], atol=2e-3)
+    repaired, report = repair(
+        house, Recipe().repair, occluder_from=lambda some: Caster(geometry_from_house(some))
+    )
+    assert report.leaks is not None
+    assert report.leaks.n_sky == 0
+    assert [r.enclosure for r in repaired.rooms] == [Enclosure.CLOSED]
+
+
+def test_an_opening_ends_below_the_slope_over_it(tmp_path: Path) -> None:
+    path = attic(tmp_path)
+    value = json.loads(path.read_text())
+    # Where it begins, 1.2 m from the ridge, the gable is 1.56 m high.
+    value["windows"] = [surface("window", (-2, 0.4), (-2, 1.2), 0.9, 2.0)]
+    path.write_text(json.dumps(value))
+    (window,) = (o for o in plan_from_file(path).plan.openings if o.kind.value == "window")
+    assert window.sill + window.height == pytest.approx(1.56 - 0.03, abs=2e-3)
+
+
+def test_a_flat_top_between_two_slopes_is_level(tmp_path: Path) -> None:
+    path = attic(tmp_path)
+    value = json.loads(path.read_text())
+    outline = [(-1.5, -0.3), (-0.5, 1.5), (0.5, 1.5), (1.5, -0.3), (1.5, -1.5), (-1.5, -1.5)]
+    for wall in value["walls"][2:]:
+        wall["polygonCorners"] = [[*c, 0] for c in outline]
+    path.write_text(json.dumps(value))
+    house = house_of(path)
+    (ceiling,) = (i.surfaces[0] for i in house.items if i.kind is ItemKind.CEILING)
+    under_ridge = np.abs(ceiling.positions[:, 2] - 1.5) < 0.5 + 1e-3
+    np.testing.assert_allclose(ceiling.positions[under_ridge, 1], RIDGE_M, atol=1e-3)
+    assert under_ridge.sum() >= 4
+
+
+def test_walls_of_two_heights_without_a_slope_are_a_note(tmp_path: Path) -> None:
+    path = attic(tmp_path)
+    value = json.loads(path.read_text())
+    for wall in value["walls"]:
+        wall["polygonCorners"] = []
+    path.write_text(json.dumps(value))
+    (note,) = plan_from_file(path).left_out
+    assert note.startswith("walls of 1.20 to 3.00 m have one ceiling, at 2.10 m")
+
+
+def test_slopes_below_another_storey_are_a_note(tmp_path: Path) -> None:
+    path = attic(tmp_path)
+    value = json.loads(path.read_text())
+    upper = [surface("wall", a, b, 3.3, 5.8) | {"story": 1}
+             for a, b in zip(FLOOR, [*FLOOR[1:], FLOOR[0]], strict=True)]  # fmt: skip
+    value["walls"] += upper
+    path.write_text(json.dumps(value))
+    found = plan_from_file(path)
+    assert found.left_out == ("walls rise to a roof below another storey: its ceilings are level",)
+    assert not any(w.tops for s in found.storeys for w in s.plan.walls)
