@@ -39,7 +39,7 @@ from pbrs_farm.read.catalogue.surface_pictures import (
     texture_library,
 )
 
-VERSION: Final = 2
+VERSION: Final = 3
 """Of the rules, the tables and the reading of models: part of the digest, and of what stored shapes
 are known by. Raised when a piece or its shape changes."""
 _AS_WRITTEN: Final = PieceVerdict("", 0.0, "")

@@ -7,12 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.regular_files import text_from_bytes
 
 Rgb = tuple[float, float, float]
+
+_MOST_BUILTIN_KS: Final = 0.48
+"""A brighter highlight on a dark colour is read as metal; in the program's photos all are lacquer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +114,7 @@ def _picture_name(words: list[str], raw: str) -> str:
 def builtin_materials() -> dict[str, ObjMaterial]:
     """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL.
 
+    The table's Kd are linear (docs/spec/sweethome3d.md section 5); those of an MTL are not.
     Read once and kept: do not write into the answer.
     """
     text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
@@ -118,14 +125,14 @@ def builtin_materials() -> dict[str, ObjMaterial]:
             continue
         table[name] = ObjMaterial(
             name,
-            _parse_mtl_colour(m.get("Kd", (0.8, 0.8, 0.8))),
-            _parse_mtl_colour(m.get("Ks", (0.0, 0.0, 0.0))),
+            _parse_mtl_colour(srgb_from_linear(np.array(m["Kd"]))),
+            _parse_mtl_colour(np.minimum(m.get("Ks", (0.0, 0.0, 0.0)), _MOST_BUILTIN_KS)),
             float(m.get("Ns", 0.0)),
             float(m.get("d", 1.0)),
         )
     return table
 
 
-def _parse_mtl_colour(values: Sequence[float]) -> Rgb:
+def _parse_mtl_colour(values: Sequence[float] | F64) -> Rgb:
     r, g, b = (min(max(float(v), 0.0), 1.0) for v in values)
     return r, g, b

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.read.mesh.mtl import builtin_materials, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
@@ -169,8 +170,21 @@ def test_mtl_lines_are_read_and_nonsense_is_passed_over() -> None:
 def test_the_built_in_materials_carry_their_notice() -> None:
     table = builtin_materials()
     assert len(table) == 134
-    assert table["redwood"].kd == pytest.approx((0.2571, 0.033, 0.0))
     assert "_notice" not in table
+
+
+def test_built_in_colours_are_linear_and_those_of_an_mtl_are_not() -> None:
+    table = builtin_materials()
+    for name, linear in (("ltgrey", 0.3837), ("grey", 0.1837), ("dkgrey", 0.049)):
+        assert linear_from_srgb(np.array(table[name].kd)) == pytest.approx([linear] * 3, abs=1e-6)
+    (same,) = parse_mtl(b"newmtl grey\nKd 0.1837 0.1837 0.1837\n")
+    assert same.kd == (0.1837,) * 3
+
+
+def test_no_built_in_material_is_read_as_a_metal() -> None:
+    # What reflects more than a fifth, and four times its colour, is one (transport/scene_tables).
+    for material in builtin_materials().values():
+        assert linear_from_srgb(np.array(material.ks)) @ LUMINANCE < 0.2, material.name
 
 
 def test_a_face_repeated_a_hundred_thousand_times_is_read_once() -> None:
