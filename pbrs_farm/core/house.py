@@ -67,6 +67,12 @@ class Texture:
         return f"Texture({self.id!r}, {self.name!r}, {self.media_type}, {len(self.data):,} bytes)"
 
 
+USUAL_CUTOFF: Final = 0.5
+"""Alpha below which a texel is a hole where the source names no other (glTF 2.0's default)."""
+NOTHING_LEFT: Final = 2.0
+"""A cutoff above any alpha: the whole surface is a hole."""
+
+
 @dataclass(frozen=True, slots=True)
 class Material:
     """A surface's material as its source gives it.
@@ -82,7 +88,8 @@ class Material:
     shininess: float = 0.0  # Phong exponent Ns, 0 = none
     opacity: float = 1.0  # d, 0..1
     texture_id: str | None = None  # key into House.textures
-    alpha_cutout: bool = False  # texture alpha < 0.5 is a hole
+    alpha_cutout: bool = False  # it has holes: where its texture's alpha is below alpha_cutoff
+    alpha_cutoff: float = USUAL_CUTOFF  # 0..1, or NOTHING_LEFT; alpha is 1 without a texture
     roughness: float | None = None  # glTF's, 0..1 (GGX alpha is its square); None = by shininess
     roughness_texture_id: str | None = None  # green times roughness, as glTF's
     normal_texture_id: str | None = None  # tangent space, x along u, y along v, as glTF's

@@ -16,7 +16,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.house import USUAL_CUTOFF, House, Item, Material
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
 from pbrs_farm.formats.serialise import json_from_value, pretty_json, value_from_json
@@ -45,12 +45,20 @@ def _json_of_house(house: House) -> dict[str, Any]:
         for name in House.__slots__
         if name not in ("items", "textures", "materials")
     }
-    data["materials"] = [json_from_value(m) for m in house.materials]
+    data["materials"] = [_json_of_material(m) for m in house.materials]
     data["items"] = [_json_of_item(item, i + 1) for i, item in enumerate(house.items)]
     data["textures"] = [
         {"key": key, "id": t.id, "name": t.name, "media_type": t.media_type}
         for key, t in house.textures.items()
     ]
+    return data
+
+
+def _json_of_material(material: Material) -> dict[str, Any]:
+    data: dict[str, Any] = json_from_value(material)
+    # The usual cutoff stays unsaid.
+    if material.alpha_cutoff == USUAL_CUTOFF:
+        del data["alpha_cutoff"]
     return data
 
 

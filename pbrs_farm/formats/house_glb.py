@@ -14,7 +14,7 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.house import House, Item, Material, MaterialKind, Surface, Texture
+from pbrs_farm.core.house import USUAL_CUTOFF, House, Item, Material, MaterialKind, Surface, Texture
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.serialise import json_from_value
 
@@ -171,6 +171,11 @@ def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
         "alphaMode": mode,
         "extras": {"kind": material.kind.value},
     }
+    if material.alpha_cutout and mode == "BLEND":
+        # glTF has no word for clear glass with holes.
+        row["extras"]["alphaCutoff"] = material.alpha_cutoff
+    elif material.alpha_cutout and material.alpha_cutoff != USUAL_CUTOFF:
+        row["alphaCutoff"] = material.alpha_cutoff
     if material.normal_texture_id in images:
         normal_map: dict[str, Any] = {"index": images[material.normal_texture_id]}
         scale = float(material.normal_scale)

@@ -187,7 +187,7 @@ def _paint(house: House, edit: PaintItems, _fields: ReadFields) -> House:
 def _cover(house: House, edit: CoverItems, _fields: ReadFields) -> House:
     data = _file(edit.path, edit.sha256)
     try:
-        texture, _has_holes = texture_from_bytes(data, Path(edit.path).name)
+        texture = texture_from_bytes(data, Path(edit.path).name).texture
     except ValueError as error:
         raise BadInput(edit.path, "", str(error)) from None
 

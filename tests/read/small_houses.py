@@ -112,7 +112,7 @@ def full_house() -> House:
             Material("tiles", diffuse=(0.2, 0.5, 1.0), texture_id=red.id, shininess=30.0),
             Material("glass", kind=MaterialKind.PANE, opacity=0.5),
             Material("bulb", kind=MaterialKind.BULB),
-            Material("old", texture_id=gif.id, alpha_cutout=True, is_default=True),
+            Material("old", texture_id=gif.id, alpha_cutout=True, alpha_cutoff=0.25, is_default=True),
         ),
         textures={red.id: red, gif.id: gif},
         openings=(

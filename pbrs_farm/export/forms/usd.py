@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, ItemKind, MaterialKind, Surface
+from pbrs_farm.core.house import USUAL_CUTOFF, House, ItemKind, MaterialKind, Surface
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, rooms_json
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
@@ -268,17 +268,30 @@ class _Stage:
             map_.CreateInput("bias", types.Float4).Set(Gf.Vec4f(-times, -times, -1, 0))
             normal = shader.CreateInput("normal", types.Normal3f)
             normal.ConnectToSource(map_.CreateOutput("rgb", types.Float3))
-        if row["alphaMode"] == "MASK" and picture is not None:
-            opacity = shader.CreateInput("opacity", types.Float)
-            opacity.ConnectToSource(picture.CreateOutput("a", types.Float))
-            shader.CreateInput("opacityThreshold", types.Float).Set(0.5)
-        elif row["alphaMode"] == "BLEND":
-            shader.CreateInput("opacity", types.Float).Set(factor[3])
+        self._set_opacity(shader, row, picture, factor)
         if "emissiveFactor" in row:
             glow = shader.CreateInput("emissiveColor", types.Color3f)
             glow.Set(Gf.Vec3f(*map(float, row["emissiveFactor"])))
         look.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", types.Token))
         return look
+
+    def _set_opacity(self, shader: Any, row: dict[str, Any], picture: Any, factor: Any) -> None:
+        """Opacity, and where the colour's picture (None = none) cuts holes."""
+        from pxr import Gf, Sdf
+
+        types, is_mask = Sdf.ValueTypeNames, row["alphaMode"] == "MASK"
+        if row["alphaMode"] == "OPAQUE":
+            return
+        opacity = shader.CreateInput("opacity", types.Float)
+        if picture is not None and (is_mask or "alphaCutoff" in row["extras"]):
+            # Of clear glass with holes the picture's alpha is multiplied by the glass's opacity.
+            picture.GetInput("scale").Set(Gf.Vec4f(*factor[:3], 1.0 if is_mask else factor[3]))
+            opacity.ConnectToSource(picture.CreateOutput("a", types.Float))
+        else:
+            opacity.Set(0.0 if is_mask else factor[3])
+        if is_mask:
+            threshold = float(row.get("alphaCutoff", USUAL_CUTOFF))
+            shader.CreateInput("opacityThreshold", types.Float).Set(min(threshold, 1.0))
 
     def _picture(self, path: str, number: int, space: str) -> Any:
         from pxr import Sdf, UsdShade

@@ -160,7 +160,7 @@ def _read_texture(
         data = contents.read(image)
         if data is None:
             raise ValueError(f"no {image[:80]!r} in the library")
-        return texture_from_bytes(data, posixpath.basename(image))[0]
+        return texture_from_bytes(data, posixpath.basename(image)).texture
     except (ValueError, BadHouse) as error:
         notes.add("unreadable-texture", place, f"{error}: left out")
         return None
@@ -170,7 +170,7 @@ def _turn_texture(texture: Texture) -> Texture:
     picture = Image.open(io.BytesIO(texture.data)).convert("RGB")
     buffer = io.BytesIO()
     picture.transpose(Image.Transpose.ROTATE_90).save(buffer, "JPEG", quality=92)
-    return texture_from_bytes(buffer.getvalue(), texture.name)[0]
+    return texture_from_bytes(buffer.getvalue(), texture.name).texture
 
 
 @cache

@@ -7,18 +7,19 @@ import warnings
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
+import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.core.house import USUAL_CUTOFF, Material, Texture
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.notes import Notes
 
 MAX_EDGE_PX: Final = 16384
 MAX_TEXTURE_PIXELS: Final = 64_000_000
-_KEPT: Final = {"PNG": "image/png", "JPEG": "image/jpeg", "MPO": "image/jpeg"}
+_PNG: Final = "image/png"
+_KEPT: Final = {"PNG": _PNG, "JPEG": "image/jpeg", "MPO": "image/jpeg"}
 _TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
-_HOLE_BELOW: Final = 128
 PANE_OPACITY: Final = 0.2  # opacity of panes and glass that the source calls opaque
 # Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
 GLASS_WORDS: Final = frozenset(
@@ -31,18 +32,64 @@ FRAME_WORDS: Final = frozenset(
 )  # fmt: skip
 
 
-def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
-    """(the texture, whether its alpha has holes). PNG and JPEG keep their bytes; GIF, BMP, TIFF
-    and WebP become PNG.
+class AlphaRange(NamedTuple):
+    """What a picture's alpha holds, 0..1: the least, the most and the mean of its texels."""
+
+    least: float
+    most: float
+    mean: float
+
+
+OPAQUE_ALPHA: Final = AlphaRange(1.0, 1.0, 1.0)
+
+
+class LoadedTexture(NamedTuple):
+    """A texture that decodes."""
+
+    texture: Texture
+    alpha: AlphaRange = OPAQUE_ALPHA
+
+    def has_holes(self, cutoff: float = USUAL_CUTOFF) -> bool:
+        """Whether its alpha is below the cutoff somewhere."""
+        return self.alpha.least < cutoff
+
+
+def texture_from_bytes(data: bytes, name: str) -> LoadedTexture:
+    """The texture and what its alpha holds. PNG and JPEG keep their bytes; GIF, BMP, TIFF and WebP
+    become PNG.
 
     Raises ValueError with the reason for a picture that cannot be decoded or is too large.
+    """
+    picture = opened_picture(data)
+    alpha = _alpha_range(picture)
+    # Store other kinds as PNG, with alpha where it is not opaque.
+    media_type = _KEPT.get(picture.format or "")
+    if media_type is None:
+        data, media_type = (
+            _png_bytes(picture.convert("RGB" if alpha == OPAQUE_ALPHA else "RGBA")),
+            _PNG,
+        )
+    return LoadedTexture(Texture(keys.sha256(data)[:16], name, media_type, data), alpha)
+
+
+def opened_picture(data: bytes, *, whole: bool = False) -> Image.Image:
+    """A picture of a kind that houses may use, decoded: a JPEG at an eighth of its size unless whole.
+
+    Raises ValueError with the reason where it cannot be decoded or is too large.
     """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of odd metadata in a picture that decodes
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_TRIED)
-            return _texture_of_picture(picture, data, name)
+            width, height = picture.size
+            if max(width, height) > MAX_EDGE_PX or width * height > MAX_TEXTURE_PIXELS:
+                raise ValueError(f"the picture is too large: {width} x {height}")
+            # Decode in full, a JPEG at an eighth: a header alone proves nothing.
+            if _KEPT.get(picture.format or "") == "image/jpeg" and not whole:
+                picture.draft("RGB", (max(width // 8, 1), max(height // 8, 1)))
+            picture.load()
+            return picture
     except (Image.DecompressionBombError, Image.DecompressionBombWarning):
         raise ValueError("the picture is too large") from None
     except UnidentifiedImageError:
@@ -51,36 +98,53 @@ def texture_from_bytes(data: bytes, name: str) -> tuple[Texture, bool]:
         raise ValueError("the picture cannot be decoded: damaged or cut short") from None
 
 
-def _texture_of_picture(picture: Image.Image, data: bytes, name: str) -> tuple[Texture, bool]:
-    width, height = picture.size
-    if max(width, height) > MAX_EDGE_PX or width * height > MAX_TEXTURE_PIXELS:
-        raise ValueError(f"the picture is too large: {width} x {height}")
-    # Decode in full, a JPEG at an eighth: a header alone proves nothing.
-    media_type = _KEPT.get(picture.format or "")
-    if media_type == "image/jpeg":
-        picture.draft("RGB", (max(width // 8, 1), max(height // 8, 1)))  # quick: eighth size
-    picture.load()
-    has_holes = _has_holes(picture)
-    # Store other kinds as PNG, with alpha where it cuts holes.
-    if media_type is None:
-        buffer = io.BytesIO()
-        picture.convert("RGBA" if has_holes else "RGB").save(buffer, "PNG")
-        data, media_type = buffer.getvalue(), "image/png"
-    return Texture(keys.sha256(data)[:16], name, media_type, data), has_holes
+def picture_with_alpha(
+    colour: bytes | None, opacity: bytes, channel: str = "", scale: float = 1.0, bias: float = 0.0
+) -> bytes:
+    """PNG of a colour picture whose alpha is what another picture says: for formats that part them.
+
+    colour: None = white. channel: "r", "g", "b" or "a" of the other picture, "l" its luminance; "" is
+    its alpha where it has any, else its luminance. Its values 0..1 are multiplied by scale, then bias is added. Of
+    two sizes the larger one is taken along each axis. Raises ValueError as `opened_picture` does.
+    """
+    values = _channel(opened_picture(opacity, whole=True), channel)
+    times = np.clip(np.rint(np.arange(256) * scale + 255 * bias), 0, 255).astype(np.uint8)
+    alpha = Image.fromarray(times[np.asarray(values)])
+    white = Image.new("RGB", alpha.size, "white")
+    picture = white if colour is None else opened_picture(colour, whole=True).convert("RGB")
+    size = (max(picture.width, alpha.width), max(picture.height, alpha.height))
+    picture, alpha = (p if p.size == size else p.resize(size) for p in (picture, alpha))
+    picture.putalpha(alpha)
+    return _png_bytes(picture)
 
 
-def _has_holes(picture: Image.Image) -> bool:
-    if picture.mode not in ("RGBA", "LA", "PA") and "transparency" not in picture.info:
-        return False
-    lowest, _ = picture.convert("RGBA").getchannel("A").getextrema()
-    return isinstance(lowest, (int, float)) and lowest < _HOLE_BELOW
+def _channel(picture: Image.Image, channel: str) -> Image.Image:
+    """One channel of a picture, 8 bits."""
+    if picture.mode.startswith("I"):
+        # 16 bits of grey: the upper eight.
+        return Image.fromarray((np.asarray(picture) >> 8).clip(0, 255).astype(np.uint8))
+    if channel == "l" or (channel == "" and not _has_alpha(picture)):
+        return picture.convert("L")
+    return picture.convert("RGBA").getchannel((channel or "a").upper())
 
 
-class LoadedTexture(NamedTuple):
-    """A texture that decodes."""
+def _alpha_range(picture: Image.Image) -> AlphaRange:
+    if not _has_alpha(picture):
+        return OPAQUE_ALPHA
+    counts = np.array(picture.convert("RGBA").getchannel("A").histogram())
+    values = np.flatnonzero(counts)
+    mean = float(counts @ np.arange(256)) / float(counts.sum())
+    return AlphaRange(float(values[0]) / 255, float(values[-1]) / 255, mean / 255)
 
-    texture: Texture
-    has_holes: bool  # its alpha falls below one half somewhere
+
+def _has_alpha(picture: Image.Image) -> bool:
+    return picture.mode in ("RGBA", "LA", "PA") or "transparency" in picture.info
+
+
+def _png_bytes(picture: Image.Image) -> bytes:
+    buffer = io.BytesIO()
+    picture.save(buffer, "PNG")
+    return buffer.getvalue()
 
 
 class MaterialLibrary:
@@ -153,7 +217,7 @@ class MaterialLibrary:
             self._notes.add("missing-texture", place, f"{shown} does not exist; the colour is kept")
             return None
         try:
-            return LoadedTexture(*texture_from_bytes(data, name))
+            return texture_from_bytes(data, name)
         except ValueError as error:
             self._notes.add("unreadable-texture", place, f"{shown}: {error}")
             return None

@@ -11,7 +11,11 @@ from typing import Final
 
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.read.common.json_values import Override
-from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
+from pbrs_farm.read.common.material_library import (
+    LoadedTexture,
+    MaterialLibrary,
+    picture_with_alpha,
+)
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.mesh.mtl import ObjMaterial
@@ -47,7 +51,7 @@ class ModelMaterials:
             diffuse = override.diffuse
         elif reference and base.kd == GREY:  # what parse_mtl gives where there is no Kd
             diffuse = WHITE
-        found = self._texture(reference, place) if reference else None
+        found = self._texture(reference, base.map_d, place) if reference or base.map_d else None
         if reference and found is None and diffuse == WHITE:
             diffuse = GREY
         return Material(
@@ -58,7 +62,7 @@ class ModelMaterials:
             shininess=base.ns,
             opacity=base.d,
             texture_id=found.texture.id if found else None,
-            alpha_cutout=bool(found and found.has_holes),
+            alpha_cutout=bool(found and found.has_holes()),
         )
 
     def wall_material(
@@ -82,10 +86,21 @@ class ModelMaterials:
         png = f"texture/{name}.png"
         return png if self._folder.path(png) is not None else f"texture/{name}.jpg"
 
-    def _texture(self, name: str, place: str) -> LoadedTexture | None:
+    def _texture(self, name: str, opacity: str, place: str) -> LoadedTexture | None:
+        """The picture of the colour ("" = none), with the alpha of the opacity's where that is another."""
+        if opacity and opacity != name:
+            mask = self._picture(opacity)
+            if mask is not None:
+                return self.library.texture(
+                    f"{name} with the alpha of {opacity}",
+                    name=posixpath.basename(name or opacity),
+                    place=place,
+                    load=lambda: picture_with_alpha(self._picture(name) if name else None, mask),
+                )
+            self.library.texture(opacity, name="", place=place, load=lambda: None)  # its note
         return self.library.texture(
-            name,
-            name=posixpath.basename(name),
-            place=place,
-            load=lambda: self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
+            name, name=posixpath.basename(name), place=place, load=lambda: self._picture(name)
         )
+
+    def _picture(self, name: str) -> bytes | None:
+        return self._folder.read(name, max_bytes=MAX_TEXTURE_BYTES)

@@ -33,7 +33,7 @@ class Layered:
 
 
 def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
-    """The library's materials, map_kd as a name below the root; None if there is no such file.
+    """The library's materials, map_kd and map_d as names below the root; None if there is no such file.
 
     Raises BadHouse for a picture that lies outside the folder.
     """
@@ -41,9 +41,12 @@ def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
     if data is None:
         return None
     at = posixpath.dirname(name)
+
+    def below_root(name: str) -> str:
+        return folder.name_from(at, name) if name else ""
+
     return tuple(
-        replace(m, map_kd=folder.name_from(at, m.map_kd)) if m.map_kd else m
-        for m in parse_mtl(data)
+        replace(m, map_kd=below_root(m.map_kd), map_d=below_root(m.map_d)) for m in parse_mtl(data)
     )
 
 
@@ -88,7 +91,9 @@ class SourceFiles:
         if key not in self._pictures:
             try:
                 materials = read_mtl(folder, mtl) or ()
-                self._pictures[key] = tuple({m.map_kd for m in materials if m.map_kd})
+                self._pictures[key] = tuple(
+                    {name for m in materials for name in (m.map_kd, m.map_d) if name}
+                )
             except BadHouse:
                 self._pictures[key] = ()
         return self._pictures[key]

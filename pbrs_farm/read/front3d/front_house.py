@@ -212,7 +212,7 @@ class _Paints:
                 load=lambda: folder.read(name, max_bytes=MAX_TEXTURE_BYTES),
             )  # fmt: skip
         if found is not None:
-            return Material(uid[:60], texture_id=found.texture.id, alpha_cutout=found.has_holes)
+            return Material(uid[:60], texture_id=found.texture.id, alpha_cutout=found.has_holes())
         return Material(uid[:60], diffuse=colour or (1.0, 1.0, 1.0), is_default=colour is None)
 
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from pbrs_farm.core.arrays import triple
 from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
-from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.house import NOTHING_LEFT, USUAL_CUTOFF, Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.material_library import (
     FRAME_WORDS,
     GLASS_WORDS,
+    OPAQUE_ALPHA,
     LoadedTexture,
     MaterialLibrary,
 )
@@ -81,8 +82,7 @@ class SceneMaterials:
         transmission = object_at(object_at(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
         # Opacity is what blending lets through, or transmission, whichever is less.
-        mode = fields_json.get("alphaMode", "OPAQUE")
-        opacity = float(np.clip(factor[3], 0, 1)) if mode == "BLEND" else 1.0
+        opacity, cutoff = self._alpha(fields_json, float(np.clip(factor[3], 0, 1)), found, place)
         opacity = min(opacity, 1.0 - passes)
         colour = np.clip(factor[:3], 0, 1)
         # Roughness to a Phong exponent: alpha = roughness^2, n = 2 / alpha^2 - 2.
@@ -99,7 +99,8 @@ class SceneMaterials:
             shininess=shininess,
             opacity=opacity,
             texture_id=found.texture.id if found else None,
-            alpha_cutout=bool(found and found.has_holes and mode != "OPAQUE"),
+            alpha_cutout=cutoff is not None,
+            alpha_cutoff=USUAL_CUTOFF if cutoff is None else cutoff,
             roughness=roughness if has_coat else None,
             roughness_texture_id=maps.get("metallicRoughnessTexture"),
             normal_texture_id=maps.get("normalTexture"),
@@ -107,6 +108,33 @@ class SceneMaterials:
             is_default=found is None and "baseColorFactor" not in pbr,
         )
         return material, self._emission(fields_json, place)
+
+    def _alpha(
+        self, fields_json: dict[str, Any], factor: float, found: LoadedTexture | None, place: str
+    ) -> tuple[float, float | None]:
+        """(opacity, alpha of the picture below which it is a hole or None) by the alpha mode.
+
+        MASK cuts out what is below its cutoff, and the rest is opaque. BLEND, which a label cannot be
+        half of, cuts its picture at one half, as Cycles' passes do; a picture that is as clear all over
+        makes glass of its mean.
+        """
+        mode = fields_json.get("alphaMode", "OPAQUE")
+        alpha = found.alpha if found else OPAQUE_ALPHA
+        if mode == "BLEND":
+            is_even = alpha.most < USUAL_CUTOFF or alpha.least == alpha.most
+            has_holes = not is_even and alpha.least < USUAL_CUTOFF
+            return (factor * alpha.mean if is_even else factor), USUAL_CUTOFF if has_holes else None
+        if mode != "MASK":
+            return 1.0, None
+        given = fields_json.get("alphaCutoff", USUAL_CUTOFF)
+        (least,) = numbers(self._gltf, [given], 1, f"{place}: alphaCutoff")
+        if factor * alpha.most < least:
+            text = (
+                f"alphaCutoff {least:g}: its alpha is nowhere more than {factor * alpha.most:.3g}"
+            )
+            self._notes.add("wholly-cut-out", place, f"{text}, so that nothing of it is seen")
+            return 1.0, NOTHING_LEFT
+        return 1.0, None if factor * alpha.least >= least else float(least) / factor
 
     def _maps(self, number: int, place: str) -> dict[str, str]:
         """Texture ids of the roughness and normal maps that lie as the leading texture does."""

@@ -22,7 +22,6 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.read.common.arch_elements import Element, element_of
 from pbrs_farm.read.common.bounded_json import bounded_json
 from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affine, number_array
-from pbrs_farm.read.common.material_library import LoadedTexture
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
@@ -291,9 +290,8 @@ class ArchMaterials(ModelMaterials):
     def _override_texture(self, name: str) -> str:
         return name
 
-    def _texture(self, name: str, place: str) -> LoadedTexture | None:
-        url = self._pictures.get(name, "")
-        return self.library.texture(name, name=name, place=place, load=lambda: _bytes_of(url))
+    def _picture(self, name: str) -> bytes | None:
+        return _bytes_of(self._pictures.get(name, ""))
 
 
 def _bytes_of(url: str) -> bytes | None:

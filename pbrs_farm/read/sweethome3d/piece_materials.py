@@ -66,7 +66,7 @@ def piece_material(
         shininess=shininess,
         opacity=1.0 if kind in (MaterialKind.OPAQUE, MaterialKind.BULB) else opacity,
         texture_id=loaded.texture.id if loaded else None,
-        alpha_cutout=bool(loaded and loaded.has_holes),
+        alpha_cutout=bool(loaded and loaded.has_holes()),
     )
     name = f"{role}:{material.name}" if role else material.name
     return PieceMaterial(name, materials.library.index(material), picture, emits)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pxr import Sdf, UsdShade
 
-from pbrs_farm.read.common.material_library import PANE_OPACITY
+from pbrs_farm.read.common.material_library import PANE_OPACITY, picture_with_alpha
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import UNREAD
 
@@ -21,6 +21,16 @@ KIND_ATTRIBUTE: Final = "pbrs:kind"
 """Of a material: how light meets it, as our own exports say."""
 _PICTURE_OF_MDL: Final = re.compile(r'texture_2d\s*\(\s*"([^"]+)"')
 _Row = dict[str, Any]
+
+
+class _Masked(NamedTuple):
+    """A picture made of two: the colours of one, a channel of the other as their alpha."""
+
+    colour: Any  # Sdf.AssetPath, None = white
+    opacity: Any  # Sdf.AssetPath
+    channel: str  # "r", "g", "b" or "a"; "" = its alpha, or its luminance without
+    scale: float
+    bias: float
 
 
 class Shaders:
@@ -32,7 +42,7 @@ class Shaders:
         self.materials: list[_Row] = []
         self.textures: list[_Row] = []
         self.images: list[_Row] = []
-        self.assets: list[Any] = []  # Sdf.AssetPath of each image
+        self.assets: list[Any] = []  # Sdf.AssetPath or _Masked of each image
         self._numbers: dict[str, int] = {}
         self._pictures: dict[str, int] = {}
 
@@ -84,9 +94,8 @@ class Shaders:
         colour, picture = self._colour(shader, "diffuseColor", (0.18, 0.18, 0.18))
         roughness, rough_picture = self._input(shader, "roughness", 0.5)
         metallic = _input_number(self._input(shader, "metallic", 0.0)[0], 0.0)
-        opacity, opacity_picture = self._input(shader, "opacity", 1.0)
         threshold = _input_number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
-        alpha = _input_number(opacity, 1.0) if opacity_picture is None else 1.0
+        alpha, picture, has_picture = self._opacity(shader, picture, name)
         row = _pbr(name, [*colour, alpha], _input_number(roughness, 0.5), metallic)
         pbr = row["pbrMetallicRoughness"]
         if picture is not None:
@@ -99,8 +108,8 @@ class Shaders:
             # The node's scale turns 0..1 into twice the map's own.
             times = _finite((normal.pop("scale_rgb", None) or (2.0,))[0], 2.0) / 2
             row["normalTexture"] = normal | ({"scale": times} if times != 1 else {})
-        if alpha < 1 or opacity_picture is not None:
-            row["alphaMode"] = "MASK" if threshold > 0 else "BLEND"
+        if alpha < 1 or has_picture:
+            row |= _alpha_mode(threshold)
         glow = _triple(self._input(shader, "emissiveColor", (0, 0, 0))[0], (0.0, 0.0, 0.0))
         if max(glow) > 0:
             row["emissiveFactor"] = [c / max(glow) for c in glow]
@@ -114,6 +123,40 @@ class Shaders:
             # A picture is multiplied by what its own node says.
             return _triple(picture.pop("scale_rgb", None), (1.0, 1.0, 1.0)), picture
         return _triple(value, default), None
+
+    def _opacity(
+        self, shader: Any, colour: _Row | None, place: str
+    ) -> tuple[float, _Row | None, bool]:
+        """(opacity, the picture of the colour with it as its alpha, whether a picture says it)."""
+        found = shader.GetInput("opacity")
+        node, channel = self._node(found) if found else (None, "")
+        if node is None:
+            return _input_number(self._input(shader, "opacity", 1.0)[0], 1.0), colour, False
+        own = self._texture(node)
+        if own is None:
+            return 1.0, colour, False
+        own.pop("scale_rgb", None)
+        k = "rgba".index(channel) if channel in "rgba" else 0
+        scale = _component(self._input(node, "scale", None)[0], k, 1.0)
+        bias = _component(self._input(node, "bias", None)[0], k, 0.0)
+        if colour is not None and own.get("extensions") != colour.get("extensions"):
+            text = "the picture of its opacity lies otherwise than that of its colour: left out"
+            self._notes.add("texture-layout", place, text)
+            return 1.0, colour, False
+        # The alpha of the colour's own picture is there already.
+        if own == colour and channel == "a" and bias == 0 and 0 < scale <= 1:
+            return scale, colour, True
+        colour_asset = self.assets[colour["index"]] if colour else None
+        mask = _Masked(colour_asset, self.assets[own["index"]], channel, scale, bias)
+        return 1.0, (colour or own) | {"index": self._masked_index(mask)}, True
+
+    def _node(self, connected: Any) -> tuple[Any, str]:
+        """(the UsdUVTexture that an input is connected to or None, the channel of it)."""
+        for attribute in connected.GetValueProducingAttributes():
+            node = UsdShade.Shader(attribute.GetPrim())
+            if node and node.GetIdAttr().Get() == "UsdUVTexture":
+                return node, attribute.GetName().rpartition(":")[2]
+        return None, ""
 
     def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Row | None]:
         """(the value of an input, the picture that it is connected to or None)."""
@@ -161,15 +204,17 @@ class Shaders:
         tint = np.array(_triple(self._input(shader, "diffuse_tint", None)[0], (1.0, 1.0, 1.0)))
         picture = self._mdl_picture(shader, "diffuse_texture")
         factor = (tint if picture else tint * np.array(colour)).tolist()
-        alpha = 1.0
+        alpha, threshold, has_picture = 1.0, 0.0, False
         if self._input(shader, "enable_opacity", False)[0]:
             alpha = _input_number(self._input(shader, "opacity_constant", 1.0)[0], 1.0)
+            threshold = _input_number(self._input(shader, "opacity_threshold", 0.0)[0], 0.0)
+            picture, has_picture = self._mdl_opacity(shader, picture)
         roughness = _input_number(self._input(shader, "reflection_roughness_constant", 0.5)[0], 0.5)
         metallic = _input_number(self._input(shader, "metallic_constant", 0.0)[0], 0.0)
         row = _pbr(name, [*factor, alpha], roughness, metallic)
         pbr = row["pbrMetallicRoughness"]
-        if alpha < 1:
-            row["alphaMode"] = "BLEND"
+        if alpha < 1 or has_picture:
+            row |= _alpha_mode(threshold)
         if picture:
             pbr["baseColorTexture"] = picture
         if normal := self._mdl_picture(shader, "normalmap_texture"):
@@ -183,6 +228,18 @@ class Shaders:
             if max(glow) > 0:
                 row["emissiveFactor"] = [c / max(glow) for c in glow]
         return row
+
+    def _mdl_opacity(self, shader: Any, colour: _Row | None) -> tuple[_Row | None, bool]:
+        """(the picture of the colour with opacity as its alpha, whether a picture says it)."""
+        is_on = self._input(shader, "enable_opacity_texture", False)[0]
+        own = self._mdl_picture(shader, "opacity_texture") if is_on else None
+        if own is None:
+            return colour, False
+        mode = self._input(shader, "opacity_mode", 1)[0]
+        colour_asset = self.assets[colour["index"]] if colour else None
+        # Mode 0 is the alpha; the others are means and the like of the colours.
+        mask = _Masked(colour_asset, self.assets[own["index"]], "a" if mode == 0 else "l", 1.0, 0.0)
+        return (colour or own) | {"index": self._masked_index(mask)}, True
 
     def _mdl_picture(self, shader: Any, name: str) -> _Row | None:
         asset = self._input(shader, name, None)[0]
@@ -208,15 +265,38 @@ class Shaders:
         return row
 
     def _info(self, asset: Any) -> _Row:
-        key = str(asset.resolvedPath or asset.path)
+        return {"index": self._picture_index(str(asset.resolvedPath or asset.path), asset, asset)}
+
+    def _masked_index(self, mask: _Masked) -> int:
+        parts = [str(a.resolvedPath or a.path) if a else "" for a in mask[:2]]
+        return self._picture_index(f"{parts} {mask[2:]}", mask, mask.colour or mask.opacity)
+
+    def _picture_index(self, key: str, asset: Any, named: Any) -> int:
         if key not in self._pictures:
             # Pictures are named by number; their names may hold anything.
-            name = asset.path.replace("\\", "/").rsplit("/", 1)[-1].rstrip("]")[:100]
+            name = named.path.replace("\\", "/").rsplit("/", 1)[-1].rstrip("]")[:100]
             self.images.append({"uri": str(len(self.assets)), "name": name or "picture"})
             self.textures.append({"source": len(self.assets)})
             self.assets.append(asset)
             self._pictures[key] = len(self.assets) - 1
-        return {"index": self._pictures[key]}
+        return self._pictures[key]
+
+    def picture(self, number: int, read: Callable[[Any], bytes | None]) -> bytes | None:
+        """The bytes of a picture by its number; read: those of an asset, None where it is not there.
+
+        Raises ValueError with the reason where a picture that has to be made of two cannot be.
+        """
+        asset = self.assets[number]
+        if not isinstance(asset, _Masked):
+            return read(asset)
+        colour = read(asset.colour) if asset.colour else None
+        opacity = read(asset.opacity)
+        if opacity is None and colour is not None:
+            missing = f"{asset.opacity.path[:120]} does not exist: nothing is cut out"
+            self._notes.add("missing-texture", f"images[{number}]", missing)
+        if opacity is None or (asset.colour and colour is None):
+            return colour
+        return picture_with_alpha(colour, opacity, asset.channel, asset.scale, asset.bias)
 
 
 def _pbr(name: str, factor: list[float], roughness: float, metallic: float) -> _Row:
@@ -238,6 +318,17 @@ def _transform(
             "offset": [float(c) for c in offset], "rotation": angle, "scale": list(size),
         }
     }  # fmt: skip
+
+
+def _alpha_mode(threshold: float) -> _Row:
+    return (
+        {"alphaMode": "MASK", "alphaCutoff": threshold} if threshold > 0 else {"alphaMode": "BLEND"}
+    )
+
+
+def _component(values: Any, k: int, default: float) -> float:
+    """Number k of four, as a node's scale and bias are."""
+    return _finite(values[k], default) if values is not None and len(values) == 4 else default
 
 
 def _input_number(value: Any, default: float) -> float:

@@ -63,7 +63,7 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
     house = house_of_gltf(
         gltf, Source("usd", path.name, sha256, attribution=_credit(stage)), path.stem, fields, notes,
         mapping=_mapping(folder, path),
-        fetch=lambda number: folder.picture(shaders.assets[int(number)]),
+        fetch=lambda number: shaders.picture(int(number), folder.picture),
     )  # fmt: skip
     if rooms:
         return house

@@ -2,12 +2,17 @@ from __future__ import annotations
 
 import io
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from pbrs_farm.read.common.material_library import texture_from_bytes
+from pbrs_farm.read.common.material_library import (
+    OPAQUE_ALPHA,
+    picture_with_alpha,
+    texture_from_bytes,
+)
 from tests.read.small_houses import png
 
 KINDS = ["PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP"]
@@ -23,10 +28,10 @@ def encoded(kind: str, mode: str = "RGB", size: tuple[int, int] = (20, 10)) -> b
 @pytest.mark.parametrize("kind", ["PNG", "JPEG"])
 def test_png_and_jpeg_keep_their_bytes(kind: str) -> None:
     data = encoded(kind)
-    texture, has_holes = texture_from_bytes(data, "a")
+    texture, alpha = texture_from_bytes(data, "a")
     assert texture.data == data
     assert texture.media_type == f"image/{kind.lower()}"
-    assert not has_holes
+    assert alpha == OPAQUE_ALPHA
 
 
 @pytest.mark.parametrize("kind", ["GIF", "BMP", "TIFF", "WEBP"])
@@ -36,16 +41,54 @@ def test_other_kinds_become_png_with_the_same_pixels(kind: str) -> None:
     assert texture.media_type == "image/png"
     ours, theirs = (Image.open(io.BytesIO(d)).convert("RGB") for d in (texture.data, data))
     assert ours.tobytes() == theirs.tobytes()
-    assert texture_from_bytes(data, "a")[0] == texture
+    assert texture_from_bytes(data, "a").texture == texture
 
 
-def test_alpha_is_a_hole_only_where_it_is_below_one_half() -> None:
+def rgba(alpha: list[list[int]]) -> bytes:
+    image = Image.new("RGBA", (len(alpha[0]), len(alpha)), (1, 2, 3, 255))
+    image.putalpha(grey(alpha))
+    return saved(image)
+
+
+def grey(values: list[list[int]]) -> Image.Image:
+    return Image.fromarray(np.array(values, np.uint8))
+
+
+def saved(image: Image.Image) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def test_alpha_is_a_hole_only_where_it_is_below_the_cutoff() -> None:
     for alpha, holes in ((255, False), (130, False), (100, True)):
-        image = Image.new("RGBA", (4, 4), (1, 2, 3, 255))
-        image.putpixel((1, 1), (1, 2, 3, alpha))
-        buffer = io.BytesIO()
-        image.save(buffer, "PNG")
-        assert texture_from_bytes(buffer.getvalue(), "a")[1] is holes
+        assert texture_from_bytes(rgba([[255, alpha]]), "a").has_holes() is holes
+    found = texture_from_bytes(rgba([[200, 100], [200, 100]]), "a")
+    assert (found.has_holes(0.2), found.has_holes(0.9)) == (False, True)
+    assert np.allclose(found.alpha, [100 / 255, 200 / 255, 150 / 255])
+
+
+@pytest.mark.parametrize(
+    ("channel", "expected"), [("r", 10), ("g", 20), ("b", 30), ("a", 40), ("", 40)]
+)
+def test_opacity_is_the_named_channel_of_another_picture(channel: str, expected: int) -> None:
+    other = saved(Image.new("RGBA", (2, 2), (10, 20, 30, 40)))
+    colour = saved(Image.new("RGB", (4, 2), (7, 8, 9)))
+    made = Image.open(io.BytesIO(picture_with_alpha(colour, other, channel)))
+    assert made.size == (4, 2)
+    assert made.getpixel((0, 0)) == (7, 8, 9, expected)
+    assert Image.open(io.BytesIO(picture_with_alpha(None, other, channel))).getpixel((0, 0)) == (
+        255, 255, 255, expected,
+    )  # fmt: skip
+
+
+def test_opacity_without_alpha_is_luminance_scaled_and_moved() -> None:
+    other = saved(grey([[0, 100, 200]]))
+    made = Image.open(io.BytesIO(picture_with_alpha(None, other, "", -1.0, 1.0)))
+    assert list(np.asarray(made)[0, :, 3]) == [255, 155, 55]
+    deep = saved(Image.fromarray(np.array([[0, 65535]], np.uint16)))
+    made = Image.open(io.BytesIO(picture_with_alpha(None, deep)))
+    assert list(np.asarray(made)[0, :, 3]) == [0, 255]
 
 
 def test_a_picture_of_absurd_size_is_refused_before_it_is_decoded() -> None:

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from pbrs_farm.core.house import House, ItemKind, Material, MaterialKind
 from pbrs_farm.core.recipe import ReadFields
@@ -134,6 +136,30 @@ def test_textures_keep_their_bytes_and_alpha_is_a_hole(root: Path, house: House)
     assert material_of(house, "0_16", "material_0").alpha_cutout
     assert not material_of(house, "0_15", "material_0").alpha_cutout
     assert "stone.jpg" not in by_name
+
+
+def test_a_picture_of_opacity_is_the_alpha_of_the_colours(tmp_path: Path) -> None:
+    suncg_root.write_root(tmp_path)
+    Image.fromarray(np.array([[0, 255], [255, 255]], np.uint8)).save(tmp_path / "texture/mask.png")
+    mtl = tmp_path / "object/chair/chair.mtl"
+    before = read_suncg(tmp_path, HOUSE, ReadFields())
+    names = [line.split()[1] for line in mtl.read_text().splitlines() if "map_Kd" in line]
+    given = names[0].replace(Path(names[0]).name, "mask.png")
+    mtl.write_text(mtl.read_text().replace("map_Kd", f"map_d {given}\nmap_Kd", 1))
+    holed = material_of(house := read_suncg(tmp_path, HOUSE, ReadFields()), "0_2", "material_0")
+    assert holed.alpha_cutout
+    assert not material_of(before, "0_2", "material_0").alpha_cutout
+    alpha = Image.open(io.BytesIO(house.textures[holed.texture_id or ""].data)).getchannel("A")
+    assert alpha.getextrema() == (0, 255)
+    assert alpha.getpixel((0, 0)) == 0
+    # Without the picture the colour stays.
+    (tmp_path / "texture/mask.png").unlink()
+    house = read_suncg(tmp_path, HOUSE, ReadFields())
+    plain = material_of(house, "0_2", "material_0")
+    assert (plain.texture_id, plain.alpha_cutout) == (
+        material_of(before, "0_2", "material_0").texture_id, False,
+    )  # fmt: skip
+    assert "missing-texture" in [n.kind for n in house.notes]
 
 
 def test_glass_of_windows_is_a_pane_and_other_glass_is_glass(house: House, tmp_path: Path) -> None:
