@@ -38,6 +38,7 @@ OWN_TARGET: Final = {
     "presets": "light.presets",
     "cycles": "renderers.cycles",
     "farm": "farm.farm_cost",
+    "cases": "cases",
     "hostile": "hostile",
     "loading": "study.loading",
     "study": "study.study_figures",

@@ -25,6 +25,8 @@ from tests.inputs.plan_files import (
     ROOMS,
     THINGS,
     WRITERS,
+    traced,
+    with_a_stub,
     write_cubicasa,
     write_procthor,
     write_react_planner,
@@ -181,49 +183,17 @@ def test_a_room_of_rooms_drawn_over_each_other_keeps_what_is_its_own(tmp_path: P
     assert any("inside another" in line for line in found.left_out)
 
 
-def _by_coordinates(value: dict[str, Any], px_per_cm: float) -> dict[str, Any]:
-    """A react-planner home as one is that was traced: pixels, outlines, an area for a scale."""
-    layer = value["layers"]["layer-1"]
-    points = {
-        name: (v["x"] * px_per_cm, v["y"] * px_per_cm) for name, v in layer["vertices"].items()
-    }
-    for name, (x, y) in points.items():
-        layer["vertices"][name] |= {"x": x, "y": y}
-    for hole in layer["holes"].values():
-        a, b = (np.array(points[n]) for n in layer["lines"][hole["line"]]["vertices"])
-        along = (b - a) / np.linalg.norm(b - a)
-        middle = a + hole.pop("offset") * (b - a)
-        half = along * hole["properties"]["width"]["length"] * px_per_cm / 2
-        across = np.array([-along[1], along[0]]) * 8
-        corners = [
-            middle - half - across,
-            middle + half - across,
-            middle + half + across,
-            middle - half + across,
-        ]
-        hole["coordinates"] = [[c.tolist() for c in (*corners, corners[0])]]
-        hole["properties"] = {
-            "length": {"value": hole["properties"]["width"]["length"], "unit": "cm"},
-            "width": {"value": 13, "unit": "cm"}, "altitude": {"value": 0, "unit": "cm"},
-            "heights": {"lower_edge": None, "upper_edge": None},
-        }  # fmt: skip
-    for area in layer["areas"].values():
-        area["coords"] = [[list(points[n]) for n in area.pop("vertices")]]
-    layer["items"] = {}
-    return value | {"scale": px_per_cm**-2}
-
-
 def test_a_traced_home_has_its_openings_by_their_outlines_and_its_scale_is_an_area(
     tmp_path: Path,
 ) -> None:
     path = write_react_planner(tmp_path)
     drawn = plan_from_file(path).plan
-    traced = plan_from_file(_written(path, _by_coordinates(json.loads(path.read_text()), 1.18)))
-    assert traced.left_out == ()
-    for room, other in zip(traced.plan.rooms, drawn.rooms, strict=True):
+    file = plan_from_file(_written(path, traced(json.loads(path.read_text()), 1.18)))
+    assert file.left_out == ()
+    for room, other in zip(file.plan.rooms, drawn.rooms, strict=True):
         assert (room.type, room.name) == (other.type, other.name)
         np.testing.assert_allclose(room.polygon, other.polygon, atol=1e-3)
-    for hole, drawn_hole in zip(traced.plan.openings, drawn.openings, strict=True):
+    for hole, drawn_hole in zip(file.plan.openings, drawn.openings, strict=True):
         assert (hole.kind, hole.wall) == (drawn_hole.kind, drawn_hole.wall)
         sizes = (drawn_hole.along, drawn_hole.width, drawn_hole.sill)
         assert (hole.along, hole.width, hole.sill) == pytest.approx(sizes, abs=1e-3)
@@ -239,16 +209,11 @@ def test_a_hole_without_a_place_is_a_guess_and_a_note(tmp_path: Path) -> None:
 
 
 def test_a_stub_of_wall_is_as_thick_as_it_is_drawn(tmp_path: Path) -> None:
-    # 11 cm thick, 1.2 m long, from the wall above; the ring ends where it begins, but for rounding.
     path = write_zind(tmp_path)
-    value = json.loads(path.read_text())
-    ring = [(0, 0), (5, 0), (5, 4), (2.11, 4), (2.11, 2.8), (2, 2.8), (2, 4), (0, 4), (1e-9, 2e-9)]
-    scale = value["scale_meters_per_coordinate"]["floor_01"]
-    room = {"vertices": [[x / scale, -z / scale] for x, z in ring]}
-    value["redraw"] = {"floor_01": {"room_00": room}}
+    value, ring = with_a_stub(json.loads(path.read_text()))
     plan = plan_from_file(_written(path, value)).plan
     (found,) = plan.rooms
-    assert Polygon(found.polygon).symmetric_difference(Polygon(ring[:-1])).area < 1e-3
+    assert Polygon(found.polygon).symmetric_difference(Polygon(ring)).area < 1e-3
     (stub,) = [w for w in plan.walls if not w.is_outer]
     assert (stub.thickness, stub.length) == pytest.approx((0.11, 1.2))
     # No wall runs across: all are level or upright.

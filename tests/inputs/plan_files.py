@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 HEIGHT: Final = 2.6
 
 
@@ -213,14 +215,14 @@ def write_room_plan(folder: Path) -> Path:
     for a, b in _walls():
         length = math.dist(a, b) - 0.08
         surfaces["walls"].append(
-            _surface("wall", a, b, length, 0.0, HEIGHT) | {"completedEdges": []}
+            surface("wall", a, b, length, 0.0, HEIGHT) | {"completedEdges": []}
         )
     for hole in HOLES:
         ends = ((hole.at[0] - 1, hole.at[1]), (hole.at[0] + 1, hole.at[1])) if hole.along_x else (
             (hole.at[0], hole.at[1] - 1), (hole.at[0], hole.at[1] + 1))  # fmt: skip
         low, high = (0.9, 2.3) if hole.kind == "window" else (0.0, 2.05)
         key = "window" if hole.kind == "window" else "door"
-        surfaces[f"{key}s"].append(_surface(key, *ends, hole.width, low, high))
+        surfaces[f"{key}s"].append(surface(key, *ends, hole.width, low, high))
     names = {
         "coffee_table": "table", "tv_cabinet": "storage", "dining_table": "table", "dining_chair": "chair",
         "nightstand": "storage", "wardrobe": "storage", "tub": "bathtub",
@@ -370,6 +372,59 @@ TELLING: Final = ("swiss", "spatiallm", "procthor", "roomplan", "cubicasa", "rea
 """Formats that tell of things."""
 
 
+def traced(value: dict[str, Any], px_per_cm: float) -> dict[str, Any]:
+    """A react-planner home as one is that was traced: pixels, outlines, an area for a scale."""
+    layer = value["layers"]["layer-1"]
+    points = {
+        name: (v["x"] * px_per_cm, v["y"] * px_per_cm) for name, v in layer["vertices"].items()
+    }
+    for name, (x, y) in points.items():
+        layer["vertices"][name] |= {"x": x, "y": y}
+    for hole in layer["holes"].values():
+        a, b = (np.array(points[n]) for n in layer["lines"][hole["line"]]["vertices"])
+        along = (b - a) / np.linalg.norm(b - a)
+        middle = a + hole.pop("offset") * (b - a)
+        half = along * hole["properties"]["width"]["length"] * px_per_cm / 2
+        across = np.array([-along[1], along[0]]) * 8
+        corners = [
+            middle - half - across,
+            middle + half - across,
+            middle + half + across,
+            middle - half + across,
+        ]
+        hole["coordinates"] = [[c.tolist() for c in (*corners, corners[0])]]
+        hole["properties"] = {
+            "length": {"value": hole["properties"]["width"]["length"], "unit": "cm"},
+            "width": {"value": 13, "unit": "cm"}, "altitude": {"value": 0, "unit": "cm"},
+            "heights": {"lower_edge": None, "upper_edge": None},
+        }  # fmt: skip
+    for area in layer["areas"].values():
+        area["coords"] = [[list(points[n]) for n in area.pop("vertices")]]
+    layer["items"] = {}
+    return value | {"scale": px_per_cm**-2}
+
+
+def with_a_stub(value: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[float, float]]]:
+    """A ZInD home of one room, into which a stub of wall comes from above; and the room's corners.
+
+    It is 11 cm thick and 1.2 m long; the file's ring ends where it begins, but for rounding.
+    """
+    ring = [
+        (0.0, 0.0),
+        (5.0, 0.0),
+        (5.0, 4.0),
+        (2.11, 4.0),
+        (2.11, 2.8),
+        (2.0, 2.8),
+        (2.0, 4.0),
+        (0.0, 4.0),
+    ]
+    scale = value["scale_meters_per_coordinate"]["floor_01"]
+    points = [*ring, (1e-9, 2e-9)]
+    room = {"vertices": [[x / scale, -z / scale] for x, z in points]}
+    return value | {"redraw": {"floor_01": {"room_00": room}}}, ring
+
+
 def _json(path: Path, value: object) -> Path:
     path.write_text(json.dumps(value))
     return path
@@ -411,7 +466,7 @@ def _unity_wall(name: str, a: tuple[float, float], b: tuple[float, float]) -> di
     return {"id": name, "polygon": [{"x": p[0], "y": y, "z": -p[1]} for p, y in points]}
 
 
-def _surface(
+def surface(
     kind: str, a: tuple[float, float], b: tuple[float, float], width: float, low: float, high: float
 ) -> dict[str, Any]:
     ux, uz = (b[0] - a[0]) / math.dist(a, b), (b[1] - a[1]) / math.dist(a, b)

@@ -7,12 +7,16 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 N_TRIANGLES: Final = 300_000
+_FEW_TRIANGLES: Final = 2_000
+_NO_PICTURE: Final = b""
+
+Write = Callable[[Path], Path]
 
 
 class SoundFile(NamedTuple):
     """How a house of a format is written, and how many doors and windows it tells."""
 
-    write: Callable[[Path], Path]  # folder -> the file to be read
+    write: Write  # folder -> the file to be read
     n_openings: int = 0  # 0 = the format's writer does not say
     models: Callable[[Path], Path] | None = None  # the file -> the folder of its models
 
@@ -61,3 +65,17 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
         "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
     } | {title: SoundFile(write, len(plan_files.HOLES)) for title, write in plans.items()}  # fmt: skip
+
+
+def every_format() -> dict[str, Write]:
+    """Title of every format of the table -> what writes a small house of it into a folder."""
+    from tests.read import textured_sources
+
+    def sweethome3d(folder: Path) -> Path:
+        return Path(textured_sources.sweethome3d(folder, _NO_PICTURE).location)
+
+    def suncg(folder: Path) -> Path:
+        return Path(textured_sources.suncg(folder, _NO_PICTURE).location)
+
+    small = {title: sound.write for title, sound in sound_files(_FEW_TRIANGLES).items()}
+    return small | {"Sweet Home 3D": sweethome3d, "SUNCG": suncg}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -37,31 +37,14 @@ from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
-from tests.inputs.sound_files import sound_files
-from tests.read import textured_sources
+from tests.inputs.sound_files import every_format
 from workers.client.farm_client import completed, new_spec
 from workers.house_files import entries_from_arguments, is_left_in_place, upload
 from workers.ids import GEOMETRY, job_key
 from workers.node import house_runner
 from workers.runner import TaskRequest
 
-_FEW_TRIANGLES: Final = 2_000
-_NO_PICTURE: Final = b""
-
-Write = Callable[[Path], Path]
-
-
-def _sweethome3d(folder: Path) -> Path:
-    return Path(textured_sources.sweethome3d(folder, _NO_PICTURE).location)
-
-
-def _suncg(folder: Path) -> Path:
-    return Path(textured_sources.suncg(folder, _NO_PICTURE).location)
-
-
-WRITERS: Final[dict[str, Write]] = {
-    title: sound.write for title, sound in sound_files(_FEW_TRIANGLES).items()
-} | {"Sweet Home 3D": _sweethome3d, "SUNCG": _suncg}
+WRITERS: Final = every_format()
 
 each_format = pytest.mark.parametrize("title", [one.title for one in formats()])
 

@@ -1,0 +1,327 @@
+"""Cases of rooms, walls, openings and roofs, in every format that tells them; writers write files."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.house import ItemKind, MaterialKind
+from pbrs_farm.repair.repair_report import RepairReport
+from tests.cases.case import Case, house_of, kinds_of_notes, named, repaired, run
+from tests.cases.surface_cases import room
+from tests.hostile.sound_inputs import suncg
+from tests.inputs import front3d_files, plan_files
+from tests.inputs.ifc_files import IfcHouse
+from tests.read.gltf.gltf_scenes import two_rooms
+from tests.read.habitat.habitat_sets import dataset
+from tests.read.suncg.suncg_root import item, material_of
+
+
+def cases() -> Iterator[Case]:
+    """By format."""
+    yield Case("habitat_plain", partial(_habitat, 1.0), _ask_to_run)
+    yield Case("habitat_scaled", partial(_habitat, 0.01), _ask_to_run)
+    yield Case("suncg_light_row", _suncg, _ask_for_bulb_and_shade)
+    yield Case("front_tiles", _front_tiles, _ask_for_the_openings_of_plain_walls)
+    yield Case("react_coordinates", _react, _ask_for_holes_at_their_places)
+    yield Case("zind_stub", _zind, _ask_for_the_stub)
+    yield Case("roomplan_attic", _attic_scan, _ask_for_gables)
+    yield Case("ifc_attic", partial(_ifc, _attic), _ask_for_a_sloped_ceiling)
+    yield Case("ifc_lowceiling", partial(_ifc, _low_ceiling), _ask_for_the_height_of_the_ceiling)
+    yield Case("ifc_twostoreys", partial(_ifc, _two_storeys), _ask_for_two_rooms)
+    yield Case("ifc_mapped", partial(_ifc, _mapped), _ask_for_positive_volumes)
+    yield Case("grass", _grass, _ask_for_ground)
+
+
+def _habitat(scale: float, folder: Path) -> Path:
+    """A scene whose name has a space; its stage is drawn in a unit of that many metres."""
+    stage = two_rooms()
+    stage.node("all", children=list(range(len(stage.nodes))), scale=[1 / scale] * 3)
+    path = dataset(folder, stage, translation_origin="COM")
+    config = folder / "stages/flat.stage_config.json"
+    config.write_text(json.dumps(json.loads(config.read_text()) | {"scale": [scale] * 3}))
+    return path.rename(path.with_name("flat 1.scene_instance.json"))
+
+
+def _ask_to_run(path: Path) -> None:
+    house = house_of(path)
+    assert len(house.rooms) == 2
+    width, _height, depth = np.ptp(np.concatenate([i.bounds for i in house.items]), axis=0)
+    assert np.allclose((width, depth), (6, 3), atol=0.5)
+    run(path, path.parents[1] / "out")
+
+
+def _suncg(folder: Path) -> Path:
+    house = suncg(folder)
+    table = house.parents[1] / "metadata/light_geometry_compact.txt"
+    table.write_text("lamp 1 material_1 1 material_2\nbare_lamp 1 material_1 0\n")
+    return house
+
+
+def _ask_for_bulb_and_shade(path: Path) -> None:
+    house = house_of(path)
+    assert item(house, "0_4").lights
+    assert material_of(house, "0_4", "material_1_0").kind is MaterialKind.BULB
+    assert material_of(house, "0_4", "material_2").kind is MaterialKind.SHADE
+
+
+_TILED: Final = ("Bathroom-5", "SecondBedroom-6", "Kitchen-2")
+
+
+def _front_tiles(folder: Path) -> Path:
+    house = front3d_files.tile_walls(front3d_files.front_house("0.11 gaps"), _TILED)
+    return _json(folder / "flat.json", house)
+
+
+def _ask_for_the_openings_of_plain_walls(path: Path) -> None:
+    plain = house_of(_json(path.with_name("plain.json"), front3d_files.front_house("0.11 gaps")))
+    assert [o.id for o in house_of(path).openings] == [o.id for o in plain.openings]
+
+
+def _react(folder: Path) -> Path:
+    path = plan_files.write_react_planner(folder)
+    return _json(path, plan_files.traced(json.loads(path.read_text()), 1.18))
+
+
+def _ask_for_holes_at_their_places(path: Path) -> None:
+    house = house_of(path)
+    kinds = [i.kind for i in house.items]
+    assert (kinds.count(ItemKind.WINDOW), kinds.count(ItemKind.DOOR)) == (4, 5)
+    corners = np.concatenate([r.polygon for r in house.rooms])
+    drawn = np.array([box for _type, box in plan_files.ROOMS])
+    assert np.allclose(np.ptp(corners, axis=0), drawn.max(0)[2:] - drawn.min(0)[:2], atol=0.3)
+    for hole in plan_files.HOLES:
+        middles = np.array([o.quad.mean(0)[[0, 2]] for o in house.openings]) - corners.min(0)
+        assert np.linalg.norm(middles - hole.at, axis=1).min() < 0.2, f"no {hole.kind} at {hole.at}"
+
+
+def _zind(folder: Path) -> Path:
+    path = plan_files.write_zind(folder)
+    return _json(path, plan_files.with_a_stub(json.loads(path.read_text()))[0])
+
+
+def _ask_for_the_stub(path: Path) -> None:
+    (room,) = house_of(path).rooms
+    _value, ring = plan_files.with_a_stub({"scale_meters_per_coordinate": {"floor_01": 1.0}})
+    lost = shapely.Polygon(room.polygon).area - shapely.Polygon(ring).area
+    assert abs(lost) < 0.3, f"the room is {lost:+.2f} m2 larger"
+
+
+_KNEE, _RIDGE = 1.2, 3.0
+
+
+def _attic_scan(folder: Path) -> Path:
+    """RoomPlan: a room of 4 x 3 m with two walls of 1.2 m and two gables of 3 m."""
+    x, z, eaves = 2.0, 1.5, _KNEE - _RIDGE / 2
+    level = [[-x, _KNEE / 2, 0], [x, _KNEE / 2, 0], [x, -_KNEE / 2, 0], [-x, -_KNEE / 2, 0]]
+    gable = [
+        [-z, eaves, 0], [0, _RIDGE / 2, 0], [z, eaves, 0], [z, -_RIDGE / 2, 0], [-z, -_RIDGE / 2, 0],
+    ]  # fmt: skip
+    sides = [((-x, -z), (x, -z)), ((x, z), (-x, z)), ((-x, z), (-x, -z)), ((x, -z), (x, z))]
+    walls = []
+    for k, (a, b) in enumerate(sides):
+        high = _KNEE if k < 2 else _RIDGE
+        wall = plan_files.surface("wall", a, b, math.dist(a, b), 0.0, high)
+        walls.append(wall | {"polygonCorners": level if k < 2 else gable, "completedEdges": []})
+    floor = [[-x, -z, 0], [x, -z, 0], [x, z, 0], [-x, z, 0]]
+    flat = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1]
+    value = {
+        "version": 2, "story": 0, "walls": walls, "openings": [], "windows": [], "objects": [],
+        "doors": [plan_files.surface("door", (x, -1), (x, 1), 0.8, 0.0, 2.0)],
+        "sections": [{"label": "bedroom", "center": [0, 1, 0], "story": 0}],
+        "floors": [{"dimensions": [4, 3, 0], "transform": flat, "polygonCorners": floor}],
+    }  # fmt: skip
+    return _json(folder / "room.json", value)
+
+
+def _ask_for_gables(path: Path) -> None:
+    """The room is as high as its gables under the ridge and as its knee walls at the eaves, or a note says that it is not."""
+    house, report = repaired(path)
+    if kinds_of_notes(house) & {"sloped-ceiling", "wall-heights"}:
+        return
+    tops = np.array([i.bounds[1, 1] for i in house.items if i.kind is ItemKind.CEILING])
+    lows = np.array([i.bounds[0, 1] for i in house.items if i.kind is ItemKind.CEILING])
+    assert tops.max() > _RIDGE - 0.1, f"the ceiling ends at {tops.max():.2f}"
+    assert lows.min() < _KNEE + 0.2, f"the ceiling begins at {lows.min():.2f}"
+    _ask_for_no_leak(report)
+
+
+def _ask_for_no_leak(report: RepairReport) -> None:
+    assert report.leaks is not None
+    assert report.leaks.n_sky == 0, f"{report.leaks.n_sky} rays reach the sky"
+
+
+def _ifc(build: Callable[[IfcHouse], None], folder: Path) -> Path:
+    house = IfcHouse("m")
+    build(house)
+    return house.save(folder / "house.ifc")
+
+
+_W, _D, _T = 6.0, 5.0, 0.3  # a room's clear width and depth, and its walls
+
+
+def _four_walls(house: IfcHouse, bottom: float, height: float, *, gables: bool = True) -> None:
+    boxes = [((-_T, -_T), (_W + _T, 0)), ((-_T, _D), (_W + _T, _D + _T))]
+    boxes += [((-_T, 0), (0, _D)), ((_W, 0), (_W + _T, _D))] if gables else []
+    for k, (low, high) in enumerate(boxes):
+        solid = house.box_solid((*low, 0), (*high, height))
+        house.product("IfcWall", f"Wall {k}", [solid], (0, 0, bottom))
+
+
+def _slab(house: IfcHouse, name: str, bottom: float, thick: float, kind: str | None) -> None:
+    solid = house.box_solid((-_T, -_T, 0), (_W + _T, _D + _T, thick))
+    fields = {"PredefinedType": kind} if kind else {}
+    house.product("IfcSlab", name, [solid], (0, 0, bottom), **fields)
+
+
+def _room(house: IfcHouse, name: str, bottom: float, height: float) -> None:
+    house.space(name, [(0, 0), (_W, 0), (_W, _D), (0, _D)], bottom, height)
+
+
+def _prism(house: IfcHouse, section: list[tuple[float, float]], x0: float, x1: float) -> Any:
+    """A solid along x of a convex section (y, z)."""
+    n = len(section)
+    points = [(x, y, z) for x in (x0, x1) for y, z in section]
+    caps = [(0, k, k + 1) for k in range(1, n - 1)]
+    faces = [(a, c, b) for a, b, c in caps] + [(n + a, n + b, n + c) for a, b, c in caps]
+    for k in range(n):
+        j = (k + 1) % n
+        faces += [(k, j, n + j), (k, n + j, n + k)]
+    return house.mesh_solid(points, faces)
+
+
+def _attic(house: IfcHouse) -> None:
+    """Knee walls of 1 m, gables, and two sloped slabs that meet at 3.5 m."""
+    house.storey("attic", 0.0)
+    _four_walls(house, 0.0, 1.0, gables=False)
+    slope = 2.5 / (_D / 2)
+    gable = [(0.0, 0.0), (_D, 0.0), (_D, 1.0), (_D / 2, 3.5), (0.0, 1.0)]
+    for k, x in enumerate((-_T, _W)):
+        house.product("IfcWall", f"Gable {k}", [_prism(house, gable, x, x + _T)])
+    _slab(house, "floor", -0.25, 0.25, "FLOOR")
+    low = 1.0 - slope * _T
+    south = [(-_T, low), (_D / 2, 3.5), (_D / 2, 3.75), (-_T, low + 0.25)]
+    north = [(_D - y, z) for y, z in reversed(south)]
+    for name, section in (("roof south", south), ("roof north", north)):
+        solid = _prism(house, section, -_T, _W + _T)
+        house.product("IfcSlab", name, [solid], PredefinedType="ROOF")
+    space = [(0.0, 0.0), (_D, 0.0), (_D, 1.0), (_D / 2, 3.5), (0.0, 1.0)]
+    house.product("IfcSpace", "1", [_prism(house, space, 0.0, _W)], LongName="Attic room")
+
+
+def _ask_for_a_sloped_ceiling(path: Path) -> None:
+    house, report = repaired(path)
+    _ask_for_no_leak(report)
+    (attic,) = house.rooms
+    flat = [
+        s.positions
+        for i in house.items
+        if i.kind is ItemKind.CEILING
+        for s in i.surfaces
+        if np.ptp(s.positions[:, 1]) < 0.1 and np.ptp(s.positions[:, [0, 2]], axis=0).min() > 2
+    ]
+    assert not flat, f"a flat ceiling in {attic.name!r}"
+
+
+def _low_ceiling(house: IfcHouse) -> None:
+    """A space of 2.5 m under a deck, and a ceiling that hangs at 2.2 m."""
+    house.storey("s", 0.0)
+    _four_walls(house, 0.0, 2.8)
+    _slab(house, "floor", -0.25, 0.25, "FLOOR")
+    _slab(house, "deck", 2.8, 0.25, "FLOOR")
+    cover = house.box_solid((0, 0, 0), (_W, _D, 0.02))
+    house.product("IfcCovering", "ceiling", [cover], (0, 0, 2.2), PredefinedType="CEILING")
+    _room(house, "Bedroom", 0.0, 2.5)
+
+
+def _ask_for_the_height_of_the_ceiling(path: Path) -> None:
+    house, report = repaired(path)
+    (bedroom,) = house.rooms
+    height = bedroom.ceiling_y - bedroom.floor_y
+    assert abs(height - 2.2) < 0.02, f"{height:.2f} m high"
+    assert not report.structure.walls_lost
+    _ask_for_no_leak(report)
+
+
+def _two_storeys(house: IfcHouse) -> None:
+    """A flat roof and the floor between as exporters name slabs, without a type."""
+    house.storey("ground", 0.0)
+    _slab(house, "Floor:Concrete", -0.25, 0.25, "FLOOR")
+    _four_walls(house, 0.0, 2.5)
+    house.storey("first", 2.75)
+    _slab(house, "Floor:2 x 10", 2.5, 0.25, None)
+    _four_walls(house, 2.75, 2.5)
+    _slab(house, "Basic Roof:Flat", 5.25, 0.25, None)
+
+
+def _ask_for_two_rooms(path: Path) -> None:
+    house, _report = repaired(path)
+    assert sorted(round(r.floor_y, 2) for r in house.rooms) == [0.0, 2.75]
+
+
+_MIRROR: Final = (-1.0, 0.0, 0.0)
+_WEDGE: Final = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.4)]
+
+
+def _mapped(house: IfcHouse) -> None:
+    """A wedge of one representation map four times: as it is, turned, half as large, mirrored."""
+    house.storey("s", 0.0)
+    _four_walls(house, 0.0, 2.5)
+    _slab(house, "floor", -0.25, 0.25, "FLOOR")
+    _slab(house, "deck", 2.5, 0.25, "FLOOR")
+    _room(house, "Bedroom", 0.0, 2.5)
+    m = house.model
+    shape = m.createIfcShapeRepresentation(
+        house.context, "Body", "Tessellation", [_prism(house, _WEDGE, 0.0, 0.9)]
+    )
+    source = m.createIfcRepresentationMap(house.axes, shape)
+    for k, (axis, scale) in enumerate(
+        (((1.0, 0.0, 0.0), 1.0), ((0.0, 1.0, 0.0), 1.0), ((1.0, 0.0, 0.0), 0.5), (_MIRROR, 1.0))
+    ):
+        # A mirrored one keeps its y and z: the three axes are left-handed.
+        y = (0.0, 1.0, 0.0) if axis[1] == 0 else (-1.0, 0.0, 0.0)
+        way = [m.createIfcDirection(list(v)) for v in (axis, y, (0.0, 0.0, 1.0))]
+        origin = m.createIfcCartesianPoint([0.0, 0.0, 0.0])
+        operator = m.createIfcCartesianTransformationOperator3D(
+            way[0], way[1], origin, scale, way[2]
+        )
+        mapped = m.createIfcMappedItem(source, operator)
+        name = f"Table {k}"
+        found = house.product("IfcFurniture", name, [mapped], (1.5 + k, 2.0, 0.0))
+        found.Representation.Representations[0].RepresentationType = "MappedRepresentation"
+
+
+def _ask_for_positive_volumes(path: Path) -> None:
+    house = house_of(path)
+    for k in range(4):
+        wedge = named(house, f"Table {k}")
+        corners = np.concatenate([s.positions[s.faces] for s in wedge.surfaces]).astype(np.float64)
+        corners -= corners.mean((0, 1))
+        volume = float(np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6)  # fmt: skip
+        expected = 0.9 * 0.6 * 0.4 / 2 * (0.125 if k == 2 else 1.0)
+        assert np.isclose(volume, expected, rtol=0.01), f"{wedge.name}: {volume:.4f} m3"
+
+
+def _grass(folder: Path) -> Path:
+    s = room()
+    s.node("Grass", mesh=s.box([-6, -0.3, -6], [10, -0.13, 9], 0))
+    path = folder / "room.glb"
+    path.write_bytes(s.glb())
+    return path
+
+
+def _ask_for_ground(path: Path) -> None:
+    house, _report = repaired(path)
+    assert named(house, "Grass").kind is ItemKind.GROUND
+
+
+def _json(path: Path, value: object) -> Path:
+    path.write_text(json.dumps(value))
+    return path
