@@ -203,9 +203,7 @@ def _storey_of_drawing(floor: _Floor, scale: float, left_out: LeftOut) -> Parsed
             word = words[0] if words else "Undefined"
             # "Bath Sauna": the second word is the room's name in the drawing.
             areas.append(DrawnArea(shape, word, parted(word) if word != "Undefined" else ""))
-    rooms = typed_rooms(
-        "cubicasa", areas, things, [o for o in openings if o["kind"] == "window"], left_out
-    )
+    rooms = typed_rooms("cubicasa", areas, things, openings, left_out)
     return ParsedStorey(value_of(_opened(rooms, left_out), openings, _HEIGHT_M), tuple(things))
 
 

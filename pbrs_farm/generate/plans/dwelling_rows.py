@@ -218,9 +218,9 @@ def _storey_of_rows(
         t for r in near if r.kind == "feature"
         for t in _things_of_row(r, height, floor, left_out) if ground.distance(shapely.Point(t.x, t.z)) < _BESIDE_M
     ]  # fmt: skip
+    railings = [r.shape for r in near if r.subtype == "RAILING"]
     drawn = [DrawnArea(a.shape, a.subtype, is_plain=a.subtype == "ROOM") for a in areas]
-    windows = [o for o in openings if o["kind"] in ("window", "french_window")]
-    rooms = typed_rooms("swiss", drawn, things, windows, left_out)
+    rooms = typed_rooms("swiss", drawn, things, openings, left_out, railings)
     if not rooms:
         raise BadInput(path, "", "has an apartment without rooms")
     balconies = unary_union([Polygon(r["polygon"]) for r in rooms if r["type"] == "balcony"])

@@ -86,12 +86,11 @@ def plan_of_procthor(path: Path, value: Any) -> ParsedPlan:
     rows = [o for o in openings if o is not None]
     assets = _assets(path)
     things = [t for o in _walk_objects(path, house.objects) if (t := _thing(o, assets, left_out))]
-    windows = [o for o in rows if o["kind"] == "window"]
     areas = [
         DrawnArea(Polygon([(p.x, -p.z) for p in r.floorPolygon]), str(r.roomType), _name(r))
         for r in house.rooms
     ]
-    rooms = typed_rooms("ai2thor", areas, things, windows, left_out)
+    rooms = typed_rooms("ai2thor", areas, things, rows, left_out)
     return ParsedPlan(
         (ParsedStorey(value_of(rooms, rows, height), tuple(things)),), left_out.lines()
     )

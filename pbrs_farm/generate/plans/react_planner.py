@@ -97,8 +97,7 @@ class _Drawing:
         ]
         things = [t for k, row in self.layer.items.items() if (t := self._thing(k, row, left_out))]
         areas = self._areas(lines, left_out)
-        windows = [o for o in openings if o["kind"] == "window"]
-        rooms = typed_rooms("react-planner", areas, things, windows, left_out)
+        rooms = typed_rooms("react-planner", areas, things, openings, left_out)
         value = value_of(rooms, openings, max(heights, default=2.6), walls)
         return ParsedStorey(value, tuple(things), str(self.layer.name)[:60])
 

@@ -135,8 +135,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         _thing(s, _parse_pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
     ]
     areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
-    windows = [o for o in openings if o["kind"] == "window"]
-    rooms = typed_rooms("roomplan", areas, things, windows, left_out)
+    rooms = typed_rooms("roomplan", areas, things, openings, left_out)
     return ParsedStorey(value_of(rooms, openings, height), tuple(things), tops=tuple(tops))
 
 

@@ -20,11 +20,16 @@ LEAST_M2: Final = 0.5
 
 _SMALL_BATH_M2: Final = 2.6  # a smaller one has no bath: a WC
 _NEAR_WINDOW_M: Final = 0.5
+_NEAR_DOOR_M: Final = 0.35
 _LIVING_M2, _ROOM_M2, _STORE_M2 = 18.0, 9.0, 3.0
+_SMALL_ROOM_M2: Final = 6.0  # of a room to live in with one door and a window
+_OPEN_AIR_SHARE: Final = 0.25  # of its outline that railings stand along: a balcony's
+_NEAR_RAILING_M: Final = 0.3
 _TYPES: Final = {
     RoomKind.DINING: "living", RoomKind.OFFICE: "bedroom", RoomKind.OUTDOOR: "balcony",
     RoomKind.OTHER: "hall",
 }  # fmt: skip
+_GLAZED: Final = ("window", "french_window")
 # Words of things that say what a room is for; the first row that one of them has a word of holds.
 _FIXTURES: Final = (
     ("bath", {"bathtub", "tub", "shower", "jacuzzi"}), ("toilet", {"toilet", "wc", "urinal"}),
@@ -46,18 +51,28 @@ def typed_rooms(
     source: str,
     areas: Sequence[DrawnArea],
     things: Sequence[Thing],
-    windows: Sequence[dict[str, Any]],
+    openings: Sequence[dict[str, Any]],
     left_out: LeftOut,
+    railings: Sequence[Polygon] = (),
 ) -> list[dict[str, Any]]:
     """The rows of the areas that are rooms, in their order.
 
-    Where none is to live in, the largest plain room is. Slivers and what is no room are left out.
+    What no word says goes by what stands in it, by railings along it, by its windows and doors, by its
+    size. Where none is to live in, the largest plain room is. Slivers and what is no room are left out.
     """
     kept: list[tuple[DrawnArea, str]] = []
-    sure = [_by_word(source, area) for area in areas]
-    largest = max((a.shape.area for a in areas), default=0.0)
+    sure = [
+        "balcony" if kind == BY_FIXTURES and _is_railed(area.shape, railings) else kind
+        for kind, area in ((_by_word(source, area), area) for area in areas)
+    ]
+    indoors = [a.shape.area for a, k in zip(areas, sure, strict=True) if k != "balcony"]
+    largest = max(indoors, default=0.0)
     places = shapely.STRtree([Point(t.x, t.z) for t in things]) if things else None
-    lights = [Point(w["at"]) for w in windows]
+    doors = [o for o in openings if o["kind"] not in _GLAZED]
+    outdoors = [a.shape for a, k in zip(areas, sure, strict=True) if k == "balcony"]
+    lights = [Point(o["at"]) for o in openings if o["kind"] in _GLAZED]
+    # A door to a balcony is of glass.
+    lights += [p for p in map(_place, doors) if any(o.distance(p) < _NEAR_DOOR_M for o in outdoors)]
     for area, kind in zip(areas, sure, strict=True):
         if kind == NO_ROOM:
             continue
@@ -68,8 +83,11 @@ def typed_rooms(
             inside = places.query(area.shape, "contains").tolist() if places is not None else []
             has = {_fixture(things[k].name) for k in inside}
             is_lit = any(area.shape.distance(p) < _NEAR_WINDOW_M for p in lights)
+            near = [d["kind"] for d in doors if area.shape.distance(_place(d)) < _NEAR_DOOR_M]
+            # One enters a home through its hall: an entrance counts as two.
+            n_doors = len(near) + near.count("entrance")
             kind = _by_fixtures(
-                area.shape.area, has, is_lit=is_lit, is_largest=area.shape.area == largest
+                area.shape.area, has, n_doors, is_lit=is_lit, is_largest=area.shape.area == largest
             )
             area = area._replace(is_plain=area.is_plain or kind == "bedroom")
         elif kind == "bathroom" and area.shape.area < _SMALL_BATH_M2:
@@ -102,18 +120,30 @@ def _fixture(name: str) -> str:
     return next((kind for kind, known in _FIXTURES if words & known), "")
 
 
-def _by_fixtures(m2: float, has: set[str], *, is_lit: bool, is_largest: bool) -> str:
+def _place(opening: dict[str, Any]) -> Point:
+    return Point(opening["at"])
+
+
+def _is_railed(shape: Polygon, railings: Sequence[Polygon]) -> bool:
+    near = shapely.union_all(list(railings)).buffer(_NEAR_RAILING_M)
+    along = shape.exterior.intersection(near).length
+    return bool(along > _OPEN_AIR_SHARE * shape.exterior.length)
+
+
+def _by_fixtures(m2: float, has: set[str], n_doors: int, *, is_lit: bool, is_largest: bool) -> str:
     if has & {"toilet", "bath"}:
         return "bathroom" if m2 >= _SMALL_BATH_M2 or "bath" in has else "wc"
+    is_living = "sofa" in has or (m2 >= _LIVING_M2 and is_largest)
     if "kitchen" in has:
-        return "living" if "sofa" in has else "kitchen"
+        return "living" if is_living else "kitchen"
     if "bed" in has:
         return "bedroom"
-    if "sofa" in has or (m2 >= _LIVING_M2 and is_largest):
+    if is_living:
         return "living"
-    if is_lit and m2 >= _ROOM_M2:
-        return "bedroom"
-    return "store" if not is_lit and m2 < _STORE_M2 else "hall"
+    # A passage has doors at two ends; what has one door is a room with a window, a store without.
+    if is_lit:
+        return "bedroom" if m2 >= (_SMALL_ROOM_M2 if n_doors == 1 else _ROOM_M2) else "hall"
+    return "store" if n_doors == 1 or m2 < _STORE_M2 else "hall"
 
 
 def _with_living(kept: list[tuple[DrawnArea, str]]) -> list[tuple[DrawnArea, str]]:

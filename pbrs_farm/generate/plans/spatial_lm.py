@@ -63,8 +63,7 @@ def plan_of_layout(path: Path) -> ParsedPlan:
         Thing("spatiallm", word, x, -y, z - sz / 2 - floor, sx, sy, sz, angle)
         for word, (x, y, z, angle, sx, sy, sz) in boxes
     ]
-    windows = [o for o in openings if o["kind"] == "window"]
-    rows = typed_rooms("spatiallm", [DrawnArea(r, "") for r in rooms], things, windows, left_out)
+    rows = typed_rooms("spatiallm", [DrawnArea(r, "") for r in rooms], things, openings, left_out)
     return ParsedPlan(
         (ParsedStorey(value_of(rows, openings, height), tuple(things)),), left_out.lines()
     )

@@ -77,9 +77,8 @@ def _storey_of_rooms(
             o["kind"] == row["kind"] and math.dist(o["at"], row["at"]) < _SAME_M for o in once
         ):
             once.append(row)
-    windows = [o for o in once if o["kind"] == "window"]
     return ParsedStorey(
-        value_of(typed_rooms("zind", areas, (), windows, left_out), once, 2.6), name=name
+        value_of(typed_rooms("zind", areas, (), once, left_out), once, 2.6), name=name
     )
 
 
