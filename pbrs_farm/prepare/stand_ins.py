@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from typing import Final, Literal, NamedTuple
 
@@ -21,10 +22,14 @@ from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, SINK
 from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, House, Item, Material, Note, Room
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.solids import box
+from pbrs_farm.geometry.surface_points import item_triangles
+from pbrs_farm.home.room_use import RoomKind, is_cooked_in, room_kind
+from pbrs_farm.prepare.kitchen_runs import Unit, kitchen_units
 from pbrs_farm.read.catalogue.piece_groups import group_rule
 
 STAND_IN: Final = "stand-in"
@@ -40,6 +45,20 @@ _BOARDS: Final = frozenset({
     "dining_table", "coffee_table", "fridge", "washer", "base_cabinet", "upper_cabinet", "rug",
     "curtain", "blinds", "picture_frame", "mirror",
 })  # fmt: skip
+_FIXTURES: Final = frozenset({
+    "toilet", "washbasin", "sink", "bathtub", "shower", "bidet", "cooker", "oven", "dishwasher",
+    "washer", "fridge",
+})  # fmt: skip
+_OWN_SCALES: Final = (0.8, 1.25)  # of a fixture whose box no piece fits
+_FAR_SCALES: Final = (0.35, 2.6)  # of such a box against the piece
+_BASINS: Final = frozenset({"sink", "washbasin"})
+_TALLEST_BASIN_M: Final = 1.3  # taller ones have a mirror
+_RIMS_M: Final = (0.6, 1.1)  # heights of basins' rims above the floor
+_ON_TOP_M: Final = 0.12  # between a thing and the top of what it stands on
+_OVER_EDGE_M: Final = 0.05
+_MOST_DROP_M: Final = (
+    0.6  # what is farther above all else is held by something that no source tells of
+)
 _NEAR_WALL_M: Final = 0.25  # a back that stands nearer to a wall than this stands at it
 _THIN_M: Final = 0.12
 _AT_TABLE_M: Final = 1.5  # from a chair to the middle of its table
@@ -86,8 +105,13 @@ def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
         )
     with closing(MutableHouse(left, 0)) as mutable:
         scene = _Scene(house, catalogue if how == "pieces" else None)
-        for item in box_only:
-            _stand_in(mutable, item, scene)
+        units = _units_of_kitchens(box_only, scene)
+        # What stands on other things comes after them.
+        for item in sorted(box_only, key=scene.stands_on_another):
+            if item.id in units:
+                _add_units(mutable, item, units[item.id], scene)
+            else:
+                _stand_in(mutable, item, scene)
         mutable.notes += scene.notes()
         made = mutable.frozen()
     owed = sorted(
@@ -127,6 +151,9 @@ class _Scene:
             i.box.centre for i in house.items
             if i.box is not None and BOX_ONLY in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
         ]  # fmt: skip
+        self._box_only = [i for i in house.items if BOX_ONLY in i.tags]
+        self._grounds: dict[str, Polygon] = {}
+        self.placed: list[Item] = []  # stand-ins so far
         self.boxes: Counter[str] = Counter()
         self.in_walls: Counter[str] = Counter()
 
@@ -164,6 +191,49 @@ class _Scene:
                 best, nearest = place, away
         return best
 
+    def items_of(self, place: _Place | None) -> list[Item]:
+        """The box-only things of a room."""
+        return [i for i in self._box_only if place is not None and self.place_of(i) is place]
+
+    def stands_on_another(self, item: Item) -> bool:
+        """Whether a thing's box begins on, or within, the box of another, above its foot."""
+        assert item.box is not None
+        low = float(item.box.centre[1] - item.box.half[1])
+        here = Point(*item.box.centre[[0, 2]])
+        for other in self._box_only:
+            assert other.box is not None
+            foot, top = (float(other.box.centre[1] + s * other.box.half[1]) for s in (-1, 1))
+            if other is item or not foot + _ON_FLOOR_M < low < top + _ON_TOP_M:
+                continue
+            if other.id not in self._grounds:
+                self._grounds[other.id] = _ground(other.box).buffer(_OVER_EDGE_M)
+            if self._grounds[other.id].contains(here):
+                return True
+        return False
+
+    def surface_below(self, item: Item, target: Box) -> float | None:
+        """The height of what stands below a thing that the source puts on another; None = nothing near."""
+        if not self.stands_on_another(item):
+            return None
+        low = float(target.centre[1] - target.half[1])
+        reach = (np.abs(target.axes) @ target.half)[[0, 2]]
+        x, z = target.centre[[0, 2]]
+        near = [
+            item_triangles(i) for i in self.placed
+            if (i.bounds[0, [0, 2]] < (x + reach[0], z + reach[1])).all()
+            and (i.bounds[1, [0, 2]] > (x - reach[0], z - reach[1])).all()
+        ]  # fmt: skip
+        if not near:
+            return None
+        spread = np.linspace(-0.4, 0.4, 5)
+        across, along = target.axes[[0, 2], 0], target.axes[[0, 2], 2]
+        places = [
+            target.centre[[0, 2]] + 2 * a * target.half[0] * across + 2 * b * target.half[2] * along
+            for a in spread for b in spread
+        ]  # fmt: skip
+        y = float(highest_below(np.array(places), np.concatenate(near), low + _ON_TOP_M).max())
+        return y if low - y < _MOST_DROP_M else None
+
     def table_near(self, middle: F64, height: float) -> F64 | None:
         """The (x, z) of the nearest table on the same storey, within reach of a chair."""
         tables = [t[[0, 2]] for t in self._tables if abs(t[1] - height) < 1.5]
@@ -172,19 +242,84 @@ class _Scene:
         return tables[nearest] if nearest >= 0 and far[nearest] < _AT_TABLE_M else None
 
 
-def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
-    assert item.box is not None
+def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Unit]]:
+    """The units that stand in for counters and kitchens, by the id of the thing."""
+    if scene.catalogue is None:
+        return {}
+    by_room: dict[str, tuple[_Place, list[Item]]] = {}
+    for item in box_only:
+        place = scene.place_of(item)
+        target = _target_of(item, place)
+        if place is not None and target is not None:
+            row = by_room.setdefault(place.room.id, (place, []))
+            row[1].append(replace(item, box=target))
+    found: dict[str, list[Unit]] = {}
+    for place, items in by_room.values():
+        found |= kitchen_units(
+            items, place.room.floor_y, scene.catalogue, scene.house.id,
+            is_kitchen=_is_kitchen(place, items),
+            distance_to_wall=place.outline.exterior.distance,
+            choose_front=partial(_likeliest_front, place=place, scene=scene),
+        )  # fmt: skip
+    return found
+
+
+def _likeliest_front(boxes: Sequence[Box], place: _Place, scene: _Scene) -> int:
+    costs = [_front_cost(box, "base_cabinet", place, scene) for box in boxes]
+    return costs.index(min(costs))
+
+
+def _is_kitchen(place: _Place | None, items: Sequence[Item]) -> bool:
+    if place is None:
+        return False
+    kind = room_kind(place.room, items, place.outline.area)
+    return kind is RoomKind.KITCHEN or (kind is not RoomKind.BATHROOM and is_cooked_in(items))
+
+
+def _add_units(mutable: MutableHouse, item: Item, units: list[Unit], scene: _Scene) -> None:
+    """The units of a run; the first one bears the thing's id."""
+    assert scene.catalogue is not None
     place = scene.place_of(item)
-    target = _inside(_between(item.box, place.room), place.area) if place else item.box
+    for number, unit in enumerate(units):
+        shape = scene.catalogue.shape(unit.piece)
+        if shape is None:
+            continue
+        fit = _Fit(unit.piece, unit.scale, 0.0)
+        placed = _placed(mutable, item, unit.box, fit, shape, place)
+        if number:
+            placed = replace(placed, id=f"{item.id}_{number}")
+        if unit.is_invented:
+            placed = replace(placed, name=unit.piece.name, nyu40=unit.piece.nyu40)
+        scene.placed.append(placed)
+        mutable.add(placed, "stand_ins", unit.piece)
+
+
+def _target_of(item: Item, place: _Place | None) -> Box | None:
+    """The box within its room, off its walls; None where most of it lies in them."""
+    assert item.box is not None
+    return _inside(_between(item.box, place.room), place.area) if place else item.box
+
+
+def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
+    place = scene.place_of(item)
+    target = _target_of(item, place)
     if target is None:
         scene.in_walls[item.name] += 1
         return
+    if item.nyu40 == SINK and place is not None:
+        target = _down_to_floor(target, place.room)
+    surface_y = scene.surface_below(item, target)
+    if surface_y is not None:
+        # What it stands on may be lower, or higher, than the source's own.
+        target = _from(target, surface_y, surface_y + 2 * float(target.half[1]))
     found = _chosen(item, target, place, scene) if scene.catalogue else None
     if found is not None and scene.catalogue is not None:
         turned, fit = found
         shape = scene.catalogue.shape(fit.piece)
         if shape is not None:
-            mutable.add(_placed(mutable, item, turned, fit, shape, place), "stand_ins", fit.piece)
+            placed = _placed(mutable, item, turned, fit, shape, place)
+            scene.placed.append(placed)
+            mutable.add(placed, "stand_ins", fit.piece)
             return
     if scene.catalogue is not None:
         scene.boxes[item.name] += 1
@@ -197,6 +332,8 @@ def _chosen(
     """The piece that fits best, and the box as it looks; None where no piece fits either way."""
     assert scene.catalogue is not None
     group = _group_of(item)
+    if group in _BASINS:
+        group = "sink" if _is_kitchen(place, scene.items_of(place)) else "washbasin"
     best: tuple[float, Box, _Fit] | None = None
     for turned in _turned(target, is_front_given=FRONT_GIVEN in item.tags):
         fit = _best(scene.catalogue, group, item, turned)
@@ -232,7 +369,20 @@ def _best(catalogue: Catalogue, group: str, item: Item, target: Box) -> _Fit | N
         fits = [fit for p in pieces if p.place is not Place.OPENING and (fit := _fit(p, target))]
         if fits:
             return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id))
-    return None
+    # Fixtures are of one size whatever a scan measured: better a toilet of its own size than a box.
+    fits = [
+        fit for p in catalogue.of(group) if group in _FIXTURES and (fit := _own_size(p, target))
+    ]
+    return min(fits, key=lambda fit: (round(fit.misfit, 6), fit.piece.id), default=None)
+
+
+def _own_size(piece: Piece, target: Box) -> _Fit | None:
+    """A piece about as large as it is made; None where the box is far smaller or larger."""
+    size = np.array([piece.size[0], piece.size[2], piece.size[1]])
+    raw = 2 * target.half / np.maximum(size, 1e-6)
+    if not _stands(piece) or raw.min() < _FAR_SCALES[0] or raw.max() > _FAR_SCALES[1]:
+        return None
+    return _Fit(piece, np.clip(raw, *_OWN_SCALES), float(np.abs(np.log(raw)).sum()))
 
 
 def _fit(piece: Piece, target: Box) -> _Fit | None:
@@ -241,6 +391,11 @@ def _fit(piece: Piece, target: Box) -> _Fit | None:
     if size.min() <= 0:
         return None
     scale = np.maximum(2 * target.half, 0.01) / size
+    if piece.group in _BASINS:
+        # A source measures a basin to its rim; the tap stands over it.
+        if not _stands(piece) or piece.size[2] > _TALLEST_BASIN_M:
+            return None
+        scale[1] = 1.0
     # What is thin, a picture, a rug, a flat screen, says little by its thickness.
     is_thin = (size < _THIN_M) | (2 * target.half < _THIN_M)
     scale = np.where(is_thin, np.clip(scale, *_SCALES), scale)
@@ -260,8 +415,21 @@ def _between(target: Box, room: Room) -> Box:
     if top - bottom < 0.01:
         # The box lies outside: keep its height and stand it on the floor.
         bottom, top = room.floor_y, room.floor_y + min(high - low, room.ceiling_y - room.floor_y)
+    return _from(target, bottom, top)
+
+
+def _down_to_floor(target: Box, room: Room) -> Box:
+    """A basin's box down to the floor where its rim is as high as those of basins that stand."""
+    rim = float(target.centre[1] + target.half[1]) - room.floor_y
+    if not _RIMS_M[0] <= rim <= _RIMS_M[1]:
+        return target
+    return _from(target, room.floor_y, room.floor_y + rim)
+
+
+def _from(target: Box, low: float, high: float) -> Box:
+    """The box between two heights of the world."""
     centre, half = target.centre.copy(), target.half.copy()
-    centre[1], half[1] = (bottom + top) / 2, (top - bottom) / 2
+    centre[1], half[1] = (low + high) / 2, (high - low) / 2
     return replace(target, centre=centre, half=half)
 
 
@@ -343,6 +511,9 @@ def _placed(
         base = float(target.centre[1] + target.half[1]) - float(high[1] - low[1])
     elif place is not None and _stands(fit.piece) and base - place.room.floor_y < _ON_FLOOR_M:
         base = place.room.floor_y
+    if fit.piece.group in _BASINS:
+        # The tap stands over the rim that the source tells of.
+        target = _from(target, base, base + float(high[1] - low[1]))
     deeper = max(float(high[2] - low[2]) / 2 - float(target.half[2]), 0.0)
     at = target.centre + deeper * front - np.array([mx * cos + mz * sin, 0.0, mz * cos - mx * sin])
     at[1] = base - low[1]

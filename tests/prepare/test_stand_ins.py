@@ -128,6 +128,22 @@ def test_chairs_look_at_the_nearest_table(way: tuple[float, float]) -> None:
     np.testing.assert_allclose(chair.box.axes[[0, 2], 2], way, atol=1e-9)
 
 
+@pytest.mark.parametrize(("z", "top"), [(1.8, 0.75), (2.2, 0.375)])
+def test_what_stands_on_a_thing_stands_on_its_stand_in(z: float, top: float) -> None:
+    """The front half of a stand-in here is half as high as its box."""
+    table = box_only(
+        "dining_table", (2.5, 0.375, 2.0), (1.4, 0.75, 0.8), number=1, is_front_given=True
+    )
+    mug = box_only("cup", (2.5, 0.8, z), (0.09, 0.1, 0.09))
+    assert of(furnished(mug, table)).bounds[0, 1] == pytest.approx(top, abs=1e-3)
+
+
+def test_what_hangs_where_nothing_is_below_stays_where_it_is() -> None:
+    table = box_only("dining_table", (2.5, 0.375, 2.0), (1.4, 0.75, 0.8), number=1)
+    picture = box_only("painting", (2.5, 1.5, 0.03), (0.6, 0.4, 0.03))
+    assert of(furnished(picture, table)).bounds[0, 1] == pytest.approx(1.3, abs=0.01)
+
+
 def test_a_given_front_is_kept() -> None:
     item = of(
         furnished(box_only("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_given=True))

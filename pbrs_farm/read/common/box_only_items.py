@@ -8,10 +8,12 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, Item, ItemKind
-from pbrs_farm.home.names import parted
+from pbrs_farm.home.names import parted, words_of
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 
 _FURNITURE: Final = ("object", "lamp", "plant", "stairs", "person")
+_ON_FIXTURES: Final = frozenset({"faucet", "tap"})
+"""What sinks and tubs have of their own."""
 LARGEST_M: Final = 15.0
 
 
@@ -33,6 +35,8 @@ def box_only_item(
     vocabulary: whose word the name is (given_classes.csv). centre: of the box, metres, world. size:
     width, height, depth. turn_rad: about +y; at 0 the front looks to +z.
     """
+    if words_of(_spoken(name)) & _ON_FIXTURES:
+        return None
     seen = given_class(vocabulary, name) or class_by_words(_spoken(name))
     if seen is not None and seen.kind == LEFT_OUT:
         return None

@@ -1,0 +1,303 @@
+"""Boxes of kitchens as runs of units of one set: cabinets, sink, cooker, wall cabinets; no effects.
+
+A source says "a kitchen, 3.2 m by 0.6 m" or "a counter", and where a sink lies in it. What one sees there
+is a row of units with one worktop; a box deeper than a unit is an L or a U along the walls that it
+touches, or an island of two rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from shapely.geometry import Point
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.catalogue import Catalogue, Piece
+from pbrs_farm.core.classes import CABINET, COUNTER, SINK
+from pbrs_farm.core.house import Box, Item
+from pbrs_farm.home.names import words_of_item
+
+MODULE_M: Final = 0.6  # of a usual unit
+_NARROWEST_M: Final = 0.28  # of a unit; what is left over goes to its neighbour
+_DEPTH_M: Final = 0.62  # of a run along a wall, where a box is deeper
+_DEPTHS_M: Final = (0.4, 0.96)  # of boxes that are one run
+_TOPS_M: Final = (0.7, 1.1)  # a worktop's height above the floor
+_FOOT_M: Final = 0.35  # what begins lower stands on the floor
+_HUNG_M: Final = 1.2  # what begins higher hangs
+_HUNG_HEIGHTS_M: Final = (0.3, 1.1)
+_HUNG_DEPTH_M: Final = 0.5
+_AT_WALL_M: Final = 0.2
+_SINK_M: Final = 0.8
+_COUNTERS: Final = frozenset({"kitchen", "counter", "countertop", "worktop", "island"})
+_COOKERS: Final = frozenset({"stove", "cooker", "hob", "cooktop", "stovetop", "range", "oven"})
+_OTHERS: Final = frozenset({"hood", "microwave"})
+_BUILT_IN: Final = frozenset({
+    "dishwasher", "washing", "washer", "fridge", "refrigerator", "freezer", "dryer",
+})  # fmt: skip
+
+
+class Unit(NamedTuple):
+    """A piece of a run, and the box that it fills; its back at the box's back."""
+
+    piece: Piece
+    box: Box
+    scale: F64  # (3,) along the piece's width, height, depth
+    is_invented: bool = False  # the source says nothing of it but that here is a kitchen
+
+
+class _Set(NamedTuple):
+    bases: tuple[Piece, ...]
+    sink: Piece
+    cooker: Piece
+    uppers: tuple[Piece, ...]
+
+    @property
+    def top(self) -> float:
+        return self.bases[0].size[2]
+
+
+@dataclass(slots=True)
+class _Run:
+    """A row along x of its own frame, from 0 to length; it looks along z."""
+
+    item: Item
+    origin: F64  # its left back lower corner, world
+    right: F64
+    front: F64
+    length: float
+    depth: float
+    height: float
+    is_hung: bool
+
+    def along(self, item: Item) -> float | None:
+        """Where the middle of another box lies along it; None: elsewhere."""
+        assert item.box is not None
+        away = item.box.centre - self.origin
+        x, z = float(away @ self.right), float(away @ self.front)
+        is_here = -0.05 <= x <= self.length + 0.05 and -0.1 <= z <= self.depth + 0.1
+        return x if is_here and float(away[1]) < self.height + 0.4 else None
+
+    def box(self, low: float, high: float) -> Box:
+        """The box of a unit between two places along it."""
+        up = np.array([0.0, 1.0, 0.0])
+        middle = self.right * (low + high) / 2 + self.front * self.depth / 2 + up * self.height / 2
+        half = np.array([high - low, self.height, self.depth]) / 2
+        return Box(self.origin + middle, half, np.stack([self.right, up, self.front], 1))
+
+
+class _Module(NamedTuple):
+    """What stands between two places along a run: a unit for an item, or nothing (a machine's place)."""
+
+    low: float
+    high: float
+    kind: str  # "base", "sink", "cooker", "gap"
+    item: Item | None = None  # that it stands for; None = the run's own
+
+
+def kitchen_units(
+    items: Sequence[Item], floor_y: float, catalogue: Catalogue, house_id: str, *, is_kitchen: bool,
+    distance_to_wall: Callable[[Point], float], choose_front: Callable[[Sequence[Box]], int],
+) -> Mapping[str, list[Unit]]:  # fmt: skip
+    """The units of a room's counters, by the id of the box-only item that each stands for.
+
+    items: the box-only things of the room. is_kitchen: whether its cabinets are kitchen cabinets.
+    choose_front: of boxes that look different ways, the number of the likeliest. Items that are no
+    part of a run are not in the result; it is empty where the catalogue has no kitchen set.
+    """
+    is_kitchen = is_kitchen or any(_is_named_counter(i) for i in items)
+    counters = [i for i in items if _is_counter(i, floor_y, is_kitchen=is_kitchen)]
+    hung = [i for i in items if is_kitchen and _is_hung(i, floor_y)]
+    chosen = _set_of_kitchen(catalogue, counters, house_id) if counters or hung else None
+    if chosen is None:
+        return {}
+    runs = [
+        run for item in (*counters, *hung)
+        for run in _runs_of(item, floor_y, distance_to_wall, choose_front, is_hung=item in hung)
+    ]  # fmt: skip
+    found: dict[str, list[Unit]] = {}
+    others = [i for i in items if i not in counters and i not in hung]
+    whole = [r for r in runs if not r.is_hung and "kitchen" in words_of_item(r.item)]
+    longest = max(whole, key=lambda r: r.length, default=None)
+    wanted = _missing(others) if longest else ()
+    for run in runs:
+        modules = _modules_of(run, [] if run.is_hung else others)
+        if run is longest:
+            modules = _with_invented(modules, wanted)
+        for number, module in enumerate(modules):
+            unit = _unit_of(module, number, run, chosen)
+            if unit is not None:
+                found.setdefault((module.item or run.item).id, []).append(unit)
+        others = [i for i in others if i.id not in found]
+    return found
+
+
+def _is_named_counter(item: Item) -> bool:
+    words = words_of_item(item)
+    return bool(item.nyu40 == COUNTER or words & _COUNTERS or {"base", "cabinet"} <= words) and (
+        item.nyu40 in (COUNTER, CABINET)
+    )
+
+
+def _is_counter(item: Item, floor_y: float, *, is_kitchen: bool) -> bool:
+    assert item.box is not None
+    low, high = (float(item.box.centre[1] + s * item.box.half[1]) - floor_y for s in (-1, 1))
+    if low > _FOOT_M or not _TOPS_M[0] <= high <= _TOPS_M[1]:
+        return False
+    if 2 * min(item.box.half[0], item.box.half[2]) < _DEPTHS_M[0]:
+        return False
+    return _is_named_counter(item) or (is_kitchen and item.nyu40 == CABINET)
+
+
+def _is_hung(item: Item, floor_y: float) -> bool:
+    assert item.box is not None
+    low, tall = float(item.box.centre[1] - item.box.half[1]) - floor_y, 2 * float(item.box.half[1])
+    return bool(
+        item.nyu40 == CABINET and low >= _HUNG_M
+        and _HUNG_HEIGHTS_M[0] <= tall <= _HUNG_HEIGHTS_M[1]
+        and 2 * min(item.box.half[0], item.box.half[2]) <= _HUNG_DEPTH_M
+    )  # fmt: skip
+
+
+def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: str) -> _Set | None:
+    """A set whose worktop is about as high as the counters are; one home has one."""
+    by_set: dict[str, dict[str, list[Piece]]] = {}
+    for piece in catalogue.of("base_cabinet", "sink", "cooker", "upper_cabinet"):
+        if piece.of_set:
+            by_set.setdefault(piece.of_set, {}).setdefault(piece.group, []).append(piece)
+    whole = [s for s in by_set.values() if {"base_cabinet", "sink", "cooker"} <= set(s)]
+    if not whole:
+        return None
+    tops = [2 * float(i.box.half[1]) for i in counters if i.box is not None] or [0.9]
+    away = [abs(s["base_cabinet"][0].size[2] - tops[0]) for s in whole]
+    near = [s for s, far in zip(whole, away, strict=True) if far <= min(away) + 0.021]
+    chosen = near[keys.seed(house_id, "kitchen set") % len(near)]
+    return _Set(
+        tuple(chosen["base_cabinet"]), chosen["sink"][0], chosen["cooker"][0],
+        tuple(chosen.get("upper_cabinet", ())),
+    )  # fmt: skip
+
+
+def _runs_of(
+    item: Item, floor_y: float, distance_to_wall: Callable[[Point], float],
+    choose_front: Callable[[Sequence[Box]], int], *, is_hung: bool,
+) -> Iterator[_Run]:  # fmt: skip
+    """The rows of units that a box is made of; none where it is too deep and stands free."""
+    box = item.box
+    assert box is not None
+    right, front = box.axes[:, 0] * [1, 0, 1], box.axes[:, 2] * [1, 0, 1]
+    half = box.half[[0, 2]]
+    # Its long side is its width.
+    if half[1] > half[0]:
+        right, front, half = front, -right, half[::-1]
+    low = float(box.centre[1] - box.half[1]) if is_hung else floor_y
+    height = float(box.centre[1] + box.half[1]) - low
+    middle = np.array([box.centre[0], low, box.centre[2]])
+
+    def run(x: tuple[float, float], z: tuple[float, float], way: F64) -> _Run:
+        # The part x by z of the box, in its right and front; way: where it looks.
+        across = np.cross([0.0, 1.0, 0.0], way)
+        corners = [middle + right * a + front * b for a in x for b in z]
+        back = min(corners, key=lambda c: float(c @ way + c @ across))
+        spans = [float(np.ptp([c @ v for c in corners])) for v in (across, way)]
+        return _Run(item, back, across, way, spans[0], spans[1], height, is_hung)
+
+    w, d = float(half[0]), float(half[1])
+    if 2 * d <= _DEPTHS_M[1]:
+        ways = [run((-w, w), (-d, d), way) for way in (front, -front)]
+        yield ways[choose_front([r.box(0, r.length) for r in ways])]
+        return
+    x, z = [-w, w], [-d, d]
+    sides = [(z, 1, front), (z, 0, -front), (x, 1, right), (x, 0, -right)]
+    at_walls = [
+        (span, end, way) for span, end, way in sides
+        if distance_to_wall(Point(*(middle + way * abs(span[end]))[[0, 2]])) < _AT_WALL_M
+    ]  # fmt: skip
+    if not at_walls and d <= _DEPTHS_M[1]:
+        # An island: two rows, back to back.
+        yield run((-w, w), (0.0, d), front)
+        yield run((-w, w), (-d, 0.0), -front)
+    for span, end, way in at_walls:
+        if min(x[1] - x[0], z[1] - z[0]) < _DEPTH_M:
+            return
+        # A strip along the wall, and less of the box for the next one.
+        inner = span[end] - (_DEPTH_M if end else -_DEPTH_M)
+        strip = min(inner, span[end]), max(inner, span[end])
+        yield run(strip if span is x else (x[0], x[1]), strip if span is z else (z[0], z[1]), -way)
+        span[end] = inner
+
+
+def _kind_of(item: Item) -> str:
+    words = words_of_item(item)
+    if words & _OTHERS:
+        return ""
+    if item.nyu40 == SINK:
+        return "sink"
+    return "gap" if words & _BUILT_IN else "cooker" if words & _COOKERS else ""
+
+
+def _missing(others: Sequence[Item]) -> tuple[str, ...]:
+    kinds = {_kind_of(i) for i in others}
+    return tuple(kind for kind in ("cooker", "sink") if kind not in kinds)
+
+
+def _modules_of(run: _Run, others: Sequence[Item]) -> list[_Module]:
+    """The run from end to end: what the source puts into it, and cabinets between."""
+    fixed: list[_Module] = []
+    inside = [(x, i) for i in others if _kind_of(i) and (x := run.along(i)) is not None]
+    for x, item in sorted(inside, key=lambda row: row[0]):
+        kind = _kind_of(item)
+        assert item.box is not None
+        width = {"sink": _SINK_M if run.length > 2 * _SINK_M else MODULE_M, "cooker": MODULE_M}.get(
+            kind, 2 * float(np.abs(item.box.axes.T @ run.right * item.box.half).sum())
+        )
+        low = max(x - width / 2, fixed[-1].high if fixed else 0.0)
+        low = min(low, run.length - width)
+        if low >= (fixed[-1].high if fixed else 0.0) - 1e-6:
+            fixed.append(_Module(low, low + width, kind, None if kind == "gap" else item))
+    found: list[_Module] = []
+    at = 0.0
+    for module in (*fixed, _Module(run.length, run.length, "gap")):
+        rest = module.low - at
+        if rest >= _NARROWEST_M:
+            n = max(round(rest / MODULE_M), 1)
+            found += [_Module(at + rest * k / n, at + rest * (k + 1) / n, "base") for k in range(n)]
+        elif found and found[-1].kind != "gap":
+            found[-1] = found[-1]._replace(high=module.low)
+        elif module.kind != "gap":
+            module = module._replace(low=at)
+        found.append(module)
+        at = module.high
+    return found[:-1]
+
+
+def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Module]:
+    """The run with a cooker a third along it and a sink at two thirds, in place of cabinets."""
+    modules = list(modules)
+    for kind, share in (("cooker", 1 / 3), ("sink", 2 / 3)):
+        free = [k for k, m in enumerate(modules) if m.kind == "base"]
+        if kind in wanted and len(free) > 1:
+            at = share * modules[-1].high
+            best = min(free, key=lambda k: abs((modules[k].low + modules[k].high) / 2 - at))
+            modules[best] = modules[best]._replace(kind=kind)
+    return modules
+
+
+def _unit_of(module: _Module, number: int, run: _Run, chosen: _Set) -> Unit | None:
+    pieces = {
+        "base": chosen.uppers if run.is_hung else chosen.bases,
+        "sink": (chosen.sink,), "cooker": (chosen.cooker,),
+    }.get(module.kind)  # fmt: skip
+    if not pieces:
+        return None
+    piece = pieces[number % len(pieces)]
+    box = run.box(module.low, module.high)
+    # A tap stands over the worktop, which all units of the set have at one height.
+    top = piece.size[2] if run.is_hung else chosen.top
+    width, depth, _ = piece.size
+    scale = np.array([2 * box.half[0] / width, 2 * box.half[1] / top, 2 * box.half[2] / depth])
+    is_invented = module.kind != "base" and module.item is None
+    return Unit(piece, box, scale, is_invented)

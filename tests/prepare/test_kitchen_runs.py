@@ -1,0 +1,150 @@
+"""Kitchens of which a source gives a box: runs of units of one set, what stands in them, what stands on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.dress.things.families import family_pieces, with_families
+from pbrs_farm.prepare.stand_ins import with_stand_ins
+from pbrs_farm.read.common.box_only_items import box_only_item
+from tests.prepare.test_stand_ins import empty_room
+
+Triple = tuple[float, float, float]
+GROUP = {f"piece:{p.id}": p.group for p in family_pieces()}
+SET = {f"piece:{p.id}": p.of_set for p in family_pieces()}
+
+
+@cache
+def generated() -> Catalogue:
+    return with_families(EMPTY)
+
+
+def told(
+    name: str, at: Triple, size: Triple, source: str = "swiss-feature", number: int = 0
+) -> Item:
+    """A thing by name and box; at: the middle of its base. size: width, height, depth."""
+    x, y, z = at
+    item = box_only_item(f"box_{number}", source, name, (x, y + size[1] / 2, z), size, 0.0)
+    assert item is not None
+    return item
+
+
+def furnished(*items: Item, room: str = "Kitchen") -> House:
+    house = empty_room()
+    named = replace(house, rooms=tuple(replace(r, name=room, types=(room,)) for r in house.rooms))
+    return with_stand_ins(named.with_items((*named.items, *items)), generated(), "pieces")
+
+
+def stand_ins(house: House, prefix: str = "box_") -> list[Item]:
+    return [i for i in house.items if i.id.startswith(prefix)]
+
+
+def groups(items: list[Item]) -> list[str]:
+    return [next((GROUP[t] for t in i.tags if t in GROUP), "box") for i in items]
+
+
+def sets(items: list[Item]) -> set[str]:
+    return {next(SET[t] for t in i.tags if t in SET) for i in items}
+
+
+def test_a_kitchen_is_units_side_by_side_with_one_worktop() -> None:
+    items = stand_ins(furnished(told("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))))
+    assert sorted(groups(items)) == ["base_cabinet"] * 3 + ["cooker", "sink"]
+    assert len(sets(items)) == 1
+    # They fill the box from end to end, their backs at the wall behind.
+    spans = sorted((float(i.bounds[0, 0]), float(i.bounds[1, 0])) for i in items)
+    assert (spans[0][0], spans[-1][1]) == pytest.approx((0.5, 3.5), abs=0.02)
+    for (_, high), (low, _) in pairwise(spans):
+        assert low == pytest.approx(high, abs=0.02)
+    tops = [i.bounds[1, 1] for i in items if "sink" not in groups([i])]
+    np.testing.assert_allclose(tops, 0.9, atol=0.01)
+    assert all(i.box is not None and i.box.axes[2, 2] > 0.99 for i in items)
+
+
+def test_a_sink_that_lies_in_a_kitchen_is_its_unit() -> None:
+    kitchen = told("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))
+    sink = told("SINK", (1.2, 0, 0.3), (0.5, 0.85, 0.45), number=1)
+    house = furnished(kitchen, sink)
+    (unit,) = stand_ins(house, "box_1")
+    assert groups([unit]) == ["sink"]
+    assert unit.bounds.mean(0)[0] == pytest.approx(1.2, abs=0.03)
+    assert np.ptp(unit.bounds[:, 0]) >= 0.6
+    rest = stand_ins(house, "box_0")
+    assert "sink" not in groups(rest)
+    assert not any(
+        i.bounds[0, 0] < unit.bounds[1, 0] - 0.02 and i.bounds[1, 0] > unit.bounds[0, 0] + 0.02
+        for i in rest
+    )
+
+
+def test_a_machine_in_a_counter_keeps_its_place() -> None:
+    counter = told("CounterTop", (2.0, 0, 0.32), (3.0, 0.9, 0.6), "ai2thor")
+    washer = told("dishwasher", (2.9, 0, 0.32), (0.6, 0.85, 0.6), "roomplan", 1)
+    house = furnished(counter, washer)
+    assert groups(stand_ins(house, "box_1")) == ["dishwasher"]
+    for unit in stand_ins(house, "box_0"):
+        assert unit.bounds[1, 0] < 2.62 or unit.bounds[0, 0] > 3.18
+    # A counter is no whole kitchen: nothing is added to it.
+    assert set(groups(stand_ins(house, "box_0"))) == {"base_cabinet"}
+
+
+def test_a_deep_counter_in_a_corner_is_an_l() -> None:
+    items = stand_ins(furnished(told("CounterTop", (1.3, 0, 0.9), (2.6, 0.95, 1.8), "ai2thor")))
+    assert set(groups(items)) == {"base_cabinet"}
+    along_north = [i for i in items if i.bounds[1, 2] < 0.7]
+    along_west = [i for i in items if i.bounds[1, 0] < 0.7 and i.bounds[0, 2] > 0.5]
+    assert len(along_north) + len(along_west) == len(items)
+    assert len(along_north) >= 3
+    assert len(along_west) >= 1
+
+
+def test_storage_of_a_scan_is_a_kitchens_in_a_kitchen_alone() -> None:
+    low = told("storage", (2.0, 0, 0.32), (2.4, 0.92, 0.62), "roomplan")
+    high = told("storage", (2.0, 1.45, 0.2), (2.4, 0.7, 0.35), "roomplan", 1)
+    kitchen = furnished(low, high)
+    assert set(groups(stand_ins(kitchen, "box_0"))) == {"base_cabinet"}
+    uppers = stand_ins(kitchen, "box_1")
+    assert set(groups(uppers)) == {"upper_cabinet"}
+    assert len(uppers) == 4
+    np.testing.assert_allclose([i.bounds[0, 1] for i in uppers], 1.45, atol=0.01)
+    assert "base_cabinet" not in groups(stand_ins(furnished(low, room="Bedroom"), "box_0"))
+
+
+@pytest.mark.parametrize(("room", "group"), [("Kitchen", "sink"), ("Bathroom", "washbasin")])
+def test_a_basin_is_what_its_room_has_and_its_rim_is_where_it_is_told(
+    room: str, group: str
+) -> None:
+    # A scan measures the bowl alone.
+    (basin,) = stand_ins(
+        furnished(told("sink", (2.0, 0.65, 0.3), (0.5, 0.2, 0.45), "roomplan"), room=room)
+    )
+    assert groups([basin]) == [group]
+    assert basin.bounds[0, 1] == pytest.approx(0.0, abs=0.01)
+    assert 0.85 < basin.bounds[1, 1] < 1.3
+
+
+@pytest.mark.parametrize("size", [(0.45, 0.42, 0.7), (0.5, 0.4, 0.5), (0.35, 1.1, 0.9)])
+def test_a_toilet_is_a_toilet_whatever_its_box_is(size: Triple) -> None:
+    house = furnished(
+        told("toilet", (2.0, 0, size[2] / 2 + 0.02), size, "roomplan"), room="Bathroom"
+    )
+    (toilet,) = stand_ins(house)
+    assert groups([toilet]) == ["toilet"]
+    assert not house.notes
+    assert 0.28 < np.ptp(toilet.bounds[:, 0]) < 0.55
+    assert toilet.bounds[0, 2] >= -0.02
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [("ai2thor", "Faucet"), ("cubicasa-icon", "WaterTap"), ("hssd", "kitchen faucet")],
+)
+def test_a_faucet_is_part_of_its_sink(source: str, name: str) -> None:
+    assert box_only_item("x", source, name, (0, 1, 0), (0.15, 0.3, 0.2), 0.0) is None
