@@ -234,7 +234,7 @@ def resume() -> Image.Image:
         for name in ("outdoor", "indoor", "albedo", "normal")
     )
     recipe = recipe_from_json((OUT / "resume/recipe.json").read_text(), "recipe.json")
-    shown = develop(LinearAovs(*means), recipe.tone_of(house, view), denoise=False)
+    shown = develop(LinearAovs(*means), recipe.camera_of(house, view).tone, denoise=False)
     return row(shown["mlt_il_ol"].rgb_srgb8, frame.colour)
 
 

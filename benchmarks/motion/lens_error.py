@@ -22,7 +22,7 @@ N_POINTS: Final = 10_000
 PINHOLE: Final = Intrinsics.from_hfov(640, 480)
 LENSES: Final = {
     "pinhole": LensFields(fx=525, fy=520, cx=310, cy=251),
-    "radtan": LensFields(preset="kinect1"),
+    "radtan": LensFields(preset="kinect"),
     "radtan_barrel": LensFields(model="radtan", k1=-0.25, k2=0.06, p1=1e-3, p2=-2e-3, k3=-0.004),
     "fisheye": LensFields(preset="tum_vi"),
     "fisheye180": LensFields(preset="fisheye180"),

@@ -44,7 +44,7 @@ _LIGHT: Final = ("--size", "160x120", "--modes", "mlt_il_ol", "--recipe", "fast"
 # Views are looked at as large as they are made: what a home costs is halved by it.
 _SCORED: Final = ("--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120")
 _OTHER_CAMERA: Final = (
-    "sensor.preset=phone", "tone.spread=0", "tone.white_balance=0.9", "tone.glare=0.04",
+    "tone.camera=phone", "tone.white_balance=0.9", "tone.glare=0.04",
     "cameras.tilt_deg=4", "cameras.hfov_rad=1.15",
 )  # fmt: skip
 JUDGES: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {

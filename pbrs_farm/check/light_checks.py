@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.recipe import Recipe, SensorFields, ToneFields
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
@@ -48,40 +50,81 @@ def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally:
     if light is None:
         return
     stated = view.table.get("modes", {}).get("develop", {})
+    camera = _camera_of(view, view.recipe, 0)
     for mode in modes:
-        _check_mode(view, mode, arrays[mode], light, stated.get(mode, {}), view.recipe, tally)
-    _check_tone(view, view.recipe, stated.get("tone"), tally)
+        shot = _Shot(f"{view.place}/{mode}.png", mode, stated.get(mode, {}), camera)
+        _check_picture(shot, arrays[mode], light, view.recipe, tally)
+    _check_errors(view, stated, camera, tally)
+    _check_variants(view, stated.get("variants", []), light, view.recipe, tally)
 
 
-def _check_tone(view: StoredView, recipe: Recipe, stated: Any, tally: Tally) -> None:
-    """What view.json tells of the choices drawn for the view is what the recipe draws."""
-    if recipe.tone.spread == 0 and stated is None:
-        return
-    tone = _tone_of(view, recipe)
-    names = ("exposure_ev", "contrast", "black", "white")
-    drawn = {name: getattr(tone, name) for name in names} if recipe.tone.spread > 0 else None
-    what = f"view.json tells of its tone {stated}, the recipe draws {drawn}"
-    tally.expect("light developed", view.place, stated == drawn, what)
+@dataclass(frozen=True, slots=True)
+class _Shot:
+    """One picture: where it is, its mode, what view.json states of it, and what took it."""
+
+    place: str
+    mode: str
+    stated: Mapping[str, Any]
+    camera: PictureCamera
 
 
-def _tone_of(view: StoredView, recipe: Recipe) -> ToneFields:
-    return recipe.tone_of(view.folder.parent.parent.name, view.folder.name)
+def _camera_of(view: StoredView, recipe: Recipe, variant: int) -> PictureCamera:
+    return recipe.camera_of(view.folder.parent.parent.name, view.folder.name, variant)
 
 
-def _check_mode(
+def _check_variants(
     view: StoredView,
-    mode: str,
-    stored: NDArray[Any],
+    rows: Any,
     light: Mapping[str, NDArray[np.float32]],
-    stated: Mapping[str, Any],
     recipe: Recipe,
     tally: Tally,
 ) -> None:
-    place = f"{view.place}/{mode}.png"
-    tone, sensor = _tone_of(view, recipe), recipe.sensor
-    total = sum((light[g] for g in _GROUPS[mode]), np.zeros_like(light["outdoor"]))
+    """Each further picture is there, is stated, and is what the camera drawn for it takes."""
+    rows = rows if isinstance(rows, list) else []
+    wanted = [f"mlt_il_ol.{n}.png" for n in range(1, recipe.tone.variants + 1)]
+    told = [row.get("file") if isinstance(row, dict) else None for row in rows]
+    there = sorted(path.name for path in view.folder.glob("mlt_il_ol.*.png"))
+    what = (
+        f"view.json tells of the variants {told}, the recipe asks for {wanted}, there are {there}"
+    )
+    if not tally.expect("light developed", view.place, told == wanted == there, what):
+        return
+    for n, row in enumerate(rows, 1):
+        camera = _camera_of(view, recipe, n)
+        what = f"variant {n} is told to be of a {row.get('camera')}, the recipe draws {camera.name}"
+        tally.expect("light developed", view.place, row.get("camera") == camera.name, what)
+        _check_errors(view, row, camera, tally)
+        place = f"{view.place}/{row['file']}"
+        stored = view.png(row["file"])
+        shot = _Shot(place, "mlt_il_ol", row, camera)
+        _check_picture(shot, stored, light, recipe, tally)
+
+
+def _check_errors(
+    view: StoredView, stated: Mapping[str, Any], camera: PictureCamera, tally: Tally
+) -> None:
+    """What view.json tells of the errors drawn for the camera is what the recipe draws."""
+    told = stated.get("tone")
+    names = ("exposure_ev", "warmth_ev", "tint_ev", "contrast")
+    drawn: dict[str, float] | None = {name: getattr(camera.tone, name) for name in names}
+    if camera.name == "neutral":
+        drawn = None
+    what = f"view.json tells of its tone {told}, the recipe draws {drawn}"
+    tally.expect("light developed", view.place, told == drawn, what)
+
+
+def _check_picture(
+    shot: _Shot,
+    stored: NDArray[Any],
+    light: Mapping[str, NDArray[np.float32]],
+    recipe: Recipe,
+    tally: Tally,
+) -> None:
+    place, stated = shot.place, shot.stated
+    tone, sensor = shot.camera.tone, shot.camera.sensor
+    total = sum((light[g] for g in _GROUPS[shot.mode]), np.zeros_like(light["outdoor"]))
     total = _add_glare(total, tone.glare)
-    gains = _white_balance(total, light["albedo"], tone.white_balance)
+    gains = _white_balance(total, light["albedo"], tone)
     balanced = np.maximum(np.nan_to_num((total * gains).astype(np.float64), posinf=0.0), 0)
     exposure = _exposure(balanced, tone)
     # A sensor's exposure is what its shutter and speed gave.
@@ -189,16 +232,24 @@ def _add_glare(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
     return np.asarray((1 - share) * finite + share * blurred, np.float32)
 
 
-def _white_balance(total: NDArray[Any], albedo: NDArray[Any], strength: float) -> Floats:
-    """(3,) gains against the median of radiance over albedo, of constant luminance."""
-    level = total @ _LUMINANCE
-    known = (level > 0) & (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
-    if strength == 0 or known.sum() < 16:
-        return np.ones(3)
-    low, high = np.percentile(level[known], [10, 90])
-    known &= (level >= low) & (level <= high)
-    surface = albedo[known].astype(np.float64)
-    logs = np.median(np.log(total[known] / surface), axis=0)
+def _white_balance(total: NDArray[Any], albedo: NDArray[Any], tone: ToneFields) -> Floats:
+    """(3,) gains against the median of radiance over albedo where it is high, of constant luminance."""
+    errors = 2.0 ** np.array([tone.warmth_ev / 2, tone.tint_ev, -tone.warmth_ev / 2])
+    light = np.ones(3)
+    known = (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
+    if tone.white_balance > 0 and known.sum() >= 16:
+        light = _light_colour(total[known], albedo[known].astype(np.float64))
+    gains = (light / (light @ _LUMINANCE)) ** -tone.white_balance * errors
+    return np.asarray((gains / (gains @ _LUMINANCE)).astype(np.float32))
+
+
+def _light_colour(total: NDArray[Any], surface: Floats) -> Floats:
+    """(3,) of (N, 3) radiance over albedo, the median of those from the middle to the 95th percentile."""
+    level = (total / surface) @ _LUMINANCE
+    low, high = np.percentile(level, [50, 95])
+    lit = (level >= low) & (level <= high)
+    total, surface = total[lit], surface[lit]
+    logs = np.median(np.log(total / surface), axis=0)
     # Walls of one hue colour the light they reflect at each other: hold it to lamps and skies.
     most, least = surface.max(axis=1), surface.min(axis=1)
     is_colour = most - least > 0.35 * most
@@ -213,13 +264,11 @@ def _white_balance(total: NDArray[Any], albedo: NDArray[Any], strength: float) -
             warmth = np.clip(logs[0] - logs[2], -0.7, 1.6)
             side = logs.mean() - tint / 3
             logs = np.array([side + warmth / 2, logs.mean() + 2 * tint / 3, side - warmth / 2])
-    light = np.exp(logs)
-    gains = (light / (light @ _LUMINANCE)) ** -strength
-    return np.asarray((gains / (gains @ _LUMINANCE)).astype(np.float32))
+    return np.asarray(np.exp(logs))
 
 
 def _exposure(balanced: Floats, tone: ToneFields) -> float:
-    """The factor that brings the log-average to the key; `photo` leaves the ends out."""
+    """The factor that brings the log-average to the key; `photo` counts 1/32 to 4 times the median."""
     if tone.preset == "released":
         level = balanced @ _MITSUBA_LUMINANCE
         return tone.key / float(np.exp(np.log(level + 1e-3).mean()))
@@ -227,8 +276,8 @@ def _exposure(balanced: Floats, tone: ToneFields) -> float:
     level = level[level > 0]
     if not level.size:
         return 1.0
-    bright = float(np.percentile(level, 98))
-    average = float(np.exp(np.log(np.clip(level, bright / 1000, bright)).mean()))
+    middle = float(np.median(level))
+    average = float(np.exp(np.log(np.clip(level, middle / 32, middle * 4)).mean()))
     return float(tone.key / average * 2**tone.exposure_ev)
 
 
@@ -245,27 +294,51 @@ def _tone(
             linear = balanced * ratio[..., None]
     else:
         light, white = balanced * exposure, tone.white
+        light = light + tone.flare * np.minimum(light, tone.white).mean(axis=(0, 1))
         if sensor.is_on:
-            light, white = (
-                np.minimum(light * _vignette(light, sensor), sensor.headroom),
-                sensor.headroom,
-            )
-        linear = _roll_off(light, white)
+            white = sensor.headroom
+            light = np.minimum(light * _vignette(light, sensor), white)
+        linear = _roll_off(_flattened(light, tone), white)
     linear = np.clip(linear, 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * _apply_curve(srgb, tone)), np.uint8)
+    return np.asarray(np.rint(255 * np.clip(_respond(srgb, tone), 0, 1)), np.uint8)
 
 
-def _apply_curve(srgb: Floats, tone: ToneFields) -> Floats:
-    """Luma by an S whose odds go to a power, then by the line that begins at the black level."""
-    if tone.preset == "released" or (tone.contrast == 1 and tone.black == 0):
+def _respond(srgb: Floats, tone: ToneFields) -> Floats:
+    """Luma by an S whose odds go to a power, then sharpened by its difference to a blurred one."""
+    if tone.preset == "released":
         return srgb
     luma = srgb @ [0.299, 0.587, 0.114]
     with np.errstate(divide="ignore"):
         s_shaped = 1 / (1 + (np.maximum(1 / luma - 1, 0)) ** tone.contrast)
-    ends = np.maximum((s_shaped - tone.black) / (1 - tone.black), 0)
-    chroma = np.minimum(np.divide(ends, luma, out=np.zeros_like(luma), where=luma > 0), 1)
-    return np.asarray(np.clip(ends[..., None] + (srgb - luma[..., None]) * chroma[..., None], 0, 1))
+    chroma = np.minimum(np.divide(s_shaped, luma, out=np.zeros_like(luma), where=luma > 0), 1)
+    picture = s_shaped[..., None] + (srgb - luma[..., None]) * chroma[..., None]
+    if tone.sharpening == 0:
+        return np.asarray(picture)
+    soft = s_shaped
+    for axis in (0, 1):
+        soft = ndimage.gaussian_filter1d(soft, 0.8, axis, mode="nearest")
+    return np.asarray(picture + tone.sharpening * (s_shaped - soft)[..., None])
+
+
+def _flattened(light: Floats, tone: ToneFields) -> Floats:
+    """Light whose large differences in stops are smaller by local_contrast: He's self-guided filter."""
+    if tone.local_contrast == 0:
+        return light
+    stops = np.log2(np.maximum(light @ _LUMINANCE, 2.0**-10))
+    r = round(light.shape[1] / 24)
+    first, second = _box_means(stops, r), _box_means(stops**2, r)
+    a = np.maximum(second - first**2, 0) / (np.maximum(second - first**2, 0) + 0.25)
+    large = _box_means(a, r) * stops + _box_means(first - a * first, r)
+    return np.asarray(light * (2 ** (tone.local_contrast * (np.log2(tone.key) - large)))[..., None])
+
+
+def _box_means(values: Floats, r: int) -> Floats:
+    """Means over squares of 2 r + 1, by sums of sums; the border goes on as its last pixel."""
+    wide = np.pad(values, r, mode="edge").cumsum(0).cumsum(1)
+    wide = np.pad(wide, ((1, 0), (1, 0)))
+    n = 2 * r + 1
+    return np.asarray((wide[n:, n:] - wide[:-n, n:] - wide[n:, :-n] + wide[:-n, :-n]) / n**2)
 
 
 def _vignette(light: Floats, sensor: SensorFields) -> Floats:
@@ -279,7 +352,7 @@ def _vignette(light: Floats, sensor: SensorFields) -> Floats:
 
 
 def _roll_off(light: Floats, white: float) -> Floats:
-    """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; beyond 2 it pales."""
+    """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; from 1 on it pales."""
     # The sum rises with k, so that halving its logarithm finds it.
     low, high = -9.3, 9.3
     for _ in range(100):
@@ -291,5 +364,5 @@ def _roll_off(light: Floats, white: float) -> Floats:
     over = np.maximum(top - 0.6, 0)
     target = np.where(top > 0.6, np.minimum(0.6 + k * np.log1p(over / k), 1), top)
     scaled = light * np.divide(target, top, out=np.ones_like(top), where=top > 0)
-    pale = np.clip(np.log2(np.maximum(top, 1e-9) / 2) / 5, 0, 1)
+    pale = np.clip(np.log2(np.maximum(top, 1)) / max(np.log2(white), 1e-3), 0, 1)
     return np.asarray(scaled * (1 - pale) + target * pale)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from pbrs_farm.check.pixel_checks import RAY_LAYERS
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS
 
 RAYS = "recomputed by rays"
 FORMULA = "recomputed from other layers"
@@ -26,6 +26,7 @@ HOW: dict[str, str] = {
     "depth_sensor.png": _NOISE, "depth_sensor_tof.png": _NOISE, "depth_sensor_stereo.png": _NOISE,
     "mlt_ol.png": "developed from radiance.exr again",
     "mlt_il_ol.png": "developed from radiance.exr again",
+    **{LAYER[f"mlt_il_ol.{n}"].file: "developed from radiance.exr again" for n in range(1, MOST_VARIANTS + 1)},
     "opengl_dl.png": "its edges against those of the instances",
     "opengl_il.png": "its edges against those of the instances",
     "view.json": "camera by rays; boxes, shares and counts recomputed",
@@ -99,6 +100,6 @@ def _light_fault(view: StoredView) -> str:
         return "no recipe.json that says how it was developed"
     if not view.has("radiance.exr"):
         return "no radiance.exr to develop"
-    if view.recipe.sensor.is_on:
+    if view.recipe.sensor.is_on or view.recipe.tone.camera != "neutral":
         return "taken by a sensor: compared by tiles of 16 px, not by pixels"
     return ""

@@ -74,6 +74,10 @@ class Layer:
         return self.title or self.name.replace("_", " ").capitalize()
 
 
+MOST_VARIANTS: Final = 8
+"""Of a view's further pictures of `mlt_il_ol`, by other cameras (recipe: tone.variants)."""
+
+
 def _picture_layer(name: str, step: str, title: str = "", *, optional: bool = False) -> Layer:
     return Layer(
         name, f"{name}.png", "RGB", "uint8", "sRGB", "-", step, optional,
@@ -181,6 +185,10 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     _picture_layer("opengl_il", "opengl_il", "OpenGL, indoor"),
     _picture_layer("mlt_ol", "develop", "Physical, outdoor"),
     _picture_layer("mlt_il_ol", "develop", "Physical, indoor + outdoor"),
+    *(
+        _picture_layer(f"mlt_il_ol.{n}", "develop", f"Physical, camera {n}", optional=True)
+        for n in range(1, MOST_VARIANTS + 1)
+    ),
     Layer(
         "radiance",
         "radiance.exr",
@@ -297,7 +305,11 @@ def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
 def layer_table() -> str:
     """The layers as a Markdown table."""
     rows = ["| file | channels | type | unit | nothing |", "|---|---|---|---|---|"]
-    rows += [f"| `{x.file}` | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |" for x in LAYERS]
+    rows += [
+        f"| `{x.file}`{' ...' if x.name == 'mlt_il_ol.1' else ''} | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |"
+        for x in LAYERS
+        if not x.name.startswith("mlt_il_ol.") or x.name.endswith(".1")
+    ]
     return "\n".join(rows)
 
 

@@ -56,7 +56,7 @@ Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
 LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "none": {},
     # The colour camera of NYUv2's Kinect: camera_params.m of its toolbox, Silberman et al. 2012.
-    "kinect1": {
+    "kinect": {
         "model": "radtan", "width_px": 640, "height_px": 480,
         "fx": 518.85790, "fy": 519.46961, "cx": 325.58245, "cy": 253.73617,
         "k1": 0.20796615, "k2": -0.58613825, "p1": 7.2231363e-4, "p2": 1.04796272e-3,
@@ -82,7 +82,7 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 class LensFields(FieldGroup):
     """The lens of every view: what bends straight lines (docs/lenses.md)."""
 
-    preset: Literal["none", "kinect1", "tum_vi", "fisheye180"] = Field(
+    preset: Literal["none", "kinect", "tum_vi", "fisheye180"] = Field(
         "none", description="of a known camera; other fields override it"
     )
     model: LensModel = Field("pinhole", description="how directions fall on the picture")
@@ -198,16 +198,23 @@ def fold_of(i: Intrinsics) -> str | None:
 SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "none": {},
     # The colour camera of a first Kinect: a 1/4 inch CMOS of 2.8 um at 640 x 480, no JPEG.
-    "kinect1": {
+    "kinect": {
         "is_on": True, "f_number": 2.4, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 800,
         "full_well_e": 7_000, "read_noise_e": 6.0, "bits": 10, "vignetting": 0.15,
         "aberration_px": 0.7, "headroom": 2.0,
     },
-    # A telephone of about 2020: pixels of 1.4 um, JPEG of high quality.
+    # A telephone of about 2020: pixels of 1.4 um, JPEG of high quality. A pixel of a picture is the
+    # mean of some sixteen of the sensor's, so that no mosaic is seen.
     "phone": {
         "is_on": True, "f_number": 1.8, "shutter_max_s": 1 / 25, "iso_min": 25, "iso_max": 3200,
-        "full_well_e": 6_000, "read_noise_e": 1.8, "bits": 10, "vignetting": 0.1,
-        "aberration_px": 0.3, "jpeg_quality": 92, "headroom": 2.0,
+        "full_well_e": 96_000, "read_noise_e": 7.0, "bits": 12, "vignetting": 0.1,
+        "aberration_px": 0.3, "jpeg_quality": 92, "headroom": 3.0, "mosaic": False,
+    },
+    # A camera with a large sensor: pixels of 5 um, 14 bits; means of sixteen pixels too.
+    "slr": {
+        "is_on": True, "f_number": 4.0, "shutter_max_s": 1 / 30, "iso_min": 100, "iso_max": 6400,
+        "full_well_e": 800_000, "read_noise_e": 12.0, "bits": 14, "vignetting": 0.2,
+        "aberration_px": 0.2, "jpeg_quality": 96, "headroom": 6.0, "mosaic": False,
     },
     # A cheap webcam: small pixels, a plastic lens, strong JPEG.
     "webcam": {
@@ -222,7 +229,7 @@ SENSOR_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 class SensorFields(FieldGroup):
     """What a camera's sensor makes of the light modes (docs/lenses.md); labels do not change."""
 
-    preset: Literal["none", "kinect1", "phone", "webcam"] = Field(
+    preset: Literal["none", "kinect", "phone", "slr", "webcam"] = Field(
         "none", description="a kind of camera; other fields override it"
     )
     is_on: bool = Field(False, description="off: pictures are as the light alone makes them")

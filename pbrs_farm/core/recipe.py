@@ -18,6 +18,7 @@ from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.checked_json import place_in, sentence
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.optics_fields import BlurFields, LensFields, SensorFields
+from pbrs_farm.core.picture_cameras import DRAWN, PictureCamera, picture_camera
 from pbrs_farm.core.recipe_fields import (
     CameraFields,
     DressFields,
@@ -115,13 +116,18 @@ class Recipe(FieldGroup):
             )
         return self
 
-    def tone_of(self, house_id: str, view_id: str) -> ToneFields:
-        """The tone of one view: drawn for it where the recipe has a spread.
+    def camera_of(self, house_id: str, view_id: str, variant: int = 0) -> PictureCamera:
+        """The camera that takes one view's pictures: tone.camera's; of a variant, one that is drawn.
 
-        Both eyes of a pair and all frames of a clip have one tone, since it is drawn for the take.
-        The same house, view and recipe seed give the same tone on every machine.
+        Both eyes of a pair and all frames of a clip have one camera with one error, since it is drawn
+        for the take. The same house, view and recipe seed give the same camera on every machine.
+
+            >>> recipe_from_name("fast").camera_of("a-1", "0_0_1").name
+            'neutral'
         """
-        return self.tone.drawn(keys.seed(house_id, keys.take_id(view_id), "tone", self.seed))
+        seed = keys.seed(house_id, keys.take_id(view_id), "camera", variant, self.seed)
+        name = DRAWN if variant else self.tone.camera
+        return picture_camera(name, self.tone, self.sensor, seed)
 
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
@@ -173,7 +179,6 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "image": {"width_px": 320, "height_px": 240},
         "light": {"spp": 10, "filter": "box"},
         "sky": {"time": "drawn"},
-        "tone": {"spread": 1.0},
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
@@ -182,7 +187,6 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "cameras": _PHOTO,
         "light": {"spp": 28, "filter": "box"},
         "sky": {"time": "drawn"},
-        "tone": {"spread": 1.0},
         "selection": {"min_room_lx": 1.0},
     },
     "paper": {"light": {"integrator": "metropolis", "denoise": False}, "sky": {"kind": "panorama"}},

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from pbrs_farm.core.lighting import BULB_RADIUS_M
@@ -376,21 +374,31 @@ class ToneFields(FieldGroup):
         le=1,
         description="how far the light's colour is turned to white; 1 = all the way",
     )
+    camera: Literal["neutral", "phone", "slr", "webcam", "kinect", "drawn"] = Field(
+        "neutral",
+        description="photo: what takes the pictures (docs/light.md); drawn: one of these a view",
+    )
+    variants: int = Field(
+        0, ge=0, le=8, description="more pictures of mlt_il_ol, each by a camera that is drawn"
+    )
+    warmth_ev: float = Field(0.0, ge=-4, le=4, description="stops of red over blue after balance")
+    tint_ev: float = Field(0.0, ge=-4, le=4, description="stops of green over both after balance")
     white: float = Field(
-        64.0, ge=1, le=1e6, description="photo: radiance over a matt white's that becomes 255"
+        10.0, ge=1, le=1e6, description="photo: radiance over a matt white's that becomes 255"
+    )
+    flare: Share = Field(
+        0.002, description="photo: of the picture's mean light, as a veil over all of it"
     )
     glare: Share = Field(0.0, description="of the light, spread wide about what is bright")
     exposure_ev: float = Field(0.0, ge=-8, le=8, description="photo: stops above the key")
     contrast: float = Field(
-        1.0, ge=0.25, le=4, description="photo: slope of encoded tones about the middle; 1 = none"
+        1.42, ge=0.25, le=4, description="photo: slope of encoded tones about the middle; 1 = none"
     )
-    black: float = Field(
-        0.0, ge=0, le=0.5, description="photo: encoded luma, 0..1, that becomes black"
+    local_contrast: Share = Field(
+        0.0, description="photo: how far large differences of light are taken out, detail kept"
     )
-    spread: Share = Field(
-        0.0,
-        description="photo: how far exposure, contrast, black and white are drawn view by view, as"
-        " cameras and their owners choose them; 0 = all alike",
+    sharpening: float = Field(
+        0.0, ge=0, le=4, description="photo: of the difference to a blurred picture, added"
     )
     pictures: str = Field(
         "", max_length=256, description="plugins' pictures beside the modes', ':' between"
@@ -400,39 +408,6 @@ class ToneFields(FieldGroup):
     @classmethod
     def _pictures_are_known(cls, value: str) -> str:
         return checked_names("pictures", value)
-
-    def drawn(self, seed: int) -> ToneFields:
-        """These fields for one view: what its camera and its owner chose, and no spread left.
-
-        The same seed gives the same choice; without a spread it is these fields.
-        """
-        if self.spread == 0:
-            return self
-        deviates = np.random.default_rng(seed).normal(size=len(TONE_CHOICES))
-        ev, contrast, black, white = (
-            self.spread * (mean + sd * float(z))
-            for (mean, sd), z in zip(TONE_CHOICES.values(), deviates, strict=True)
-        )
-        return self.model_copy(
-            update={
-                "spread": 0.0,
-                "exposure_ev": round(min(max(self.exposure_ev + ev, -8.0), 8.0), 4),
-                "contrast": round(min(max(self.contrast * 2**contrast, 0.25), 4.0), 4),
-                "black": round(min(max(self.black + black, 0.0), 0.5), 4),
-                "white": round(max(self.white * 2**white, 1.0), 4),
-            }
-        )
-
-
-# What tone.spread = 1 draws: mean and standard deviation of stops of exposure, of the binary
-# logarithms of contrast and white, and of the black level. Set so that pictures of homes have the
-# spread, the dark and the bright pixels of photographs of rooms (`make bench NAME=tone`).
-TONE_CHOICES: Final[Mapping[str, tuple[float, float]]] = {
-    "exposure_ev": (0.3, 0.6),
-    "contrast": (0.6, 0.25),
-    "black": (0.08, 0.04),
-    "white": (-4.7, 1.0),
-}
 
 
 class RasterFields(FieldGroup):

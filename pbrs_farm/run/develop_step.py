@@ -14,9 +14,9 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import HistogramFields, ToneFields
-from pbrs_farm.core.recipe_fields import TONE_CHOICES
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
@@ -30,6 +30,7 @@ from pbrs_farm.store.object_store import Store
 from pbrs_farm.transport.develop.camera_sensor import SensorShot
 from pbrs_farm.transport.develop.mode_pictures import (
     LinearAovs,
+    ToneMappedImage,
     denoise_aovs,
     develop,
     wanted_exposures,
@@ -45,28 +46,43 @@ _GLANCE_SPP: Final = 16
 def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     """The PNGs of the light modes: groups summed, denoised, white-balanced, tone-mapped.
 
-    Through the recipe's sensor where it is on. cached: the house and its views by id, asked for
-    only where earlier frames decide the exposure.
+    By the camera that the recipe gives the view, and by one that is drawn for each variant. cached:
+    the house and its views by id, asked for only where earlier frames decide the exposure.
     """
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
     aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
-    denoise = work.recipe.light.denoise
-    tone = work.recipe.tone_of(work.house_id, work.view_id or "")
-    if tone.pictures and denoise:
-        # Denoise once for the modes and for the plugins' pictures.
-        aovs, denoise = denoise_aovs(aovs, wraps=_wraps(work)), False
-    shot = _sensor_shot(work, cached)
-    images = develop(aovs, tone, denoise=denoise, shot=shot, wraps=_wraps(work))
+    # Denoise once for the modes, the variants and the plugins' pictures.
+    if work.recipe.light.denoise:
+        aovs = denoise_aovs(aovs, wraps=_wraps(work))
+    camera = work.recipe.camera_of(work.house_id, work.view_id or "")
+    images = _taken(work, aovs, camera, 0, cached)
     # Write a PNG a mode; its exposure and white balance become facts.
     credit = attribution(work.store, work.house_id)
     files = {LAYER[m].file: layer_bytes(m, i.rgb_srgb8, credit) for m, i in images.items()}
-    for name in filter(None, tone.pictures.split(":")):
-        files[LAYER[name].file] = layer_bytes(name, _picture_of_plugin(name, aovs, tone), credit)
+    for name in filter(None, camera.tone.pictures.split(":")):
+        picture = _picture_of_plugin(name, aovs, camera.tone)
+        files[LAYER[name].file] = layer_bytes(name, picture, credit)
     facts: dict[str, Any] = {"denoised": work.recipe.light.denoise}
-    facts |= {m: i.facts() for m, i in images.items()}
-    if work.recipe.tone.spread > 0:
-        facts["tone"] = tone.model_dump(include=set(TONE_CHOICES))
+    facts |= {m: i.facts() for m, i in images.items()} | camera.facts()
+    variants = []
+    for n in range(1, camera.tone.variants + 1):
+        drawn = work.recipe.camera_of(work.house_id, work.view_id or "", n)
+        image = _taken(work, aovs, drawn, n, cached)[Mode.MLT_IL_OL]
+        name = f"mlt_il_ol.{n}"
+        file = LAYER[name].file
+        files[file] = layer_bytes(name, image.rgb_srgb8, credit)
+        variants.append({"file": file, "camera": drawn.name} | drawn.facts() | image.facts())
+    if variants:
+        facts["variants"] = variants
     return StepOutput(files, facts)
+
+
+def _taken(
+    work: Work, aovs: LinearAovs, camera: PictureCamera, variant: int, cached: HouseAndViews
+) -> dict[str, ToneMappedImage]:
+    """Mode -> the picture of denoised light that a camera takes."""
+    shot = _sensor_shot(work, camera, variant, cached)
+    return develop(aovs, camera.tone, denoise=False, shot=shot, wraps=_wraps(work))
 
 
 def _picture_of_plugin(name: str, light: LinearAovs, tone: ToneFields) -> Srgb8Image:
@@ -83,11 +99,14 @@ def _wraps(work: Work) -> bool:
     return work.recipe.lens.model == "equirect"
 
 
-def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
-    fields = work.recipe.sensor
+def _sensor_shot(
+    work: Work, camera: PictureCamera, variant: int, cached: HouseAndViews
+) -> SensorShot | None:
+    fields, tone = camera.sensor, camera.tone
     if not fields.is_on:
         return None
-    seed = keys.seed(work.house_id, work.view_id or "", "sensor", work.recipe.digest("sensor"))
+    names = [work.house_id, work.view_id or "", "sensor", work.recipe.digest("sensor")]
+    seed = keys.seed(*names, *([variant] if variant else []))
     if fields.lag_s == 0:
         return SensorShot(fields, seed)
     house, views = cached()
@@ -102,7 +121,6 @@ def _sensor_shot(work: Work, cached: HouseAndViews) -> SensorShot | None:
         and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
     ]  # fmt: skip
     earlier.sort(key=lambda v: v.time_s or 0.0)
-    tone = work.recipe.tone_of(work.house_id, view.id)
     denoise = work.recipe.light.denoise
     wanted = [
         wanted_exposures(_glance(work, house, v), tone, denoise=denoise, wraps=_wraps(work))

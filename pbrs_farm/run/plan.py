@@ -48,7 +48,7 @@ STEPS: Final = {
             "light", 21, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
-        Step("develop", 7, ("tone", "light", "sensor"), ("light",), needs=("light",)),
+        Step("develop", 8, ("tone", "light", "sensor"), ("light",), needs=("light",)),
         Step("view", 3, ("histogram",), _VIEW_READS, needs=("truth",)),
     )
 }  # fmt: skip

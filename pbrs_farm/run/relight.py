@@ -101,7 +101,7 @@ def relit(
     # Develop it as the run would have, with the recipe's tone.
     recipe = recipe_from_json(read_given(root / "recipe.json"), str(root / "recipe.json"))
     house_id = view.resolve().parents[1].name
-    tone = recipe.tone_of(house_id, view.resolve().name)
+    tone = recipe.camera_of(house_id, view.resolve().name).tone
     images = develop(clean, tone, denoise=False, indoor=indoor, outdoor=outdoor)
     credit = attribution(FolderStore(root), house_id)
     return layer_bytes(Mode.MLT_IL_OL.value, images[Mode.MLT_IL_OL.value].rgb_srgb8, credit)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares
+from pbrs_farm.core.layers import MOST_VARIANTS
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.class_map import ClassMap, class_map
 from pbrs_farm.views.stored_layers import ViewFacts
@@ -208,6 +209,19 @@ class Frame:
             hint = f"of {', '.join(self.modes) or 'none'}"
             raise BadInput(self.source.url, self.id, f"no picture in {mode}", hint=hint)
         return np.asarray(self._array("colour", mode), np.uint8)
+
+    @property
+    def variants(self) -> tuple[NDArray[np.uint8], ...]:
+        """The same view by other cameras, (H, W, 3) sRGB each: recipe `tone.variants` (docs/light.md).
+
+        Empty where none were asked for. `table["modes"]["develop"]["variants"]` says which camera
+        took each.
+
+            >>> len(frame.variants)
+            0
+        """
+        names = [f"mlt_il_ol.{n}" for n in range(1, MOST_VARIANTS + 1)]
+        return tuple(self.layer(name) for name in names if name in self.layers)
 
     @property
     def depth(self) -> NDArray[np.float32]:

@@ -43,10 +43,10 @@ def test_the_packet_holds_each_layer_of_light_to_a_half_floats_precision(
     assert list(planes) == ["albedo", "outdoor", "lamp1", "lamp2"]
     assert (facts["width"], facts["height"], facts["denoised"]) == (WIDTH, HEIGHT, False)
     knee = facts["tone"].pop("knee")
-    tone = recipe_from_name("preview").tone_of("a-1", "0_0_1")
+    tone = recipe_from_name("preview").camera_of("a-1", "0_0_1").tone
     assert abs(0.6 + knee * np.log1p((tone.white - 0.6) / knee) - 1) < 1e-9
     assert facts["tone"] == {name: getattr(tone, name) for name in facts["tone"]}
-    assert {"preset", "key", "white_balance", "exposure_ev", "contrast", "black"} <= set(
+    assert {"preset", "key", "white_balance", "exposure_ev", "contrast", "flare"} <= set(
         facts["tone"]
     )
     assert [lamp["name"] for lamp in facts["lamps"]] == ["lamp 0", "lamp 1"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, p
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
+from pbrs_farm.views.open_views import open_views
 from tests.check.roots import house_of, sign
 
 LAYERS = (
@@ -27,15 +28,17 @@ LAYERS = (
 Plant = Callable[[Path], None]
 
 
-def make_finished(root: Path) -> Path:
-    """The built-in home as a run leaves it: one small view in all modes, with LAYERS."""
+def make_finished(
+    root: Path, layers: tuple[str, ...] = LAYERS, words: Mapping[str, str] | None = None
+) -> Path:
+    """The built-in home as a run leaves it: one small view in all modes, with layers."""
     settings = {
         "image.width_px": "160", "image.height_px": "120", "light.spp": "2", "light.pilot_spp": "0",
         "light.denoise": "false", "cameras.cell_m": "1.0",
         "cameras.score_width_px": "160", "cameras.score_height_px": "120",
     }  # fmt: skip
-    recipe = recipe_from_name("preview", settings)
-    assert run_local(Run(["builtin"], str(root), recipe, wanted((), LAYERS, 1))).failures == []
+    recipe = recipe_from_name("preview", settings | dict(words or {}))
+    assert run_local(Run(["builtin"], str(root), recipe, wanted((), layers, 1))).failures == []
     return root
 
 
@@ -204,9 +207,6 @@ FALSEHOODS: dict[str, tuple[Plant, str]] = {
     "light brightened": (picture("mlt_il_ol.png", scaled(1.05)), "light developed"),
     "light patched": (picture("mlt_ol.png", patch(20)), "light developed"),
     "light brightened, and its facts": (brighter_with_its_facts, "light developed"),
-    "another tone told": (
-        table(lambda t: t["modes"]["develop"]["tone"].update(contrast=1.0)), "light developed",
-    ),
     "radiance of one colour scaled": (
         exr("radiance.exr", lambda a: a * (1 + np.arange(a.shape[1]) / 320)), "light developed",
     ),
@@ -244,6 +244,49 @@ def planted(root: Path, kind: str) -> set[str]:
 @pytest.mark.parametrize("kind", FALSEHOODS)
 def test_a_falsehood_with_all_hashes_mended_is_found(root: Path, kind: str) -> None:
     assert FALSEHOODS[kind][1] in planted(root, kind)
+
+
+FALSEHOODS_OF_CAMERAS = {
+    "another tone told": (
+        table(lambda t: t["modes"]["develop"]["variants"][0]["tone"].update(contrast=1.0)), "light developed",
+    ),
+    "another camera told": (
+        table(lambda t: t["modes"]["develop"]["variants"][0].update(camera="none")), "light developed",
+    ),
+    "a camera told where none was drawn": (
+        table(lambda t: t["modes"]["develop"].update(tone={"contrast": 1.2})), "light developed",
+    ),
+    "a variant mirrored": (picture("mlt_il_ol.2.png", mirrored), "light developed"),
+    "a variant too many": (
+        lambda view: shutil.copy(view / "mlt_il_ol.1.png", view / "mlt_il_ol.4.png"), "light developed",
+    ),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def by_cameras(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A root whose view has further pictures by cameras that are drawn."""
+    words = {"tone.variants": "3", "light.spp": "16", "light.denoise": "true"}
+    return make_finished(tmp_path_factory.mktemp("by_cameras"), (), words)
+
+
+def test_further_pictures_by_other_cameras_are_developed_again(by_cameras: Path) -> None:
+    certificate = verify(by_cameras, all_pixels=True)
+    assert certificate.is_clean, certificate.text()
+    assert "mlt_il_ol.3.png (1): developed from radiance.exr again" in certificate.text()
+    (frame,) = open_views(str(by_cameras))
+    assert len(frame.variants) == 3
+    assert all((picture != frame.colour).any() for picture in frame.variants)
+
+
+@pytest.mark.parametrize("kind", FALSEHOODS_OF_CAMERAS)
+def test_a_falsehood_about_cameras_is_found(by_cameras: Path, tmp_path: Path, kind: str) -> None:
+    root = Path(shutil.copytree(by_cameras, tmp_path / "root"))
+    plant, check = FALSEHOODS_OF_CAMERAS[kind]
+    plant(view_of(root))
+    sign(root, house_of(root))
+    counts = verify(root).counts
+    assert check in {name for name, count in counts.items() if count.failed}
 
 
 def test_at_least_twenty_six_kinds_of_falsehood_are_planted() -> None:

@@ -59,7 +59,7 @@ def test_a_stored_recipe_reads_back_and_a_damaged_one_names_its_place(name):
 
 
 def test_a_lens_changes_the_digest_of_cameras():
-    plain, bent = recipe_from_name("fast"), recipe_from_name("fast", {"lens.preset": "kinect1"})
+    plain, bent = recipe_from_name("fast"), recipe_from_name("fast", {"lens.preset": "kinect"})
     assert bent.digest("cameras", "lens") != plain.digest("cameras", "lens")
     assert bent.digest("cameras") == plain.digest("cameras")
     # A stored recipe that names no lens is a pin-hole's.

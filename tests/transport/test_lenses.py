@@ -27,11 +27,11 @@ pytestmark = pytest.mark.skipif(
 RECIPE = recipe_from_name("fast")
 FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "pilot_spp": 0, "spp": 4})
 HOUSE, PLAIN = furnace(0.5)
-SIZES = {"kinect1": (64, 48), "tum_vi": (48, 48), "equirect": (64, 32), "cubemap": (96, 16)}
+SIZES = {"kinect": (64, 48), "tum_vi": (48, 48), "equirect": (64, 32), "cubemap": (96, 16)}
 
 
 def camera_of(name: str) -> Camera:
-    fields = LensFields(**({"preset": name} if name in ("kinect1", "tum_vi") else {"model": name}))  # type: ignore[arg-type]
+    fields = LensFields(**({"preset": name} if name in ("kinect", "tum_vi") else {"model": name}))  # type: ignore[arg-type]
     camera = Camera(fields.intrinsics(PLAIN.intrinsics), PLAIN.world_from_camera)
     return camera.with_size(*SIZES[name])
 
@@ -69,7 +69,7 @@ def test_one_kernel_traces_every_lens() -> None:
     import drjit as dr
 
     scene = LightScene.load(HOUSE, {}, RECIPE, dark_sky())
-    scene.render(camera_of("kinect1"), "0_0", FIELDS, 1)  # the first one builds the emitters
+    scene.render(camera_of("kinect"), "0_0", FIELDS, 1)  # the first one builds the emitters
     traced = []
     for name in SIZES:
         dr.kernel_history_clear()

@@ -145,15 +145,20 @@ def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
         house, view = str(row["house"]), str(row["view"])
     except (ValueError, KeyError, TypeError, RecursionError):
         raise BadInput("view.json", "", "names no house and view") from None
-    return recipe_from_json(recipe, "recipe.json").tone_of(house, view)
+    return recipe_from_json(recipe, "recipe.json").camera_of(house, view).tone
 
 
 def _tone_facts(tone: ToneFields) -> dict[str, Any]:
     from pbrs_farm.transport.develop.tone_mapping import knee_of
 
     facts = {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
-    facts |= {"exposure_ev": tone.exposure_ev, "contrast": tone.contrast, "black": tone.black}
-    return facts | {"knee": knee_of(tone.white)}
+    facts |= {"exposure_ev": tone.exposure_ev, "contrast": tone.contrast, "flare": tone.flare}
+    return facts | {
+        "warmth_ev": tone.warmth_ev,
+        "tint_ev": tone.tint_ev,
+        "white": tone.white,
+        "knee": knee_of(tone.white),
+    }
 
 
 def _view_files(data: bytes) -> tuple[Sequence[bytes], bool]:

@@ -29,8 +29,8 @@ vec3 summed() {
 }`;
 
 const TONE = `
-uniform float u_exposure, u_white, u_knee, u_contrast, u_black;
-uniform vec3 u_gains;
+uniform float u_exposure, u_white, u_knee, u_pale, u_contrast;
+uniform vec3 u_gains, u_veil;
 uniform bool u_released;
 
 const float SHOULDER = 0.6;
@@ -40,7 +40,7 @@ vec3 rolledOff(vec3 rgb) {
   float soft = SHOULDER + u_knee * log(1.0 + max(top - SHOULDER, 0.0) / u_knee);
   float target = top > SHOULDER ? min(soft, 1.0) : top;
   vec3 scaled = rgb * (top > 0.0 ? target / top : 1.0);
-  float fade = clamp(log2(max(top, 1e-9) / 2.0) / 5.0, 0.0, 1.0);
+  float fade = clamp(log2(max(top, 1.0)) * u_pale, 0.0, 1.0);
   return mix(scaled, vec3(target), fade);
 }
 
@@ -53,17 +53,16 @@ vec3 reinhard(vec3 rgb) {
 }
 
 vec3 curved(vec3 rgb) {
-  if (u_contrast == 1.0 && u_black <= 0.0) return rgb;
   float luma = dot(rgb, vec3(0.299, 0.587, 0.114));
-  if (luma <= 0.0) return vec3(0.0);
+  if (u_contrast == 1.0 || luma <= 0.0) return rgb;
   float light = pow(luma, u_contrast), dark = pow(max(1.0 - luma, 0.0), u_contrast);
-  float tone = max((light / (light + dark) - u_black) / (1.0 - u_black), 0.0);
+  float tone = light / (light + dark);
   return clamp(tone + (rgb - luma) * min(tone / luma, 1.0), 0.0, 1.0);
 }
 
 vec4 toned(vec3 light) {
   vec3 rgb = max(light * u_gains, 0.0);
-  vec3 linear = clamp(u_released ? reinhard(rgb) : rolledOff(rgb * u_exposure), 0.0, 1.0);
+  vec3 linear = clamp(u_released ? reinhard(rgb) : rolledOff(rgb * u_exposure + u_veil), 0.0, 1.0);
   vec3 low = 12.92 * linear, high = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
   vec3 encoded = mix(high, low, vec3(lessThanEqual(linear, vec3(0.0031308))));
   return vec4(u_released ? encoded : curved(clamp(encoded, 0.0, 1.0)), 1.0);
@@ -169,13 +168,14 @@ export class LightGl {
     gl.uniform1f(at.u_height, this.height);
   }
 
-  #setTone(at, { gains, exposure, white, knee, contrast, black }, isReleased) {
+  #setTone(at, { gains, exposure, veil, white, knee, pale, contrast }, isReleased) {
     const { gl } = this;
     gl.uniform1f(at.u_exposure, exposure);
     gl.uniform1f(at.u_white, white);
     gl.uniform1f(at.u_knee, knee);
+    gl.uniform1f(at.u_pale, pale);
     gl.uniform1f(at.u_contrast, contrast);
-    gl.uniform1f(at.u_black, black);
+    gl.uniform3f(at.u_veil, ...veil);
     gl.uniform3fv(at.u_gains, gains);
     gl.uniform1i(at.u_released, isReleased ? 1 : 0);
   }

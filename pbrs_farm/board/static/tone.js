@@ -3,20 +3,32 @@
 
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const MITSUBA_LUMINANCE = [0.212671, 0.71516, 0.072169];
+const METERED = [1 / 32, 4], LIT_SHARES = [0.5, 0.95];
 const SATURATED = 0.35, SAME_HUE_COS = 0.9, FILLED = 0.5;
 const TINT = [-0.1, 0.35], WARMTH = [-0.7, 1.6];
 const BURN = 0.2, LOG_FLOOR = 1e-3;
 
 // What the shader needs for a picture. light, albedo: Float32Array of n pixels x 3, absolute radiance.
 export function toneOf(light, albedo, fields) {
-  const gains = whiteBalance(light, albedo, fields.white_balance).map(Math.fround);
+  const gains = whiteBalance(light, albedo, fields).map(Math.fround);
   const n = light.length / 3;
-  const exposure = fields.preset === "released" ? releasedExposure(light, gains, n, fields.key) : photoExposure(light, gains, n, fields.key) * 2 ** fields.exposure_ev;
+  const isReleased = fields.preset === "released";
+  const exposure = isReleased ? releasedExposure(light, gains, n, fields.key) : photoExposure(light, gains, n, fields.key) * 2 ** fields.exposure_ev;
   let largest = 0;
-  if (fields.preset === "released") {
+  if (isReleased) {
     for (let k = 0; k < n; k++) largest = Math.max(largest, dot(light, k, gains, MITSUBA_LUMINANCE));
   }
-  return { gains, exposure, white: largest * exposure * (1 - BURN) ** 2, knee: fields.knee, contrast: fields.contrast, black: fields.black };
+  const veil = isReleased ? [0, 0, 0] : strayLight(light, gains, n, exposure, fields);
+  return { gains, exposure, veil, white: largest * exposure * (1 - BURN) ** 2, knee: fields.knee, pale: 1 / Math.max(Math.log2(fields.white), 1e-3), contrast: fields.contrast };
+}
+
+// The share of the picture's mean that the lens spreads over all of it, in exposed light.
+function strayLight(light, gains, n, exposure, fields) {
+  return gains.map((gain, c) => {
+    let sum = 0;
+    for (let k = 0; k < n; k++) sum += Math.min(Math.max(light[3 * k + c] * gain, 0) * exposure, fields.white);
+    return (fields.flare * sum) / n;
+  });
 }
 
 function dot(light, k, gains, weights) {
@@ -30,7 +42,7 @@ function releasedExposure(light, gains, n, key) {
 }
 
 function photoExposure(light, gains, n, key) {
-  // Leave out pixels that hit nothing; clamp to 0.001..1 of the 98th percentile.
+  // Leave out pixels that hit nothing; clamp to METERED of the median.
   const levels = new Float64Array(n);
   let m = 0;
   for (let k = 0; k < n; k++) {
@@ -39,44 +51,51 @@ function photoExposure(light, gains, n, key) {
   }
   if (m === 0) return 1;
   const lit = levels.subarray(0, m);
-  const bright = percentile(lit, 0.98);
+  const [low, high] = METERED.map((share) => share * percentile(lit, 0.5));
   let sum = 0;
-  for (let k = 0; k < m; k++) sum += Math.log(Math.min(bright, Math.max(bright / 1000, lit[k])));
+  for (let k = 0; k < m; k++) sum += Math.log(Math.min(high, Math.max(low, lit[k])));
   return key / Math.exp(sum / m);
 }
 
-function whiteBalance(light, albedo, strength) {
-  if (strength === 0) return [1, 1, 1];
+function whiteBalance(light, albedo, fields) {
+  const found = fields.white_balance > 0 ? illuminant(light, albedo) : null;
+  let gains = [1, 1, 1];
+  if (found) {
+    const level = weighted(found);
+    gains = found.map((v) => (v / level) ** -fields.white_balance);
+  }
+  // The camera's errors: red and blue part by the warmth, green and both by the tint.
+  gains = [gains[0] * 2 ** (fields.warmth_ev / 2), gains[1] * 2 ** fields.tint_ev, gains[2] * 2 ** (-fields.warmth_ev / 2)];
+  const total = weighted(gains);
+  return gains.map((g) => g / total);
+}
+
+function illuminant(light, albedo) {
   const n = light.length / 3;
-  const one = [1, 1, 1];
-  // Pixels whose light and colour are known, between the 10th and 90th percentile of luminance.
+  // Pixels whose light and colour are known, the better lit half of them.
   let chosen = new Uint32Array(n), m = 0;
   const levels = new Float64Array(n);
   for (let k = 0; k < n; k++) {
     const a = 3 * k;
     const isUsable = albedo[a] > 0.02 && albedo[a + 1] > 0.02 && albedo[a + 2] > 0.02 && light[a] > 0 && light[a + 1] > 0 && light[a + 2] > 0;
     if (isUsable) {
-      levels[m] = dot(light, k, one, LUMINANCE);
+      levels[m] = weighted([0, 1, 2].map((c) => light[a + c] / albedo[a + c]));
       chosen[m++] = k;
     }
   }
-  if (m < 16) return [1, 1, 1];
+  if (m < 16) return null;
   const copy = levels.slice(0, m);
-  const low = percentile(copy, 0.1), high = percentile(copy, 0.9);
+  const [low, high] = LIT_SHARES.map((share) => percentile(copy, share));
   let kept = 0;
   for (let k = 0; k < m; k++) if (levels[k] >= low && levels[k] <= high) chosen[kept++] = chosen[k];
   chosen = chosen.subarray(0, kept);
   // The illuminant is the median of radiance over albedo.
-  let colour = [0, 1, 2].map((c) => {
+  const colour = [0, 1, 2].map((c) => {
     const logs = new Float64Array(kept);
     for (let k = 0; k < kept; k++) logs[k] = Math.log(light[3 * chosen[k] + c] / albedo[3 * chosen[k] + c]);
     return Math.exp(percentile(logs, 0.5));
   });
-  if (oneColourFills(albedo, chosen)) colour = asLampOrSky(colour);
-  const level = weighted(colour);
-  const gains = colour.map((v) => (v / level) ** -strength);
-  const total = weighted(gains);
-  return gains.map((g) => g / total);
+  return oneColourFills(albedo, chosen) ? asLampOrSky(colour) : colour;
 }
 
 const weighted = (rgb) => rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2];

@@ -21,7 +21,7 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F32, F64, RadianceImage, Srgb8Image
 from pbrs_farm.core.frames import LM_PER_W
 from pbrs_farm.core.recipe import SensorFields, ToneFields
-from pbrs_farm.transport.develop.tone_mapping import encode_tone, roll_off
+from pbrs_farm.transport.develop.tone_mapping import add_veil, encode_tone
 
 _ABERRATION_WIDTH_PX: Final = 640.0  # of the picture that aberration_px is of
 _SATURATION_LX_S: Final = 78.0  # times 1 / ISO: exposure that saturates, ISO 12232:2019
@@ -116,18 +116,20 @@ def take_by_sensor(
 ) -> Srgb8Image:
     """(H, W, 3) uint8 sRGB as the sensor takes radiance (H, W, 3); gains (3,): its white balance.
 
-    fields: contrast and black level of its curve, whose white is where the sensor saturates. Equal
-    seeds give equal bits.
+    fields: flare, contrast and sharpening of its response, whose white is where the sensor
+    saturates. Equal seeds give equal bits.
     """
     rng = np.random.default_rng(seed)
     # Saturation is white in all channels after the gains: scale them to 1 at least.
     scaled = gains.astype(np.float64) / float(gains.min())
-    light = apply_lens(radiance.astype(np.float64), sensor) * exposure.factor * float(gains.min())
+    # The veil is the lens's: it stands before noise and saturation.
+    light = apply_lens(add_veil(radiance.astype(np.float64) * exposure.factor, fields), sensor)
+    light = light * float(gains.min())
     raw = _electrons_read(mosaic(light) if sensor.mosaic else light, exposure.iso, sensor, rng)
     rgb = demosaic(raw) if sensor.mosaic else raw
     # Balance white, hold to what saturates, and let that be the curve's end.
     balanced = np.clip(rgb * scaled, 0, sensor.headroom)
-    picture = encode_tone(roll_off(balanced, sensor.headroom), fields)
+    picture = encode_tone(balanced, fields, sensor.headroom)
     return compress_as_jpeg(picture, sensor.jpeg_quality) if sensor.jpeg_quality > 0 else picture
 
 

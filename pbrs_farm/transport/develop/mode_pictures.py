@@ -77,7 +77,7 @@ def develop(
         if names:
             total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
             total = add_glare(total, fields.glare)
-            gains = white_balance(total, aovs.albedo, fields.white_balance)
+            gains = white_balance(total, aovs.albedo, fields)
             exposure = exposure_of(total * gains, fields)
             if shot is not None:
                 taken = shot.exposure(mode.value, exposure)

@@ -1,7 +1,8 @@
 """Tone mapping: radiance to 8-bit sRGB, exposed by the log-average; pure numpy, no effects.
 
 `released` is Reinhard's global operator as the published images used it (docs/spec/suncg.md section 5:
-key 0.8, burn 0.2); `photo`, the default, rolls highlights off.
+key 0.8, burn 0.2); `photo`, the default, is a camera's response: a veil of stray light, a straight
+part with a shoulder, an S of contrast, and sharpening.
 """
 
 from __future__ import annotations
@@ -21,9 +22,18 @@ _MITSUBA_LUMINANCE: Final = np.array([0.212671, 0.715160, 0.072169])  # of Mitsu
 _LUMA: Final = np.array([0.299, 0.587, 0.114])  # of encoded colours, ITU-R BT.601
 _BURN: Final = 0.2  # of Reinhard's operator: how far highlights may burn out
 _LOG_FLOOR: Final = 1e-3  # added before the logarithm, as Mitsuba's tone mapper does
+_METERED: Final = (
+    1 / 32,
+    4.0,
+)  # of the median luminance: what is darker or brighter counts as these
 _SHOULDER: Final = 0.6  # of photo: the curve is straight below
+_LEAST_STOPS: Final = 1e-3  # from 1 to a white of 1
 _HALVINGS: Final = 60  # that find a knee to the last bit
 _GLARE_WIDTHS: Final = (0.01, 0.04, 0.16)  # of the picture's width, standard deviations
+_LOCAL_RADIUS: Final = 1 / 24  # of the picture's width, of the guided filter of local_contrast
+_LOCAL_EDGE: Final = 0.5  # stops: larger steps of light keep their edge in it
+_LOCAL_FLOOR: Final = 2.0**-10  # luminance below which it sees no detail
+_SHARPENED_PX: Final = 0.8  # standard deviation of the blur that sharpening compares with
 
 
 def tone(
@@ -36,48 +46,91 @@ def tone(
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":
-        linear = _reinhard(rgb, fields.key, exposure)
-    else:
-        factor = exposure_of(radiance, fields) if exposure is None else exposure
-        linear = roll_off(rgb * factor, fields.white)
-    return encode_tone(linear, fields)
+        return _eight_bits(srgb_from_linear(_reinhard(rgb, fields.key, exposure)))
+    factor = exposure_of(radiance, fields) if exposure is None else exposure
+    return encode_tone(add_veil(rgb * factor, fields), fields, fields.white)
 
 
-def encode_tone(linear: F64, fields: ToneFields) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of linear light; `photo` with its contrast and black level.
+def encode_tone(light: F64, fields: ToneFields, white: float) -> Srgb8Image:
+    """(H, W, 3) uint8 sRGB of exposed light by the response of `photo`; white becomes 255.
 
-    Both act on the encoded luma, as a camera's own curve does: the contrast is an S through the
-    middle of the range (its odds to a power), the black level a line. Colours keep their chroma
-    where they get lighter, and their saturation where they get darker.
+    Contrast acts on the encoded luma, as a camera's own curve does: an S through the middle of the
+    range (its odds to a power). Colours keep their chroma where they get lighter, and their
+    saturation where they get darker.
     """
+    linear = roll_off(flatten_light(light, fields), white)
     rgb = np.clip(srgb_from_linear(linear), 0, 1)
-    if fields.preset == "photo" and (fields.contrast != 1 or fields.black > 0):
-        luma = (rgb @ _LUMA)[..., None]
-        light, dark = luma**fields.contrast, (1 - luma).clip(0) ** fields.contrast
-        curved = (light / (light + dark) - fields.black) / (1 - fields.black)
-        curved = np.maximum(curved, 0)
+    luma = (rgb @ _LUMA)[..., None]
+    if fields.contrast != 1:
+        bright, dark = luma**fields.contrast, (1 - luma).clip(0) ** fields.contrast
+        curved = bright / (bright + dark)
         ratio = np.divide(curved, luma, out=np.zeros_like(luma), where=luma > 0)
-        rgb = np.clip(curved + (rgb - luma) * np.minimum(ratio, 1), 0, 1)
-    return np.round(rgb * 255).astype(np.uint8)
+        rgb, luma = curved + (rgb - luma) * np.minimum(ratio, 1), curved
+    if fields.sharpening > 0:
+        blurred = ndimage.gaussian_filter(luma[..., 0], _SHARPENED_PX, mode="nearest")
+        rgb = rgb + fields.sharpening * (luma - blurred[..., None])
+    return _eight_bits(rgb)
+
+
+def _eight_bits(rgb: F64) -> Srgb8Image:
+    return np.round(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
 
 
 def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     """The factor that brings an image's log-average luminance to the key; 1 for a black one.
 
-    For `photo` luminance is clamped to 0.001..1 of its 98th percentile (windows and bulbs are above),
-    and the factor is higher by the fields' stops.
+    `photo` meters the room and not its windows and lamps: luminance counts as 1/32 to 4 times the
+    median. The factor is higher by the fields' stops.
     """
     rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
     if fields.preset == "released":
         luminance = rgb @ _MITSUBA_LUMINANCE
         return fields.key / float(np.exp(np.mean(np.log(luminance + _LOG_FLOOR))))
     luminance = rgb @ LUMINANCE
-    if luminance.max() <= 0:
-        return 1.0
     luminance = luminance[luminance > 0]  # leave out pixels that hit nothing
-    bright = float(np.percentile(luminance, 98))
-    clipped = np.clip(luminance, bright / 1000, bright)
-    return 2**fields.exposure_ev * fields.key / float(np.exp(np.mean(np.log(clipped))))
+    if not luminance.size:
+        return 1.0
+    low, high = (share * float(np.median(luminance)) for share in _METERED)
+    average = float(np.exp(np.mean(np.log(np.clip(luminance, low, high)))))
+    return 2**fields.exposure_ev * fields.key / average
+
+
+def add_veil(light: F64, fields: ToneFields) -> F64:
+    """Exposed light (H, W, 3) with the share of its mean that a lens strays over the whole picture.
+
+    What is brighter than the white counts as the white, since a camera's flare is of what it sees as
+    a whole, and one bulb's pixel would otherwise veil a room.
+    """
+    if fields.flare == 0:
+        return light
+    return np.asarray(light + fields.flare * np.minimum(light, fields.white).mean(axis=(0, 1)))
+
+
+def flatten_light(light: F64, fields: ToneFields) -> F64:
+    """Exposed light (H, W, 3) with large differences of luminance reduced and detail kept.
+
+    The large part is the logarithm of luminance by a guided filter (He, Sun, Tang 2013), whose
+    edges stay where the light's are, so that nothing gets a halo; `local_contrast` of its distance
+    to the key is taken out.
+    """
+    if fields.local_contrast == 0:
+        return light
+    stops = np.log2(np.maximum(light @ LUMINANCE, _LOCAL_FLOOR))
+    large = _guided_filter(stops, round(light.shape[1] * _LOCAL_RADIUS))
+    gain = 2 ** (fields.local_contrast * (math.log2(fields.key) - large))
+    return np.asarray(light * gain[..., None])
+
+
+def _guided_filter(values: F64, radius: int) -> F64:
+    """(H, W) values smoothed within a square where they vary by less than _LOCAL_EDGE, guided by themselves."""
+
+    def mean(of: F64) -> F64:
+        return np.asarray(ndimage.uniform_filter(of, 2 * radius + 1, mode="nearest"))
+
+    middle = mean(values)
+    variance = np.maximum(mean(values * values) - middle * middle, 0)
+    slope = variance / (variance + _LOCAL_EDGE**2)
+    return np.asarray(mean(slope) * values + mean(middle * (1 - slope)))
 
 
 def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
@@ -97,23 +150,25 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
 def roll_off(rgb: F64, white: float) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
 
-    It maps the largest component and keeps the hue; colours far beyond white fade to white.
+    It maps the largest component and keeps the hue; from 1 on colours pale, and at white they are
+    white, as a sensor's channels saturate one after the other.
     """
     # Leave what lies on the straight part as it is: most of a picture.
     top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
     is_soft = top > _SHOULDER
     out = np.array(rgb)
-    out[is_soft] = _shoulder(rgb[is_soft], top[is_soft][:, None], knee_of(white))
+    out[is_soft] = _shoulder(rgb[is_soft], top[is_soft][:, None], white)
     return out
 
 
-def _shoulder(rgb: F64, top: F64, knee: float) -> F64:
+def _shoulder(rgb: F64, top: F64, white: float) -> F64:
     """The curve of `photo` above the straight part: of (N, 3) colours, top (N, 1) their largest."""
     # Its slope at the shoulder is 1, so that it goes on without a bend.
+    knee = knee_of(white)
     target = np.minimum(_SHOULDER + knee * np.log1p((top - _SHOULDER) / knee), 1.0)
-    # Scale all three components alike; fade to white over five stops, from twice white on.
-    fade = np.clip(np.log2(top / 2) / 5, 0, 1)
-    return np.asarray(rgb * (target / top) * (1 - fade) + target * fade)
+    # Scale all three components alike; pale by stops.
+    pale = np.clip(np.log2(np.maximum(top, 1)) / max(math.log2(white), _LEAST_STOPS), 0, 1)
+    return np.asarray(rgb * (target / top) * (1 - pale) + target * pale)
 
 
 @functools.cache

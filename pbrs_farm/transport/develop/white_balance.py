@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, RadianceImage
 from pbrs_farm.core.frames import LUMINANCE
+from pbrs_farm.core.recipe import ToneFields
 
+_LIT_PERCENTILES: Final = (50, 95)  # of irradiance: pixels that tell the light's colour
 _SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
 _SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
 _FILLED: Final = 0.5  # share of pixels from which one colour fills a view
@@ -19,29 +21,42 @@ _TINT: Final = (-0.1, 0.35)
 _WARMTH: Final = (-0.7, 1.6)
 
 
-def white_balance(radiance: RadianceImage, albedo: RadianceImage, strength: float) -> F32:
+def white_balance(radiance: RadianceImage, albedo: RadianceImage, fields: ToneFields) -> F32:
     """(3,) gains that turn the illuminant's colour towards white, as a camera's do; luminance 1.
 
     The illuminant is radiance over albedo, which is known here: the median of its logarithm over
-    pixels that are neither dark nor overexposed. strength: 0 leaves the colour, 1 makes it
-    neutral. Ones when fewer than 16 pixels are usable. Where one colour fills the view, the light that
-    its walls reflect at each other has that colour, and no camera would take it for a lamp's: the
-    illuminant is then clamped to colours that lamps and skies have.
+    the better lit half of the pixels, since what lies in shade has the colour of walls and floors
+    that light was reflected by, and correcting that would turn a garden blue. Ones, but for the
+    fields' errors, when fewer than 16 pixels are usable. Where one colour fills the view, the light
+    that its walls reflect at each other has that colour, and no camera would take it for a lamp's:
+    the illuminant is then clamped to colours that lamps and skies have.
+
+    fields: white_balance, 0 leaves the colour, 1 makes it neutral; warmth_ev and tint_ev are the
+    camera's errors.
     """
-    # Take pixels between the 10th and the 90th percentile of luminance.
-    level = radiance @ LUMINANCE
-    usable = (level > 0) & all_channels(albedo > 0.02) & all_channels(radiance > 0)
-    if strength == 0 or usable.sum() < 16:
-        return np.ones(3, np.float32)
-    low, high = np.percentile(level[usable], [10, 90])
-    usable &= (level >= low) & (level <= high)
-    # Scale against the illuminant, at constant luminance.
-    reflecting = albedo[usable]
-    light = np.exp(_medians(np.log(radiance[usable] / reflecting)))
-    if _one_colour_fills(reflecting):
-        light = _clamp_to_lamps_and_skies(light)
-    gains = (light / (light @ LUMINANCE)) ** -strength
+    light = _illuminant(radiance, albedo) if fields.white_balance > 0 else None
+    gains: NDArray[np.floating] = np.ones(3)
+    if light is not None:
+        gains = (light / (light @ LUMINANCE)) ** -np.float32(fields.white_balance)
+    # Red and blue part by the warmth, green and both by the tint.
+    errors = fields.warmth_ev / 2 * np.array([1, 0, -1]) + fields.tint_ev * np.array([0, 1, 0])
+    gains = gains * np.exp2(errors)
     return np.asarray(gains / (gains @ LUMINANCE), np.float32)
+
+
+def _illuminant(radiance: RadianceImage, albedo: RadianceImage) -> F32 | None:
+    """(3,) the light's colour; None when fewer than 16 pixels tell it."""
+    usable = all_channels(albedo > 0.02) & all_channels(radiance > 0)
+    if usable.sum() < 16:
+        return None
+    # Take the better lit half without the very brightest.
+    reflecting = albedo[usable]
+    light = radiance[usable] / reflecting
+    level = light @ LUMINANCE
+    low, high = np.percentile(level, _LIT_PERCENTILES)
+    is_lit = (level >= low) & (level <= high)
+    found = np.exp(_medians(np.log(light[is_lit])))
+    return _clamp_to_lamps_and_skies(found) if _one_colour_fills(reflecting[is_lit]) else found
 
 
 def _one_colour_fills(albedo: F32) -> bool:

@@ -15,7 +15,7 @@ from pbrs_farm.core.optics_fields import LENS_PRESETS, LensFields, fold_of
 PINHOLE = Intrinsics.from_hfov(640, 480)
 MODELS = {
     "pinhole": LensFields(fx=500, fy=510, cx=300, cy=260),
-    "kinect1": LensFields(preset="kinect1"),
+    "kinect": LensFields(preset="kinect"),
     "barrel": LensFields(model="radtan", k1=-0.2, k2=0.03, p1=1e-3, p2=-2e-3),
     "tum_vi": LensFields(preset="tum_vi"),
     "fisheye180": LensFields(preset="fisheye180"),
@@ -126,12 +126,12 @@ def test_a_lens_reads_back_from_its_table(name: str) -> None:
 
 
 def test_a_preset_fills_what_the_user_leaves() -> None:
-    assert LensFields(preset="kinect1", k1=0).k1 == 0
-    assert LensFields(preset="kinect1").fy == LENS_PRESETS["kinect1"]["fy"]
+    assert LensFields(preset="kinect", k1=0).k1 == 0
+    assert LensFields(preset="kinect").fy == LENS_PRESETS["kinect"]["fy"]
     assert LensFields().intrinsics(PINHOLE) is PINHOLE
 
 
-@pytest.mark.parametrize("name", ["kinect1", "tum_vi", "equirect"])
+@pytest.mark.parametrize("name", ["kinect", "tum_vi", "equirect"])
 def test_a_picture_from_pin_hole_faces_shows_each_ray_its_own_direction(name: str) -> None:
     # Paint each face with its directions; the resampled picture must show those of its own rays.
     camera = camera_of(name)
@@ -146,4 +146,4 @@ def test_a_picture_from_pin_hole_faces_shows_each_ray_its_own_direction(name: st
     own = own[sees] / np.linalg.norm(own[sees], axis=-1, keepdims=True)
     assert np.linalg.norm(found[sees] - own, axis=-1).max() < 2e-4
     # A lens of 195 degrees looks into five faces of the cube.
-    assert len(faces) == {"kinect1": 1, "tum_vi": 5, "equirect": 6}[name]
+    assert len(faces) == {"kinect": 1, "tum_vi": 5, "equirect": 6}[name]

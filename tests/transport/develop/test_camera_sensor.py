@@ -21,6 +21,7 @@ from pbrs_farm.transport.develop.camera_sensor import (
 )
 
 PLAIN = SensorFields(is_on=True)
+PLAIN_TONE = ToneFields(contrast=1.0, flare=0.0)  # noise is of the straight part
 ONES = np.ones(3, np.float32)
 
 
@@ -45,7 +46,7 @@ def test_noise_is_that_of_the_electrons(iso: float) -> None:
     # Without a mosaic and at many bits the values are electrons over the well.
     fields = PLAIN.model_copy(update={"mosaic": False, "bits": 16, "headroom": 1.0})
     picture = take_by_sensor(
-        grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, ToneFields(), seed=1
+        grey(0.25, 256), ONES, Exposure(0.01, iso, 1.0), fields, PLAIN_TONE, seed=1
     )
     back = (picture / 255.0).astype(float)
     well = fields.full_well_e * 100 / iso
@@ -55,7 +56,7 @@ def test_noise_is_that_of_the_electrons(iso: float) -> None:
     step = 0.02
     low, high = (
         take_by_sensor(grey(v, 256), ONES, Exposure(0.01, 1.0, 1.0),
-               fields.model_copy(update={"full_well_e": 1e7, "read_noise_e": 0.0}), ToneFields(), seed=1)
+               fields.model_copy(update={"full_well_e": 1e7, "read_noise_e": 0.0}), PLAIN_TONE, seed=1)
         for v in (0.25 - step, 0.25 + step)
     )  # fmt: skip
     slope = (high.mean() - low.mean()) / 255 / (2 * step)
@@ -92,9 +93,7 @@ def test_automatic_exposure_makes_up_63_percent_of_a_step_after_its_lag() -> Non
 
 def test_saturated_light_is_white_whatever_the_gains() -> None:
     gains = np.array([0.7, 1.0, 1.8], np.float32)
-    picture = take_by_sensor(
-        grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, ToneFields(), seed=3
-    )
+    picture = take_by_sensor(grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, PLAIN_TONE, seed=3)
     assert (picture[4:-4, 4:-4] >= 254).all()
 
 
@@ -122,9 +121,7 @@ def test_aberration_parts_red_from_blue_at_the_edge_and_not_in_the_middle() -> N
 def test_equal_seeds_give_equal_bits_and_other_seeds_other_noise() -> None:
     shot = Exposure(0.02, 800, 1.0)
     fields = SensorFields(preset="phone")
-    a, b, c = (
-        take_by_sensor(grey(0.2), ONES, shot, fields, ToneFields(), seed=s) for s in (5, 5, 6)
-    )
+    a, b, c = (take_by_sensor(grey(0.2), ONES, shot, fields, PLAIN_TONE, seed=s) for s in (5, 5, 6))
     assert (a == b).all()
     assert (a != c).any()
 

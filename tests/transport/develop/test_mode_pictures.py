@@ -3,15 +3,19 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.picture_cameras import CAMERAS, ERRING
 from pbrs_farm.core.recipe import ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs, wanted_exposures
 from pbrs_farm.transport.develop.tone_mapping import (
     add_glare,
     encode_tone,
     exposure_of,
+    flatten_light,
     roll_off,
     tone,
 )
+
+STRAIGHT = ToneFields(contrast=1.0, flare=0.0, white=64.0)
 
 
 def grey(level: float) -> np.ndarray:
@@ -19,7 +23,7 @@ def grey(level: float) -> np.ndarray:
 
 
 def test_exposure_brings_any_level_to_the_same_grey() -> None:
-    pictures = [tone(grey(x), ToneFields()) for x in (1e-4, 1.0, 1e4)]
+    pictures = [tone(grey(x), STRAIGHT) for x in (1e-4, 1.0, 1e4)]
     assert len({int(p[0, 0, 0]) for p in pictures}) == 1
     expected = round(255 * (1.055 * 0.18 ** (1 / 2.4) - 0.055))
     assert abs(int(pictures[0][0, 0, 0]) - expected) <= 1
@@ -53,57 +57,110 @@ def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -
 
 def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
     sky = np.geomspace(4, 60, 12).reshape(1, -1, 1).repeat(3, -1)
-    steps = tone(sky.astype(np.float32), ToneFields(white=64), exposure=1.0)[0, :, 0].astype(int)
-    assert (np.diff(steps) >= 1).all()
-    assert tone(grey(64.0), ToneFields(white=64), exposure=1.0)[0, 0, 0] == 255
-    assert tone(grey(4.0), ToneFields(white=4), exposure=1.0)[0, 0, 0] == 255
-    assert tone(grey(0.99), ToneFields(white=1), exposure=1.0)[0, 0, 0] < 255
+
+    def toned(light: np.ndarray, white: float) -> np.ndarray:
+        fields = STRAIGHT.model_copy(update={"white": white})
+        return tone(light.astype(np.float32), fields, exposure=1.0)[0, :, 0].astype(int)
+
+    assert (np.diff(toned(sky, 64)) >= 1).all()
+    assert toned(grey(64.0), 64)[0] == toned(grey(4.0), 4)[0] == 255
+    assert toned(grey(0.99), 1)[0] < 255
 
 
 def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
     ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
+    # Above the shoulder the ramp is rolled off: look at what lies below.
     linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
-    values = encode_tone(linear, ToneFields(contrast=2.0))[0, :, 0].astype(int)
+    values = encode_tone(linear, ToneFields(contrast=2.0), 1.0)[0, :, 0].astype(int)
     assert (values[0], values[255]) == (0, 255)
     assert abs(values[128] - 128) <= 1
     assert abs((values[144] - values[112]) / 32 - 2.0) < 0.05
     assert (np.diff(values) >= 0).all()
 
 
-def test_what_is_below_the_black_level_is_black_and_white_stays() -> None:
-    ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
-    linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
-    values = encode_tone(linear, ToneFields(black=0.2))[0, :, 0]
-    assert (values[:51] == 0).all()
-    assert values[53] > 0
-    assert values[255] == 255
+def test_the_veil_lifts_black_and_one_bulb_does_not_fill_the_room_with_it() -> None:
+    room = grey(1.0)
+    room[:8] = 1e-6
+    bulb = room.copy()
+    bulb[20, 20] = 1e5
+    dim, veiled, with_bulb = (
+        tone(light, ToneFields(flare=flare), exposure=1.0)[0, 0, 0]
+        for light, flare in ((room, 0.0), (room, 0.01), (bulb, 0.01))
+    )
+    assert dim == 0
+    assert 3 <= veiled <= with_bulb <= veiled + 12
+
+
+def test_local_contrast_brings_shade_and_sun_together_keeps_detail_and_makes_no_halo() -> None:
+    detail = 1 + 0.1 * np.sin(np.arange(96))
+    light = np.broadcast_to(detail[None, :, None], (64, 96, 3)).copy()
+    light[:, 48:] *= 8
+    flat = flatten_light(light, ToneFields(local_contrast=0.5))
+    sides = flat[:, :40].mean(), flat[:, 56:].mean()
+    assert 2 < sides[1] / sides[0] < 4  # of 8
+    ripple = (flat / light)[32, 10:30, 0]
+    assert ripple.max() / ripple.min() < 1.1  # detail as it was
+    # Beside the edge no pixel is brighter or darker than its side by more than its own detail.
+    assert flat[:, 40:48].min() > 0.8 * flat[:, :40].min()
+    assert flat[:, 48:56].max() < 1.2 * flat[:, 56:].max()
+
+
+def test_sharpening_acts_at_edges_alone() -> None:
+    light = np.full((16, 16, 3), 0.1)
+    light[:, 8:] = 0.3
+    plain, sharp = (
+        encode_tone(light, ToneFields(sharpening=s), 10.0).astype(int)[8, :, 0] for s in (0.0, 1.0)
+    )
+    assert (plain[:4] == sharp[:4]).all()
+    assert (plain[-4:] == sharp[-4:]).all()
+    assert sharp[7] < plain[7] - 5
+    assert sharp[8] > plain[8] + 5
 
 
 def test_contrast_keeps_the_hue_and_saturates_no_shadow() -> None:
     dim = np.array([[[0.15, 0.075, 0.0375]]])
     before, after = (
-        encode_tone(dim, ToneFields(contrast=c))[0, 0].astype(float) for c in (1.0, 2.0)
+        encode_tone(dim, ToneFields(contrast=c), 10.0)[0, 0].astype(float) for c in (1.0, 2.0)
     )
     assert after.max() < before.max()
     np.testing.assert_allclose(after / after.max(), before / before.max(), atol=0.05)
 
 
-def test_a_spread_draws_one_tone_a_view_and_none_without_it() -> None:
-    plain, spread = ToneFields(), ToneFields(spread=1.0)
-    assert plain.drawn(1) is plain
-    assert spread.drawn(1) == spread.drawn(1) != spread.drawn(2)
-    assert spread.drawn(1).spread == 0
-    half = ToneFields(spread=0.5).drawn(1)
-    assert abs(half.exposure_ev - spread.drawn(1).exposure_ev / 2) < 1e-3
+def test_the_neutral_camera_is_the_same_for_each_view_and_others_err() -> None:
+    neutral = recipe_from_name("fast")
+    assert {neutral.camera_of("h", f"0_0_{k}") for k in range(5)} == {
+        ("neutral", neutral.tone, neutral.sensor)
+    }
+    phone = recipe_from_name("fast", {"tone.camera": "phone"})
+    cameras = [phone.camera_of("h", f"0_0_{k}") for k in range(5)]
+    assert len({c.tone.warmth_ev for c in cameras}) == 5
+    assert {c.sensor.preset for c in cameras} == {"phone"}
+    assert all(c.tone.local_contrast == 0.4 for c in cameras)
 
 
-def test_frames_of_a_clip_and_both_eyes_have_one_tone() -> None:
-    recipe = recipe_from_name("fast")
-    frames = {recipe.tone_of("h", keys.frame_id(k)) for k in range(9)}
+def test_what_the_recipe_sets_is_kept_whatever_the_camera() -> None:
+    words = {"tone.camera": "phone", "tone.sharpening": "0.1", "sensor.preset": "webcam"}
+    camera = recipe_from_name("fast", words).camera_of("h", "0_0_1")
+    assert (camera.tone.sharpening, camera.sensor.preset) == (0.1, "webcam")
+
+
+def test_drawn_cameras_are_of_all_kinds_and_of_a_variant_another_each() -> None:
+    recipe = recipe_from_name("fast", {"tone.camera": "drawn"})
+    names = [recipe.camera_of("h", f"0_0_{k}").name for k in range(200)]
+    assert set(names) == set(ERRING) == set(CAMERAS) - {"neutral"}
+    assert min(names.count(name) for name in ERRING) > 20
+    plain = recipe_from_name("fast")
+    assert plain.camera_of("h", "0_0_1").name == "neutral"
+    assert len({plain.camera_of("h", "0_0_1", n).tone for n in range(1, 9)}) > 4
+
+
+def test_frames_of_a_clip_and_both_eyes_have_one_camera() -> None:
+    recipe = recipe_from_name("fast", {"tone.camera": "drawn"})
+    frames = {recipe.camera_of("h", keys.frame_id(k)) for k in range(9)}
     assert len(frames) == 1
-    assert recipe.tone_of("h", "0_1_2") == recipe.tone_of("h", keys.right_id("0_1_2"))
-    assert recipe.tone_of("h", "0_1_2") != recipe.tone_of("h", "0_1_3")
-    assert recipe.tone_of("h", "0_1_2") != recipe.tone_of("g", "0_1_2")
+    assert recipe.camera_of("h", "0_1_2") == recipe.camera_of("h", keys.right_id("0_1_2"))
+    others = {recipe.camera_of(h, v) for h in "gh" for v in ("0_1_2", "0_1_3", "0_1_4", "0_1_5")}
+    assert len(others) > 4
 
 
 def test_glare_spreads_light_and_neither_adds_nor_takes_any() -> None:

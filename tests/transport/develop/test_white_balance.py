@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.white_balance import white_balance
 
 PINK = np.array([0.9, 0.11, 0.32])
@@ -18,7 +19,7 @@ def view(albedo: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def test_a_room_of_one_strong_colour_turns_the_sky_no_complement() -> None:
     radiance, albedo = view(PINK, PINK / PINK.max())  # light that the walls reflected at each other
-    gains = white_balance(radiance, albedo, 0.7)
+    gains = white_balance(radiance, albedo, ToneFields(white_balance=0.7))
     sky = np.array([0.8, 0.95, 1.1]) * gains
     assert sky[1] < 1.05 * max(sky[0], sky[2])  # green does not lead: no mint
     assert gains.max() / gains.min() < 3
@@ -29,7 +30,7 @@ def test_the_light_of_lamps_is_balanced_as_before(albedo: np.ndarray) -> None:
     warm = np.array([1.0, 0.65, 0.33])  # about 2,700 K
     radiance, picture = view(albedo, warm)
     expected = (warm / (warm @ [0.2126, 0.7152, 0.0722])) ** -0.7
-    gains = white_balance(radiance, picture, 0.7)
+    gains = white_balance(radiance, picture, ToneFields(white_balance=0.7))
     np.testing.assert_allclose(gains / gains[1], expected / expected[1], rtol=1e-2)
 
 
@@ -37,5 +38,5 @@ def test_colours_of_many_hues_fill_no_view() -> None:
     rng = np.random.default_rng(1)
     albedo = rng.uniform(0.05, 0.9, (24, 32, 3)).astype(np.float32)
     green = np.array([0.3, 1.0, 0.3], np.float32)
-    gains = white_balance(albedo * green, albedo, 1.0)
+    gains = white_balance(albedo * green, albedo, ToneFields(white_balance=1.0))
     np.testing.assert_allclose(gains / gains[1], [1 / 0.3, 1, 1 / 0.3], rtol=1e-3)
