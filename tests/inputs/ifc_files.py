@@ -97,6 +97,17 @@ class IfcHouse:
             m.createIfcStyledItem(solid, [self.styles[style]], None)
         return solid
 
+    def mapped(self, solids: Any, *, axis_y: Any = (0, 1, 0), scale: float = 1.0) -> Any:
+        """A mapped item of the solids; axis_y (0, -1, 0) mirrors them."""
+        m = self.model
+        shape = m.createIfcShapeRepresentation(self.context, "Body", "SweptSolid", list(solids))
+        axes = [m.createIfcDirection([float(c) for c in d]) for d in ((1, 0, 0), axis_y, (0, 0, 1))]
+        x, y, z = axes
+        target = m.createIfcCartesianTransformationOperator3D(
+            x, y, self._point((0, 0, 0)), scale, z
+        )
+        return m.createIfcMappedItem(m.createIfcRepresentationMap(self.axes, shape), target)
+
     def product(
         self, entity: str, name: str, solids: Any, place: Any = (0, 0, 0), turn: float = 0.0,
         inside: Any = None, **fields: Any,

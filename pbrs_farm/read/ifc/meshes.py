@@ -14,12 +14,14 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.mesh import closed_edge_share, signed_volume
 from pbrs_farm.core.recipe import ReadFields
 
 _MOST_THREADS: Final = 8
 # Faceted shapes by the quick kernel (300,000 triangles in 8 s; in 170 s by the other), all else by
 # the one that knows curves.
 _KERNEL: Final = "hybrid-cgal-simple-opencascade"
+_WELD_DECIMALS: Final = 6  # of metres: corners nearer than a micrometre are one
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,28 @@ def _mesh_of_shape(shape: Any) -> ProductMesh | None:
     if len(numbers) != len(faces):
         numbers = np.full(len(faces), -1)
     matrix = np.asarray(shape.transformation.matrix, np.float64).reshape(4, 4).T
-    return ProductMesh(positions, faces, numbers, styles, matrix)
+    items = np.asarray(geometry.item_ids, np.int64)
+    if len(items) != len(faces):
+        items = np.zeros(len(faces), np.int64)
+    return ProductMesh(positions, _facing_out(positions, faces, items), numbers, styles, matrix)
+
+
+def _facing_out(positions: F64, faces: I64, items: I64) -> I64:
+    """The faces, turned where they bound a closed body from inside.
+
+    items: (F,) the representation item each face comes from. A mapped item that mirrors (a right-hand
+    door made of a left-hand one) comes out of the library with its faces looking inwards.
+    """
+    turned = faces.copy()
+    for item in np.unique(items):
+        own = items == item
+        corners = positions[faces[own]]
+        # Ask for the sign first: nearly all bodies are sound.
+        if signed_volume(corners, corners.reshape(-1, 3).mean(0)) >= 0:
+            continue
+        if closed_edge_share(np.round(corners, _WELD_DECIMALS)) == 1.0:
+            turned[own] = faces[own][:, ::-1]
+    return turned
 
 
 def _style(row: Any) -> Style:

@@ -10,7 +10,8 @@ import pytest
 import shapely
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, ItemKind, MaterialKind
+from pbrs_farm.core.house import House, ItemKind, MaterialKind, corners_of_surfaces
+from pbrs_farm.core.mesh import signed_volume
 from pbrs_farm.core.recipe import ReadFields, RepairFields
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
@@ -158,6 +159,24 @@ def test_a_product_whose_shape_fails_is_a_note(tmp_path: Path) -> None:
     house = read(building, tmp_path)
     assert [n.kind for n in house.notes] == ["unusable-model"]
     assert "Flat" in house.notes[0].place
+
+
+@pytest.mark.parametrize(
+    ("axis_y", "scale"), [((0, 1, 0), 1.0), ((0, -1, 0), 1.0), ((0, -1, 0), 0.5)]
+)
+def test_a_mirrored_mapped_item_faces_outwards(
+    tmp_path: Path, axis_y: tuple[int, int, int], scale: float
+) -> None:
+    building = two_rooms()
+    boxes = [((0, 0.1, 0), (0.4, 0.5, 0.4)), ((0, 0.1, 0.4), (0.4, 0.2, 0.9))]
+    chair = building.mapped(
+        [building.box_solid(a, b) for a, b in boxes], axis_y=axis_y, scale=scale
+    )
+    building.product("IfcFurniture", "Stuhl", [chair], (1, 1.5, 0))
+    item = next(i for i in read(building, tmp_path).items if i.name == "Stuhl")
+    corners = corners_of_surfaces(item.surfaces)
+    volume = signed_volume(corners, corners.reshape(-1, 3).mean(0))
+    assert volume == pytest.approx((0.4**3 + 0.4 * 0.1 * 0.5) * scale**3, rel=1e-4)
 
 
 def test_an_attic_is_no_room_unless_it_is_high(tmp_path: Path) -> None:
