@@ -262,7 +262,7 @@ PASSES: Final = (
     Pass("stand-ins", 3, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 1, ("dress",), _dress, _is_dressed, _dress_depends),
-    Pass("repair", 1, ("repair",), _repair, _is_home),
+    Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass(
         "surroundings", 1, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",

@@ -27,6 +27,7 @@ _STEP_M = 0.05  # between samples of a room's edge
 _OPEN_EDGE_M = 0.075  # a shorter open edge is a fault of the drawing
 _OPEN_AREA_M2 = 0.02  # so is a smaller hole in a floor or ceiling
 _STOREY_GAP_M = 0.8  # thickest floor between two storeys
+_LEAST_M = 0.1  # above the floor: what hangs lower is no ceiling
 _PROBES_M = (0.02, 0.12, 0.24)  # out of an edge, to meet the next room behind a thin wall
 
 
@@ -160,8 +161,10 @@ def _ceiling_at(points: F64, room: Room, covers: Sequence[Cover]) -> F64:
         if not cover.is_ceiling:
             continue
         heights = cover.plane.at(points)
+        # No wall is needed where a roof comes down to the floor.
+        least_y = room.floor_y + (-GAP_M if cover.is_roof else _LEAST_M)
         inside = shapely.contains_xy(plan.grown(cover.area, 0.01), points[:, 0], points[:, 1])
-        y = np.where(inside & (heights < y) & (heights > room.floor_y + 0.1), heights, y)
+        y = np.where(inside & (heights < y) & (heights > least_y), heights, y)
     return y
 
 
@@ -173,7 +176,7 @@ def _walled(points: F64, low: F64, high: F64, walls: Sequence[Wall]) -> Bools:
     for wall in plan.near_to(around, walls, lambda w: w.footprint, 4 * GAP_M):
         inside = shapely.contains_xy(plan.grown(wall.footprint, GAP_M), points[:, 0], points[:, 1])
         if inside.any():
-            spans.append((inside, wall.bottom_y, wall.top.at(points)))
+            spans.append((inside, wall.bottom_y, wall.top_at(points)))
     # Stack walls from the lowest up, as over a window in three parts.
     for inside, bottom, top in sorted(spans, key=lambda s: s[1]):
         grows = inside & (bottom <= reached + GAP_M)
@@ -237,13 +240,19 @@ def _storey_next(room: Room, rooms: Sequence[Room], *, above: bool) -> list[int]
 
 def _closes(room: Room, cover: Cover, *, above: bool) -> bool:
     # Count a ceiling, or the floor of the storey above, upwards; and the other way round.
-    corners = shapely.get_coordinates(cover.area)
+    area = cover.area
+    if cover.is_roof:
+        # Its eaves hang lower, outside.
+        area = plan.common(area, plan.polygon_of_room(room.polygon))
+    corners = shapely.get_coordinates(area)
     if not len(corners):
         return False
     heights = cover.plane.at(corners)
     if above:
+        if cover.is_roof:
+            return bool(heights.max() > room.floor_y + _LEAST_M and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
         if cover.is_ceiling:
-            return bool(heights.min() > room.floor_y + 0.1 and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
+            return bool(heights.min() > room.floor_y + _LEAST_M and heights.min() < room.ceiling_y + _STOREY_GAP_M)  # fmt: skip
         return bool(-GAP_M <= heights.min() - room.ceiling_y <= _STOREY_GAP_M)
     if cover.is_ceiling:
         return bool(-GAP_M <= room.floor_y - heights.max() <= _STOREY_GAP_M)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import shapely
 from manifold3d import Manifold
 
-from pbrs_farm.core.arrays import F64, I32
+from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
@@ -23,8 +24,15 @@ from pbrs_farm.repair.structure.prisms import (
     plane_of_points,
 )
 
+Faces = TypeVar("Faces", I32, I64)
+
 _MAX_UV_OFF = 1e-3  # texture widths; beyond it a texture is no affine map of the plan
 _SAME_FACING = 1.0 - 1e-6  # cosine between normals of one plane
+_LEVEL_M = 0.01  # an underside that rises less is level
+_MOST_FACETS = (
+    200  # of a ceiling's underside; of more (a vault in small faces) its lowest height counts
+)
+_UP = 0.05  # y of the normal of a face that is not upright, at least
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +64,11 @@ class Cover:
     area: plan.Shape
     plane: Plane
 
+    @property
+    def is_roof(self) -> bool:
+        """It is a ceiling that slopes, and may come down to the floor."""
+        return self.is_ceiling and (self.plane.a, self.plane.b) != (0.0, 0.0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorsAndCeilings:
@@ -81,9 +94,8 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
         if shells is not None:
             found.solid[index] = [solid for solid, _ in shells]
             if item.kind is not ItemKind.GROUND:
-                found.covers.extend(
-                    _cover_of_solid(item, solid, patches) for solid, patches in shells
-                )
+                for solid, patches in shells:
+                    found.covers.extend(_covers_of_solid(item, solid, patches))
         # Leave the ground around the house alone, unless it is solid.
         elif item.kind is ItemKind.GROUND:
             continue
@@ -96,18 +108,37 @@ def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCe
     return found
 
 
-def _cover_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> Cover:
+def _covers_of_solid(item: Item, solid: Manifold, patches: Sequence[Patch]) -> list[Cover]:
     # Take the side that looks into the room: a ceiling's lowest, a floor's highest.
     low, high = bounds(solid)
     is_ceiling = item.kind is ItemKind.CEILING
+    sloped = _sloped_undersides(patches) if is_ceiling else []
+    if sloped:
+        return sloped
     area = plan.union(plan.polygon_of_triangles(p.positions, p.faces) for p in patches)
-    return Cover(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))
+    return [Cover(is_ceiling, area, level_plane(float(low[1] if is_ceiling else high[1])))]
+
+
+def _sloped_undersides(patches: Sequence[Patch]) -> list[Cover]:
+    """The planes of the underside of a roof; none where it is level, or made of very many faces."""
+    found = []
+    for p in patches:
+        down = p.faces[unit_normals(p.positions[p.faces])[:, 1] < -_UP]
+        for faces in facets(p.positions, down):
+            plane = plane_of_points(p.positions[np.unique(faces)])
+            area = plan.polygon_of_triangles(p.positions, faces)
+            if plane is not None and not shapely.is_empty(area):
+                found.append(Cover(True, area, plane))
+    heights = [c.plane.at(shapely.get_coordinates(c.area)) for c in found]
+    if not found or len(found) > _MOST_FACETS or np.ptp(np.concatenate(heights)) < _LEVEL_M:
+        return []
+    return found
 
 
 def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
     for surface in item.surfaces:
         positions = surface.positions.astype(np.float64)
-        for faces in _facets(positions, surface.faces):
+        for faces in facets(positions, surface.faces):
             corners = positions[np.unique(faces)]
             plane = plane_of_points(corners)
             area = plan.polygon_of_triangles(positions, faces)
@@ -125,13 +156,16 @@ def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
             )
 
 
-def _facets(positions: F64, faces: I32) -> list[I32]:
-    # Group faces by their plane, in order of first face; leave out upright ones.
+def facets(positions: F64, faces: Faces) -> list[Faces]:
+    """The faces (F, 3) grouped by their plane, in order of first face; upright ones are left out.
+
+    positions: (V, 3) metres. Faces that look down count as those that look up.
+    """
     normals = unit_normals(positions[faces])
     normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
     offsets = (normals * positions[faces[:, 0]]).sum(1)
     groups: list[tuple[F64, float, list[int]]] = []  # normal, offset along it, faces
-    for k in np.flatnonzero(normals[:, 1] > 0.05):
+    for k in np.flatnonzero(normals[:, 1] > _UP):
         for normal, offset, members in groups:
             if normals[k] @ normal > _SAME_FACING and abs(offsets[k] - offset) < 1e-3:
                 members.append(int(k))

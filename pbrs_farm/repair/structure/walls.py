@@ -15,6 +15,7 @@ from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, bounds, solid_from_patches
 from pbrs_farm.repair.structure.closed_shells import flat_patch, shells_from_item
+from pbrs_farm.repair.structure.planar_surfaces import facets
 from pbrs_farm.repair.structure.prisms import (
     Plane,
     affine_uv_map,
@@ -27,6 +28,8 @@ from pbrs_farm.repair.structure.prisms import (
 REVEAL = "reveal"
 ADDED_SURFACES = frozenset({REVEAL, "joint", "hidden", "back", "rim"})
 """Names of the surfaces repair adds to structure items."""
+
+_BESIDE_M = 0.05  # a point so far beside a gable's slope is under it
 
 BASEBOARD = "baseboard"
 """Tag of wall items that are baseboards."""
@@ -71,8 +74,11 @@ class Wall:
     footprint: plan.Shape
     bottom_y: float  # lowest point
     high_y: float  # highest point
-    top: Plane  # its upper edge, sloped under a roof
+    top: Plane  # its upper edge, sloped under a roof; of a gable its lowest height
     material: int  # of parts that repair adds
+    slopes: tuple[
+        tuple[plan.Shape, Plane], ...
+    ] = ()  # of a gable: area and plane of its upper edges
     thickened: bool = False  # it was planar
     is_board: bool = False  # a baseboard: bounds no room, is joined to nothing
     room_id: str | None = None  # the one room it belongs to, if it does
@@ -80,6 +86,14 @@ class Wall:
     def tag(self, surface: str) -> Tag:
         """The tag of a surface that repair adds to this wall."""
         return Tag(self.item, surface, self.material)
+
+    def top_at(self, points: F64) -> F64:
+        """(N,) heights of its upper edge at plan points (N, 2), a gable's slopes followed."""
+        y = self.top.at(points)
+        for area, plane in self.slopes:
+            inside = shapely.contains_xy(area, points[:, 0], points[:, 1])
+            y = np.where(inside, np.maximum(y, plane.at(points)), y)
+        return y
 
 
 def walls_from_house(
@@ -113,7 +127,7 @@ def _wall_of_solid(
     # The first surface of a name counts.
     named = {s.name: s.material for s in reversed(item.surfaces)}
     low, high = bounds(solid)
-    footprint, top = _footprint_and_top(patches, float(high[1]))
+    footprint, top, slopes = _footprint_and_top(patches, float(high[1]))
     return Wall(
         item=index,
         solid=solid,
@@ -122,30 +136,42 @@ def _wall_of_solid(
         high_y=float(high[1]),
         top=top,
         material=named.get(REVEAL, named.get("left", item.surfaces[0].material)),
+        slopes=slopes,
         thickened=thickened,
         is_board=BASEBOARD in item.tags,
         room_id=item.room_id,
     )
 
 
-def _footprint_and_top(patches: Sequence[Patch], high_y: float) -> tuple[plan.Shape, Plane]:
-    """Plan area of the faces that look up, and the plane of the wall's upper edge.
+def _footprint_and_top(
+    patches: Sequence[Patch], high_y: float
+) -> tuple[plan.Shape, Plane, tuple[tuple[plan.Shape, Plane], ...]]:
+    """Plan area of the faces that look up, the plane of the wall's upper edge, and a gable's slopes.
 
     A wall with holes looks up at its sills too: the level top counts if it covers half the plan.
     """
-    footprint, level_top, points = [], [], []
+    footprint, level_top, points, upward = [], [], [], []
     for p in patches:
         faces = p.faces[unit_normals(p.positions[p.faces])[:, 1] > 0.05]
         at_top = (p.positions[faces][:, :, 1] > high_y - 1e-3).all(1)
         footprint.append(plan.polygon_of_triangles(p.positions, faces))
         level_top.append(plan.polygon_of_triangles(p.positions, faces[at_top]))
         points.append(p.positions[faces].reshape(-1, 3))
+        upward.append((p.positions, faces))
     # Trust a level top that covers half the plan, else fit the sloped edge.
-    whole, upward = plan.union(footprint), np.concatenate(points)
-    if plan.union(level_top).area > 0.5 * whole.area or not len(upward):
-        return whole, level_plane(high_y)
-    plane = plane_of_points(upward)
-    return whole, level_plane(float(upward[:, 1].min())) if plane is None else plane
+    whole, ends = plan.union(footprint), np.concatenate(points)
+    if plan.union(level_top).area > 0.5 * whole.area or not len(ends):
+        return whole, level_plane(high_y), ()
+    plane = plane_of_points(ends)
+    if plane is not None:
+        return whole, plane, ()
+    slopes = [
+        (plan.grown(plan.polygon_of_triangles(positions, facet), _BESIDE_M), slope)
+        for positions, faces in upward
+        for facet in facets(positions, faces)
+        if (slope := plane_of_points(positions[np.unique(facet)])) is not None
+    ]
+    return whole, level_plane(float(ends[:, 1].min())), tuple(slopes)
 
 
 def _thickened(

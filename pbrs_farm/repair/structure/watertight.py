@@ -100,7 +100,7 @@ def repaired_structure(house: House, thickness_m: float) -> Structure:
         plugs,
         report,
         spaces_of_rooms(house.rooms, found.wells, standing, covers),
-        {r.id: interiors_of_room(r, wholes, planar) for r in lived},
+        {r.id: interiors_of_room(r, wholes, planar, horizontal.covers) for r in lived},
     )
 
 

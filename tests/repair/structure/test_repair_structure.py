@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from pbrs_farm.core.house import Enclosure, House, Item, ItemKind, Opening
+from pbrs_farm.core.house import Enclosure, House, Item, ItemKind, Opening, Surface
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import RepairReport, repair
+from pbrs_farm.repair.structure.booleans import TagTable
+from pbrs_farm.repair.structure.walls import walls_from_house
 from tests.repair.embree import EmbreeOccluder
 from tests.repair.shells import (
     coinciding_share,
@@ -247,3 +250,21 @@ def _shortened(source: Item, by_m: float) -> Item:
         positions[:, axis] -= (np.sign(positions[:, axis] - middle) * by_m).astype(np.float32)
         surfaces.append(replace(s, positions=positions))
     return replace(source, surfaces=tuple(surfaces))
+
+
+def test_a_gable_is_as_high_as_its_slopes_where_they_are() -> None:
+    gable = np.array([(0, 0), (4, 0), (4, 1), (2, 3), (0, 1)], float)
+    n = len(gable)
+    points = np.array([(x, y, z) for z in (0.0, 0.3) for x, y in gable], np.float32)
+    faces = [(0, k + 1, k) for k in range(1, n - 1)] + [
+        (n, n + k, n + k + 1) for k in range(1, n - 1)
+    ]
+    for k in range(n):
+        j = (k + 1) % n
+        faces += [(k, j, n + k), (j, n + j, n + k)]
+    surface = Surface("left", points, np.array(faces, np.int32), 0)
+    item = Item("gable", "gable", ItemKind.WALL, "0", (surface,))
+    walls, left = walls_from_house(house([item], [room("0_0", (0, 0, 4, 4))]), TagTable(), shapely.Polygon(), 0.2)  # fmt: skip
+    assert not left
+    x = np.array([[0.0, 0.15], [1.0, 0.15], [2.0, 0.15], [3.5, 0.15]])
+    assert walls[0].top_at(x) == pytest.approx([1.0, 2.0, 3.0, 1.5], abs=1e-5)
