@@ -227,6 +227,55 @@ def roof(house: IfcHouse, bottom: float) -> None:
     house.product("IfcSlab", "Roof", [solid], (0, 0, bottom), PredefinedType="ROOF")
 
 
+def attic(
+    house: IfcHouse, *, knee: float = 1.0, is_box: bool = True, has_space: bool = True, roof: Any = (),
+    **fields: Any,
+) -> None:  # fmt: skip
+    """A room of 6 x 5 m under two slabs that slope by 45 degrees up to a ridge along x.
+
+    knee: height of the walls under the eaves. is_box: the space is a box up to the ridge, else it ends
+    at the slabs. roof: entity and the two slabs' names, none for no roof. fields: of the slabs.
+    """
+    house.storey("Attic", 0.0)
+    ridge = knee + 2.5
+    for name, start, end in (
+        ("South", (-0.3, -0.3), (6.3, -0.3)), ("North", (6.3, 5.3), (-0.3, 5.3)),
+    ):  # fmt: skip
+        if knee:
+            house.wall(name, start, end, 0.0, knee, thick=0.3)
+    # A gable is one wall, cut by the roof.
+    gable = [(0, 0), (5, 0), (5, knee), (2.5, ridge), (0, knee)]
+    gable = gable if knee else [(0, 0), (5, 0), (2.5, ridge)]
+    for name, x in (("West", -0.3), ("East", 6.0)):
+        house.product("IfcWall", name, [house.mesh_solid(*_prism_along_x(gable, x, x + 0.3))])
+    floor = house.box_solid((-0.3, -0.3, -0.2), (6.3, 5.3, 0))
+    house.product("IfcSlab", "Floor", [floor], PredefinedType="FLOOR")
+    if roof:
+        entity, *names = roof
+        # The undersides pass through the knee walls' inner edges.
+        south = [(-0.5, knee - 0.5), (2.5, ridge), (2.5, ridge + 0.25), (-0.5, knee - 0.25)]
+        for name, sign in zip(names, (1, -1), strict=True):
+            side = [(2.5 + sign * (y - 2.5), z) for y, z in south][::sign]
+            solid = house.mesh_solid(*_prism_along_x(side, -0.5, 6.5))
+            house.product(entity, name, [solid], **fields)
+    if has_space:
+        inside = [(0, 0), (5, 0), (5, ridge), (0, ridge)] if is_box else gable
+        solid = house.mesh_solid(*_prism_along_x(inside, 0, 6))
+        house.product("IfcSpace", "Studio", [solid], LongName="Studio")
+
+
+def _prism_along_x(outline: Any, x0: float, x1: float) -> tuple[Any, Any]:
+    """(points, triangles) of a convex outline in (y, z), counter-clockwise, drawn out from x0 to x1."""
+    n = len(outline)
+    points = [(x, y, z) for x in (x0, x1) for y, z in outline]
+    caps = [(0, k + 1, k) for k in range(1, n - 1)] + [
+        (n, n + k, n + k + 1) for k in range(1, n - 1)
+    ]
+    sides = [(k, (k + 1) % n, n + k) for k in range(n)]
+    sides += [((k + 1) % n, n + (k + 1) % n, n + k) for k in range(n)]
+    return np.array(points, float), np.array(caps + sides)
+
+
 def realistic_house(path: Path, n_triangles: int = 300_000) -> Path:
     """Three storeys of two rooms, 60 furnishings of many triangles, lamps, a stair, railings."""
     house = IfcHouse("mm")

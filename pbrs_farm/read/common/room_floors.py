@@ -136,7 +136,7 @@ def polygon_of(area: Any) -> F64 | None:
         return None
     largest = max(pieces, key=lambda g: (g.area, g.bounds))
     # Opening removes slivers that a wall's bevel leaves; corners of walls stay where they are.
-    opened = largest.buffer(-_SLACK_M, join_style="mitre").buffer(_SLACK_M, join_style="mitre")
+    opened = _grown(_grown(largest, -_SLACK_M), _SLACK_M)
     simple = shapely.simplify(_largest(opened, largest), _SLACK_M)
     outline = shapely.orient_polygons(shapely.Polygon(simple.exterior))
     return np.asarray(shapely.get_coordinates(outline)[:-1], np.float64)
@@ -166,6 +166,4 @@ def _outline_from_above(corners: F64) -> Any:
     # Widen triangles a little before their union, so that cracks between them close.
     triangles: Any = shapely.polygons(plan)
     triangles = triangles[shapely.area(triangles) > 1e-10]
-    return shapely.union_all(shapely.buffer(triangles, _CRACK_M, join_style="mitre")).buffer(
-        -_CRACK_M, join_style="mitre"
-    )
+    return _grown(shapely.union_all(_grown(triangles, _CRACK_M)), -_CRACK_M)

@@ -15,7 +15,7 @@ import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import CEILING, FLOOR, LAMP, OTHERPROP
+from pbrs_farm.core.classes import CEILING, FLOOR, LAMP, OTHERPROP, WALL
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import (
     Box,
@@ -29,8 +29,10 @@ from pbrs_farm.core.house import (
     Source,
     Surface,
 )
+from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.geometry.plan_surfaces import horizontal
+from pbrs_farm.home.names import words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
 from pbrs_farm.read.common.format import GivenFile
@@ -43,6 +45,7 @@ from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors
+from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
@@ -51,15 +54,17 @@ Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1
 """(x, y, z) with z up -> (x, z, -y) with y up."""
 _FAR_M: Final = 1000.0  # from the origin: coordinates of a national grid
 _CLEAR: Final = 0.3  # transparency of glass in a window
-_LEAST_HEIGHT_M: Final = 1.8  # least height of an attic that counts as a room
+_LEAST_HEIGHT_M: Final = 1.8  # least height of an attic that counts as a room, and of its walls
+_LEAST_KNEE_M: Final = 0.5  # least height of the walls of a room under a roof
 _LEAST_ROOM_M: Final = 1.0  # least height of any other room
 _LEAST_ROOM_M2: Final = 0.3
 _COVERED: Final = 0.5  # share of a room that a slab covers to be its floor or ceiling
-_NEAR_M: Final = 0.35  # from a room's floor or ceiling to the slab that is it
 _BELOW_SLAB_M: Final = 0.005  # a room's own ceiling hangs so far below a slab
 _THIN_M: Final = 0.045  # a part of a window that is no thicker may be its glass
 _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
-_ROOF: Final = frozenset({"roof", "attic", "dach", "dachraum", "dachboden", "loft", "чердак"})
+_UPWARD: Final = 0.05  # y of the normal of a face of a body's top, at least
+_LEVEL_M: Final = 0.01  # a top whose heights differ less is level
+_ATTIC_WORDS: Final = ROOF_WORDS | {"attic", "dachraum", "dachboden", "loft", "чердак"}
 
 
 def read_ifc(given: GivenFile, fields: ReadFields) -> House:
@@ -84,10 +89,13 @@ class _Building:
     """A building while it is read. State: what was found so far."""
 
     def __init__(self, path: Path, fields: ReadFields) -> None:
+        from ifcopenshell.util.unit import calculate_unit_scale
+
         self._path, self._fields = path, fields
         self._notes = Notes(path.name, strict=fields.strict)
         self._library = MaterialLibrary(self._notes)
         self._model = model_of(path)
+        self._metres = float(calculate_unit_scale(self._model))  # of a length of the file
         self._meshes: dict[int, ProductMesh] = {}
         self._world = Y_UP.copy()
 
@@ -99,16 +107,20 @@ class _Building:
         self._note_failed(products)
         self._shift_to_origin()
         items = list(self._items(products))
-        rooms = self._rooms(items)
+        told = self._rooms_of_spaces()
+        items = with_roofs(items, [room for room, _top in told])
+        overheads = Overheads(items)
+        rooms = self._under_ceilings(told, overheads) or _rooms_between_walls(items, overheads)
         if not rooms:
             hint = "export its spaces or rooms, or its floor slabs, with it"
             raise BadHouse(
                 self._path.name, "", "has no space and no floor between walls", hint=hint
             )
         builder = HouseBuilder(self._path.name, self._fields, self._notes, self._library)
-        builder.set_rooms(rooms)
+        builder.set_rooms([room for room, _top in rooms])
         builder.levels = self._named(builder.levels)
-        items += self._covers(builder.rooms, items)
+        tops = [top for _room, top in rooms]
+        items += self._covers(list(zip(builder.rooms, tops, strict=True)), items, overheads)
         builder.items += [_sort_product(item, builder) for item in items]
         source = Source("ifc", self._path.name, keys.sha256(self._path.read_bytes()))
         return builder.house(self._path.stem, source, openings=openings(builder.items))
@@ -192,6 +204,8 @@ class _Building:
             return _part_of_wall(product, mesh)
         if given is not None and given.nyu40 >= 0:
             return given.item_kind, given.nyu40, _swing(product)
+        if product.is_a("IfcCovering"):
+            return self._class_of_covering(product, mesh)
         for word in (product.Name, product.ObjectType, _type_name(product)):
             seen = class_of_node_name(str(word or ""))
             if seen is not None:
@@ -199,6 +213,25 @@ class _Building:
                 return kind, seen.nyu40, ()
         self._notes.add("unmapped-class", f"{place} {product.Name or ''}", "is otherprop")
         return ItemKind.OBJECT, OTHERPROP, (UNMAPPED,)
+
+    def _class_of_covering(
+        self, product: Any, mesh: ProductMesh
+    ) -> tuple[ItemKind, int, tuple[str, ...]]:
+        """Ceiling, floor or wall by where a covering of no known type lies."""
+        import ifcopenshell.util.element as element
+
+        low, high = mesh.world.min(0), mesh.world.max(0)
+        if high[2] - low[2] > (high - low)[:2].min():
+            return ItemKind.WALL, WALL, ()
+        storey = element.get_container(product)
+        elevation = self._elevation(storey) if storey is not None else None
+        is_high = (low[2] + high[2]) / 2 > (elevation or 0.0) + _LEAST_ROOM_M
+        return (ItemKind.CEILING, CEILING, ()) if is_high else (ItemKind.FLOOR, FLOOR, ())
+
+    def _elevation(self, storey: Any) -> float | None:
+        """Metres, z of the file; None where the storey tells none."""
+        height = getattr(storey, "Elevation", None)
+        return float(height) * self._metres if height is not None and np.isfinite(height) else None
 
     def _surfaces(
         self, product: Any, kind: ItemKind, mesh: ProductMesh, world: F64
@@ -268,48 +301,63 @@ class _Building:
 
     # Rooms and levels
 
-    def _rooms(self, items: Sequence[Item]) -> list[Room]:
+    def _rooms_of_spaces(self) -> list[tuple[Room, F64]]:
+        """The rooms that the building tells, each with the triangles of the top of its body."""
         spaces = [
             _Space(row, self._meshes[row.id()])
             for row in self._model.by_type("IfcSpace")
             if row.id() in self._meshes
         ]
-        found = [room for space in spaces if (room := self._room(space)) is not None]
-        return found or [r for r in rooms_from_floors(items) if _is_walled(r, items)]
+        return [found for space in spaces if (found := self._room(space)) is not None]
 
-    def _room(self, space: _Space) -> Room | None:
+    def _under_ceilings(
+        self, told: Sequence[tuple[Room, F64]], overheads: Overheads
+    ) -> list[tuple[Room, F64 | None]]:
+        """The rooms as high as the ceiling that hangs there; those on a roof, under nothing, are none."""
+        found: list[tuple[Room, F64 | None]] = []
+        for room, top in told:
+            above = overheads.over(room)
+            near_y = room.ceiling_y + NEAR_M
+            if _is_called_attic(room.name) and above.share(near_y) < _COVERED:
+                self._notes.add("degenerate-room", room.name, "lies under no roof; left out")
+            elif above.share(near_y, of_ceilings=True) > _COVERED:
+                y = above.height(near_y, of_ceilings=True)
+                found.append((replace(room, ceiling_y=y or room.ceiling_y), top))
+            else:
+                found.append((room, top))
+        return found
+
+    def _room(self, space: _Space) -> tuple[Room, F64] | None:
         row, mesh = space.row, space.mesh
         world = self._world @ mesh.world_from_product
         points = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
         low, high = float(points[:, 1].min()), float(points[:, 1].max())
         name = str(row.LongName or row.Name or "")[:60]
         place = f"#{row.id()} {name}".strip()
-        is_attic = bool(set(name.lower().split()) & _ROOF)
-        if high - low < (_LEAST_HEIGHT_M if is_attic else _LEAST_ROOM_M):
+        if high - low < (_LEAST_HEIGHT_M if _is_called_attic(name) else _LEAST_ROOM_M):
             self._notes.add("degenerate-room", place, f"is {high - low:.2f} m high; left out")
             return None
         # The lower face, turned to look up.
-        near = points[mesh.faces][:, :, 1].max(1) < low + _NEAR_M
+        near = points[mesh.faces][:, :, 1].max(1) < low + NEAR_M
         faces = np.ascontiguousarray(mesh.faces[near][:, ::-1], np.int32)
         polygon = floor_polygon([Surface("", points, faces, 0)], []) if len(faces) else None
         if polygon is None or shapely.Polygon(polygon).area < _LEAST_ROOM_M2:
             self._notes.add("degenerate-room", place, "has no floor; left out")
             return None
-        return Room(
+        corners = points.astype(np.float64)[mesh.faces]
+        room = Room(
             id="", name=name, level_id="", polygon=polygon, floor_y=low, ceiling_y=high,
             types=(str(row.ObjectType)[:60],) if row.ObjectType else (),
         )  # fmt: skip
+        return room, corners[unit_normals(corners)[:, 1] > _UPWARD]
 
     def _named(self, levels: Sequence[Level]) -> tuple[Level, ...]:
         """The levels of the rooms' floors, each named as the storey that is nearest."""
-        import ifcopenshell.util.unit
-
-        scale = float(ifcopenshell.util.unit.calculate_unit_scale(self._model))
-        storeys = []
-        for row in self._model.by_type("IfcBuildingStorey"):
-            if row.Elevation is not None and np.isfinite(row.Elevation):
-                y = float(row.Elevation) * scale + float(self._world[1, 3])
-                storeys.append((y, str(row.LongName or row.Name or "")[:60]))
+        storeys = [
+            (z + float(self._world[1, 3]), str(row.LongName or row.Name or "")[:60])
+            for row in self._model.by_type("IfcBuildingStorey")
+            if (z := self._elevation(row)) is not None
+        ]
         found = []
         for level in levels:
             near = min(storeys, key=lambda s: abs(s[0] - level.elevation), default=(np.inf, ""))
@@ -317,25 +365,33 @@ class _Building:
             found.append(replace(level, name=near[1]) if is_named else level)
         return tuple(found)
 
-    def _covers(self, rooms: Sequence[Room], items: Sequence[Item]) -> list[Item]:
+    def _covers(
+        self, rooms: Sequence[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
+    ) -> list[Item]:
         """A floor or a ceiling for each room over or under which the building has none.
 
-        A slab is the floor of what is above; its underside gets the ceiling of the room below.
+        rooms: each with the top of its space's body, which a ceiling follows where it slopes. A slab is
+        the floor of what is above; its underside gets the ceiling of the room below.
         """
         white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
         found: list[Item] = []
-        for room in rooms:
+        for room, top in rooms:
             is_open = named_kind(" ".join((*room.types, room.name))) is RoomKind.OUTDOOR
-            floors = _heights_of_covers(items, ItemKind.FLOOR, room, room.floor_y, _top_of_item)
+            floors = _heights_of_floors(items, room)
             if not floors:
                 surface = horizontal("floor", [[room.polygon]], room.floor_y, white, up=True)
                 found.append(_floor_or_ceiling_item(room, ItemKind.FLOOR, surface))
-            ceilings = _heights_of_covers(items, ItemKind.CEILING, room, room.ceiling_y, _bottom)
-            slabs = _heights_of_covers(items, ItemKind.FLOOR, room, room.ceiling_y, _bottom)
-            if ceilings or (is_open and not slabs):
+            above = overheads.over(room)
+            near_y = room.ceiling_y + NEAR_M
+            is_ceiled = above.share(near_y, of_ceilings=True) > _COVERED
+            slab_y = above.height(near_y) if above.share(near_y) > _COVERED else None
+            if is_ceiled or (is_open and slab_y is None):
                 continue
-            y = min([room.ceiling_y, *slabs]) - _BELOW_SLAB_M
-            surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
+            if slab_y is None and top is not None and np.ptp(top[:, :, 1]) > _LEVEL_M:
+                surface = _looking_down(top, white)
+            else:
+                y = min(room.ceiling_y, slab_y or np.inf) - _BELOW_SLAB_M
+                surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
             found.append(_floor_or_ceiling_item(room, ItemKind.CEILING, surface))
         return found
 
@@ -458,25 +514,44 @@ def _top_of_item(item: Item) -> float:
     return float(item.bounds[1, 1])
 
 
-def _bottom(item: Item) -> float:
-    return float(item.bounds[0, 1])
-
-
-def _heights_of_covers(
-    items: Sequence[Item], kind: ItemKind, room: Room, y: float, of: Any
-) -> list[float]:
-    """The heights (of: an item's top or bottom) near y of the items that cover the room."""
+def _heights_of_floors(items: Sequence[Item], room: Room) -> list[float]:
+    """The heights near the room's floor of the slabs that are it."""
     low, high = room.polygon.min(0), room.polygon.max(0)
     found = []
     for item in items:
-        if item.kind is not kind or abs(of(item) - y) > _NEAR_M:
+        if item.kind is not ItemKind.FLOOR or abs(_top_of_item(item) - room.floor_y) > NEAR_M:
             continue
         plan = item.bounds[:, [0, 2]]
         if (plan[0] < high).all() and (plan[1] > low).all():
             share = sum(covered_share(s, room.polygon) for s in item.surfaces)
             if share > _COVERED:
-                found.append(of(item))
+                found.append(_top_of_item(item))
     return found
+
+
+def _is_called_attic(name: str) -> bool:
+    return bool(words_of(name) & _ATTIC_WORDS)
+
+
+def _rooms_between_walls(
+    items: Sequence[Item], overheads: Overheads
+) -> list[tuple[Room, F64 | None]]:
+    """The rooms of a building that tells none, as high as what hangs over most of them."""
+    found: list[tuple[Room, F64 | None]] = []
+    for room in rooms_from_floors(items):
+        above = overheads.over(room)
+        y = above.height() if above.share(np.inf) > _COVERED else None
+        # Under a roof knee walls bound a room, under the sky they are parapets.
+        if _is_walled(room, items, _LEAST_HEIGHT_M if y is None else _LEAST_KNEE_M):
+            found.append((room if y is None else replace(room, ceiling_y=y), None))
+    return found
+
+
+def _looking_down(top: F64, material: int) -> Surface:
+    """The ceiling that the top of a space's body is, a little below it."""
+    points = top[:, ::-1].reshape(-1, 3) - [0.0, _BELOW_SLAB_M, 0.0]
+    faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
+    return Surface("ceiling", points.astype(np.float32), faces, material)
 
 
 def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item:
@@ -487,15 +562,16 @@ def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item
     )  # fmt: skip
 
 
-def _is_walled(room: Room, items: Sequence[Item]) -> bool:
-    """Whether walls stand around most of a room's outline: a terrace has none."""
+def _is_walled(room: Room, items: Sequence[Item], least_m: float) -> bool:
+    """Whether walls stand around most of a room's outline: a terrace and a roof have none."""
     ring: Any = shapely.Polygon(room.polygon).exterior
     points = shapely.points(
         [ring.interpolate(d).coords[0] for d in np.arange(0, ring.length, 0.25)]
     )
     lines: list[Any] = []
     for item in items:
-        if item.kind is not ItemKind.WALL:
+        # Leave out what is lower, and what stands below.
+        if item.kind is not ItemKind.WALL or _top_of_item(item) < room.floor_y + least_m:
             continue
         for s in item.surfaces:
             plan = s.positions[s.faces][:, :, [0, 2]]

@@ -1,0 +1,158 @@
+"""What hangs over the rooms of an IFC building: ceilings, roofs, undersides of slabs; no effects.
+
+Programs write a room's height as that of its space's body, which may end at the slab above a suspended
+ceiling or in the sky over a sloped roof: what hangs there counts. They write roofs as slabs without a
+type, which their names and their place tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.classes import CEILING
+from pbrs_farm.core.house import Item, ItemKind, Room, corners_of_surfaces
+from pbrs_farm.core.mesh import closed_edge_share, unit_normals
+from pbrs_farm.geometry.heights import lowest_above
+from pbrs_farm.home.names import words_of
+
+NEAR_M: Final = 0.35  # from the end of a space's body to the floor or ceiling that bounds it
+_SAMPLES: Final = 3000  # of a room's plan
+_LEAST_STEP_M: Final = 0.05  # between samples
+_KNEE_M: Final = 0.3  # above the floor: a sloped roof that comes lower is no ceiling there
+_HEADROOM_M: Final = 1.8  # above the floor: a slab that hangs lower is a platform, a wall a parapet
+_LEVEL_M: Final = 0.025  # samples that differ less from the middle one are at its height
+_HALF: Final = 0.5  # share of a room, or of a slab, that counts as most of it
+_JOINT_M: Final = 0.6  # from a wall's end to the slab that it stands on or carries
+_WELD_DECIMALS: Final = 4  # of metres: corners nearer than .1 mm are one
+_CARRIES: Final = 0.1  # share of a slab's plan that a space on it covers at least
+
+_ROOF_NAMES: Final = (
+    "roof roofing flatroof dach dachhaut flachdach steildach satteldach pultdach walmdach dachplatte "
+    "dachdecke dachflache dachschrage toit toiture tetto copertura cubierta tejado azotea telhado "
+    "cobertura dak dakvloer plattedak yttertak takplatta katto ylapohja vesikatto strecha stropodach "
+    "teto acoperis cati крыша кровля дах στεγη 屋根 屋上 屋顶 屋頂 屋面 지붕"
+)
+ROOF_WORDS: Final = frozenset(_ROOF_NAMES.split())
+"""Words of roofs, folded: names of slabs and spaces in the languages of exporters."""
+_TERRACE_NAMES: Final = (
+    "terrace terrasse dachterrasse terraza terrazza deck balcony balkon floor boden"
+)
+_NO_ROOF_WORDS: Final = frozenset(_TERRACE_NAMES.split())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Overhead:
+    """What hangs over a room at samples of its plan."""
+
+    heights: F64  # (N,) y of the lowest ceiling, roof or slab above; inf = none
+    is_ceiling: Bools  # (N,) it is a ceiling or a roof, not the underside of a slab
+
+    def share(self, below_y: float, *, of_ceilings: bool = False) -> float:
+        """Share of the room under something that hangs below a height."""
+        return float(self._within(below_y, of_ceilings=of_ceilings).mean())
+
+    def height(self, below_y: float = np.inf, *, of_ceilings: bool = False) -> float | None:
+        """The nominal height of what hangs below a height: of a sloped roof its highest; None for none.
+
+        A level ceiling over half of it counts, whatever bulkheads and shadow gaps are at its edges.
+        """
+        y = self.heights[self._within(below_y, of_ceilings=of_ceilings)]
+        if not len(y):
+            return None
+        middle = float(np.median(y))
+        is_level = (np.abs(y - middle) < _LEVEL_M).mean() > _HALF
+        return middle if is_level else float(y.max())
+
+    def _within(self, below_y: float, *, of_ceilings: bool) -> Bools:
+        near = np.isfinite(self.heights) & (self.heights <= below_y)
+        return near & self.is_ceiling if of_ceilings else near
+
+
+class Overheads:
+    """Looks up from rooms. State: the triangles of what may hang there."""
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        none = np.zeros((0, 3, 3))
+        self._ceilings = np.concatenate([none, *_undersides(items, ItemKind.CEILING)])
+        self._slabs = np.concatenate([none, *_undersides(items, ItemKind.FLOOR)])
+
+    def over(self, room: Room) -> Overhead:
+        """What hangs over a room of a polygon and a floor."""
+        points = _samples_of_plan(room.polygon)
+        ceiling = lowest_above(points, self._ceilings, room.floor_y + _KNEE_M)
+        slab = lowest_above(points, self._slabs, room.floor_y + _HEADROOM_M)
+        return Overhead(np.minimum(ceiling, slab), ceiling <= slab)
+
+
+def _undersides(items: Sequence[Item], kind: ItemKind) -> list[F64]:
+    """The faces that look down; all of a sheet, which may lie either way."""
+    found = []
+    for item in items:
+        if item.kind is kind:
+            corners = corners_of_surfaces(item.surfaces)
+            is_closed = closed_edge_share(np.round(corners, _WELD_DECIMALS)) == 1.0
+            found.append(corners[unit_normals(corners)[:, 1] < 0] if is_closed else corners)
+    return found
+
+
+def _samples_of_plan(polygon: F64) -> F64:
+    """Points (N, 2) of a grid inside a polygon; its middle where it is too narrow for any."""
+    area: Any = shapely.Polygon(polygon)
+    step = max(float(np.sqrt(area.area / _SAMPLES)), _LEAST_STEP_M)
+    x0, z0, x1, z1 = area.bounds
+    x, z = np.arange(x0 + step / 2, x1, step), np.arange(z0 + step / 2, z1, step)
+    points = np.stack(np.meshgrid(x, z), -1).reshape(-1, 2)
+    inside = points[shapely.contains_xy(area, points[:, 0], points[:, 1])]
+    middle = area.representative_point()
+    return inside if len(inside) else np.array([[middle.x, middle.y]])
+
+
+def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
+    """The items, slabs that are roofs made ceilings: by their names, or by their place.
+
+    rooms: those that the building tells; a slab under one is no roof. By its place a slab is a roof that
+    lies on walls, and on which neither a room nor a wall of a storey stands (parapets do).
+    """
+    walls = [i.bounds for i in items if i.kind is ItemKind.WALL]
+    bounds = np.array(walls).reshape(-1, 2, 3)
+    found = []
+    for item in items:
+        is_roof = (
+            item.kind is ItemKind.FLOOR
+            and item.source_class.startswith("IfcSlab")
+            and not _carries_room(item, rooms)
+            and (is_called_roof(item.name) or _is_placed_as_roof(item, bounds))
+        )
+        found.append(replace(item, kind=ItemKind.CEILING, nyu40=CEILING) if is_roof else item)
+    return found
+
+
+def is_called_roof(name: str) -> bool:
+    """Whether a name says roof, and not that one stands on it (a roof terrace)."""
+    words = words_of(name)
+    return bool(words & ROOF_WORDS) and not words & _NO_ROOF_WORDS
+
+
+def _carries_room(slab: Item, rooms: Sequence[Room]) -> bool:
+    low, high = slab.bounds
+    plan: Any = shapely.box(low[0], low[2], high[0], high[2])
+    on_it = [r for r in rooms if abs(r.floor_y - high[1]) < _JOINT_M]
+    covered = sum(plan.intersection(shapely.Polygon(r.polygon)).area for r in on_it)
+    return bool(covered > _CARRIES * plan.area)
+
+
+def _is_placed_as_roof(slab: Item, walls: F64) -> bool:
+    """Whether a slab lies on walls and carries none. walls: (W, 2, 3) bounds."""
+    low, high = slab.bounds
+    # Keep walls over or under the slab, not those that only touch its edge.
+    overlap = np.minimum(walls[:, 1], high) - np.maximum(walls[:, 0], low)
+    near = walls[(overlap[:, [0, 2]] > 0.0).all(1)]
+    carried = near[:, 1, 1] > high[1] + _HEADROOM_M
+    carrying = (near[:, 1, 1] > low[1] - _JOINT_M) & (near[:, 0, 1] < high[1] - _HEADROOM_M)
+    return bool(carrying.any() and not carried.any())
