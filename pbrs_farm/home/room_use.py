@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import cache, lru_cache
 from importlib.resources import files
 from typing import Final, NamedTuple
+
+import numpy as np
+import shapely
 
 from pbrs_farm.core.classes import (
     BATHTUB,
@@ -24,7 +28,7 @@ from pbrs_farm.core.classes import (
     TABLE,
     TOILET,
 )
-from pbrs_farm.core.house import Item, Room
+from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.home.names import folded, words_of, words_of_item
 
 
@@ -74,6 +78,18 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
         return RoomKind.LIVING
     if named is not None:
         return named
+    # Small or long rooms without furniture are passages.
+    by_things = kind_by_things(items, area_m2)
+    return by_things or (RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER)
+
+
+def kind_by_things(items: Iterable[Item], area_m2: float) -> RoomKind | None:
+    """What a room without a name is for by the things that stand in it; None where they do not say.
+
+    area_m2: of its floor.
+    """
+    items = tuple(items)
+    has = {item.nyu40 for item in items}
     # One sits on sofas where one lives, whatever else an outline takes in.
     if SOFA in has and (is_cooked_in(items) or has & {TOILET, BATHTUB}):
         return RoomKind.LIVING
@@ -92,8 +108,28 @@ def room_kind(room: Room, items: Sequence[Item], area_m2: float) -> RoomKind:
     ):
         if has & classes:
             return kind
-    # Small or long rooms without furniture are passages.
-    return RoomKind.HALL if area_m2 < _LARGE_M2 else RoomKind.OTHER
+    return None
+
+
+def with_uses(house: House) -> House:
+    """The house, its rooms that no type and no name says the use of typed by what stands in them."""
+    unnamed = [r for r in house.rooms if named_kind(" ".join((*r.types, r.name))) is None]
+    things = [i for i in house.items if not i.kind.is_structure and (i.n_faces or i.box)]
+    if not unnamed or not things:
+        return house
+    middles = np.array([i.box.centre if i.box else i.bounds.mean(0) for i in things])
+    kinds: dict[str, RoomKind] = {}
+    for room in unnamed:
+        outline = shapely.Polygon(room.polygon)
+        inside = shapely.contains_xy(outline, middles[:, [0, 2]])
+        inside &= (middles[:, 1] > room.floor_y) & (middles[:, 1] < room.ceiling_y)
+        here = [things[n] for n in np.flatnonzero(inside)]
+        kind = kind_by_things(here, outline.area)
+        if kind is not None:
+            kinds[room.id] = kind
+    return replace(house, rooms=tuple(
+        replace(r, types=(*r.types, kinds[r.id].value)) if r.id in kinds else r for r in house.rooms
+    ))  # fmt: skip
 
 
 def named_kind(name: str) -> RoomKind | None:

@@ -152,6 +152,7 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 
 def _read(work: Preparation) -> Preparation:
     """The house as its source gives it; of an object and of a plugin's home that is all there is."""
+    from pbrs_farm.home.room_use import with_uses
     from pbrs_farm.prepare.read_source import house_of_plugin, read_house
     from pbrs_farm.repair import RepairReport
 
@@ -164,9 +165,10 @@ def _read(work: Preparation) -> Preparation:
             report=plugins_own.report,
             dressing=plugins_own.dressing,
         )
-    house = read_house(source, recipe.read)
-    # An object without context has no walls to close.
+    # An object without context has no walls to close and no rooms.
     is_whole = source.kind == "object"
+    house = read_house(source, recipe.read)
+    house = house if is_whole else with_uses(house)
     report = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None
     return replace(work, current=house, report=report)
 

@@ -144,3 +144,38 @@ def test_slopes_below_another_storey_are_a_note(tmp_path: Path) -> None:
     found = plan_from_file(path)
     assert found.left_out == ("walls rise to a roof below another storey: its ceilings are level",)
     assert not any(w.tops for s in found.storeys for w in s.plan.walls)
+
+
+def whole_home(folder: Path) -> Path:
+    """A home of 8 m by 6 m in one scan, one floor for all: a living room, a hall, a bathroom.
+
+    The wall between is seen from both sides, and ends at a doorway; the bathroom's has a door in it.
+    """
+    ring: list[Place] = [(0, 0), (8, 0), (8, 6), (0, 6)]
+    lines = [*zip(ring, [*ring[1:], ring[0]], strict=True),
+             ((4.95, 0.05), (4.95, 2.6)), ((5.05, 2.6), (5.05, 0.05)), ((4.95, 3.5), (4.95, 5.95)),
+             ((5.05, 5.95), (5.05, 3.5)), ((5.1, 4), (7.95, 4))]  # fmt: skip
+    toilet = {"category": {"toilet": {}}, "dimensions": [0.4, 0.8, 0.7],
+              "transform": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 6, 0.4, 5.6, 1]}  # fmt: skip
+    return scan(
+        folder, walls=[surface("wall", a, b, 0, 2.5) for a, b in lines], floors=[floor(ring)],
+        doors=[surface("door", (6, 4), (6.8, 4), 0, 2)], objects=[toilet],
+    )  # fmt: skip
+
+
+def test_a_home_scanned_at_once_has_its_rooms(tmp_path: Path) -> None:
+    rooms = plan_from_file(whole_home(tmp_path)).plan.rooms
+    found = {r.type.value: r.area for r in rooms}
+    assert found == {
+        "living": pytest.approx(4.95 * 6, rel=0.03),
+        "bathroom": pytest.approx(2.95 * 2, rel=0.08),
+        "hall": pytest.approx(2.95 * 4, rel=0.08),
+    }
+
+
+def test_the_doorway_between_two_walls_stays_open(tmp_path: Path) -> None:
+    house = house_of(whole_home(tmp_path))
+    middle = np.array([5.0, 1.0, 3.05])
+    near = [o for o in house.openings if np.abs(o.quad.mean(0) - middle)[[0, 2]].max() < 0.2]
+    assert len(near) == 1
+    assert near[0].quad[:, 1].max() > 1.9

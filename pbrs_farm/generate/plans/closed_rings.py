@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import shapely
@@ -14,6 +14,7 @@ from shapely.ops import polygonize, unary_union
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.geometry.doorways import HALF_M, NARROWEST_M, WIDEST_M, doorways
 
 Line = tuple[tuple[float, float], tuple[float, float]]
 
@@ -22,6 +23,8 @@ _MOST_CROSSINGS: Final = 2_000
 _SHORTEST_M: Final = 0.15
 _JOIN_M: Final = 0.1
 _LEAST_M2: Final = 1.0
+_BESIDE_M: Final = 0.25  # a room's side may run so far beside its wall's middle
+_SAME_SIDE_M: Final = 0.06
 
 
 def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> list[Polygon]:
@@ -44,9 +47,10 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
     if crossings > _MOST_CROSSINGS + len(drawn):
         text = f"its {len(drawn)} walls cross {crossings} times: no plan"
         raise BadInput(path, "walls", text)
-    noded = unary_union(
-        [*drawn, *(LineString(pair) for pair in joined if (pair[0] != pair[1]).any())]
-    )
+    middles = [LineString(pair) for pair in joined if (pair[0] != pair[1]).any()]
+    # A wall that ends at a doorway goes on behind it.
+    standing = unary_union([line.buffer(HALF_M, cap_style="flat") for line in middles])
+    noded = unary_union([*drawn, *middles, *doorways(standing, HALF_M + join_m)])
     rooms = [p for p in polygonize(noded) if p.area >= _LEAST_M2]
     if not rooms:
         gap, at = _widest_gap(ends)
@@ -54,6 +58,29 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
         raise BadInput(path, "walls", text, hint=f"ends within {join_m:g} m are joined")
     whole = [Polygon(p.exterior) if not p.interiors else p for p in rooms]
     return sorted((Polygon(p.exterior) for p in whole), key=lambda p: -p.area)
+
+
+def passages_between(
+    rooms: Sequence[Polygon], lines: Sequence[Line], openings: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """The rows of passages: gaps between the walls of two rooms, as wide as doors, of which the file has no opening.
+
+    lines: middle lines of walls, metres. Without a passage a wall would stand in the doorway.
+    """
+    walls = [LineString(line) for line in lines if line[0] != line[1]]
+    standing = unary_union([wall.buffer(_BESIDE_M, cap_style="flat") for wall in walls])
+    told = [Point(o["at"]) for o in openings]
+    found: list[dict[str, Any]] = []
+    for k, room in enumerate(rooms):
+        for other in rooms[:k]:
+            shared = room.buffer(_SAME_SIDE_M).intersection(other.exterior).difference(standing)
+            for gap in shapely.get_parts(shapely.line_merge(shared)):
+                middle = gap.interpolate(0.5, normalized=True)
+                is_door = NARROWEST_M - _JOIN_M <= gap.length <= WIDEST_M + _JOIN_M
+                if is_door and not any(p.distance(middle) < gap.length / 2 for p in told):
+                    row = {"at": [middle.x, middle.y], "width": gap.length, "kind": "passage"}
+                    found.append(row)
+    return found
 
 
 def _join_near_ends(ends: F64, join_m: float) -> F64:

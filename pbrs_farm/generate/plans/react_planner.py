@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.closed_rings import Line, closed_rings, passages_between
 from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
     ParsedPlan,
@@ -97,6 +97,8 @@ class _Drawing:
         ]
         things = [t for k, row in self.layer.items.items() if (t := self._thing(k, row, left_out))]
         areas = self._areas(lines, left_out)
+        outlines = [area.shape for area in areas]
+        openings += passages_between(outlines, list(lines.values()), openings)
         rooms = typed_rooms("react-planner", areas, things, openings, left_out)
         value = value_of(rooms, openings, max(heights, default=2.6), walls)
         return ParsedStorey(value, tuple(things), str(self.layer.name)[:60])

@@ -14,12 +14,12 @@ from typing import Any, Final
 import numpy as np
 import shapely
 from pydantic import BaseModel, Field
-from shapely.geometry import Point, Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.closed_rings import closed_rings
+from pbrs_farm.generate.plans.closed_rings import closed_rings, passages_between
 from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
     ParsedPlan,
@@ -31,6 +31,7 @@ from pbrs_farm.generate.plans.parsed_plan import (
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
 from pbrs_farm.generate.plans.wall_tops import WallTop, upper_edge
+from pbrs_farm.geometry.doorways import rooms_by_walls
 
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
@@ -125,6 +126,8 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         shape for k, f in enumerate(scan.floors, 1)
         if len(f.polygonCorners) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
     ]  # fmt: skip
+    walls_of_plan = [LineString(line) for line in lines if line[0] != line[1]]
+    outlines = [room for o in outlines for room in rooms_by_walls(o, walls_of_plan) or [o]]
     outlines = outlines or closed_rings(path, lines, _JOIN_M)
     openings = [
         _opening_of_surface(s, _parse_pose(path, f"{kind} {k}", s), kind, floor)
@@ -134,6 +137,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
     things = [
         _thing(s, _parse_pose(path, f"object {k}", s), floor) for k, s in enumerate(scan.objects, 1)
     ]
+    openings += passages_between(outlines, lines, openings)
     areas = [DrawnArea(shape, _section_label(shape, scan.sections)) for shape in outlines]
     rooms = typed_rooms("roomplan", areas, things, openings, left_out)
     return ParsedStorey(value_of(rooms, openings, height), tuple(things), tops=tuple(tops))

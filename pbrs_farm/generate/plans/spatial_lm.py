@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.closed_rings import Line, closed_rings
+from pbrs_farm.generate.plans.closed_rings import Line, closed_rings, passages_between
 from pbrs_farm.generate.plans.parsed_plan import LeftOut, ParsedPlan, ParsedStorey, Thing, value_of
 from pbrs_farm.generate.plans.plan_format import PlanFormat
 from pbrs_farm.generate.plans.room_types import DrawnArea, typed_rooms
@@ -59,6 +59,7 @@ def plan_of_layout(path: Path) -> ParsedPlan:
     outlines: list[Line] = [((w[0], -w[1]), (w[3], -w[4])) for w in walls]
     rooms = closed_rings(path, outlines)
     openings = [_opening_of_numbers(kind, n, floor) for kind, n in holes]
+    openings += passages_between(rooms, outlines, openings)
     things = [
         Thing("spatiallm", word, x, -y, z - sz / 2 - floor, sx, sy, sz, angle)
         for word, (x, y, z, angle, sx, sy, sz) in boxes

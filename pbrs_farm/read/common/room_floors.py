@@ -15,6 +15,7 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
+from pbrs_farm.geometry.doorways import doorways, parted_at_doorways
 
 # A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
@@ -82,11 +83,14 @@ def floor_polygons(
     if not len(corners):
         return []
     # Cut closed walls by their footprint, planar walls by a strip along them.
-    between = shapely.difference(
-        _outline_from_above(corners), _outline_from_above(_faces_looking(walls, 1))
-    )
-    between = shapely.difference(between, _outline_from_above(_faces_looking(walls, -1)))
-    pieces = shapely.get_parts(shapely.difference(between, _traces(walls)))
+    feet = [_outline_from_above(_faces_looking(walls, sign)) for sign in (1, -1)]
+    between = _outline_from_above(corners)
+    for taken in (*feet, traces := _traces(walls)):
+        between = shapely.difference(between, taken)
+    # One room ends at the doorway to the next.
+    ways = doorways(shapely.union_all([*feet, traces]))
+    parts = [p for whole in shapely.get_parts(between) for p in parted_at_doorways(whole, ways)]
+    pieces = np.array(parts, object)
     # Keep pieces that are large and wide enough; give back what the strips took.
     narrow = shapely.is_empty(_grown(pieces, -min_width_m / 2))
     fit = pieces[(shapely.area(pieces) >= min_area_m2) & ~narrow].tolist()

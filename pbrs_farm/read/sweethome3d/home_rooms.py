@@ -10,6 +10,7 @@ import shapely
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
+from pbrs_farm.geometry.doorways import doorways, parted_at_doorways
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
@@ -69,7 +70,7 @@ def read_rooms(
 def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[HomeRoom, ...]:
     """Rooms where walls of visible levels enclose something, for a plan in which none is drawn.
 
-    Gaps of ends that miss each other are closed; parapets and fences enclose nothing.
+    Gaps of ends that miss each other are closed, and rooms end at doorways; parapets and fences enclose nothing.
     """
     found: list[HomeRoom] = []
     for level_id in dict.fromkeys(wall.level for wall in plan.walls):
@@ -84,7 +85,9 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
         standing = standing.buffer(-GAP_M / 2, join_style="mitre")
         # What lies within the walls' outer edge, and under no wall.
         whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(standing)])
-        inside = _polygons(shapely.difference(whole, shapely.union_all([standing, *feet])))
+        pieces = _polygons(shapely.difference(whole, shapely.union_all([standing, *feet])))
+        ways = doorways(shapely.union_all([standing, *feet]))
+        inside = [room for piece in pieces for room in parted_at_doorways(piece, ways)]
         found += [
             HomeRoom(
                 place=f"walls of level {level_id or '0'}", level=level_id, name="", points=_ring(p.exterior),

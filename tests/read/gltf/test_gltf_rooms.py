@@ -21,6 +21,21 @@ def test_rooms_are_the_pieces_of_floor_that_walls_part() -> None:
     assert house.rooms[0].has_ceiling
 
 
+@pytest.mark.parametrize(("thickness", "gap", "n"), [(0.0, 1.0, 2), (0.15, 0.9, 2), (0.15, 1.8, 1)])
+def test_rooms_end_at_a_doorway_as_high_as_the_walls(thickness: float, gap: float, n: int) -> None:
+    s = two_rooms()
+    s.nodes.pop()
+    for k, (low, high) in enumerate([(0.0, 1.0), (1.0 + gap, 3.0)]):
+        side = [[4, 0, high], [4, 0, low], [4, 2.6, low], [4, 2.6, high]]
+        corners = [4 - thickness / 2, 0, low], [4 + thickness / 2, 2.6, high]
+        s.node(f"Wall.{k}", mesh=s.box(*corners) if thickness else s.mesh([side]))
+    house = read(s)
+    assert len(house.rooms) == n
+    if n == 2:
+        areas = [area(r.polygon) for r in house.rooms]
+        assert areas == pytest.approx([12.0, 6.0], abs=0.25)
+
+
 def test_a_room_beside_a_ceiling_has_none_and_takes_its_height_from_the_walls() -> None:
     s = two_rooms()
     s.nodes[1]["mesh"] = s.mesh([[[0, 2.4, 0], [4.05, 2.4, 0], [4.05, 2.4, 3], [0, 2.4, 3]]])

@@ -302,3 +302,19 @@ def test_a_baseboard_is_a_solid_strip_along_the_wall() -> None:
     assert mesh.bounds[:, 1] == pytest.approx([0, 0.07], abs=1e-5)
     assert mesh.bounds[1, 2] == pytest.approx(0.06, abs=1e-5)
     assert board.kind is ItemKind.WALL
+
+
+@pytest.mark.parametrize(("gap_cm", "n"), [(90, 2), (180, 1)])
+def test_rooms_between_walls_end_at_a_doorway(gap_cm: int, n: int) -> None:
+    ends = f"""
+    <wall id='e' xStart='250' yStart='0' xEnd='250' yEnd='100' thickness='10'/>
+    <wall id='f' xStart='250' yStart='{100 + gap_cm}' xEnd='250' yEnd='300' thickness='10'/>
+    """
+    house = read_home(sh3d(home_xml(WALLS + ends, room="")), "test.sh3d")
+    areas = sorted(float(shapely.Polygon(r.polygon).area) for r in house.rooms)
+    assert len(areas) == n
+    # The doorway's ground is half of one room's, half of the other's.
+    expected = [1.45 * 2.9 - 0.05 * (2.9 - 0.9), 2.45 * 2.9 - 0.05 * (2.9 - 0.9)]
+    assert n == 1 or areas == pytest.approx(expected, abs=0.01)
+    floors = [i for i in house.items if i.kind is ItemKind.FLOOR]
+    assert len(floors) == n

@@ -1,0 +1,123 @@
+"""Doorways between walls that end: gaps that part one room from the next, though no wall does; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.ops import polygonize, unary_union
+
+from pbrs_farm.core.arrays import F64
+
+NARROWEST_M: Final = 0.5
+WIDEST_M: Final = (
+    1.3  # of a doorway with one leaf and its frame; wider gaps join two parts of a room
+)
+LEAST_M2: Final = 1.2  # of what a doorway leads into
+_LEAST_WIDTH_M: Final = 0.7
+_THICKEST_M: Final = 0.6  # of a wall that ends
+_LEAST_LONG_M: Final = 0.3  # of the wall behind its end
+_THINNEST_M: Final = 0.004
+_SQUARE: Final = 0.9  # least cosine between a wall's sides and the way out of its end
+_AT_EDGE_M: Final = 0.15  # walls nearer to the edge of a ground are its own
+HALF_M: Final = 0.05  # half the thickness that walls without one are given
+_JOIN_M: Final = 0.1  # between walls that were meant to meet
+_REACH_M: Final = 0.02  # into the walls at both ends, so that what is parted is parted whole
+
+
+def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
+    """A line across each gap between the end of a wall and what stands before it, doors wide.
+
+    walls: their ground, a shapely area in metres. reach_m: by how much a line goes on into the walls. A
+    gap between two ends may be there twice.
+    """
+    found = []
+    for ring in _rings(walls):
+        corners = shapely.get_coordinates(ring)[:-1]
+        for start, way in _ends(corners):
+            gap = _gap_before(start, way, walls)
+            if gap is not None:
+                tip = way * reach_m
+                found.append(LineString([start - tip, start + way * gap + tip]))
+    return found
+
+
+def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Polygon]:
+    """A piece of ground, parted by the lines where they leave rooms on both sides; whole where none does.
+
+    What is too small for a room goes to its neighbour. Parts share the line between them: nothing of
+    the ground is lost.
+    """
+    across = [line for line in lines if piece.intersects(line)]
+    if not across:
+        return [piece]
+    faces = polygonize(unary_union([piece.boundary, *across]))
+    parts: list[Any] = [f for f in faces if piece.contains(f.representative_point())]
+    while small := sorted((p for p in parts if not _is_room(p)), key=lambda p: p.area):
+        rest = [p for p in parts if p is not small[0]]
+        shared = [p.intersection(small[0]).length for p in rest]
+        if not any(shared):
+            break
+        k = int(np.argmax(shared))
+        parts = [p.union(small[0]) if n == k else p for n, p in enumerate(rest)]
+    return parts if len(parts) > 1 else [piece]
+
+
+def _is_room(part: Polygon) -> bool:
+    return bool(part.area >= LEAST_M2 and not part.buffer(-_LEAST_WIDTH_M / 2).is_empty)
+
+
+def _rings(walls: Any) -> list[Any]:
+    """Their outlines and holes, the wall to the left of each."""
+    polygons = [p for p in shapely.get_parts(walls) if p.geom_type == "Polygon"]
+    simple = [shapely.orient_polygons(p.simplify(_THINNEST_M / 2)) for p in polygons]
+    return [ring for p in simple for ring in (p.exterior, *p.interiors)]
+
+
+def _ends(corners: F64) -> list[tuple[F64, F64]]:
+    """(middle, way out) of each side of a ring that is the end of a wall: short, between two long ones."""
+    sides = np.roll(corners, -1, 0) - corners
+    lengths = np.hypot(*sides.T)
+    ways = sides / np.maximum(lengths, 1e-12)[:, None]
+    out = np.stack([ways[:, 1], -ways[:, 0]], 1)
+    before, after = np.roll(ways, 1, 0), np.roll(ways, -1, 0)
+    is_end = (lengths >= _THINNEST_M) & (lengths <= _THICKEST_M)
+    is_end &= (np.roll(lengths, 1) >= _LEAST_LONG_M) & (np.roll(lengths, -1) >= _LEAST_LONG_M)
+    # It turns left at both of its corners, about square: the wall lies behind it.
+    is_end &= ((before * out).sum(1) > _SQUARE) & ((after * out).sum(1) < -_SQUARE)
+    return [(corners[k] + sides[k] / 2, out[k]) for k in np.flatnonzero(is_end)]
+
+
+def _gap_before(start: F64, way: F64, walls: Any) -> float | None:
+    """Metres from a wall's end to what stands before it, where that is as wide as a doorway."""
+    ahead = LineString([start + way * 1e-3, start + way * (WIDEST_M + 0.01)])
+    hit = shapely.intersection(ahead, walls)
+    if hit.is_empty:
+        return None
+    gap = float(hit.distance(Point(start)))
+    return gap if NARROWEST_M <= gap <= WIDEST_M else None
+
+
+def rooms_by_walls(ground: Polygon, lines: Sequence[LineString]) -> list[Polygon]:
+    """The rooms into which walls without thickness part a ground, closed at doorways; [] = they part none.
+
+    lines: middle lines of walls in metres, which may end a little before each other or the ground's edge.
+    What is too small for a room, between two faces of one wall, is left to the wall.
+    """
+    inner = ground.buffer(-_AT_EDGE_M)
+    within = [part for line in lines for part in shapely.get_parts(line.intersection(inner))]
+    if not within:
+        return []
+    edge = ground.exterior.buffer(HALF_M, join_style="mitre")
+    standing = unary_union([edge, *(line.buffer(HALF_M, cap_style="flat") for line in within)])
+    # Walls meet that end a little before each other.
+    standing = standing.buffer(_JOIN_M, join_style="mitre").buffer(-_JOIN_M, join_style="mitre")
+    ways = doorways(standing)
+    free = [p for p in shapely.get_parts(ground.difference(standing)) if _is_room(p)]
+    rooms = [room for piece in free for room in parted_at_doorways(piece, ways)]
+    grown = [r.buffer(HALF_M, join_style="mitre").intersection(ground) for r in rooms]
+    whole: list[Any] = [max(shapely.get_parts(r), key=lambda p: p.area) for r in grown]
+    return whole if len(whole) > 1 else []
