@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.dressing import dress
 from pbrs_farm.prepare.read_source import read_house
@@ -93,7 +93,7 @@ def repaired_home(
         house, repairs, _report = finished_house(variants(resolve(name), [seed])[0], recipe)
     else:
         house, repairs = repair(
-            dressed, recipe.repair, occluder_from=lambda some: Caster(geometry_from_house(some))
+            dressed, recipe.repair, occluder_from=lambda some: Caster.of_house(some)
         )
     glb, description = bundle_from_house(house)
     row: dict[str, Any] = {
@@ -113,7 +113,7 @@ def _seen(house: House) -> dict[str, Any]:
     from pbrs_farm.sample import sample_cameras
 
     recipe = recipe_from_name("fast")
-    caster = Caster(geometry_from_house(house))
+    caster = Caster.of_house(house)
     seed = camera_seed(house.id, recipe)
     views = sample_cameras(
         house, recipe.cameras, seed, caster.item_counts, caster.depth_pictures

@@ -10,7 +10,7 @@ import json
 import sys
 import time
 
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.source import resolve, variants
@@ -28,7 +28,7 @@ def cost(name: str, seed: int) -> dict[str, float]:
     recipe = recipe_from_name("fast")
     bare, _ = repaired_house(resolve(name), recipe)
     dressed, _ = repaired_house(variants(resolve(name), [seed])[0], recipe)
-    caster = Caster(geometry_from_house(dressed))
+    caster = Caster.of_house(dressed)
     views = sample_cameras(
         dressed, recipe.cameras, camera_seed(dressed.id, recipe), caster.item_counts,
         caster.depth_pictures,

@@ -83,7 +83,6 @@ def _measured(name: str) -> dict[str, Any]:
 def measure(name: str) -> dict[str, Any]:
     """Read and repair one home on one core of this process."""
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.core.recipe import Recipe
     from pbrs_farm.prepare.read_source import read_house
     from pbrs_farm.raycast.caster import Caster
@@ -97,9 +96,7 @@ def measure(name: str) -> dict[str, Any]:
         started = time.perf_counter()
         house = read_house(source, recipe.read)
         read_s = time.perf_counter() - started
-        repaired, report = repair(
-            house, recipe.repair, occluder_from=lambda h: Caster(geometry_from_house(h))
-        )
+        repaired, report = repair(house, recipe.repair, occluder_from=lambda h: Caster.of_house(h))
         seconds = time.perf_counter() - started
     leaks = report.leaks
     return {

@@ -12,7 +12,6 @@ from typing import Any, Final
 
 from benchmarks.figures import write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.repair import repair
@@ -47,7 +46,7 @@ def _view(preset: str, parts: int) -> tuple[float, int]:
 
     recipe = recipe_from_name(preset, {"sky.kind": "sunsky"})
     house, _report = repair(
-        builtin_home(), recipe.repair, occluder_from=lambda h: Caster(geometry_from_house(h))
+        builtin_home(), recipe.repair, occluder_from=lambda h: Caster.of_house(h)
     )
     scene = LightScene.load(house, {}, recipe, sky_for_house(recipe, house.id))
     stored = house.cameras[0]

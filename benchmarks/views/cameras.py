@@ -112,7 +112,7 @@ def _repaired(name: str) -> House:
     house = read_house(resolve(name), recipe.read)
 
     def occluder_from(some: House) -> Caster:
-        return Caster(geometry_from_house(some))
+        return Caster.of_house(some)
 
     return repair(house, recipe.repair, occluder_from=occluder_from)[0]
 
@@ -205,7 +205,7 @@ def _in_a_process(*words: str, env: Mapping[str, str] | None = None) -> dict[str
 def _sample_home(name: str) -> None:
     house = _repaired(name)
     started = time.perf_counter()
-    caster = Caster(geometry_from_house(house))
+    caster = Caster.of_house(house)
     report = sample_cameras(house, CameraFields(), 0, caster.item_counts).report
     seconds = time.perf_counter() - started
     row = {"seconds": seconds, "candidates": report.n_candidates, "views": report.n_views}

@@ -82,13 +82,13 @@ def _write(
 def _seconds_a_view(house: House, cameras: list[Camera]) -> tuple[float, float]:
     """Median seconds from camera to encoded files: the labels every view has; those and all more."""
     geometry = geometry_from_house(house)
-    caster, textures = Caster(geometry), decoded_textures(house)[0]
+    caster, textures = Caster.of_house(house, geometry), decoded_textures(house)[0]
     basic, everything = [], []
     for camera in [cameras[0], *cameras]:  # the first warms the caster's kernels up
         started = time.perf_counter()
         hit = caster.hit_record(camera)
         arrays = truth.layers_from_hit(hit, house, camera)
-        truth.view_table(hit.item, house, camera)
+        truth.view_table(hit.item, house, camera, cut_outs=caster.cut_outs)
         for name, array in arrays.items():
             layer_bytes(name, array)
         basic.append(time.perf_counter() - started)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.classes import NYU13_NAMES
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.raycast.caster import Caster
@@ -31,7 +31,7 @@ SIZE = (160, 120)
 
 def measured_home(house: House, preset: str) -> dict[str, Any]:
     """Views of one repaired home: a row of numbers for each, and how many rooms have one."""
-    caster = Caster(geometry_from_house(house))
+    caster = Caster.of_house(house)
     fields = recipe_from_name(PRESETS[preset]).cameras
     sampling = sample_cameras(house, fields, 0, caster.item_counts, caster.depth_pictures)
     views = list(sampling.views)

@@ -192,19 +192,10 @@ def _albedo(view: StoredView, face: Faces, point: Floats, triangles: Triangles) 
     """(N, 3) sRGB 0..255 of the materials at points (N, 3) on faces; 0 where face is -1."""
     found = np.zeros((len(face), 3))
     hit = np.nonzero(face >= 0)[0]
-    corners = triangles.faces[face[hit]]
-    a, b, c = (triangles.vertices[corners[:, k]].astype(np.float64) for k in range(3))
-    # Weights of the corners: areas over against them.
-    normal = np.cross(b - a, c - a)
-    squared = np.einsum("ni,ni->n", normal, normal)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at_b = np.einsum("ni,ni->n", np.cross(point[hit] - a, c - a), normal) / squared
-        at_c = np.einsum("ni,ni->n", np.cross(b - a, point[hit] - a), normal) / squared
-    uv = triangles.uv[corners].astype(np.float64)
-    at = uv[:, 0] + at_b[:, None] * (uv[:, 1] - uv[:, 0]) + at_c[:, None] * (uv[:, 2] - uv[:, 0])
+    at = triangles.uv_at(face[hit], point[hit])
     is_physical = view.recipe is not None and view.recipe.materials.preset == "physical"
     most = PHYSICAL_ALBEDO if is_physical else 1.0
-    found[hit] = triangles.colours.at(triangles.material[face[hit]], np.nan_to_num(at), most)
+    found[hit] = triangles.colours.at(triangles.material[face[hit]], at, most)
     return found
 
 
@@ -288,7 +279,7 @@ def _coincident(
             gap = np.abs(t - first[pixel]) * across[pixel]
             if len(own) and gap.min() <= TIE_DEPTH_M:
                 found[pixel] = own[gap.argmin()]
-    return found
+    return rays.without_holes(found, origin, directions)
 
 
 def _distances_pierced(

@@ -18,6 +18,8 @@ from pbrs_farm.images import decode_texture
 
 _DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
+_SHARE = np.arange(256) / 255  # of one, that a byte is; and its linear light
+_LINEAR = np.where(_SHARE <= 0.04045, _SHARE / 12.92, ((_SHARE + 0.055) / 1.055) ** 2.4)
 _SEE_THROUGH = ("glass", "pane")  # kinds of material
 _MAX_ELEMENTS = 50_000_000  # vertices, triangles: nodes may show one mesh many times
 
@@ -33,6 +35,7 @@ class Colours:
     factors: NDArray[np.float64]  # (M, 3) linear
     pictures: tuple[tuple[str, bytes] | None, ...]  # of each material: media type and bytes
     decoded: dict[int, NDArray[np.uint8] | None]  # of those looked up until now
+    cutoffs: NDArray[np.float64]  # (M,) alpha below which there is a hole, 0 = no holes
 
     def at(
         self, material: NDArray[np.int64], uv: NDArray[np.float64], most: float
@@ -49,12 +52,25 @@ class Colours:
             pixels = self._picture(int(number))
             if pixels is not None:
                 own = material == number
-                linear[own] *= _between_texels(pixels, uv[own])
+                linear[own] *= _between_texels(pixels[..., :3], uv[own], _LINEAR)
         linear = np.clip(linear, 0.0, most)
         low = linear * 12.92
         return np.asarray(
             255 * np.where(linear <= 0.0031308, low, 1.055 * linear ** (1 / 2.4) - 0.055)
         )
+
+    def is_hole(self, material: NDArray[np.int64], uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(N,) whether alpha at uv (N, 2), v down, is below the cutoff of material (N,) there."""
+        hole = np.zeros(len(material), bool)
+        for number in np.unique(material):
+            if self.cutoffs[number] > 0:
+                own = material == number
+                pixels = self._picture(int(number))
+                alpha = np.ones(int(own.sum()))
+                if pixels is not None and pixels.shape[2] == 4:
+                    alpha = _between_texels(pixels[..., 3:], uv[own], _SHARE)[:, 0]
+                hole[own] = alpha < self.cutoffs[number]
+        return hole
 
     def _picture(self, material: int) -> NDArray[np.uint8] | None:
         stored = self.pictures[material]
@@ -70,16 +86,17 @@ class Colours:
         return self.decoded[material]
 
 
-def _between_texels(pixels: NDArray[np.uint8], uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) linear colour between the four texels about each uv (N, 2), which repeats; v down."""
+def _between_texels(
+    pixels: NDArray[np.uint8], uv: NDArray[np.float64], value_of_byte: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(N, C) values between the four texels about each uv (N, 2), which repeats; v down."""
     height, width = pixels.shape[:2]
     x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
-    found = np.zeros((len(uv), 3))
+    found = np.zeros((len(uv), pixels.shape[2]))
     for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
         column, row = np.floor(x) + dx, np.floor(y) + dy
         weight = (1 - np.abs(x - column)) * (1 - np.abs(y - row))
-        byte = pixels[(row % height).astype(int), (column % width).astype(int), :3] / 255
-        texel = np.where(byte <= 0.04045, byte / 12.92, ((byte + 0.055) / 1.055) ** 2.4)
+        texel = value_of_byte[pixels[(row % height).astype(int), (column % width).astype(int)]]
         found += weight[:, None] * texel
     return found
 
@@ -100,6 +117,31 @@ class Triangles:
     loose: dict[
         int, NDArray[np.float32]
     ]  # instance id -> (N, 3) vertices, also those of no triangle
+
+    @property
+    def has_holes(self) -> NDArray[np.bool_]:
+        """(F,) whether the material may be cut out."""
+        if not len(self.material):
+            return np.zeros(0, bool)
+        return np.asarray(self.colours.cutoffs[self.material] > 0)
+
+    def uv_at(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, 2) texture coordinates, v down, of points (N, 3) on faces (N,)."""
+        corners = self.faces[face]
+        a, b, c = (self.vertices[corners[:, k]].astype(np.float64) for k in range(3))
+        # Weights of the corners: areas over against them.
+        normal = np.cross(b - a, c - a)
+        squared = np.einsum("ni,ni->n", normal, normal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at_b = np.einsum("ni,ni->n", np.cross(points - a, c - a), normal) / squared
+            at_c = np.einsum("ni,ni->n", np.cross(b - a, points - a), normal) / squared
+        uv = self.uv[corners].astype(np.float64)
+        at = uv[:, 0] + at_b[:, None] * (uv[:, 1] - uv[:, 0])
+        return np.asarray(np.nan_to_num(at + at_c[:, None] * (uv[:, 2] - uv[:, 0])))
+
+    def is_hole(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(N,) whether alpha leaves nothing of faces (N,) at points (N, 3) on them."""
+        return self.colours.is_hole(self.material[face], self.uv_at(face, points))
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
@@ -188,7 +230,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
 
 
 def _colours(document: dict[str, Any], binary: bytes) -> Colours:
-    factors, pictures = [], []
+    factors, pictures, cutoffs = [], [], []
     for material in document.get("materials", []):
         pbr = material["pbrMetallicRoughness"]
         factors.append(pbr["baseColorFactor"][:3])
@@ -201,4 +243,9 @@ def _colours(document: dict[str, Any], binary: bytes) -> Colours:
             start = view.get("byteOffset", 0)
             picture = image["mimeType"], binary[start : start + view["byteLength"]]
         pictures.append(picture)
-    return Colours(np.array(factors, np.float64).reshape(-1, 3), tuple(pictures), {})
+        # Glass with holes, for which glTF has no mode, has its cutoff among its extras.
+        given = material if material.get("alphaMode") == "MASK" else material.get("extras", {})
+        cutoffs.append(float(given.get("alphaCutoff", 0.5 if given is material else 0.0)))
+    return Colours(
+        np.array(factors, np.float64).reshape(-1, 3), tuple(pictures), {}, np.array(cutoffs)
+    )

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
 from pbrs_farm.check.stored_files import BadFile, stored_object
-from pbrs_farm.check.stored_mesh import Colours, Triangles
+from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
 BOX_M = 0.001  # by which a side of a box may differ from its triangles
@@ -47,8 +47,8 @@ class HouseItems:
             n = len(faces)
             own = Triangles(
                 t.vertices[used], numbers.reshape(-1, 3).astype(np.int64), np.full(n, instance),
-                np.zeros(n, np.int64), {}, np.zeros(n, bool), {}, t.uv[used],
-                Colours(np.zeros((0, 3)), (), {}), {},
+                t.material[t.instance == instance], {}, np.zeros(n, bool), {}, t.uv[used],
+                t.colours, {},
             )  # fmt: skip
             self._alone[instance] = own.vertices.astype(np.float64), Rays(own)
         return self._alone[instance]

@@ -226,7 +226,6 @@ def _repair(args: argparse.Namespace) -> int:
 
 
 def _cameras(args: argparse.Namespace) -> int:
-    from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.crash_notes import note_step
     from pbrs_farm.formats.cameras_json import cameras_document
     from pbrs_farm.formats.serialise import json_bytes
@@ -240,7 +239,7 @@ def _cameras(args: argparse.Namespace) -> int:
     recipe = recipe_of(args)
     house, _report = repaired_house(resolve(args.home, models=args.models), recipe)
     # Score candidates by the items that rays from them meet.
-    caster = Caster(geometry_from_house(house))
+    caster = Caster.of_house(house)
     note_step(args.home, "cameras")
     seed = camera_seed(house.id, recipe)
     sampling = chosen_cameras(house, recipe.cameras, seed, caster)

@@ -1,4 +1,4 @@
-"""Arrays on another pixel grid, the same bits on every machine: by area, nearest, or any; no effects."""
+"""Arrays on another pixel grid or between pixels, the same bits on every machine; no effects."""
 
 from __future__ import annotations
 
@@ -55,6 +55,36 @@ def resized_any(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.
         counts = np.insert(np.cumsum(mask, axis=axis, dtype=np.int32), 0, 0, axis=axis)
         mask = np.take(counts, last, axis=axis) > np.take(counts, first, axis=axis)
     return mask
+
+
+def bilinear(
+    pixels: NDArray[np.uint8],
+    uv: NDArray[np.floating],
+    value_of_byte: NDArray[np.float32] | None = None,
+) -> NDArray[np.float32]:
+    """(N, C) values of pixels (H, W, C) at uv (N, 2), v up and row 0 at the top.
+
+    value_of_byte: (256,) what the bytes stand for; None = themselves.
+    """
+    # Place texel centres at half integers; v points up, rows count down.
+    height, width = pixels.shape[:2]
+    finite = np.where(np.isfinite(uv), uv, 0).astype(np.float64)
+    x = finite[:, 0] * width - 0.5
+    y = (1 - finite[:, 1]) * height - 0.5
+    # Find the four texels around each point and how far it lies between them.
+    x0, y0 = np.floor(x), np.floor(y)
+    fx, fy = (x - x0).astype(np.float32)[:, None], (y - y0).astype(np.float32)[:, None]
+    left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)
+    top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
+
+    def at(rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
+        found = pixels[rows, columns]
+        return found.astype(np.float32) if value_of_byte is None else value_of_byte[found]
+
+    # Blend along rows first.
+    upper = at(top, left) * (1 - fx) + at(top, right) * fx
+    lower = at(bottom, left) * (1 - fx) + at(bottom, right) * fx
+    return np.asarray(upper * (1 - fy) + lower * fy, np.float32)
 
 
 def _nearest(size: int, n: int) -> NDArray[np.intp]:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest
 from pbrs_farm.core.recipe import Recipe
@@ -223,7 +223,7 @@ def _repair(work: Preparation) -> Preparation:
     from pbrs_farm.repair import repair
 
     def occluder_from(some: House) -> Caster:
-        return Caster(geometry_from_house(some))
+        return Caster.of_house(some)
 
     repaired = partial(repair, fields=work.recipe.repair, occluder_from=occluder_from)
     dressed = work.dressed

@@ -6,7 +6,9 @@ computed in double precision from that face's float32 vertices, the same bits in
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,8 +16,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, I32, Bools, HitRecord, ItemBuffer
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.cutouts import CutOut, CutOuts, cut_outs_by_material, faces_with_holes
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
+from pbrs_farm.raycast.cutout_tracer import CutOutTracer
 from pbrs_farm.raycast.hit_records import hit_record_from_faces
 from pbrs_farm.raycast.scalar_tracer import ScalarTracer
 from pbrs_farm.raycast.tracer import JitTracer, RayTracer
@@ -29,16 +34,29 @@ class Caster:
     """The ray caster of one Geometry, panes included; face numbers are Geometry's.
 
     variant: a Mitsuba variant; the best that works here when None. No ray hits a degenerate
-    triangle or one with a vertex that is not finite; without faces no ray hits anything.
+    triangle or one with a vertex that is not finite; without faces no ray hits anything. Where
+    alpha leaves a hole in a surface a ray goes on behind it.
     """
 
-    def __init__(self, geometry: Geometry, *, variant: str | None = None) -> None:
+    def __init__(
+        self, geometry: Geometry, *, cut_outs: CutOuts | None = None, variant: str | None = None
+    ) -> None:
+        """cut_outs: the holes that pictures cut into surfaces; `of_house` finds them."""
         self.geometry = geometry  # world frame, metres
+        self.cut_outs: CutOuts = cut_outs or {}
         self.variant = choose_variant() if variant is None else variant
         # Ids run from 1: the largest is the number of items.
         self.n_items = int(geometry.face_item.max()) if len(geometry.face_item) else 0
-        self._tracer = _tracer(self.variant, geometry, _hittable(geometry))
+        self._tracer = self._tracer_of(_hittable(geometry))
         self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
+
+    @classmethod
+    def of_house(cls, house: House, geometry: Geometry | None = None) -> Caster:
+        """The caster of a house, with the holes that pictures cut into its surfaces.
+
+        geometry: of the house, where it is at hand.
+        """
+        return cls(geometry or geometry_from_house(house), cut_outs=cut_outs_of_house(house))
 
     def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
         """The first hit of the ray through each pixel's centre (rule 8).
@@ -119,8 +137,31 @@ class Caster:
         key = np.packbits(skip_faces).tobytes()
         if self._without[0] != key:
             keep = _hittable(self.geometry) & ~skip_faces
-            self._without = (key, _tracer(self.variant, self.geometry, keep))
+            self._without = (key, self._tracer_of(keep))
         return self._without[1]
+
+    def _tracer_of(self, keep: Bools) -> RayTracer | None:
+        """The tracer of the faces to keep (F,), None of none."""
+        build = partial(_tracer, self.variant, self.geometry)
+        if (keep & faces_with_holes(self.geometry, self.cut_outs)).any():
+            return CutOutTracer(self.geometry, self.cut_outs, keep, build)
+        return build(keep)
+
+
+def cut_outs_of_house(house: House) -> dict[int, CutOut]:
+    """The holes of a house's materials; decodes those pictures alone that may cut any.
+
+    A picture that cannot be decoded is opaque.
+    """
+    from pbrs_farm.images import decode_texture
+
+    cutting = {m.texture_id or "" for m in house.materials if m.alpha_cutout}
+    pictures = {}
+    for key in sorted(cutting & house.textures.keys()):
+        texture = house.textures[key]
+        with contextlib.suppress(BadInput):
+            pictures[key] = decode_texture(texture.data, texture.name, texture.media_type)
+    return cut_outs_by_material(house, pictures)
 
 
 def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:

@@ -72,7 +72,7 @@ class CachedHouse:
         """The ray caster of labels and item buffers."""
         from pbrs_farm.raycast.caster import Caster
 
-        return Caster(self.geometry)
+        return Caster.of_house(self.house, self.geometry)
 
     @cached_property
     def rasterizer(self) -> Rasterizer:

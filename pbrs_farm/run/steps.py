@@ -166,7 +166,7 @@ def _truth(work: Work) -> StepOutput:
     hit = caster.hit_record(camera)
     # Derive the layers that every view has, and the table of what is seen.
     arrays = truth.layers_from_hit(hit, house, camera)
-    table = truth.view_table(hit.item, house, camera)
+    table = truth.view_table(hit.item, house, camera, cut_outs=caster.cut_outs)
     room = room_of(house, view)
     if room is not None:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.camera import View
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.run import plan
@@ -41,7 +41,7 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.sample import sample_cameras
 
-    caster = Caster(geometry_from_house(dressed))
+    caster = Caster.of_house(dressed)
     views = sample_cameras(
         dressed, recipe.cameras, camera_seed(dressed.id, recipe), caster.item_counts,
         caster.depth_pictures,

@@ -13,7 +13,7 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import House, Item, Room, geometry_from_house
+from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.truth.coverage import coverage
@@ -96,7 +96,7 @@ def _is_in(room: Room, point: F64) -> bool:
 def _visible(house: House, item: Item, camera: Camera) -> float:
     """Share of an item's pixels that nothing hides, of those it has when alone and unbounded."""
     small = camera.with_size(*_SMALL)
-    alone = int(coverage(item, small).sum())
+    alone = int(coverage(item, small, _caster_of(house).cut_outs).sum())
     if alone < _LEAST_PX:
         return 0.0
     number = next(k for k, other in enumerate(house.items, 1) if other is item)
@@ -123,4 +123,4 @@ class _Identity:
 
 @lru_cache(maxsize=2)
 def _caster(key: _Identity) -> Caster:
-    return Caster(geometry_from_house(key.house))
+    return Caster.of_house(key.house)

@@ -7,39 +7,103 @@ clipped and nothing is divided by depth. On one row of pixels that is an interva
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 
-from pbrs_farm.core.arrays import F32, F64, I32, I64, Mask
+from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics, pinholes_of
-from pbrs_farm.core.house import Item
+from pbrs_farm.core.cutouts import CutOut, CutOuts
+from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import cross_products, finite_triangles, triangle_bounds
 
 _CHUNK_ROWS = 500_000  # row intervals handled at once: bounds memory on large meshes
+_CHUNK_PIXELS = 500_000  # and pixels of surfaces with holes
 
 
-def coverage(item: Item, camera: Camera) -> Mask:
-    """(H, W) bool: the ray through the pixel's centre meets any triangle of item.
+def coverage(item: Item, camera: Camera, cut_outs: CutOuts | None = None) -> Mask:
+    """(H, W) bool: the ray through the pixel's centre meets any triangle of item, where it has no hole.
 
-    Exact for a pin-hole; of another lens, by pin-hole pictures that are finer than its own.
+    cut_outs: of the house's materials. Exact for a pin-hole; of another lens, by pin-hole pictures
+    that are finer than its own.
     """
+    holes = cut_outs or {}
     if camera.intrinsics.lens.is_pinhole:
-        return _pinhole_coverage(item, camera)
+        return _pinhole_coverage(item, camera, holes)
     cameras, faces = pinholes_of(camera)
-    return faces.nearest([_pinhole_coverage(item, face) for face in cameras])
+    return faces.nearest([_pinhole_coverage(item, face, holes) for face in cameras])
 
 
-def _pinhole_coverage(item: Item, camera: Camera) -> Mask:
+def _pinhole_coverage(item: Item, camera: Camera, cut_outs: CutOuts) -> Mask:
     # Count intervals that begin and end along each row; their running sum is the depth of cover.
     i = camera.intrinsics
     starts = np.zeros((i.height_px, i.width_px + 1), np.int32)
+    covered = np.zeros((i.height_px, i.width_px), np.bool_)
     for s in item.surfaces:
-        if len(s.faces):
-            corners = _camera_space(s.positions, camera)[s.faces]
-            _add_triangles(starts, finite_triangles(corners), i)
+        if not len(s.faces):
+            continue
+        corners = _camera_space(s.positions, camera)[s.faces]
+        if s.material in cut_outs:
+            _cover_without_holes(covered, corners, s, cut_outs[s.material], i)
+        else:
+            for spans in _spans_of_triangles(finite_triangles(corners), i):
+                _add_spans(starts, spans)
     # Sum up the rows that the item reaches.
-    covered, used = np.zeros((i.height_px, i.width_px), np.bool_), starts.any(1)
-    covered[used] = np.cumsum(starts[used], axis=1, dtype=np.int32)[:, :-1] > 0
+    used = starts.any(1)
+    covered[used] |= np.cumsum(starts[used], axis=1, dtype=np.int32)[:, :-1] > 0
     return covered
+
+
+class _Spans(NamedTuple):
+    """Intervals of pixels on rows, both ends inclusive."""
+
+    triangle: I64  # (N,) of the triangles that were given
+    row: I64
+    left: I64
+    right: I64
+
+
+def _add_spans(starts: I32, spans: _Spans) -> None:
+    """Add to starts, per row, +1 where a span begins and -1 past where it ends."""
+    begin, flat = spans.row * starts.shape[1], starts.reshape(-1)
+    np.add.at(flat, begin + spans.left, 1)
+    np.add.at(flat, begin + spans.right + 1, -1)
+
+
+def _cover_without_holes(
+    covered: Mask, corners: F64, surface: Surface, holes: CutOut, i: Intrinsics
+) -> None:
+    """Mark the pixels that a surface's triangles (F, 3, 3) cover where it has no hole."""
+    finite = np.isfinite(corners).all((1, 2))
+    corners, faces = corners[finite], surface.faces[finite]
+    uvs = np.zeros((len(surface.positions), 2)) if surface.uvs is None else surface.uvs
+    planes, _ = _edge_planes(corners)
+    for spans in _spans_of_triangles(corners, i):
+        for part in _parts_by_pixels(spans):
+            # List every pixel of the spans that nothing covers yet.
+            n = part.right - part.left + 1
+            column = np.arange(n.sum()) - np.repeat(np.cumsum(n) - n - part.left, n)
+            triangle, row = np.repeat(part.triangle, n), np.repeat(part.row, n)
+            is_open = ~covered[row, column]
+            triangle, row, column = triangle[is_open], row[is_open], column[is_open]
+            # Weigh the corners by the planes of the edges over against them.
+            x, y = (column + 0.5 - i.cx) / i.fx, (row + 0.5 - i.cy) / i.fy
+            ray = np.stack([x, y, np.ones(len(row))], axis=1)
+            weights = np.einsum("ntk,nk->nt", planes[triangle], ray)
+            weights /= weights.sum(1, keepdims=True)
+            uv = np.einsum("nt,ntc->nc", weights, uvs[faces[triangle]].astype(np.float64))
+            solid = ~holes.is_hole(uv)
+            covered[row[solid], column[solid]] = True
+
+
+def _parts_by_pixels(spans: _Spans) -> Iterator[_Spans]:
+    """The spans by and by, bounded by their pixels."""
+    ends = np.cumsum(spans.right - spans.left + 1)
+    most = int(ends[-1]) if len(ends) else 0
+    cuts = np.searchsorted(ends, np.arange(_CHUNK_PIXELS, most, _CHUNK_PIXELS))
+    for part in np.split(np.arange(len(ends)), cuts):
+        yield _Spans(*(values[part] for values in spans))
 
 
 def _camera_space(points: F32, camera: Camera) -> F64:
@@ -48,8 +112,8 @@ def _camera_space(points: F32, camera: Camera) -> F64:
     return np.asarray(moved @ camera.world_from_camera[:3, :3] * [1.0, -1.0, -1.0])
 
 
-def _add_triangles(starts: I32, corners: F64, i: Intrinsics) -> None:
-    """Add to starts, per row, +1 where a triangle (T, 3, 3) begins and -1 past where it ends."""
+def _spans_of_triangles(corners: F64, i: Intrinsics) -> Iterator[_Spans]:
+    """The rows of pixel centres that each triangle (T, 3, 3) covers, by and by."""
     # Cut the triangles into chunks of bounded rows, one triangle at least.
     first, n_rows = _rows_of_triangles(corners, i)
     kept = np.nonzero(n_rows)[0]
@@ -59,7 +123,8 @@ def _add_triangles(starts: I32, corners: F64, i: Intrinsics) -> None:
         done = ends[begin - 1] if begin else 0
         stop = max(begin + 1, int(np.searchsorted(ends, done + _CHUNK_ROWS, side="right")))
         chosen = kept[begin:stop]
-        _add_spans(starts, corners[chosen], first[chosen], n_rows[chosen], i)
+        spans = _row_spans(corners[chosen], first[chosen], n_rows[chosen], i)
+        yield spans._replace(triangle=chosen[spans.triangle])
         begin = stop
 
 
@@ -78,16 +143,22 @@ def _rows_of_triangles(corners: F64, i: Intrinsics) -> tuple[I64, I64]:
     return first.astype(np.int64), n_rows.astype(np.int64)
 
 
-def _add_spans(starts: I32, corners: F64, first: I64, n_rows: I64, i: Intrinsics) -> None:
-    # List one interval for each triangle and row; y is the row's ray at z = 1.
-    row = np.arange(n_rows.sum()) - np.repeat(np.cumsum(n_rows) - n_rows - first, n_rows)
-    y = (row + 0.5 - i.cy) / i.fy
-
-    # Span planes by the eye and each edge; turn them so that they are positive in the triangle.
+def _edge_planes(corners: F64) -> tuple[F64, Bools]:
+    """(T, 3, 3) normals of the planes through the eye and the edge over against each corner, positive
+    in the triangle; (T,) whether it is seen from its edge."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     planes = np.stack([cross_products(b, c), cross_products(c, a), cross_products(a, b)], axis=1)
     determinant = np.einsum("ti,ti->t", a, planes[:, 0])
     planes *= np.sign(determinant)[:, None, None]
+    return planes, determinant == 0
+
+
+def _row_spans(corners: F64, first: I64, n_rows: I64, i: Intrinsics) -> _Spans:
+    # List one interval for each triangle and row; y is the row's ray at z = 1.
+    row = np.arange(n_rows.sum()) - np.repeat(np.cumsum(n_rows) - n_rows - first, n_rows)
+    y = (row + 0.5 - i.cy) / i.fy
+
+    planes, is_edge_on = _edge_planes(corners)
 
     # Intersect the half-lines p x + q >= 0 on each row: bounds from below (p > 0), above (p < 0).
     low = np.full(len(row), -np.inf)
@@ -101,10 +172,9 @@ def _add_spans(starts: I32, corners: F64, first: I64, n_rows: I64, i: Intrinsics
         np.minimum(high, bound, out=high, where=p < 0)
         low[(p == 0) & (q < 0)] = np.inf
 
-    # Round inwards to pixel centres and add the interval's two ends.
+    # Round inwards to pixel centres.
     left = np.ceil(np.clip(i.fx * low + i.cx - 0.5, 0, i.width_px)).astype(np.int64)
     right = np.floor(np.clip(i.fx * high + i.cx - 0.5, -1, i.width_px - 1)).astype(np.int64)
-    covers = (right >= left) & np.repeat(determinant != 0, n_rows)
-    begin, flat = row[covers] * (i.width_px + 1), starts.reshape(-1)
-    np.add.at(flat, begin + left[covers], 1)
-    np.add.at(flat, begin + right[covers] + 1, -1)
+    triangle = np.repeat(np.arange(len(corners)), n_rows)
+    covers = (right >= left) & ~is_edge_on[triangle]
+    return _Spans(*(values[covers] for values in (triangle, row, left, right)))

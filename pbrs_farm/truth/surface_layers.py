@@ -7,12 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, F64, I32, I64, HitRecord, UnitVectors
+from pbrs_farm.core.arrays import F64, I32, HitRecord, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Geometry, House, Item, corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
+from pbrs_farm.core.resampling import bilinear
 
 _LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
 _STEPS = 4096  # entries of the encoding table: fine enough that every byte is rounded as by formula
@@ -22,32 +23,6 @@ _NEAREST_CM = 100.0  # nearer depths count as this: the disparity fits into a by
 _ANGLE_OFFSET = 128 - 90  # a wall, at 90 degrees, is 128
 _FLOOR_IN_VIEW_CM = -90.0  # the lowest point below this, from the eye, is taken for the floor
 _ASSUMED_FLOOR_CM = -130.0  # the floor's height from the eye when none is in view
-
-
-def bilinear(pixels: NDArray[np.uint8], uv: F32, value_of_byte: F32 | None = None) -> F32:
-    """(N, C) values of pixels (H, W, C) at uv (N, 2), v up and row 0 at the top.
-
-    value_of_byte: (256,) what the bytes stand for; None = themselves.
-    """
-    # Place texel centres at half integers; v points up, rows count down.
-    height, width = pixels.shape[:2]
-    finite = np.where(np.isfinite(uv), uv, 0).astype(np.float64)
-    x = finite[:, 0] * width - 0.5
-    y = (1 - finite[:, 1]) * height - 0.5
-    # Find the four texels around each point and how far it lies between them.
-    x0, y0 = np.floor(x), np.floor(y)
-    fx, fy = (x - x0).astype(np.float32)[:, None], (y - y0).astype(np.float32)[:, None]
-    left, right = (x0 % width).astype(np.int64), ((x0 + 1) % width).astype(np.int64)
-    top, bottom = (y0 % height).astype(np.int64), ((y0 + 1) % height).astype(np.int64)
-
-    def at(rows: I64, columns: I64) -> F32:
-        found = pixels[rows, columns]
-        return found.astype(np.float32) if value_of_byte is None else value_of_byte[found]
-
-    # Blend along rows first.
-    upper = at(top, left) * (1 - fx) + at(top, right) * fx
-    lower = at(bottom, left) * (1 - fx) + at(bottom, right) * fx
-    return np.asarray(upper * (1 - fy) + lower * fy, np.float32)
 
 
 def albedo_label(

@@ -10,6 +10,7 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F32, ItemBuffer
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
+from pbrs_farm.core.cutouts import CutOuts
 from pbrs_farm.core.frames import opencv_world_from_camera
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.truth.coverage import coverage
@@ -38,9 +39,12 @@ def camera_table(camera: Camera) -> dict[str, Any]:
 
 
 def view_table(
-    item_buffer: ItemBuffer, house: House, camera: Camera, *, with_visible_fraction: bool = True
-) -> dict[str, Any]:
+    item_buffer: ItemBuffer, house: House, camera: Camera, *, with_visible_fraction: bool = True,
+    cut_outs: CutOuts | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """The part of view.json that labels need: the camera's table and "instances".
+
+    cut_outs: of the house's materials, as its caster has them: no item covers what lies in its holes.
 
     instances: a row for each instance id in item_buffer (H, W), by id: id, item, name, kind, nyu40,
     class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
@@ -59,7 +63,7 @@ def view_table(
     rows = []
     for instance in visible:
         item, pixels = house.items[instance - 1], int(counts[instance])
-        alone = coverage(item, camera) if with_visible_fraction else None
+        alone = coverage(item, camera, cut_outs) if with_visible_fraction else None
         rows.append(
             {
                 "id": instance,

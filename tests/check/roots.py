@@ -44,18 +44,23 @@ def make_root(
     cameras: dict[str, Camera] | None = None,
     *,
     with_optional: bool = False,
+    caster: Caster | None = None,
 ) -> Path:
     """Write the root and return its house folder; of the small home when none is given."""
     home = home or builtin_home()
     house = root / "houses" / home.id
     geometry = geometry_from_house(home)
-    caster = Caster(geometry)
+    caster = caster or Caster.of_house(home, geometry)
     glb, plain = bundle_from_house(home)
     files = {"house": {"house.glb": glb, "house.json": plain}}
     for name, camera in (cameras or views_of(home)).items():
         hit = caster.hit_record(camera)
         layers = truth.layers_from_hit(hit, home, camera)
-        table = {"house": home.id, "view": name, **truth.view_table(hit.item, home, camera)}
+        table = {
+            "house": home.id,
+            "view": name,
+            **truth.view_table(hit.item, home, camera, cut_outs=caster.cut_outs),
+        }
         label_inputs = truth.LabelInputs(
             hit,
             home,

@@ -1,9 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pbrs_farm import truth
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.cutouts import CutOut
+from pbrs_farm.core.house import Item, ItemKind, Material, Surface, geometry_from_house
+from pbrs_farm.raycast.caster import Caster
 from tests.truth.hits import camera, house
 
 
@@ -58,3 +62,37 @@ def test_a_triangle_with_nan_is_left_out():
     points = np.array([[0, 0, -1], [1, 0, -1], [np.nan, 1, -1]], np.float32)
     surface = Surface("s", points, np.array([[0, 1, 2]], np.int32), 0)
     assert not truth.coverage(Item("x", "x", ItemKind.OBJECT, "0", (surface,)), camera()).any()
+
+
+def leaf(cutoff: float = 0.5) -> tuple[Item, dict[int, CutOut]]:
+    """A slanted square before the camera, the left half of its picture a hole."""
+    points = np.array([[-1, -1, -2], [1, -1, -3], [1, 1, -3], [-1, 1, -2]], np.float32)
+    uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
+    surface = Surface("s", points, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 3, uvs)
+    alpha = np.full((4, 16, 1), 200, np.uint8)
+    alpha[:, :8] = 90
+    return Item("x", "x", ItemKind.OBJECT, "0", (surface,)), {3: CutOut(alpha, cutoff)}
+
+
+def test_an_item_covers_nothing_in_its_holes():
+    view = Camera.look(Intrinsics.from_hfov(160, 120), np.zeros(3), np.array([0, 0, -1.0]))
+    item, holes = leaf()
+    whole, left = truth.coverage(item, view), truth.coverage(item, view, holes)
+    # The square's left half is the hole, but for half a texel at the edge: the picture repeats.
+    edge = int(np.flatnonzero(whole.any(0))[0])
+    assert edge < 20
+    assert not left[:, edge + 8 : 79].any()
+    assert np.array_equal(left[:, 82:140], whole[:, 82:140])
+    assert np.array_equal(truth.coverage(item, view, leaf(0.2)[1]), whole)
+    assert not truth.coverage(item, view, leaf(0.9)[1]).any()
+    assert np.array_equal(truth.coverage(item, view, {7: holes[3]}), whole)
+
+
+def test_an_item_alone_covers_what_the_rays_to_it_meet():
+    view = Camera.look(Intrinsics.from_hfov(160, 120), np.zeros(3), np.array([0.1, 0.05, -1.0]))
+    item, holes = leaf()
+    home = replace(house(), items=(item,), materials=(Material("m"),) * 4)
+    caster = Caster(geometry_from_house(home), cut_outs=holes)
+    assert np.array_equal(truth.coverage(item, view, holes), caster.item_buffer(view) == 1)
+    row = truth.view_table(caster.item_buffer(view), home, view, cut_outs=holes)["instances"][0]
+    assert row["visible_fraction"] == 1.0

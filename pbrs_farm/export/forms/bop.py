@@ -24,6 +24,7 @@ from scipy.spatial.distance import pdist
 
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.cutouts import CutOuts
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.export.chosen_view import Choice, ChosenView, blenderproc_k, require_lens
@@ -31,6 +32,7 @@ from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
+from pbrs_farm.raycast.caster import cut_outs_of_house
 from pbrs_farm.truth.coverage import coverage
 
 _SPLIT: Final = "train_pbr"
@@ -148,6 +150,7 @@ def _write_scene(
 ) -> int:
     for name in ("rgb", "depth", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
+    cut_outs = cut_outs_of_house(house)
     camera: dict[str, Any] = {}
     poses: dict[str, Any] = {}
     info: dict[str, Any] = {}
@@ -169,7 +172,7 @@ def _write_scene(
         file = f"rgb/{image:06d}.png"
         coco["images"].append({"id": image, "file_name": file, "width": size[0], "height": size[1]})
         for k, row in enumerate(rows):
-            alone, seen = _masks(view, house.items[row["id"] - 1], row["id"])
+            alone, seen = _masks(view, house.items[row["id"] - 1], row["id"], cut_outs)
             for name, mask in (("mask", alone), ("mask_visib", seen)):
                 png = png_from_array(mask.astype(np.uint8) * np.uint8(255))
                 (folder / name / f"{image:06d}_{k:06d}.png").write_bytes(png)
@@ -193,14 +196,16 @@ def _write_scene(
     return n_files + len(files)
 
 
-def _masks(view: ChosenView, item: Item, instance: int) -> tuple[NDArray[Any], NDArray[Any]]:
+def _masks(
+    view: ChosenView, item: Item, instance: int, cut_outs: CutOuts
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """(H, W) bool where the item is when alone, and where it is seen."""
     facts = view.facts
     (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
     intrinsics = Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy)
     camera = Camera(intrinsics, np.array(facts["world_from_camera_opengl"]))
     seen = view.array("instance") == instance
-    return coverage(item, camera) | seen, seen
+    return coverage(item, camera, cut_outs) | seen, seen
 
 
 def _mask_facts(alone: NDArray[Any], seen: NDArray[Any], valid: NDArray[Any]) -> dict[str, Any]:
