@@ -21,8 +21,8 @@ from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.material_rows import (
     ALPHA,
+    CUTOFF,
     F0,
-    IS_CUTOUT,
     KD,
     KIND,
     MIRROR,
@@ -138,6 +138,6 @@ def _part(tag: int, tables: SceneTables, house: House, textures: set[str]) -> di
         "f0": row[F0].tolist(),
         "tau": row[TAU].tolist(),
         "texture": texture if int(row[KIND]) != MIRROR else None,
-        "cutout": bool(row[IS_CUTOUT] > 0),
+        "cutout": bool(row[CUTOFF] > 0),
         "radiance": [0.0] * 3 if lamp == NO_LAMP else tables.lamp_rows[lamp, :3].tolist(),
     }

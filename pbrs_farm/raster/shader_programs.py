@@ -83,10 +83,9 @@ def features_of_material(material: Material, *, is_textured: bool = True) -> int
     features = Feature.TEXTURED if is_textured and material.texture_id is not None else Feature(0)
     if material.shininess > 0 and any(material.specular):
         features |= Feature.GLOSSY
-    # Blend what is transparent; alpha then needs no cut-out of its own.
     if material.kind in (MaterialKind.GLASS, MaterialKind.PANE) or material.opacity < 1:
         features |= Feature.TRANSPARENT
-    elif material.alpha_cutout and features & Feature.TEXTURED:
+    if material.alpha_cutout:
         features |= Feature.ALPHA_CUTOUT
     return int(features)
 

@@ -10,7 +10,7 @@ layout(std140) uniform Material {
     vec4 diffuse;   // linear rgb, opacity
     vec4 specular;  // linear rgb, Phong exponent
     vec4 emission;  // linear rgb a lamp's part shows under its own light, 0
-    vec4 flags;     // 1 = window pane, 0, 0, 0
+    vec4 flags;     // 1 = window pane, cutoff of alpha, 0, 0
 };
 
 struct Light {
@@ -102,7 +102,13 @@ void main() {
     const vec4 texel = vec4(1.0);
 #endif
 #ifdef ALPHA_CUTOUT
-    if (texel.a < 0.5) discard;
+#ifdef TEXTURED
+    // Alpha is not filtered over the pixel, as labels' is not: far leaves would melt away.
+    float alpha = textureLod(diffuse_texture, uv, 0.0).a;
+#else
+    const float alpha = 1.0;
+#endif
+    if (alpha < flags.y) discard;
 #endif
     vec3 to_eye = normalize(eye - position);
     vec3 n = normalize(normal);

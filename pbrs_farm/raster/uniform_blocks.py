@@ -32,7 +32,7 @@ def _material_block(material: Material) -> list[float]:
         *diffuse, material.opacity,
         *specular, exponent,
         *emission, 0.0,
-        float(is_pane), 0.0, 0.0, 0.0,
+        float(is_pane), material.alpha_cutoff if material.alpha_cutout else 0.0, 0.0, 0.0,
     ]  # fmt: skip
 
 

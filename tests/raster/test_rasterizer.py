@@ -8,6 +8,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.frames import srgb_from_linear
 from pbrs_farm.core.house import (
+    NOTHING_LEFT,
     House,
     LightPart,
     Material,
@@ -109,6 +110,37 @@ def test_a_cut_out_texture_shows_what_lies_behind():
         picture = raster.render_dl(camera())
     assert (picture[..., 1] == 0).all()
     assert (picture[..., 0] > 100).all()
+
+
+@pytest.mark.parametrize(("cutoff", "is_left"), [(0.2, True), (0.5, False), (0.9, False)])
+def test_the_cutoff_is_the_materials(cutoff, is_left):
+    pixels = np.full((8, 8, 4), 90, np.uint8)
+    holed = Material("holed", texture_id="t", alpha_cutout=True, alpha_cutoff=cutoff)
+    scene = house((item(square(-2.0, 0)), item(square(-3.0, 1))), (holed, RED))
+    with Rasterizer(scene, {"t": pixels}) as raster:
+        picture = raster.render_dl(camera())
+    assert bool((picture[..., 1] > 0).all()) is is_left
+
+
+def test_glass_has_holes_too():
+    pixels = np.full((8, 8, 4), 255, np.uint8)
+    pixels[..., 3] = 0
+    glass = Material(
+        "g", MaterialKind.GLASS, opacity=0.5, texture_id="t", alpha_cutout=True,
+        diffuse=(0.0, 0.0, 1.0),
+    )  # fmt: skip
+    wall = item(square(-3.0, 0))
+    with Rasterizer(house((wall,), (RED,)), {}) as bare:
+        without = bare.render_dl(camera())
+    with Rasterizer(house((wall, item(square(-2.0, 1))), (RED, glass)), {"t": pixels}) as glazed:
+        assert np.array_equal(glazed.render_dl(camera()), without)
+
+
+def test_what_is_cut_out_as_a_whole_needs_no_picture():
+    gone = Material("gone", alpha_cutout=True, alpha_cutoff=NOTHING_LEFT)
+    scene = house((item(square(-2.0, 0)), item(square(-3.0, 1))), (gone, RED))
+    with Rasterizer(scene, {}) as raster:
+        assert (raster.render_dl(camera())[..., 1] == 0).all()
 
 
 def test_a_window_pane_lets_nearly_everything_through():

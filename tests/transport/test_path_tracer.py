@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.cutouts import CutOut
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
-from pbrs_farm.core.house import House, Material, MaterialKind, geometry_from_house
+from pbrs_farm.core.house import NOTHING_LEFT, House, Material, MaterialKind, geometry_from_house
 from pbrs_farm.core.lighting import Group, Mode
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.light_result import LightResult
 from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.material_rows import FIRST_TEXEL, material_rows
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, sunsky, uniform_sky
+from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
 from pbrs_farm.transport.validation.known_rooms import furnace
@@ -215,6 +218,51 @@ def test_a_cut_out_leaf_lets_light_through_its_holes() -> None:
         seen[x] = float(scene.render(camera, "0_0", fields, 1).indoor.mean())
     assert seen[0.8] == 0
     assert seen[-0.8] > 1e-3
+
+
+def leaf_room(leaf: Material) -> House:
+    floor = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
+    sheet = rooms.quad([(-1, 0.5, -1), (1, 0.5, -1), (1, 0.5, 1), (-1, 0.5, 1)], 2)
+    materials = [rooms.matte("floor", 0.5), rooms.BULB, leaf]
+    return rooms.house([floor, sheet], materials, lamps=[rooms.bulb((0, 2, 0), 1, 1000.0)])
+
+
+@pytest.mark.parametrize(
+    ("cutoff", "alpha", "is_lit"),
+    [(0.2, 90, False), (0.5, 90, True), (0.9, 200, True), (NOTHING_LEFT, None, True)],
+)
+def test_light_passes_where_alpha_is_below_the_cutoff(
+    cutoff: float, alpha: int | None, is_lit: bool
+) -> None:
+    textures = {} if alpha is None else {"leaf": np.full((8, 8, 4), alpha, np.uint8)}
+    leaf = Material(
+        "leaf", diffuse=(0, 0, 0), texture_id=None if alpha is None else "leaf",
+        alpha_cutout=True, alpha_cutoff=cutoff,
+    )  # fmt: skip
+    scene = LightScene.load(leaf_room(leaf), textures, RECIPE, dark_sky())
+    camera = rooms.camera((0.1, 0.3, 0.1), (0.1, 0, 0), 4, 4, 0.01)
+    fields = FIELDS.model_copy(update={"spp": 64, "max_depth": 2})
+    assert (float(scene.render(camera, "0_0", fields, 1).indoor.mean()) > 1e-3) is is_lit
+
+
+def test_light_and_labels_cut_the_same_holes() -> None:
+    import drjit as dr
+
+    rng = np.random.default_rng(4)
+    picture = rng.integers(0, 256, (5, 7, 4)).astype(np.uint8)
+    leaf = Material("leaf", texture_id="leaf", alpha_cutout=True, alpha_cutoff=0.37)
+    house = leaf_room(leaf)
+    atlas = texture_atlas(house, {"leaf": picture})
+    rows, _notes = material_rows(house, atlas, RECIPE)
+    uv = rng.uniform(-2, 2, (20_000, 2)).astype(np.float32)
+    mi = mitsuba(choose_variant())
+    from pbrs_farm.transport.kernels.surface_textures import is_hole_at
+
+    slot = dr.gather(mi.Vector4f, mi.Float(rows[2]), mi.UInt32(FIRST_TEXEL // 4))
+    found = is_hole_at(mi.UInt32(atlas.texels), slot, mi.Point2f(uv.T), mi.Bool(True)).numpy()
+    expected = CutOut(picture[..., 3:], 0.37).is_hole(uv)
+    assert 0.1 < expected.mean() < 0.5
+    assert (found == expected).mean() > 0.9995
 
 
 def test_another_camera_compiles_nothing() -> None:

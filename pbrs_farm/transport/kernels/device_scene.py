@@ -20,6 +20,7 @@ from pbrs_farm.transport.kernels.surface_textures import (
     Triangle,
     colour_at,
     follow_maps,
+    is_hole_at,
 )
 from pbrs_farm.transport.scene_tables.material_rows import (
     FIRST_MAP_TEXEL,
@@ -262,7 +263,7 @@ class DeviceScene:
         kd, f0, tau, texture = packets
         first_texel: Any = dr.reinterpret_array(mi.UInt32, texture[0])
         has_texture: Any = active & (first_texel > mi.UInt32(0))
-        rgb, is_solid = colour_at(self._texels, texture, uv, has_texture)
+        rgb = colour_at(self._texels, texture, uv, has_texture)
         kind = mi.UInt32(tau[3])
         tinted = has_texture & (kind != MIRROR)
         bsdf = Bsdf(
@@ -272,8 +273,7 @@ class DeviceScene:
             alpha=f0[3],
             kind=kind,
         )
-        may_be_cut: Any = texture[3] > 0
-        is_cut = has_texture & may_be_cut & ~is_solid
+        is_cut = is_hole_at(self._texels, texture, uv, has_texture & (texture[3] > 0))
         return bsdf, active & (is_cut | (kind == NULL)), kd[3]
 
 

@@ -29,19 +29,34 @@ class ShadedSurface(NamedTuple):
     alpha: Any  # GGX roughness, 0 = no coat
 
 
-def colour_at(texels: Any, slot: Any, uv: Any, active: Any) -> tuple[Any, Any]:
-    """(Color3f, whether it is opaque) of a colour texture.
+def colour_at(texels: Any, slot: Any, uv: Any, active: Any) -> Any:
+    """Color3f of a colour texture.
 
     slot: packet of first texel (bits), width and height.
     """
     total = mi.Color3f(0)
-    solid = mi.Float(0)
-    # A texel holds square roots in 10 bits each, and alpha.
+    # A texel holds square roots in 10 bits each.
     for bits, weight in _four_texels(texels, slot, uv, active):
         root = mi.Color3f(bits & 1023, (bits >> 10) & 1023, (bits >> 20) & 1023) * (1 / 1023)
         total += weight * dr.square(root)
-        solid += dr.select((bits >> 30) > 0, weight, 0)
-    return total, solid >= 0.5
+    return total
+
+
+@dr.syntax
+def is_hole_at(texels: Any, slot: Any, uv: Any, may_be_hole: Any) -> Any:
+    """Bool: alpha, whose texels follow those of the colours, is below the cutoff at uv.
+
+    slot: as of `colour_at`, and the cutoff of alpha 0..255.
+    """
+    hole = mi.Bool(False)
+    # Branch: packets of lanes on surfaces without holes pass by.
+    if may_be_hole:
+        n_texels = mi.UInt32(slot[1]) * mi.UInt32(slot[2])
+        alpha = mi.Float(0)
+        for bits, weight in _four_texels(texels, slot, uv, may_be_hole, n_texels):
+            alpha += weight * mi.Float(bits)
+        hole = may_be_hole & (alpha < slot[3])
+    return hole
 
 
 @dr.syntax
@@ -93,9 +108,11 @@ def _perturbed_normal(n: Any, triangle: Triangle, x: Any, y: Any) -> Any:
     return dr.select(has_area & (length2 > 1e-30), bent, n)
 
 
-def _four_texels(texels: Any, slot: Any, uv: Any, active: Any) -> list[tuple[Any, Any]]:
-    """(bits, weight) of the four texels around uv, both axes repeating."""
-    first: Any = dr.reinterpret_array(mi.UInt32, slot[0])
+def _four_texels(
+    texels: Any, slot: Any, uv: Any, active: Any, skipped: Any = 0
+) -> list[tuple[Any, Any]]:
+    """(bits, weight) of the four texels around uv, both axes repeating; skipped: texels before them."""
+    first: Any = dr.reinterpret_array(mi.UInt32, slot[0]) + skipped
     width, height = slot[1], slot[2]
     # Find the texel to the top left; row 0 is the top (v = 1).
     w, h = dr.maximum(mi.Int32(width), 1), dr.maximum(mi.Int32(height), 1)

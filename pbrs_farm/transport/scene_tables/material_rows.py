@@ -19,7 +19,7 @@ KD, TAU = slice(0, 3), slice(8, 11)  # diffuse reflectance; transmittance, diffu
 F0, ALPHA = slice(4, 7), 7  # specular reflectance at right angles, GGX roughness
 KIND = 11  # of the next four
 FIRST_TEXEL = 12  # in the atlas, 0 = none: an unsigned integer in the float's bits
-TEXTURE_SIZE, IS_CUTOUT = slice(13, 15), 15  # width and height in texels; alpha cuts out
+TEXTURE_SIZE, CUTOFF = slice(13, 15), 15  # width and height in texels; of alpha 0..255, 0 = none
 FIRST_MAP_TEXEL, MAP_SIZE = 16, slice(17, 19)  # the same of the roughness and normal maps
 
 SURFACE, MIRROR, GLASS = 0, 1, 2  # rough and diffuse, delta mirror, thin glass
@@ -60,7 +60,9 @@ def _place_in_atlas(row: F32, material: Material, packed: TextureAtlas) -> None:
     slot = packed.slots.get(material.texture_id or "")
     if slot is not None:
         row[FIRST_TEXEL], row[TEXTURE_SIZE] = _float_of_bits(slot[0]), slot[1:]
-        row[IS_CUTOUT] = float(material.alpha_cutout)
+        row[CUTOFF] = 255 * material.alpha_cutoff if material.alpha_cutout else 0.0
+    elif material.alpha_cutout and material.alpha_cutoff > 1:
+        row[KIND] = NULL
     slot = packed.map_slots.get(map_key(material))
     if slot is not None and material.shows_maps and int(row[KIND]) != NULL:
         row[FIRST_MAP_TEXEL], row[MAP_SIZE] = _float_of_bits(slot[0]), slot[1:]

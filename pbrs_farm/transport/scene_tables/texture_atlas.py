@@ -1,8 +1,9 @@
 """All pictures of a house as one list of texels for the kernels; pure numpy, no effects.
 
-A texel is 32 bits: of a colour 10 for the square root of each linear component and 2 of alpha; of
+A texel is 32 bits: of a colour 10 for the square root of each linear component; of
 maps 11 for each of the normal's x and y, 10 for the roughness. A material's roughness map and
-normal map are one list of texels, so that both cost one look-up.
+normal map are one list of texels, so that both cost one look-up. The texels of a picture that cuts holes
+are followed by as many of its alpha, 0..255.
 """
 
 from __future__ import annotations
@@ -61,7 +62,12 @@ def texture_atlas(
         return first - texels.size, texels.shape[1], texels.shape[0]
 
     colours = sorted({m.texture_id for m in house.materials if m.texture_id in known})
-    slots = {name: added(_packed_colours(known[name])) for name in colours}
+    cutting = {m.texture_id for m in house.materials if m.alpha_cutout}
+    slots = {}
+    for name in colours:
+        slots[name] = added(_packed_colours(known[name]))
+        if name in cutting:
+            added(_alpha_texels(known[name]))
     # Pair the maps; what has neither needs no texels.
     map_slots: dict[MapKey, Slot] = {}
     for key in dict.fromkeys(map_key(m) for m in house.materials):
@@ -92,25 +98,26 @@ def _packed_colours(picture: Picture) -> NDArray[np.uint32]:
     if picture.ndim == 2:
         picture = picture[..., None]
     rgb = picture[..., :3] if picture.shape[-1] >= 3 else np.repeat(picture[..., :1], 3, -1)
-    alpha = picture[..., 3] if picture.shape[-1] == 4 else None
-    # Encode by the square root of linear light; cut alpha at one half.
+    # Encode by the square root of linear light.
     linear = linear_from_srgb(np.arange(256) / 255)
     if _reduction_of(picture) > 1:
         small = _shrunk(rgb, linear.astype(np.float32))
         bits = np.round(np.sqrt(small) * 1023).astype(np.uint32)
         packed = bits[..., 0] | bits[..., 1] << np.uint32(10) | bits[..., 2] << np.uint32(20)
-        if alpha is not None:
-            plain = np.arange(256, dtype=np.float32)
-            alpha = _shrunk(alpha[..., None], plain)[..., 0].astype(np.uint8)
     else:
         # Look each channel up where its bits belong.
         of_byte = np.round(np.sqrt(linear) * 1023).astype(np.uint32)
         packed = of_byte.take(rgb[..., 0])
         for k in (1, 2):
             packed |= (of_byte << np.uint32(10 * k)).take(rgb[..., k])
-    opaque = np.uint32(3 << 30)
-    packed |= opaque if alpha is None else np.where(alpha >= 128, opaque, np.uint32(0))
     return np.asarray(packed, np.uint32)
+
+
+def _alpha_texels(picture: Picture) -> NDArray[np.uint32]:
+    """(H, W) uint32 alpha of a picture, of the size of its colours; 255 of one without."""
+    has_alpha = picture.ndim == 3 and picture.shape[2] == 4
+    alpha = picture[..., 3:] if has_alpha else np.full((*picture.shape[:2], 1), 255, np.uint8)
+    return _round_to_uint(_shrunk(alpha, np.arange(256, dtype=np.float32))[..., 0])
 
 
 def _packed_maps(
