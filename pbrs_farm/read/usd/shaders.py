@@ -136,7 +136,7 @@ class Shaders:
         if own is None:
             return 1.0, colour, False
         own.pop("scale_rgb", None)
-        k = "rgba".index(channel) if channel in "rgba" else 0
+        k = "rgba".index(channel)
         scale = _component(self._input(node, "scale", None)[0], k, 1.0)
         bias = _component(self._input(node, "bias", None)[0], k, 0.0)
         if colour is not None and own.get("extensions") != colour.get("extensions"):
@@ -155,7 +155,8 @@ class Shaders:
         for attribute in connected.GetValueProducingAttributes():
             node = UsdShade.Shader(attribute.GetPrim())
             if node and node.GetIdAttr().Get() == "UsdUVTexture":
-                return node, attribute.GetName().rpartition(":")[2]
+                channel = attribute.GetName().rpartition(":")[2]
+                return node, channel if channel in tuple("rgba") else "r"
         return None, ""
 
     def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Row | None]:
