@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I32, Points, Points2
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.mesh import points_bounds, triangle_corners
 
 MAX_INSTANCES = 65535
+_LEAST_METAL: Final = 0.2  # reflectance, linear; the dullest metals have .4, dielectrics .1 at most
 
 
 class ItemKind(StrEnum):
@@ -101,6 +103,16 @@ class Material:
         """Its colour picture, roughness map and normal map, those that it has."""
         named = (self.texture_id, self.roughness_texture_id, self.normal_texture_id)
         return tuple(name for name in named if name)
+
+    @property
+    def is_metal(self) -> bool:
+        """Whether its colour is that of its highlights: of no picture, Ks bright and four times Kd.
+
+        Light, and OpenGL, which has nothing for a metal to mirror, both ask it.
+        """
+        brightness = float(linear_from_srgb(np.clip(self.specular, 0, 1)) @ LUMINANCE)
+        dark = 4 * float(linear_from_srgb(np.clip(self.diffuse, 0, 1)) @ LUMINANCE) < brightness
+        return self.texture_id is None and brightness > _LEAST_METAL and dark
 
     @property
     def shows_maps(self) -> bool:

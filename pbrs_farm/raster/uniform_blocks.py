@@ -25,6 +25,8 @@ def _material_block(material: Material) -> list[float]:
     # Decode colours to linear light; a black highlight gets exponent 0, which switches it off.
     diffuse = linear_from_srgb(np.array(material.diffuse))
     specular = linear_from_srgb(np.array(material.specular))
+    if material.is_metal:
+        diffuse = np.minimum(diffuse + specular, 1.0)  # nothing stands here for it to mirror
     emission = _EMISSION.get(material.kind, 0.0) * diffuse
     exponent = material.shininess if specular.any() else 0.0
     is_pane = material.kind is MaterialKind.PANE

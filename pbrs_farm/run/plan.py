@@ -40,8 +40,8 @@ STEPS: Final = {
         Step("cameras", 2, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
-        Step("opengl_dl", 2, ("image", "raster"), ("house", "cameras")),
-        Step("opengl_il", 2, ("image", "raster"), ("house", "cameras")),
+        Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),
+        Step("opengl_il", 3, ("image", "raster"), ("house", "cameras")),
         Step("illuminance", 7, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(

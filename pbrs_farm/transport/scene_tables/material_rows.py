@@ -102,9 +102,7 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
     too_much = bool(np.any(kd + ks > 1 + 1e-6))
     is_rough = material.roughness is not None or material.roughness_texture_id is not None
     has_coat = is_rough or (material.shininess > 1 and float(ks.max()) > 0)
-    brightness = float(ks @ LUMINANCE)
-    is_metal = brightness > 0.2 and brightness > 4 * float(kd @ LUMINANCE)
-    if has_coat and is_metal and material.texture_id is None:
+    if has_coat and material.is_metal:
         scale = 1 / max(float((kd + ks).max()), 1.0)
         kd, f0 = kd * scale, ks * scale
     else:
