@@ -9,7 +9,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import read_mtl
-from pbrs_farm.read.mesh.mtl import ObjMaterial
+from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 
 _BYTES_PER_TRIANGLE = 150
@@ -77,7 +77,14 @@ class ModelCache:
             if mtl and name not in names:
                 text = f"usemtl {name[:60]!r} is not in {mtl_name}; it is grey"
                 self._notes.add("unknown-material", obj_name, text)
-        return ParsedModel(meshes, tuple(names.get(m.material, -1) for m in meshes), mtl)
+        slots = tuple(names.get(m.material, -1) for m in meshes)
+        used = {slot: mtl[slot] for slot in slots if slot >= 0}
+        for material in used.values():
+            if material.unread:
+                text = f"{material.name[:60]}: {', '.join(material.unread)} not read"
+                self._notes.add("unread-map", mtl_name, text)
+        meshes = tuple(laid(m, used.get(k)) for m, k in zip(meshes, slots, strict=True))
+        return ParsedModel(meshes, slots, mtl)
 
     def _mtl(self, name: str) -> tuple[ObjMaterial, ...]:
         materials = read_mtl(self._folder, name)

@@ -23,6 +23,7 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 MAX_TEXTURE_BYTES: Final = 64_000_000
 GREY: Final = (0.8, 0.8, 0.8)
 WHITE: Final = (1.0, 1.0, 1.0)
+BLACK: Final = (0.0, 0.0, 0.0)
 DEFAULT_WALLS: Final = ("wallp_0", "wallp_1_1", "wallp_1_2")
 """Papers that the published pictures show white, whatever colour they have (docs/spec/suncg.md section 6)."""
 
@@ -49,7 +50,7 @@ class ModelMaterials:
             diffuse = override.diffuse or WHITE
         elif override is not None and override.diffuse is not None:
             diffuse = override.diffuse
-        elif reference and base.kd == GREY:  # what parse_mtl gives where there is no Kd
+        elif reference and base.kd in (GREY, BLACK):  # no Kd, or one that would hide the picture
             diffuse = WHITE
         found = self._texture(reference, base.map_d, place) if reference or base.map_d else None
         if reference and found is None and diffuse == WHITE:

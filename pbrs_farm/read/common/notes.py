@@ -17,6 +17,7 @@ HARMLESS: Final = frozenset(
         "unknown-material",  # the surface has its format's default colour
         "unknown-type",  # a node that is no room, object, box or ground
         "wholly-cut-out",  # a surface whose alpha is below its cutoff everywhere: nobody sees it
+        "unread-map",  # a bump, gloss or such picture of an MTL: its colour is there
         "unused-opacity-map",  # the colour map's own alpha is used
         "door-leaf-left-out",  # of a door that was asked to stand open
         "door-without-hinge",  # the same: it stays as it is drawn

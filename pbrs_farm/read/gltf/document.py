@@ -22,6 +22,7 @@ from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, vi
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import draco_arrays
 from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.texture_wraps import CLAMP, MIRROR, REPEAT
 
 # A relative name -> the bytes of that file beside the scene, or None if there is none.
 Fetch = Callable[[str], bytes | None]
@@ -35,10 +36,11 @@ UNDERSTOOD: Final = frozenset({
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
     "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
     "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_texture_basisu",
+    "KHR_draco_mesh_compression", "KHR_texture_basisu", "KHR_materials_pbrSpecularGlossiness",
 })  # fmt: skip
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 UNREAD: Final = "unread-part"
+_WRAPS: Final = {33071: CLAMP, 33648: MIRROR}  # values of sampler.wrapS
 
 # Extensions without which nothing that is seen is missing: what a reader without them shows is
 # there as well (compressed meshes, pictures), or they say nothing of the picture.
@@ -239,6 +241,12 @@ def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
+def specular_glossiness(fields_json: dict[str, Any]) -> dict[str, Any]:
+    """KHR_materials_pbrSpecularGlossiness of a material, {} where it has none or says it in metal, too."""
+    found = object_at(object_at(fields_json, "extensions"), "KHR_materials_pbrSpecularGlossiness")
+    return {} if object_at(fields_json, "pbrMetallicRoughness") else found
+
+
 def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
     """The textures of a material that are looked at, by their key in glTF, the leading one first.
 
@@ -247,19 +255,38 @@ def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]
     if material is None:
         return {}
     fields_json = entry(gltf, "materials", material)
-    pbr = object_at(fields_json, "pbrMetallicRoughness")
+    pbr, glossy = object_at(fields_json, "pbrMetallicRoughness"), specular_glossiness(fields_json)
     found = {
         "baseColorTexture": pbr.get("baseColorTexture"),
+        "diffuseTexture": glossy.get("diffuseTexture"),
         "normalTexture": fields_json.get("normalTexture"),
         "metallicRoughnessTexture": pbr.get("metallicRoughnessTexture"),
+        "specularGlossinessTexture": glossy.get("specularGlossinessTexture"),
     }
     return {key: info for key, info in found.items() if isinstance(info, dict)}
 
 
-def texture_layout(info: dict[str, Any]) -> tuple[Any, Any]:
-    """What places a texture on a surface: its set of texture coordinates and their transform."""
+def texture_layout(gltf: Gltf, info: dict[str, Any]) -> tuple[Any, ...]:
+    """What places a texture on a surface: its set of texture coordinates, their transform, its wraps."""
     turn = object_at(info, "extensions").get("KHR_texture_transform")
-    return info.get("texCoord", 0), turn
+    return texture_set(info), turn, texture_wraps(gltf, info)
+
+
+def texture_wraps(gltf: Gltf, info: dict[str, Any]) -> tuple[str, str]:
+    """How a texture goes on beyond its edges, along u and v: words of `mesh/texture_wraps.py`."""
+    texture = entry(gltf, "textures", info.get("index"))
+    sampler = entry(gltf, "samplers", texture["sampler"]) if "sampler" in texture else {}
+    along_u, along_v = (
+        next((mode for n, mode in _WRAPS.items() if n == sampler.get(key)), REPEAT)
+        for key in ("wrapS", "wrapT")
+    )
+    return along_u, along_v
+
+
+def texture_set(info: dict[str, Any]) -> Any:
+    """The number of the texture coordinates that a texture lies by; its transform may name others."""
+    turn = object_at(object_at(info, "extensions"), "KHR_texture_transform")
+    return turn.get("texCoord", info.get("texCoord", 0))
 
 
 def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
@@ -305,7 +332,7 @@ def _mesh_of_primitive(gltf: Gltf, primitive: dict[str, Any], place: str) -> Mes
         return None
     # Take the texture coordinates that the leading picture uses.
     leading = next(iter(texture_slots(gltf, primitive.get("material")).values()), {})
-    name, uvs = f"TEXCOORD_{leading.get('texCoord', 0)}", None
+    name, uvs = f"TEXCOORD_{texture_set(leading)}", None
     if name in attributes:
         uvs = _accessor_floats(gltf, attributes[name], 2, f"{place}.TEXCOORD", known.get(name))
         uvs = _transformed(gltf, uvs, leading, place) * [1, -1] + [0, 1]  # v up

@@ -2,35 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import triple
-from pbrs_farm.core.frames import LUMINANCE, srgb_from_linear
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import NOTHING_LEFT, USUAL_CUTOFF, Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import words_of
+from pbrs_farm.read.common.material_fields import noted_fields
 from pbrs_farm.read.common.material_library import (
     FRAME_WORDS,
     GLASS_WORDS,
     OPAQUE_ALPHA,
     LoadedTexture,
     MaterialLibrary,
+    opened_picture,
 )
+from pbrs_farm.read.common.model_materials import GREY
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.picture_values import (
+    PictureValues,
+    base_colour_picture,
+    picture_mean,
+    picture_of_values,
+)
 from pbrs_farm.read.gltf.compressed import BASISU, decoded_picture
 from pbrs_farm.read.gltf.document import (
+    UNREAD,
     Fetch,
     MissingFile,
     image_bytes,
     numbers,
     object_at,
+    specular_glossiness,
     texture_layout,
     texture_slots,
+    texture_wraps,
 )
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.texture_wraps import REPEAT, Wraps, leaves_picture, wrapped
 
 # Reflectance of a dielectric at normal incidence, linear (glTF 2.0, appendix B).
 F0: Final = 0.04
@@ -57,6 +71,7 @@ class SceneMaterials:
         self._gltf = gltf
         self._fetch = fetch
         self._notes = notes
+        self._means: dict[tuple[str, bool], F64] = {}
         self.library = MaterialLibrary(notes)
 
     def material(
@@ -70,14 +85,12 @@ class SceneMaterials:
             return Material("default", is_default=True), None
         fields_json = entry(self._gltf, "materials", number)
         place = f"materials[{number}]"
-        pbr = object_at(fields_json, "pbrMetallicRoughness")
-        factor = numbers(self._gltf, pbr.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
-        # The metallic-roughness factors; of a texture of them metal is not looked at.
-        metallic = self._fraction(pbr, "metallicFactor", 1.0, place)
-        roughness = self._fraction(pbr, "roughnessFactor", 1.0, place)
-        if "metallicRoughnessTexture" in pbr:
-            metallic = 0.0  # its factor only scales what this reader does not look at
-        found = self._texture(pbr.get("baseColorTexture"), place)
+        for path in noted_fields("glTF"):
+            if path.startswith("extensions.") and _has_path(fields_json, path):
+                self._notes.add(UNREAD, place, f"{path.rpartition('.')[2]} is not read")
+        factor, found, is_lost = self._colour(number, place)
+        glossy = specular_glossiness(fields_json)
+        metallic, roughness = self._metal(fields_json, place)
         maps = self._maps(number, place)
         transmission = object_at(object_at(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
@@ -85,12 +98,18 @@ class SceneMaterials:
         opacity, cutoff = self._alpha(fields_json, float(np.clip(factor[3], 0, 1)), found, place)
         opacity = min(opacity, 1.0 - passes)
         colour = np.clip(factor[:3], 0, 1)
+        if is_lost:
+            colour, metallic = colour * linear_from_srgb(np.array(GREY)), 0.0
         # Roughness to a Phong exponent: alpha = roughness^2, n = 2 / alpha^2 - 2.
         shininess = min(2.0 / max(roughness, 1e-3) ** 4 - 2.0, MAX_SHININESS)
         is_metal = metallic > 0 and found is None
-        specular = F0 + (colour - F0) * metallic if shininess > 0 or is_metal else np.zeros(3)
+        reflected = self._reflected(fields_json, place)
+        if not glossy:
+            reflected = reflected + (colour - reflected) * metallic
+        specular = reflected if shininess > 0 or is_metal else np.zeros(3)
         # What is as rough as can be and no metal is matte.
-        has_coat = roughness < 1 or is_metal or "metallicRoughnessTexture" in maps
+        roughness_map = maps.get("metallicRoughnessTexture", maps.get("specularGlossinessTexture"))
+        has_coat = roughness < 1 or is_metal or roughness_map is not None
         material = Material(
             name=str(fields_json.get("name", ""))[:100],
             kind=self._kind(fields_json, clear, opacity, metallic, roughness),
@@ -102,10 +121,10 @@ class SceneMaterials:
             alpha_cutout=cutoff is not None,
             alpha_cutoff=USUAL_CUTOFF if cutoff is None else cutoff,
             roughness=roughness if has_coat else None,
-            roughness_texture_id=maps.get("metallicRoughnessTexture"),
+            roughness_texture_id=roughness_map,
             normal_texture_id=maps.get("normalTexture"),
             normal_scale=self._normal_scale(fields_json, place) if "normalTexture" in maps else 1.0,
-            is_default=found is None and "baseColorFactor" not in pbr,
+            is_default=found is None and not is_lost and not _names_colour(fields_json),
         )
         return material, self._emission(fields_json, place)
 
@@ -136,22 +155,95 @@ class SceneMaterials:
             return 1.0, NOTHING_LEFT
         return 1.0, None if factor * alpha.least >= least else float(least) / factor
 
+    def _colour(self, number: int, place: str) -> tuple[F64, LoadedTexture | None, bool]:
+        """(colour and opacity, the picture they multiply or None, whether one is named and cannot be had)."""
+        fields_json = entry(self._gltf, "materials", number)
+        glossy, slots = specular_glossiness(fields_json), texture_slots(self._gltf, number)
+        if not glossy:
+            pbr, info = (
+                object_at(fields_json, "pbrMetallicRoughness"),
+                slots.get("baseColorTexture"),
+            )
+            factor = numbers(self._gltf, pbr.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
+            found = self._texture(info, place)
+            return factor, found, info is not None and found is None
+        factor = numbers(self._gltf, glossy.get("diffuseFactor", [1] * 4), 4, f"{place}: colour")
+        diffuse, shine = slots.get("diffuseTexture"), slots.get("specularGlossinessTexture")
+        found = self._texture(diffuse, place)
+        is_lost = diffuse is not None and found is None
+        if shine is None or is_lost or (diffuse and not self._lie_alike(diffuse, shine)):
+            return factor, found, is_lost
+        # Metals of two pictures are black in the one and coloured in the other.
+        made = self._made(shine, f"{place}: base colour", lambda data: base_colour_picture(
+            found.texture.data if found else None, data,
+            np.clip(factor[:3], 0, 1), self._specular_factor(glossy, place),
+        ))  # fmt: skip
+        if made is None:
+            return factor, found, False
+        return np.array([1, 1, 1, factor[3]]), made, False
+
+    def _lie_alike(self, one: dict[str, Any], other: dict[str, Any]) -> bool:
+        return texture_layout(self._gltf, one) == texture_layout(self._gltf, other)
+
+    def _specular_factor(self, glossy: dict[str, Any], place: str) -> F64:
+        given = numbers(self._gltf, glossy.get("specularFactor", [1] * 3), 3, f"{place}: specular")
+        return np.clip(given, 0, 1)
+
+    def _metal(self, fields_json: dict[str, Any], place: str) -> tuple[float, float]:
+        """(metallic, roughness) by the factors; what says nothing of its surface is no metal."""
+        extensions = object_at(fields_json, "extensions")
+        pbr = object_at(fields_json, "pbrMetallicRoughness")
+        if glossy := specular_glossiness(fields_json):
+            return 0.0, 1.0 - self._fraction(glossy, "glossinessFactor", 1.0, place)
+        if "KHR_materials_unlit" in extensions or not pbr:
+            return 0.0, 1.0
+        metallic = self._fraction(pbr, "metallicFactor", 1.0, place)
+        if "metallicRoughnessTexture" in pbr:
+            # A colour's picture is shown as paint; without one the mean of metal's picture counts.
+            info = None if "baseColorTexture" in pbr else pbr["metallicRoughnessTexture"]
+            mean = self._mean(info, f"{place}: metallicRoughnessTexture", is_colour=False)
+            metallic *= 0.0 if mean is None else float(mean[2])
+        return metallic, self._fraction(pbr, "roughnessFactor", 1.0, place)
+
+    def _reflected(self, fields_json: dict[str, Any], place: str) -> F64:
+        """(3,) reflectance at right angles of what is no metal, linear."""
+        if glossy := specular_glossiness(fields_json):
+            return self._specular_factor(glossy, place)
+        extensions = object_at(fields_json, "extensions")
+        ior, own = (object_at(extensions, f"KHR_materials_{key}") for key in ("ior", "specular"))
+        (index,) = numbers(self._gltf, [ior.get("ior", 1.5)], 1, f"{place}: ior")
+        given = own.get("specularColorFactor", [1] * 3)
+        tint = np.maximum(numbers(self._gltf, given, 3, f"{place}: specular colour"), 0)
+        strength = self._fraction(own, "specularFactor", 1.0, place)
+        f0 = ((index - 1) / (index + 1)) ** 2 if "ior" in ior and index >= 0 else F0
+        return np.asarray(np.minimum(f0 * tint, 1) * strength)
+
     def _maps(self, number: int, place: str) -> dict[str, str]:
         """Texture ids of the roughness and normal maps that lie as the leading texture does."""
         slots = texture_slots(self._gltf, number)
-        layouts = {key: texture_layout(info) for key, info in slots.items()}
+        layouts = {key: texture_layout(self._gltf, info) for key, info in slots.items()}
         maps: dict[str, str] = {}
         for key, info in slots.items():
-            if key == "baseColorTexture":
+            if key in ("baseColorTexture", "diffuseTexture"):
                 continue
             if layouts[key] != next(iter(layouts.values())):
                 text = f"{key} lies on the surface otherwise than the first texture: left out"
                 self._notes.add("texture-layout", place, text)
                 continue
             found = self._texture(info, f"{place}: {key}")
+            if found is not None and key == "specularGlossinessTexture":
+                found = self._roughness_of_gloss(number, info, place)
             if found is not None:
                 maps[key] = found.texture.id
         return maps
+
+    def _roughness_of_gloss(
+        self, number: int, info: dict[str, Any], place: str
+    ) -> LoadedTexture | None:
+        glossy = specular_glossiness(entry(self._gltf, "materials", number))
+        gloss = self._fraction(glossy, "glossinessFactor", 1.0, place)
+        values = PictureValues("a", scale=(-gloss,) * 3, bias=(1.0,) * 3)
+        return self._made(info, f"{place}: roughness", lambda data: picture_of_values(data, values))
 
     def _normal_scale(self, fields_json: dict[str, Any], place: str) -> float:
         scale = object_at(fields_json, "normalTexture").get("scale", 1.0)
@@ -180,6 +272,10 @@ class SceneMaterials:
         factor = numbers(
             self._gltf, fields_json.get("emissiveFactor", [0] * 3), 3, f"{place}: emission"
         )
+        mean = None
+        if (factor > 0).any():
+            mean = self._mean(fields_json.get("emissiveTexture"), place, is_colour=True)
+        factor = factor if mean is None else factor * mean
         if not (factor > 0).any():
             return None
         strength = object_at(
@@ -211,20 +307,54 @@ class SceneMaterials:
             self._notes.add("unreadable-texture", place, "its picture is of an unknown kind")
             return None
         image = entry(self._gltf, "images", source)
-        key = f"images[{source}]"
-        name = str(image.get("name") or image.get("uri") or key)[:100]
+        name = str(image.get("name") or image.get("uri") or "")[:100]
+        name = "" if name.startswith("data:") else name
+        key = f"images[{source}]" + (f" ({name})" if name else "")
         return self.library.texture(
-            key,
-            name=key if name.startswith("data:") else name,
-            place=place,
-            load=lambda: self._picture(source),
+            key, name=name or f"images[{source}]", place=place, load=lambda: self._picture(source)
         )
+
+    def _mean(self, info: Any, place: str, *, is_colour: bool) -> F64 | None:
+        """(3,) mean of a texture, of a colour in linear light; None where there is none."""
+        found = self._texture(info, place)
+        if found is None:
+            return None
+        key = (found.texture.id, is_colour)
+        if key not in self._means:
+            self._means[key] = picture_mean(found.texture.data, is_colour=is_colour)
+        return self._means[key]
+
+    def _made(
+        self, info: dict[str, Any], key: str, make: Callable[[bytes], bytes]
+    ) -> LoadedTexture | None:
+        """The texture that is made of another's picture; None where that cannot be had."""
+        found = self._texture(info, key)
+        if found is None:
+            return None
+        data = found.texture.data
+        return self.library.texture(key, name=key, place=key, load=lambda: make(data))
 
     def _picture(self, source: int) -> bytes | None:
         try:
             return decoded_picture(image_bytes(self._gltf, source, self._fetch))
         except MissingFile:
             return None
+
+    def laid(self, number: int | None, mesh: Mesh) -> Mesh:
+        """The mesh as its material's pictures lie on it, which a surface repeats beyond their edges."""
+        info = next(iter(texture_slots(self._gltf, number).values()), None)
+        modes = (REPEAT, REPEAT) if info is None else texture_wraps(self._gltf, info)
+        if info is None or not leaves_picture(mesh, modes):
+            return mesh
+        place = f"materials[{number}]"
+        found = self._texture(info, place)
+        if found is None:
+            return mesh
+        cut = wrapped(mesh, Wraps(modes, opened_picture(found.texture.data, whole=True).size))
+        if cut is None:
+            text = f"its picture ({' and '.join(modes)}) goes on too often: it repeats"
+            self._notes.add("texture-layout", place, text)
+        return cut or mesh
 
     def is_tagged(self, number: int | None) -> bool:
         """Whether the material's extras say its kind, as those of house.glb do."""
@@ -235,6 +365,18 @@ class SceneMaterials:
     def as_bulb(self, material: Material) -> int:
         """The index of the material as one that emits."""
         return self.library.index(replace(material, kind=MaterialKind.BULB))
+
+
+def _has_path(fields_json: dict[str, Any], path: str) -> bool:
+    *holders, name = path.split(".")
+    for holder in holders:
+        fields_json = object_at(fields_json, holder)
+    return name in fields_json
+
+
+def _names_colour(fields_json: dict[str, Any]) -> bool:
+    pbr, glossy = object_at(fields_json, "pbrMetallicRoughness"), specular_glossiness(fields_json)
+    return "baseColorFactor" in pbr or "diffuseFactor" in glossy
 
 
 def _encoded(linear: Any) -> tuple[float, float, float]:

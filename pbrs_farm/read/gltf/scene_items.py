@@ -203,7 +203,8 @@ def _item(
             emits = emits and (is_known or kind is ItemKind.LAMP)
             index = materials.as_bulb(material) if emits else materials.library.index(material)
             name = material.name or f"part {len(surfaces)}"
-            surface = placed(mesh, part.world_from_node, name=name, material=index)
+            laid = materials.laid(number, mesh)
+            surface = placed(laid, part.world_from_node, name=name, material=index)
             if surface is None:
                 continue
             if emits and emission is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Final
@@ -13,6 +13,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import srgb_from_linear
+from pbrs_farm.read.common.material_fields import noted_fields
+from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.regular_files import text_from_bytes
 
 Rgb = tuple[float, float, float]
@@ -32,6 +34,9 @@ class ObjMaterial:
     d: float = 1.0  # opacity
     map_kd: str = ""  # picture as written, "" = none
     map_d: str = ""  # picture as written, "" = none
+    uv_scale: tuple[float, float] = (1.0, 1.0)  # of the colour's picture: times u and v
+    uv_offset: tuple[float, float] = (0.0, 0.0)  # then added
+    unread: tuple[str, ...] = ()  # statements and options that are not read
 
 
 def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
@@ -80,7 +85,34 @@ def _read_line(key: str, words: list[str], raw: str, fields: dict[str, object]) 
                 # The first of d and Tr counts; Tr is one less opacity.
                 fields.setdefault("d", float(np.clip(d, 0, 1)))
     elif key in ("map_kd", "map_d") and words:
-        fields[key] = _picture_name(words, raw)
+        options, fields[key] = _picture_of_line(words, raw)
+        if key == "map_kd":
+            fields["uv_scale"] = _pair_of_option(options.get("-s"), 1.0)
+            fields["uv_offset"] = _pair_of_option(options.get("-o"), 0.0)
+        for option in options:
+            what = f"{option} {' '.join(options[option])}".lower()
+            if _noted_words() & {option, what}:
+                _add_unread(fields, f"{key} {what}")
+    elif key in _noted_words() and words and (key != "ke" or any(_mtl_number(w) for w in words)):
+        _add_unread(fields, key)
+
+
+@cache
+def _noted_words() -> frozenset[str]:
+    return frozenset(name.lower() for name in noted_fields("MTL"))
+
+
+def _add_unread(fields: dict[str, object], what: str) -> None:
+    before = fields.get("unread", ())
+    assert isinstance(before, tuple)
+    fields["unread"] = tuple(dict.fromkeys((*before, what)))
+
+
+def _pair_of_option(words: list[str] | None, default: float) -> tuple[float, float]:
+    """The first two numbers after -s or -o; what is left out is the default."""
+    found = [_mtl_number(w) for w in (words or [])[:2]] + [None, None]
+    u, v = (default if value is None else value for value in found[:2])
+    return u, v
 
 
 def _mtl_number(word: str) -> float | None:
@@ -96,18 +128,29 @@ _OPTIONS = {"-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-bm": 1, "-clamp": 1, "-blendu
             "-blendv": 1, "-texres": 1, "-imfchan": 1, "-cc": 1, "-boost": 1}  # fmt: skip
 
 
-def _picture_name(words: list[str], raw: str) -> str:
-    # Pass over options and their numbers: what is left is the name, blanks included.
+def _picture_of_line(words: list[str], raw: str) -> tuple[dict[str, list[str]], str]:
+    """(option -> what follows it, the picture's name) of a map_ line; what is left is the name, blanks included."""
+    options: dict[str, list[str]] = {}
     at = 0
     while at < len(words) and words[at].lower() in _OPTIONS:
-        most = _OPTIONS[words[at].lower()]
-        at += 1
-        n = 0
-        while n < most and at < len(words) and (most == 1 or _mtl_number(words[at]) is not None):
-            at, n = at + 1, n + 1
-    if at == 0:
-        return raw.split(None, 1)[1].strip()
-    return " ".join(words[at:])
+        option = words[at].lower()
+        most, first = _OPTIONS[option], at + 1
+        at = first
+        while at - first < most and at < len(words):
+            if most > 1 and _mtl_number(words[at]) is None:
+                break
+            at += 1
+        options[option] = words[first:at]
+    return options, " ".join(words[at:]) if at else raw.split(None, 1)[1].strip()
+
+
+def laid(mesh: Mesh, material: ObjMaterial | None) -> Mesh:
+    """A mesh with the texture coordinates that its material's picture has on it."""
+    if material is None or mesh.uvs is None:
+        return mesh
+    if material.uv_scale == (1.0, 1.0) and material.uv_offset == (0.0, 0.0):
+        return mesh
+    return replace(mesh, uvs=mesh.uvs * material.uv_scale + material.uv_offset)
 
 
 @cache

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.read.common.material_library import PANE_OPACITY, LoadedTexture
+from pbrs_farm.read.common.model_materials import BLACK, GREY, WHITE
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, PlanPicture, PlanPiece
@@ -47,7 +48,9 @@ def piece_material(
         )
     emits = role == LIGHT or mesh.material in piece.light_materials
     loaded, picture = _texture_of_mesh(piece, paint, base, mesh, model, materials)
-    diffuse = (1.0, 1.0, 1.0) if loaded else paint.colour or base.kd
+    diffuse = WHITE if loaded else paint.colour or base.kd
+    if loaded is None and base.map_kd and diffuse == BLACK:
+        diffuse = GREY  # its picture cannot be had
     # The home's shininess replaces the model's highlights.
     specular, shininess = base.ks, base.ns
     if paint.shininess is not None:

@@ -11,7 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
-from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, parse_mtl
+from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, laid, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 
@@ -182,7 +182,11 @@ class PieceModels:
         unknown = sorted(used - set(materials))
         if unknown:
             note("unknown-material", f"model {name}", f"no material {', '.join(unknown)[:120]}")
-        meshes = _merge_meshes(parsed.meshes)
+        for material in (materials[name] for name in sorted(used & set(materials))):
+            if material.unread:
+                text = f"{material.name[:60]}: {', '.join(material.unread)} not read"
+                note("unread-map", f"model {name}", text)
+        meshes = _merge_meshes(tuple(laid(m, materials.get(m.material)) for m in parsed.meshes))
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
         return PieceModel(meshes, materials, folder, points.min(0), points.max(0))

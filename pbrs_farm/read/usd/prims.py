@@ -86,7 +86,7 @@ class StageNodes:
         document = {
             "asset": {"version": "2.0"}, "scene": 0,
             "scenes": [{"nodes": [0], "extras": scene_extras}], "nodes": self._nodes,
-            "meshes": self._meshes, "materials": shaders.materials, "textures": shaders.textures,
+            "meshes": self._meshes, "materials": shaders.materials, "textures": shaders.textures, "samplers": shaders.samplers,
             "images": shaders.images, "extensions": extensions,
         }  # fmt: skip
         return self._writer.gltf(document, self._file)
@@ -203,7 +203,7 @@ class StageNodes:
             self._unread[kind] = self._unread.get(kind, 0) + 1
         if not prim.IsA(UsdGeom.Gprim) and not prim.IsA(UsdLux.BoundableLightBase):
             return None
-        bound = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        bound = self._bound_material(prim)
         # Instances of one prototype share its mesh.
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), str(bound.GetPath()) if bound else "")
@@ -223,7 +223,7 @@ class StageNodes:
         else:
             is_mesh = prim.IsA(UsdGeom.Mesh)
             shape = (
-                mesh_shape(prim, self._time, self._file)
+                mesh_shape(prim, self._time, self._file, self._uv_name(prim, bound))
                 if is_mesh
                 else solid_shape(prim, self._time)
             )
@@ -265,11 +265,30 @@ class StageNodes:
             chosen = np.asarray(subset.GetIndicesAttr().Get(self._time) or [], np.int64)
             own = np.isin(shape.polygon, chosen) & rest
             rest &= ~own
-            material = UsdShade.MaterialBindingAPI(subset.GetPrim()).ComputeBoundMaterial()[0]
+            material = self._bound_material(subset.GetPrim())
             if own.any():
                 yield shape.faces[own], self._material(prim, material)
         if rest.any():
             yield shape.faces[rest], self._material(prim, bound)
+
+    def _uv_name(self, prim: Any, bound: Any) -> str:
+        """The texture coordinates that the materials of a mesh ask for, those of its subsets first."""
+        subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
+        materials = [*(self._bound_material(s.GetPrim()) for s in subsets), bound]
+        return next(filter(None, (self._shaders.uv_name(m) for m in materials if m)), "")
+
+    def _bound_material(self, prim: Any) -> Any:
+        """The material of full renders, which is all purposes' where none is bound for these alone.
+
+        That of previews where it is the one that is understood.
+        """
+        binding = UsdShade.MaterialBindingAPI(prim)
+        full = binding.ComputeBoundMaterial(UsdShade.Tokens.full)[0]
+        if full and self._shaders.is_understood(full):
+            return full
+        preview = binding.ComputeBoundMaterial(UsdShade.Tokens.preview)[0]
+        is_better = preview and (not full or self._shaders.is_understood(preview))
+        return preview if is_better else full
 
     def _material(self, prim: Any, material: Any) -> int | None:
         if material:

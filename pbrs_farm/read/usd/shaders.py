@@ -1,25 +1,39 @@
 """Materials of UsdShade -> rows of a glTF document; pictures by the path that the stage resolves.
 
-UsdPreviewSurface, OmniPBR and OmniGlass are understood; of any other MDL the first picture of its
-text. Effect: reads such texts, through the caller.
+UsdPreviewSurface, MaterialX's surfaces, OmniPBR and OmniGlass are understood; of any other MDL the first
+picture of its text, of anything else a matte grey. Effect: reads such texts, through the caller.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pxr import Sdf, UsdShade
 
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.read.common.material_fields import noted_fields
 from pbrs_farm.read.common.material_library import PANE_OPACITY, picture_with_alpha
+from pbrs_farm.read.common.model_materials import GREY
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.picture_values import PictureValues, picture_of_values
 from pbrs_farm.read.gltf.document import UNREAD
+from pbrs_farm.read.usd.surface_shaders import WRAPS, SurfaceWords, is_picture, surface_of
 
 KIND_ATTRIBUTE: Final = "pbrs:kind"
 """Of a material: how light meets it, as our own exports say."""
 _PICTURE_OF_MDL: Final = re.compile(r'texture_2d\s*\(\s*"([^"]+)"')
+_REPEAT: Final = 10497  # glTF's number for a picture that goes on beyond its edges
+_MODES: Final = ("uaddressmode", "vaddressmode")  # of MaterialX's image nodes
+_USUAL_IOR: Final = 1.5
+_MOST_NODES: Final = 8  # between a surface and its picture
+_FIRST_TILE: Final = "1001"  # of a picture in tiles: where u and v are within 0..1
+_TRANSFORMS: Final = {
+    "UsdTransform2d": ("rotation", "scale", "translation"),
+    "place2d_vector2": ("rotate", "scale", "offset"),
+}
 _Row = dict[str, Any]
 
 
@@ -33,6 +47,29 @@ class _Masked(NamedTuple):
     bias: float
 
 
+class _Changed(NamedTuple):
+    """A picture whose stored values are changed before they are read."""
+
+    asset: Any  # Sdf.AssetPath
+    values: PictureValues
+
+    @property
+    def path(self) -> str:
+        """Of the picture that is changed."""
+        return str(self.asset.path)
+
+
+class _Picture(NamedTuple):
+    """A picture as the node that reads it says."""
+
+    info: _Row  # glTF's textureInfo
+    channel: str  # the output that is taken: "rgb", "r", "g", "b", "a", MaterialX's "out"
+    scale: tuple[float, ...] = (1.0,) * 4
+    bias: tuple[float, ...] = (0.0,) * 4
+    has_scale: bool = False
+    space: str = ""  # "raw", "sRGB", "" = what its use means
+
+
 class Shaders:
     """The materials of a stage as glTF has them, each once. State: what was asked for."""
 
@@ -41,8 +78,11 @@ class Shaders:
         self._notes, self._text_of, self._time = notes, text_of, time
         self.materials: list[_Row] = []
         self.textures: list[_Row] = []
+        self.samplers: list[_Row] = [{"wrapS": _REPEAT, "wrapT": _REPEAT}]
         self.images: list[_Row] = []
-        self.assets: list[Any] = []  # Sdf.AssetPath or _Masked of each image
+        self.assets: list[Any] = []  # Sdf.AssetPath, _Masked or _Changed of each image
+        self._uv_names: dict[str, str] = {}  # by the material's path
+        self._uv_name = ""  # of the material that is being read
         self._numbers: dict[str, int] = {}
         self._pictures: dict[str, int] = {}
 
@@ -75,70 +115,148 @@ class Shaders:
         self.materials.append(row)
         return len(self.materials) - 1
 
+    def is_understood(self, material: Any) -> bool:
+        """Whether a material has a surface of which more than a picture is read."""
+        return surface_of(material)[1] is not None or bool(_omniverse(material))
+
+    def uv_name(self, material: Any) -> str:
+        """The texture coordinates by which a material's first picture lies, "" where it names none."""
+        self.number(material)
+        return self._uv_names.get(str(material.GetPath()), "") if material else ""
+
     def _row(self, material: Any) -> _Row:
-        name = material.GetPrim().GetName()[:100]
-        shader = material.ComputeSurfaceSource()[0]
-        kind = str(shader.GetIdAttr().Get() or "") if shader else ""
-        if kind == "UsdPreviewSurface":
-            row = self._preview(name, shader)
+        self._uv_name = ""
+        name, place = material.GetPrim().GetName()[:100], str(material.GetPath())
+        shader, words = surface_of(material)
+        if words is not None:
+            row = self._surface(name, shader, words)
         elif shader := material.ComputeSurfaceSource("mdl")[0] or shader:
-            row = self._mdl(name, shader, str(material.GetPath()))
+            row = self._mdl(name, shader, place)
         else:
-            row = {"name": name}
+            self._notes.add(UNREAD, place, "has no surface shader: it is a matte grey")
+            row = _grey(name)
+        self._uv_names[place] = self._uv_name
         given = material.GetPrim().GetAttribute(KIND_ATTRIBUTE).Get()
         return row | ({"extras": {"kind": str(given)}} if given else {})
 
-    # UsdPreviewSurface
+    # UsdPreviewSurface and MaterialX
 
-    def _preview(self, name: str, shader: Any) -> _Row:
-        colour, picture = self._colour(shader, "diffuseColor", (0.18, 0.18, 0.18))
-        roughness, rough_picture = self._input(shader, "roughness", 0.5)
-        metallic = _input_number(self._input(shader, "metallic", 0.0)[0], 0.0)
-        threshold = _input_number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
-        alpha, picture, has_picture = self._opacity(shader, picture, name)
-        row = _pbr(name, [*colour, alpha], _input_number(roughness, 0.5), metallic)
+    def _surface(self, name: str, shader: Any, words: SurfaceWords) -> _Row:
+        colour, picture = self._colour(shader, words.colour, (words.default_colour,) * 3)
+        times = _finite(self._input(shader, words.colour_times, 1.0)[0], 1.0)
+        colour = tuple(c * times for c in colour)
+        roughness, rough_picture = self._input(shader, words.roughness, words.default_roughness)
+        roughness = _input_number(roughness, words.default_roughness)
+        metallic = _input_number(
+            self._input(shader, words.metallic, words.default_metallic)[0], words.default_metallic
+        )
+        is_specular = bool(self._input(shader, "useSpecularWorkflow", 0)[0])
+        metallic = 0.0 if is_specular else metallic
+        alpha, picture, has_picture = self._opacity(shader, words.opacity, picture, name)
+        row = _pbr(name, [*colour, alpha], roughness, metallic)
         pbr = row["pbrMetallicRoughness"]
         if picture is not None:
             pbr["baseColorTexture"] = picture
         if rough_picture is not None:
-            times = _input_number((rough_picture.pop("scale_rgb", None) or (1.0,))[0], 1.0)
-            pbr |= {"metallicRoughnessTexture": rough_picture, "roughnessFactor": times}
-        normal = self._input(shader, "normal", None)[1]
+            factor, info = self._level(rough_picture)
+            pbr |= {"metallicRoughnessTexture": info, "roughnessFactor": factor}
+        normal = self._input(shader, words.normal, None)[1]
         if normal is not None:
-            # The node's scale turns 0..1 into twice the map's own.
-            times = _finite((normal.pop("scale_rgb", None) or (2.0,))[0], 2.0) / 2
-            row["normalTexture"] = normal | ({"scale": times} if times != 1 else {})
+            row["normalTexture"] = self._normal(normal, name)
         if alpha < 1 or has_picture:
-            row |= _alpha_mode(threshold)
-        glow = _triple(self._input(shader, "emissiveColor", (0, 0, 0))[0], (0.0, 0.0, 0.0))
-        if max(glow) > 0:
-            row["emissiveFactor"] = [c / max(glow) for c in glow]
-        return row
+            row |= self._alpha_mode(shader)
+        self._add_glow(row, shader, words)
+        passes = _input_number(self._input(shader, words.transmission, 0.0)[0], 0.0)
+        index = _finite(self._input(shader, "ior", _USUAL_IOR)[0], _USUAL_IOR)
+        own = {} if index == _USUAL_IOR else {"KHR_materials_ior": {"ior": index}}
+        if passes > 0:
+            own |= {"KHR_materials_transmission": {"transmissionFactor": passes}}
+        self._note_unread(shader, is_specular=is_specular)
+        return row | ({"extensions": own} if own else {})
+
+    def _note_unread(self, shader: Any, *, is_specular: bool) -> None:
+        """A note for what the shader says of its surface and is not read."""
+        for name in noted_fields("USD"):
+            if not name.isidentifier() or (name == "specularColor" and not is_specular):
+                continue
+            value, picture = self._input(shader, name, 0.0)
+            if picture is not None or np.any(value):
+                self._notes.add(UNREAD, str(shader.GetPath()), f"{name} is not read")
+
+    def _add_glow(self, row: _Row, shader: Any, words: SurfaceWords) -> None:
+        given, picture = self._input(shader, words.glow, None)
+        if given is None and picture is None and not words.glow_times:
+            return
+        times = 1.0
+        if words.glow_times:
+            times = _finite(self._input(shader, words.glow_times, 0.0)[0], 0.0)
+        glow = _triple(given, (1.0, 1.0, 1.0)) if picture is None else picture.scale[:3]
+        if max(glow) > 0 and times > 0:
+            row["emissiveFactor"] = [max(c, 0.0) / max(glow) for c in glow]
+            if picture is not None:
+                row["emissiveTexture"] = picture.info
+
+    def _alpha_mode(self, shader: Any) -> _Row:
+        """glTF's words for a surface that is not opaque: by the threshold of either family."""
+        threshold = _input_number(self._input(shader, "opacityThreshold", 0.0)[0], 0.0)
+        if shader.GetInput("alpha_mode"):
+            mode = self._input(shader, "alpha_mode", 0)[0]
+            cutoff = _input_number(self._input(shader, "alpha_cutoff", 0.5)[0], 0.5)
+            return {} if mode == 0 else _alpha_mode(cutoff if mode == 1 else 0.0)
+        return _alpha_mode(threshold)
+
+    def _normal(self, picture: _Picture, place: str) -> _Row:
+        """A normal map; its node's scale turns 0..1 into twice the map's own."""
+        x, y = picture.scale[:2]
+        if (x < 0) != (y < 0):
+            # A map whose green points down: turn it over.
+            values = PictureValues(scale=(1.0, -1.0, 1.0), bias=(0.0, 1.0, 0.0))
+            picture = picture._replace(info=self._changed(picture.info, values))
+        times = abs(x) / 2 if picture.has_scale else 1.0
+        return picture.info | ({"scale": times} if times != 1 else {})
 
     def _colour(
         self, shader: Any, name: str, default: tuple[float, ...]
     ) -> tuple[tuple[float, ...], _Row | None]:
         value, picture = self._input(shader, name, default)
-        if picture is not None:
-            # A picture is multiplied by what its own node says.
-            return _triple(picture.pop("scale_rgb", None), (1.0, 1.0, 1.0)), picture
-        return _triple(value, default), None
+        if picture is None:
+            return _triple(value, default), None
+        # A picture is multiplied by what its own node says; what a factor cannot say changes the picture.
+        (r, g, b), bias = picture.scale[:3], picture.bias[:3]
+        is_factor = 0 <= min(r, g, b) <= max(r, g, b) <= 1 and not any(bias)
+        is_raw = picture.space == "raw"
+        channel = picture.channel if picture.channel in tuple("rgba") else ""
+        values = PictureValues(
+            channel, decode=not is_factor and not is_raw, encode=not is_factor or is_raw
+        )
+        if not is_factor:
+            values = values._replace(scale=(r, g, b), bias=(bias[0], bias[1], bias[2]))
+        return (r, g, b) if is_factor else (1.0,) * 3, self._changed(picture.info, values)
+
+    def _level(self, picture: _Picture) -> tuple[float, _Row]:
+        """(factor, picture) of one number a texel, as glTF has roughness: in green, linear."""
+        k = max("rgba".find(picture.channel), 0) if picture.channel else 1
+        scale, bias = picture.scale[k], picture.bias[k]
+        factor = 1.0 if bias or not 0 <= scale <= 1 else scale
+        values = PictureValues(
+            picture.channel if picture.channel in tuple("rba") else "",
+            decode=picture.space == "sRGB",
+            scale=(1.0 if factor != 1 else scale,) * 3, bias=(bias,) * 3,
+        )  # fmt: skip
+        return factor, self._changed(picture.info, values)
 
     def _opacity(
-        self, shader: Any, colour: _Row | None, place: str
+        self, shader: Any, name: str, colour: _Row | None, place: str
     ) -> tuple[float, _Row | None, bool]:
         """(opacity, the picture of the colour with it as its alpha, whether a picture says it)."""
-        found = shader.GetInput("opacity")
-        node, channel = self._node(found) if found else (None, "")
-        if node is None:
-            return _input_number(self._input(shader, "opacity", 1.0)[0], 1.0), colour, False
-        own = self._texture(node)
-        if own is None:
-            return 1.0, colour, False
-        own.pop("scale_rgb", None)
+        value, picture = self._input(shader, name, 1.0)
+        if picture is None:
+            level = np.mean(_triple(value, (1.0,) * 3)) if np.ndim(value) else value
+            return _input_number(level, 1.0), colour, False
+        own = picture.info
+        channel = picture.channel if picture.channel in tuple("rgba") else "r"
         k = "rgba".index(channel)
-        scale = _component(self._input(node, "scale", None)[0], k, 1.0)
-        bias = _component(self._input(node, "bias", None)[0], k, 0.0)
+        scale, bias = picture.scale[k], picture.bias[k]
         if colour is not None and own.get("extensions") != colour.get("extensions"):
             text = "the picture of its opacity lies otherwise than that of its colour: left out"
             self._notes.add("texture-layout", place, text)
@@ -146,48 +264,144 @@ class Shaders:
         # The alpha of the colour's own picture is there already.
         if own == colour and channel == "a" and bias == 0 and 0 < scale <= 1:
             return scale, colour, True
-        colour_asset = self.assets[colour["index"]] if colour else None
-        mask = _Masked(colour_asset, self.assets[own["index"]], channel, scale, bias)
-        return 1.0, (colour or own) | {"index": self._masked_index(mask)}, True
+        colour_asset = None if colour is None else self._asset(colour)
+        mask = _Masked(colour_asset, self._asset(own), channel, scale, bias)
+        return 1.0, self._with_image(colour or own, self._masked_image(mask)), True
 
-    def _node(self, connected: Any) -> tuple[Any, str]:
-        """(the UsdUVTexture that an input is connected to or None, the channel of it)."""
-        for attribute in connected.GetValueProducingAttributes():
-            node = UsdShade.Shader(attribute.GetPrim())
-            if node and node.GetIdAttr().Get() == "UsdUVTexture":
-                channel = attribute.GetName().rpartition(":")[2]
-                return node, channel if channel in tuple("rgba") else "r"
-        return None, ""
-
-    def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Row | None]:
+    def _input(self, shader: Any, name: str, default: Any) -> tuple[Any, _Picture | None]:
         """(the value of an input, the picture that it is connected to or None)."""
-        found = shader.GetInput(name)
+        found = shader.GetInput(name) if name else None
         for attribute in found.GetValueProducingAttributes() if found else ():
             if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
                 value = attribute.Get(self._time)
                 return (default if value is None else value), None
-            node = UsdShade.Shader(attribute.GetPrim())
-            if node.GetIdAttr().Get() == "UsdUVTexture":
-                return default, self._texture(node)
+            return self._followed(attribute, default, _MOST_NODES)
         return default, None
 
-    def _texture(self, node: Any) -> _Row | None:
+    def _followed(self, output: Any, default: Any, depth: int) -> tuple[Any, _Picture | None]:
+        """What a node's output gives: its picture, a constant, else what its own inputs are connected to."""
+        node = UsdShade.Shader(output.GetPrim())
+        kind = str(node.GetIdAttr().Get() or "") if node else ""
+        channel = output.GetName().rpartition(":")[2]
+        if is_picture(kind):
+            fallback = self._input(node, "fallback", self._input(node, "default", None)[0])[0]
+            picture = self._texture(node, channel)
+            is_lost = picture is None or (fallback is not None and self._is_lost(picture))
+            return (
+                (default if fallback is None else fallback, None) if is_lost else (default, picture)
+            )
+        if kind.startswith("UsdPrimvarReader"):
+            value = self._input(node, "fallback", None)[0]
+            return (default if value is None else value), None
+        for own in node.GetInputs() if node and depth else ():
+            if kind.startswith("ND_constant_"):
+                return self._input(node, own.GetBaseName(), default)
+            for attribute in own.GetValueProducingAttributes():
+                if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
+                    found = self._followed(attribute, default, depth - 1)
+                    if found[1] is not None:
+                        return found[0], self._through(found[1], node, kind, channel)
+        return default, None
+
+    def _through(self, picture: _Picture, node: Any, kind: str, channel: str) -> _Picture:
+        """A picture after a node that stands between it and its surface."""
+        if kind.startswith(("ND_separate", "ND_extract")):
+            number = self._input(node, "index", 0)[0] if "extract" in kind else None
+            word = "rgba"[int(number)] if number is not None else channel.removeprefix("out")[:1]
+            return picture._replace(channel={"x": "r", "y": "g", "z": "b"}.get(word, word))
+        if not kind.startswith(("ND_normalmap", "ND_convert", "ND_dot", "ND_gltf")):
+            place = str(node.GetPath())
+            self._notes.add(UNREAD, place, f"{kind or 'a node'} is not read: its picture is taken")
+        return picture
+
+    def _texture(self, node: Any, channel: str = "") -> _Picture | None:
         asset = self._input(node, "file", None)[0]
         if not isinstance(asset, Sdf.AssetPath) or not asset.path:
             return None
-        info = self._info(asset)
-        scale = self._input(node, "scale", None)[0]
-        if scale is not None and len(scale) == 4 and not np.allclose(list(scale)[:3], 1):
-            info["scale_rgb"] = tuple(scale)[:3]
-        st = node.GetInput("st")
+        if "<UDIM>" in asset.path:
+            asset = self._first_tile(node, asset)
+        words = ("wrapS", "wrapT") if node.GetInput("wrapS") or node.GetInput("wrapT") else _MODES
+        wraps = [WRAPS.get(str(self._input(node, w, "")[0]), _REPEAT) for w in words]
+        if any(self._input(node, w, "")[0] in ("black", "constant") for w in words):
+            text = "its picture ends in black beyond its edges: its last texels are drawn there"
+            self._notes.add("texture-layout", str(node.GetPath()), text)
+        scale, bias = (self._input(node, name, None)[0] for name in ("scale", "bias"))
+        picture = _Picture(
+            self._info(asset, wraps), channel,
+            scale=tuple(_component(scale, k, 1.0) for k in range(4)),
+            bias=tuple(_component(bias, k, 0.0) for k in range(4)),
+            has_scale=scale is not None, space=self._colour_space(node),
+        )  # fmt: skip
+        turn = self._place_of_picture(node)
+        return picture._replace(info=picture.info | {"extensions": turn}) if turn else picture
+
+    def _colour_space(self, node: Any) -> str:
+        """How a picture is encoded: "raw", "sRGB", or "" for what its use means."""
+        word = str(self._input(node, "sourceColorSpace", "")[0])
+        file = node.GetInput("file")
+        word = word or (str(file.GetAttr().GetColorSpace()) if file else "")
+        if word.startswith(("lin", "raw")) and not word.startswith("linear_to"):
+            return "raw"
+        return "sRGB" if word.lower().startswith("srgb") else ""
+
+    def _place_of_picture(self, node: Any) -> dict[str, _Row]:
+        """KHR_texture_transform of UsdTransform2d, or of what MaterialX's nodes say; {} of none."""
+        st = node.GetInput("st") or node.GetInput("texcoord")
         for attribute in st.GetValueProducingAttributes() if st else ():
             turn = UsdShade.Shader(attribute.GetPrim())
-            if turn.GetIdAttr().Get() == "UsdTransform2d":
-                angle = np.radians(_finite(self._input(turn, "rotation", 0.0)[0], 0.0))
-                size = _pair(self._input(turn, "scale", (1, 1))[0], (1.0, 1.0))
-                shift = _pair(self._input(turn, "translation", (0, 0))[0], (0.0, 0.0))
-                info["extensions"] = _transform(float(angle), size, shift)
-        return info
+            kind = str(turn.GetIdAttr().Get() or "") if turn else ""
+            self._uv_name = self._uv_name or self._name_of_uvs(turn, _MOST_NODES)
+            names = _TRANSFORMS.get(kind.removeprefix("ND_"))
+            if names is not None:
+                angle = np.radians(_finite(self._input(turn, names[0], 0.0)[0], 0.0))
+                size = _pair(self._input(turn, names[1], (1, 1))[0], (1.0, 1.0))
+                shift = _pair(self._input(turn, names[2], (0, 0))[0], (0.0, 0.0))
+                if names[1] == "scale" and kind.startswith("ND_place2d"):
+                    # MaterialX divides by the scale, and takes the offset off.
+                    size = (1 / (size[0] or 1.0), 1 / (size[1] or 1.0))
+                    shift = (-shift[0], -shift[1])
+                return _transform(float(angle), size, shift)
+        size = _pair(self._input(node, "uvtiling", (1, 1))[0], (1.0, 1.0))
+        shift = _pair(self._input(node, "uvoffset", (0, 0))[0], (0.0, 0.0))
+        is_plain = size == (1.0, 1.0) and shift == (0.0, 0.0)
+        return {} if is_plain else _transform(0.0, size, (-shift[0], -shift[1]))
+
+    def _name_of_uvs(self, node: Any, depth: int) -> str:
+        """The primvar that the nodes before a picture read, "" where they name none."""
+        if not node or not depth:
+            return ""
+        for name in ("varname", "geomprop"):
+            if value := self._input(node, name, "")[0]:
+                return str(value)
+        for name in ("in", "texcoord"):
+            found = node.GetInput(name)
+            for attribute in found.GetValueProducingAttributes() if found else ():
+                if value := self._name_of_uvs(UsdShade.Shader(attribute.GetPrim()), depth - 1):
+                    return value
+        return ""
+
+    def _first_tile(self, node: Any, asset: Any) -> Any:
+        """The first tile of a picture in tiles (UDIM), with a note where there are more."""
+        attribute = node.GetInput("file").GetValueProducingAttributes()[0]
+        layer = attribute.GetPropertyStack(self._time)[0].layer
+        tiles = UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, layer)
+        for path, number in tiles:
+            if number != _FIRST_TILE:
+                continue
+            if len(tiles) > 1:
+                text = f"{asset.path[:80]} has {len(tiles)} tiles: {_FIRST_TILE} alone is read"
+                self._notes.add("texture-layout", str(node.GetPath()), text)
+            return Sdf.AssetPath(asset.path.replace("<UDIM>", number), path)
+        return asset
+
+    def _is_lost(self, picture: _Picture) -> bool:
+        """Whether a picture's file is not there; its note says what stands for it."""
+        asset = self._asset(picture.info)
+        if asset.resolvedPath:
+            return False
+        text = f"{asset.path[:120]} does not exist: its fallback stands for it"
+        self._notes.add("missing-texture", asset.path[:80], text)
+        return True
 
     # MDL
 
@@ -237,10 +451,10 @@ class Shaders:
         if own is None:
             return colour, False
         mode = self._input(shader, "opacity_mode", 1)[0]
-        colour_asset = self.assets[colour["index"]] if colour else None
+        colour_asset = self._asset(colour) if colour else None
         # Mode 0 is the alpha; the others are means and the like of the colours.
-        mask = _Masked(colour_asset, self.assets[own["index"]], "a" if mode == 0 else "l", 1.0, 0.0)
-        return (colour or own) | {"index": self._masked_index(mask)}, True
+        mask = _Masked(colour_asset, self._asset(own), "a" if mode == 0 else "l", 1.0, 0.0)
+        return self._with_image(colour or own, self._masked_image(mask)), True
 
     def _mdl_picture(self, shader: Any, name: str) -> _Row | None:
         asset = self._input(shader, name, None)[0]
@@ -256,8 +470,8 @@ class Shaders:
         found = _PICTURE_OF_MDL.search(self._text_of(asset))
         text = f"{stem or 'a shader'} is not read"
         if found is None:
-            self._notes.add(UNREAD, place, f"{text}: the surface stays plain")
-            return {"name": name}
+            self._notes.add(UNREAD, place, f"{text}: the surface is a matte grey")
+            return _grey(name)
         self._notes.add(UNREAD, place, f"{text}: its first picture is the colour")
         folder = (asset.resolvedPath or asset.path).replace("\\", "/").rpartition("/")[0]
         picture = Sdf.AssetPath(found[1], f"{folder}/{found[1].lstrip('./')}")
@@ -265,19 +479,43 @@ class Shaders:
         row["pbrMetallicRoughness"]["baseColorTexture"] = self._info(picture)
         return row
 
-    def _info(self, asset: Any) -> _Row:
-        return {"index": self._picture_index(str(asset.resolvedPath or asset.path), asset, asset)}
+    def _info(self, asset: Any, wraps: Sequence[int] = (_REPEAT, _REPEAT)) -> _Row:
+        return self._texture_of_image(self._image(_path_of(asset), asset, asset), *wraps)
 
-    def _masked_index(self, mask: _Masked) -> int:
-        parts = [str(a.resolvedPath or a.path) if a else "" for a in mask[:2]]
-        return self._picture_index(f"{parts} {mask[2:]}", mask, mask.colour or mask.opacity)
+    def _masked_image(self, mask: _Masked) -> int:
+        parts = [_path_of(a) if a else "" for a in mask[:2]]
+        return self._image(f"{parts} {mask[2:]}", mask, mask.colour or mask.opacity)
 
-    def _picture_index(self, key: str, asset: Any, named: Any) -> int:
+    def _changed(self, info: _Row, values: PictureValues) -> _Row:
+        """The texture of a picture whose values are changed, laid as the other."""
+        if values == PictureValues():
+            return info
+        asset = self._asset(info)
+        return self._with_image(
+            info, self._image(f"{_path_of(asset)} {values}", _Changed(asset, values), asset)
+        )
+
+    def _asset(self, info: _Row) -> Any:
+        return self.assets[self.textures[info["index"]]["source"]]
+
+    def _with_image(self, info: _Row, image: int) -> _Row:
+        sampler = self.samplers[self.textures[info["index"]].get("sampler", 0)]
+        return info | self._texture_of_image(image, sampler["wrapS"], sampler["wrapT"])
+
+    def _texture_of_image(self, image: int, wrap_s: int, wrap_t: int) -> _Row:
+        sampler = {"wrapS": wrap_s, "wrapT": wrap_t}
+        if sampler not in self.samplers:
+            self.samplers.append(sampler)
+        row = {"source": image, "sampler": self.samplers.index(sampler)}
+        if row not in self.textures:
+            self.textures.append(row)
+        return {"index": self.textures.index(row)}
+
+    def _image(self, key: str, asset: Any, named: Any) -> int:
         if key not in self._pictures:
             # Pictures are named by number; their names may hold anything.
             name = named.path.replace("\\", "/").rsplit("/", 1)[-1].rstrip("]")[:100]
             self.images.append({"uri": str(len(self.assets)), "name": name or "picture"})
-            self.textures.append({"source": len(self.assets)})
             self.assets.append(asset)
             self._pictures[key] = len(self.assets) - 1
         return self._pictures[key]
@@ -289,8 +527,8 @@ class Shaders:
         """
         asset = self.assets[number]
         if not isinstance(asset, _Masked):
-            return read(asset)
-        colour = read(asset.colour) if asset.colour else None
+            return _bytes_of(asset, read)
+        colour = _bytes_of(asset.colour, read) if asset.colour else None
         opacity = read(asset.opacity)
         if opacity is None and colour is not None:
             missing = f"{asset.opacity.path[:120]} does not exist: nothing is cut out"
@@ -298,6 +536,34 @@ class Shaders:
         if opacity is None or (asset.colour and colour is None):
             return colour
         return picture_with_alpha(colour, opacity, asset.channel, asset.scale, asset.bias)
+
+
+def _bytes_of(asset: Any, read: Callable[[Any], bytes | None]) -> bytes | None:
+    """The bytes of an asset, its values changed where they are; None where it is not there."""
+    if not isinstance(asset, _Changed):
+        return read(asset)
+    data = read(asset.asset)
+    return None if data is None else picture_of_values(data, asset.values)
+
+
+def _path_of(asset: Any) -> str:
+    if isinstance(asset, (_Masked, _Changed)):
+        return str(asset)
+    return str(asset.resolvedPath or asset.path)
+
+
+def _omniverse(material: Any) -> str:
+    """OmniPBR or OmniGlass, "" of other materials."""
+    shader = material.ComputeSurfaceSource("mdl")[0]
+    asset = shader.GetPrim().GetAttribute("info:mdl:sourceAsset").Get() if shader else None
+    path = asset.path if isinstance(asset, Sdf.AssetPath) else ""
+    stem = path.replace("\\", "/").rsplit("/", 1)[-1]
+    return stem if stem.startswith(("OmniPBR", "OmniGlass")) else ""
+
+
+def _grey(name: str) -> _Row:
+    """What is not understood: a matte grey."""
+    return _pbr(name, [float(c) for c in (*linear_from_srgb(np.array(GREY)), 1.0)], 1.0, 0.0)
 
 
 def _pbr(name: str, factor: list[float], roughness: float, metallic: float) -> _Row:

@@ -33,8 +33,11 @@ class Shape:
     normals: F64 | None = None  # (V, 3)
 
 
-def mesh_shape(prim: Any, time: Any, file: str) -> Shape | None:
-    """The triangles of a UsdGeom.Mesh; None where it has none. BadHouse where they are damaged."""
+def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | None:
+    """The triangles of a UsdGeom.Mesh; None where it has none. BadHouse where they are damaged.
+
+    uv_name: the texture coordinates that its material asks for.
+    """
     mesh = UsdGeom.Mesh(prim)
     points = _float_rows(mesh.GetPointsAttr().Get(time), 3)
     sizes = _ints(mesh.GetFaceVertexCountsAttr().Get(time))
@@ -50,7 +53,7 @@ def mesh_shape(prim: Any, time: Any, file: str) -> Shape | None:
         triangles, polygon = triangles[kept], polygon[kept]
     if not len(triangles):
         return None
-    pairs = [_texture_coordinates(prim, time), _normals(mesh, time)]
+    pairs = [_texture_coordinates(prim, time, uv_name), _normals(mesh, time)]
     of_points = [_of_points(*pair, len(points)) for pair in pairs]
     of_corners = [_of_corners(*pair, indices, sizes) for pair in pairs]
     # Where a corner has values of its own, every corner becomes a vertex.
@@ -87,11 +90,11 @@ def _ints(value: Any) -> I64:
     return np.zeros(0, np.int64) if value is None else np.asarray(value, np.int64).reshape(-1)
 
 
-def _texture_coordinates(prim: Any, time: Any) -> tuple[F64 | None, str]:
-    """(values, interpolation) of the texture coordinates, those called st before others."""
+def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None, str]:
+    """(values, interpolation) of the texture coordinates of that name, else those called st before others."""
     found = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
-    names = ("st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
-    order = {name: k for k, name in enumerate(names)}
+    names = (uv_name, "st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
+    order = {name: k for k, name in reversed(list(enumerate(names)))}
     found.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
     if not found:
         return None, ""

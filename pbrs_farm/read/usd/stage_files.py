@@ -78,7 +78,7 @@ def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
     while todo:
         name = todo.pop()
         yield name, True
-        for asset in _named_in(folder.root.root / name):
+        for asset in _with_tiles(folder.root.root / name):
             found = _name_below_root(folder, name, asset)
             if found is None or found in seen:
                 continue
@@ -96,6 +96,18 @@ def _named_in(path: Path) -> list[str]:
         return [name for kind in UsdUtils.ExtractExternalReferences(str(path)) for name in kind]
     except (RuntimeError, UnicodeDecodeError):  # a damaged layer, of which the stage will tell
         return []
+
+
+def _with_tiles(layer: Path) -> Iterator[str]:
+    """The names in a layer; of a picture in tiles (UDIM) each tile's that is there."""
+    for asset in _named_in(layer):
+        head, mark, tail = asset.partition("<UDIM>")
+        if not mark or "://" in head:
+            yield asset
+            continue
+        for number in range(_TILES[0], _TILES[1]):
+            if (layer.parent / f"{head}{number}{tail}").exists():
+                yield f"{head}{number}{tail}"
 
 
 def _name_below_root(folder: StageFolder, layer: str, asset: str) -> str | None:
@@ -167,6 +179,7 @@ try:
 except Exception:
     pass  # the process that reads says so
 """
+_TILES: Final = (1001, 1101)  # numbers of UDIM's tiles: ten a row, ten rows are looked for
 _TRIAL_S: Final = 8.0
 _BYTES_A_SECOND: Final = 10e6
 _BINARY: Final = frozenset({".usd", ".usdc", ".usdz"})

@@ -10,7 +10,7 @@ import trimesh
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
-from pbrs_farm.read.mesh.mtl import builtin_materials, parse_mtl
+from pbrs_farm.read.mesh.mtl import builtin_materials, laid, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
@@ -165,6 +165,21 @@ def test_mtl_lines_are_read_and_nonsense_is_passed_over() -> None:
     assert (red.kd, red.ks, red.ns, red.d) == ((1, 0, 0), (0.5, 0.5, 0.5), 30, 0.75)
     assert red.map_kd == "a b.jpg"
     assert (blue.kd, blue.ns, blue.d, blue.map_d) == ((0.8, 0.8, 0.8), 0, 1, "mask.png")
+
+
+def test_what_an_mtl_says_of_its_pictures_place_is_read_and_the_rest_is_named() -> None:
+    wood, plain = parse_mtl(
+        b"newmtl wood\nmap_Kd -o 0.25 -s 2 3 1 -clamp on a.png\nKe 1 1 1\nmap_Bump -bm 2 b.png\n"
+        b"newmtl plain\nmap_Kd -clamp off a.png\nKe 0 0 0\nNi 1.4\nillum 2\n"
+    )
+    assert (wood.map_kd, wood.uv_offset, wood.uv_scale) == ("a.png", (0.25, 0), (2, 3))
+    assert wood.unread == ("map_kd -clamp on", "ke", "map_bump")
+    assert (plain.map_kd, plain.unread) == ("a.png", ())
+    (mesh,) = parse_obj((QUAD + "vt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n").encode(), "q.obj").meshes
+    uvs = laid(mesh, wood).uvs
+    assert uvs is not None
+    assert uvs.tolist() == [[0.25, 0], [2.25, 0], [2.25, 3]]
+    assert laid(mesh, plain) is mesh
 
 
 def test_the_built_in_materials_carry_their_notice() -> None:

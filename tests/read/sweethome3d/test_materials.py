@@ -123,6 +123,13 @@ def test_a_models_own_texture_is_found_beside_its_mtl() -> None:
     assert not house.notes or all(n.kind != "missing-texture" for n in house.notes)
 
 
+def test_a_black_material_whose_picture_is_not_there_is_grey() -> None:
+    obj = b"mtllib c.mtl\n" + BOX_OBJ.replace(b"usemtl white", b"usemtl w")
+    mtl = b"newmtl w\nKd 0 0 0\nmap_Kd pic.png\n"
+    house = read(piece("model='2/c/c.obj'"), {"2/c/c.obj": obj, "2/c/c.mtl": mtl})
+    assert look(house, "piece_0")[1].diffuse == (0.8, 0.8, 0.8)
+
+
 def test_a_texture_that_cannot_be_read_is_noted_and_the_colour_stays() -> None:
     texture = "<texture attribute='floorTexture' name='T' width='50' height='50' image='{}'/>"
     for image, kind in (("absent", "missing-texture"), ("junk", "unreadable-texture")):

@@ -1,0 +1,85 @@
+"""What the inputs of surface shaders are called: UsdPreviewSurface and those of MaterialX. No effects.
+
+MaterialX's nodes come as ND_<name>_surfaceshader; Arnold's standard_surface has the same inputs. A shader
+that is none of these is not read: its material is a matte grey, with a note.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+
+class SurfaceWords(NamedTuple):
+    """Names of a surface shader's inputs ("" = it has none), and what they are where nothing says it."""
+
+    colour: str
+    roughness: str
+    metallic: str
+    opacity: str
+    normal: str
+    glow: str
+    colour_times: str = ""  # a number that multiplies the colour
+    glow_times: str = ""  # and one for what shines, 0 where nothing says it
+    transmission: str = ""
+    default_colour: float = 0.8
+    default_roughness: float = 0.5
+    default_metallic: float = 0.0
+
+
+_PREVIEW: Final = SurfaceWords(
+    "diffuseColor", "roughness", "metallic", "opacity", "normal", "emissiveColor",
+    default_colour=0.18,
+)  # fmt: skip
+_STANDARD: Final = SurfaceWords(
+    "base_color", "specular_roughness", "metalness", "opacity", "normal", "emission_color",
+    "base", "emission", "transmission", default_roughness=0.2,
+)  # fmt: skip
+_GLTF: Final = SurfaceWords(
+    "base_color", "roughness", "metallic", "alpha", "normal", "emissive",
+    transmission="transmission", default_colour=1.0, default_roughness=1.0, default_metallic=1.0,
+)  # fmt: skip
+_OPEN: Final = SurfaceWords(
+    "base_color", "specular_roughness", "base_metalness", "geometry_opacity", "geometry_normal",
+    "emission_color", "base_weight", "emission_luminance", "transmission_weight",
+    default_roughness=0.3,
+)  # fmt: skip
+
+_BY_NAME: Final = {
+    "UsdPreviewSurface": _PREVIEW,
+    "standard_surface": _STANDARD,
+    "gltf_pbr": _GLTF,
+    "open_pbr_surface": _OPEN,
+}
+_CONTEXTS: Final = ("", "mtlx")  # render contexts that are asked first: what all renderers share
+
+
+def surface_of(material: Any) -> tuple[Any, SurfaceWords | None]:
+    """(the surface shader of a UsdShade.Material that is understood, its words), else (any, None).
+
+    (None, None) where the material has none at all.
+    """
+    first = None
+    outputs = (o.GetBaseName().rpartition(":")[0] for o in material.GetSurfaceOutputs())
+    for context in dict.fromkeys((*_CONTEXTS, *outputs)):
+        shader = material.ComputeSurfaceSource(context)[0]
+        if not shader:
+            continue
+        first = first or shader
+        kind = str(shader.GetIdAttr().Get() or "")
+        name = kind.removeprefix("ND_").removesuffix("_surfaceshader").rpartition(":")[2]
+        if name in _BY_NAME:
+            return shader, _BY_NAME[name]
+    return first, None
+
+
+def is_picture(kind: str) -> bool:
+    """Whether a node of that id reads a picture from a file."""
+    return kind.startswith(("UsdUVTexture", "ND_UsdUVTexture", "ND_image_", "ND_tiledimage_")) or (
+        kind.startswith("ND_gltf_") and "image" in kind
+    )
+
+
+WRAPS: Final = {
+    "clamp": 33071, "black": 33071, "constant": 33071, "mirror": 33648
+}  # fmt: skip
+"""How a picture goes on beyond its edges, in words of USD and MaterialX -> glTF's number; others repeat."""
