@@ -36,7 +36,7 @@ _COUNTERS: Final = frozenset({"kitchen", "counter", "countertop", "worktop", "is
 _COOKERS: Final = frozenset({"stove", "cooker", "hob", "cooktop", "stovetop", "range", "oven"})
 _OTHERS: Final = frozenset({"hood", "microwave"})
 _BUILT_IN: Final = frozenset({
-    "dishwasher", "washing", "washer", "fridge", "refrigerator", "freezer", "dryer",
+    "washing", "washer", "fridge", "refrigerator", "freezer", "dryer",
 })  # fmt: skip
 
 
@@ -53,6 +53,7 @@ class _Set(NamedTuple):
     bases: tuple[Piece, ...]
     sink: Piece
     cooker: Piece
+    dishwashers: tuple[Piece, ...]
     uppers: tuple[Piece, ...]
 
     @property
@@ -96,6 +97,7 @@ class _Module(NamedTuple):
     high: float
     kind: str  # "base", "sink", "cooker", "gap"
     item: Item | None = None  # that it stands for; None = the run's own
+    absorbed: tuple[str, ...] = ()  # ids of what it has in it as well
 
 
 def kitchen_units(
@@ -106,7 +108,7 @@ def kitchen_units(
 
     items: the box-only things of the room. is_kitchen: whether its cabinets are kitchen cabinets.
     choose_front: of boxes that look different ways, the number of the likeliest. Items that are no
-    part of a run are not in the result; it is empty where the catalogue has no kitchen set.
+    part of a run are not in the result, those that are part of another's unit have none; it is empty where the catalogue has no kitchen set.
     """
     is_kitchen = is_kitchen or any(_is_named_counter(i) for i in items)
     counters = [i for i in items if _is_counter(i, floor_y, is_kitchen=is_kitchen)]
@@ -127,6 +129,8 @@ def kitchen_units(
         modules = _modules_of(run, [] if run.is_hung else others)
         if run is longest:
             modules = _with_invented(modules, wanted)
+        found.setdefault(run.item.id, [])
+        found |= {id_: [] for module in modules for id_ in module.absorbed}
         for number, module in enumerate(modules):
             unit = _unit_of(module, number, run, chosen)
             if unit is not None:
@@ -165,7 +169,7 @@ def _is_hung(item: Item, floor_y: float) -> bool:
 def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: str) -> _Set | None:
     """A set whose worktop is about as high as the counters are; one home has one."""
     by_set: dict[str, dict[str, list[Piece]]] = {}
-    for piece in catalogue.of("base_cabinet", "sink", "cooker", "upper_cabinet"):
+    for piece in catalogue.of("base_cabinet", "sink", "cooker", "dishwasher", "upper_cabinet"):
         if piece.of_set:
             by_set.setdefault(piece.of_set, {}).setdefault(piece.group, []).append(piece)
     whole = [s for s in by_set.values() if {"base_cabinet", "sink", "cooker"} <= set(s)]
@@ -177,7 +181,7 @@ def _set_of_kitchen(catalogue: Catalogue, counters: Sequence[Item], house_id: st
     chosen = near[keys.seed(house_id, "kitchen set") % len(near)]
     return _Set(
         tuple(chosen["base_cabinet"]), chosen["sink"][0], chosen["cooker"][0],
-        tuple(chosen.get("upper_cabinet", ())),
+        tuple(chosen.get("dishwasher", ())), tuple(chosen.get("upper_cabinet", ())),
     )  # fmt: skip
 
 
@@ -236,6 +240,8 @@ def _kind_of(item: Item) -> str:
         return ""
     if item.nyu40 == SINK:
         return "sink"
+    if words & {"dishwasher", "dish"}:
+        return "dishwasher"
     return "gap" if words & _BUILT_IN else "cooker" if words & _COOKERS else ""
 
 
@@ -251,9 +257,15 @@ def _modules_of(run: _Run, others: Sequence[Item]) -> list[_Module]:
     for x, item in sorted(inside, key=lambda row: row[0]):
         kind = _kind_of(item)
         assert item.box is not None
-        width = {"sink": _SINK_M if run.length > 2 * _SINK_M else MODULE_M, "cooker": MODULE_M}.get(
-            kind, 2 * float(np.abs(item.box.axes.T @ run.right * item.box.half).sum())
-        )
+        if fixed and fixed[-1].kind == kind == "cooker" and x < fixed[-1].high:
+            # A hob, and the oven under it.
+            fixed[-1] = fixed[-1]._replace(absorbed=(*fixed[-1].absorbed, item.id))
+            continue
+        width = MODULE_M
+        if kind == "gap":
+            width = 2 * float(np.abs(item.box.axes.T @ run.right * item.box.half).sum())
+        elif kind == "sink" and run.length > 2 * _SINK_M:
+            width = _SINK_M
         low = max(x - width / 2, fixed[-1].high if fixed else 0.0)
         low = min(low, run.length - width)
         if low >= (fixed[-1].high if fixed else 0.0) - 1e-6:
@@ -289,7 +301,7 @@ def _with_invented(modules: list[_Module], wanted: Sequence[str]) -> list[_Modul
 def _unit_of(module: _Module, number: int, run: _Run, chosen: _Set) -> Unit | None:
     pieces = {
         "base": chosen.uppers if run.is_hung else chosen.bases,
-        "sink": (chosen.sink,), "cooker": (chosen.cooker,),
+        "sink": (chosen.sink,), "cooker": (chosen.cooker,), "dishwasher": chosen.dishwashers,
     }.get(module.kind)  # fmt: skip
     if not pieces:
         return None

@@ -86,13 +86,31 @@ def test_a_sink_that_lies_in_a_kitchen_is_its_unit() -> None:
 
 def test_a_machine_in_a_counter_keeps_its_place() -> None:
     counter = told("CounterTop", (2.0, 0, 0.32), (3.0, 0.9, 0.6), "ai2thor")
-    washer = told("dishwasher", (2.9, 0, 0.32), (0.6, 0.85, 0.6), "roomplan", 1)
+    washer = told("washing machine", (2.9, 0, 0.32), (0.6, 0.85, 0.6), "roomplan", 1)
     house = furnished(counter, washer)
-    assert groups(stand_ins(house, "box_1")) == ["dishwasher"]
+    assert groups(stand_ins(house, "box_1")) == ["washer"]
     for unit in stand_ins(house, "box_0"):
         assert unit.bounds[1, 0] < 2.62 or unit.bounds[0, 0] > 3.18
     # A counter is no whole kitchen: nothing is added to it.
     assert set(groups(stand_ins(house, "box_0"))) == {"base_cabinet"}
+
+
+def test_a_counter_full_of_machines_is_nothing_beside_them() -> None:
+    counter = told("storage", (1.4, 0, 0.32), (2.0, 0.92, 0.62), "roomplan")
+    inside = [
+        told("dishwasher", (0.7, 0.03, 0.32), (0.6, 0.82, 0.6), "roomplan", 1),
+        told("sink", (1.4, 0.78, 0.32), (0.55, 0.16, 0.45), "roomplan", 2),
+        told("stove", (2.1, 0.88, 0.32), (0.58, 0.06, 0.5), "roomplan", 3),
+        told("oven", (2.1, 0.1, 0.32), (0.58, 0.6, 0.55), "roomplan", 4),
+    ]
+    items = stand_ins(furnished(counter, *inside))
+    # The cooker has its oven in it.
+    assert {i.id: g for i, g in zip(items, groups(items), strict=True)} == {
+        "box_1": "dishwasher", "box_2": "sink", "box_3": "cooker",
+    }  # fmt: skip
+    assert len(sets(items)) == 1
+    low, high = (f(i.bounds[k, 0] for i in items) for f, k in ((min, 0), (max, 1)))
+    assert (low, high) == pytest.approx((0.4, 2.4), abs=0.03)
 
 
 def test_a_deep_counter_in_a_corner_is_an_l() -> None:
