@@ -45,6 +45,15 @@ def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
     return found
 
 
+def door_line(middle: F64, way: F64, width: float) -> LineString:
+    """The line that a door closes, however wide it is: into the walls at both its sides.
+
+    middle, way: (2,) of the plan, way of length 1 along the door's width; metres.
+    """
+    half = way * (width / 2 + _JOIN_M)
+    return LineString([middle - half, middle + half])
+
+
 def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Polygon]:
     """A piece of ground, parted by the lines where they leave rooms on both sides; whole where none does.
 

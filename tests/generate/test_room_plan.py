@@ -179,3 +179,21 @@ def test_the_doorway_between_two_walls_stays_open(tmp_path: Path) -> None:
     near = [o for o in house.openings if np.abs(o.quad.mean(0) - middle)[[0, 2]].max() < 0.2]
     assert len(near) == 1
     assert near[0].quad[:, 1].max() > 1.9
+
+
+@pytest.mark.parametrize("has_floor", [True, False])
+def test_a_wide_opening_between_two_walls_closes_its_rooms(tmp_path: Path, has_floor: bool) -> None:
+    ring: list[Place] = [(0, 0), (8, 0), (8, 6), (0, 6)]
+    lines = [
+        *zip(ring, [*ring[1:], ring[0]], strict=True),
+        ((5, 0.05), (5, 2)),
+        ((5, 4), (5, 5.95)),
+    ]
+    path = scan(
+        tmp_path, walls=[surface("wall", a, b, 0, 2.5) for a, b in lines],
+        floors=[floor(ring)] if has_floor else [], openings=[surface("opening", (5, 2), (5, 4), 0, 2.2)],
+    )  # fmt: skip
+    plan = plan_from_file(path).plan
+    assert sorted(r.area for r in plan.rooms) == pytest.approx([18, 30], rel=0.04)
+    (passage,) = plan.openings
+    assert (passage.kind.value, passage.width) == ("passage", pytest.approx(2.0))

@@ -15,11 +15,12 @@ import numpy as np
 import shapely
 from pydantic import BaseModel, Field
 from shapely.geometry import LineString, Point, Polygon
+from shapely.ops import unary_union
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.plans.closed_rings import closed_rings, passages_between
+from pbrs_farm.generate.plans.closed_rings import Line, closed_rings, passages_between
 from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
     ParsedPlan,
@@ -35,6 +36,7 @@ from pbrs_farm.geometry.doorways import rooms_by_walls
 
 _MOST: Final = 3_000
 _JOIN_M: Final = 0.25  # scanned walls do not meet exactly
+_IN_WALL_M: Final = 0.15  # what lies so near to a wall's line stands in it
 _SPURIOUS_M: Final = 12.0
 _SAME_HEIGHT_M: Final = 0.15  # of walls: larger differences are told
 _UPRIGHT: Final = 0.98  # y of a wall's own up, at least: others lean
@@ -126,6 +128,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         shape for k, f in enumerate(scan.floors, 1)
         if len(f.polygonCorners) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
     ]  # fmt: skip
+    lines += _lines_in_gaps(path, scan, lines)
     walls_of_plan = [LineString(line) for line in lines if line[0] != line[1]]
     outlines = [room for o in outlines for room in rooms_by_walls(o, walls_of_plan) or [o]]
     outlines = outlines or closed_rings(path, lines, _JOIN_M)
@@ -168,6 +171,21 @@ def _upper_edge_of(path: Path, place: str, surface: _Surface, pose: F64) -> Wall
     world = np.array([(x, y, 0.0) for x, y in edge]) @ pose[:3, :3].T + pose[:3, 3]
     places = tuple((float(x), float(z)) for x, _, z in world)
     return WallTop(places, tuple(float(y) for y in world[:, 1]))
+
+
+def _lines_in_gaps(path: Path, scan: _Scan, lines: list[Line]) -> list[Line]:
+    """Middle lines of doors, windows and openings that stand between walls, not in one."""
+    standing = unary_union([LineString(line).buffer(_IN_WALL_M) for line in lines])
+    found = []
+    for kind in ("doors", "windows", "openings"):
+        for k, surface in enumerate(getattr(scan, kind), 1):
+            top = _upper_edge_of(
+                path, f"{kind} {k}", surface, _parse_pose(path, f"{kind} {k}", surface)
+            )
+            line = (top.places[0], top.places[-1])
+            if LineString(line).difference(standing).length > surface.dimensions[0] / 2:
+                found.append(line)
+    return found
 
 
 def _note_heights(tops: list[WallTop], height: float, left_out: LeftOut) -> None:

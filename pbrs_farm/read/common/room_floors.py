@@ -15,7 +15,7 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
-from pbrs_farm.geometry.doorways import doorways, parted_at_doorways
+from pbrs_farm.geometry.doorways import NARROWEST_M, door_line, doorways, parted_at_doorways
 
 # A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
@@ -25,6 +25,7 @@ _CRACK_M: Final = 1e-4  # between triangles that should touch
 _SLACK_M: Final = 0.002  # tolerance of an outline's corners
 _UPRIGHT_UP: Final = 0.3  # |y| of a wall's normal, at most
 _LEVEL_UP: Final = 0.7  # least |y| of the normal of a floor or ceiling
+_THICKEST_DOOR_M: Final = 0.4  # with its frame
 _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
@@ -73,11 +74,12 @@ def covered_share(surface: Surface, polygon: F64) -> float:
 
 
 def floor_polygons(
-    floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float
-) -> list[F64]:
+    floor: Sequence[Surface], walls: Sequence[Surface], *, min_area_m2: float, min_width_m: float,
+    doors: Sequence[F64] = (),
+) -> list[F64]:  # fmt: skip
     """Every piece of floor between the walls, planar walls too, that is a room by its size.
 
-    Each as floor_polygon gives it, largest first.
+    doors: (2, 3) bounds of each, which part rooms however wide they are. Each as floor_polygon gives it, largest first.
     """
     corners = _faces_looking(floor, 1)
     if not len(corners):
@@ -89,6 +91,7 @@ def floor_polygons(
         between = shapely.difference(between, taken)
     # One room ends at the doorway to the next.
     ways = doorways(shapely.union_all([*feet, traces]))
+    ways += [line for bounds in doors if (line := _line_of_door(bounds)) is not None]
     parts = [p for whole in shapely.get_parts(between) for p in parted_at_doorways(whole, ways)]
     pieces = np.array(parts, object)
     # Keep pieces that are large and wide enough; give back what the strips took.
@@ -97,6 +100,16 @@ def floor_polygons(
     fit.sort(key=lambda p: (-p.area, p.bounds))
     found = [polygon_of(p) for p in _grown(fit, _TRACE_M)]
     return [p for p in found if p is not None]
+
+
+def _line_of_door(bounds: F64) -> shapely.LineString | None:
+    # A door that stands open, or askew, tells no line.
+    low, high = bounds[:, [0, 2]]
+    size, middle = high - low, (low + high) / 2
+    across = int(np.argmax(size))
+    if size[1 - across] > _THICKEST_DOOR_M or size[across] < NARROWEST_M:
+        return None
+    return door_line(middle, np.eye(2)[across], float(size[across]))
 
 
 def _grown(areas: Any, by_m: float) -> Any:

@@ -10,7 +10,7 @@ import shapely
 from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
-from pbrs_farm.geometry.doorways import doorways, parted_at_doorways
+from pbrs_farm.geometry.doorways import door_line, doorways, parted_at_doorways
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
@@ -28,6 +28,8 @@ MIN_AREA_M2 = 0.01  # smaller rooms are left out
 LEAST_ROOM_M2 = 1.0  # a smaller area between walls is a shaft
 LEAST_WALL_M = 1.8  # lower walls enclose no room
 GAP_M = 0.1  # between walls that were meant to meet
+ACROSS_M = 0.01  # half the width that a doorway is closed by
+DOOR_SILL_M = 0.3  # what begins higher is a window
 SLIVER_M2 = 1e-4  # smaller pieces come of rounding
 MAX_CORNERS = 300  # an outline of more corners is simplified: cost grows with their square
 
@@ -81,12 +83,13 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
             and wall.id in outlines
             and max(wall.height, wall.height_end or 0.0) >= LEAST_WALL_M
         ]
-        standing = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
-        standing = standing.buffer(-GAP_M / 2, join_style="mitre")
-        # What lies within the walls' outer edge, and under no wall.
-        whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(standing)])
-        pieces = _polygons(shapely.difference(whole, shapely.union_all([standing, *feet])))
-        ways = doorways(shapely.union_all([standing, *feet]))
+        met = shapely.union_all(feet).buffer(GAP_M / 2, join_style="mitre")
+        standing = shapely.union_all([met.buffer(-GAP_M / 2, join_style="mitre"), *feet])
+        ways = [*doorways(standing), *_door_lines(plan, level_id)]
+        # What lies within the outer edge of walls and doorways, and under no wall.
+        closed = shapely.union_all([standing, *(way.buffer(ACROSS_M) for way in ways)])
+        whole = shapely.union_all([shapely.Polygon(p.exterior) for p in _polygons(closed)])
+        pieces = _polygons(shapely.difference(whole, standing))
         inside = [room for piece in pieces for room in parted_at_doorways(piece, ways)]
         found += [
             HomeRoom(
@@ -97,6 +100,15 @@ def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[H
             if p.area >= LEAST_ROOM_M2
         ]  # fmt: skip
     return tuple(found)
+
+
+def _door_lines(plan: HomePlan, level_id: str) -> list[shapely.LineString]:
+    """The lines across a level that its doors close, and windows down to the floor."""
+    return [
+        door_line(np.array(p.centre), np.array([np.cos(p.angle), np.sin(p.angle)]), p.size[0])
+        for p in plan.pieces
+        if p.level == level_id and p.frame is not None and p.elevation < DOOR_SILL_M
+    ]
 
 
 def _simple(room: HomeRoom, materials: HomeMaterials) -> shapely.Polygon | None:

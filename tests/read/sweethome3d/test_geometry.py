@@ -318,3 +318,27 @@ def test_rooms_between_walls_end_at_a_doorway(gap_cm: int, n: int) -> None:
     assert n == 1 or areas == pytest.approx(expected, abs=0.01)
     floors = [i for i in house.items if i.kind is ItemKind.FLOOR]
     assert len(floors) == n
+
+
+@pytest.mark.parametrize(("door_cm", "n"), [(0, 1), (180, 2)])
+def test_a_double_door_between_two_walls_parts_two_rooms(door_cm: int, n: int) -> None:
+    ends = """
+    <wall id='e' xStart='250' yStart='0' xEnd='250' yEnd='60' thickness='10'/>
+    <wall id='f' xStart='250' yStart='240' xEnd='250' yEnd='300' thickness='10'/>
+    """
+    door = piece(
+        f"name='Door' x='250' y='150' width='{door_cm}' depth='10' height='210' angle='{math.pi / 2}'",
+        tag="doorOrWindow",
+    )  # fmt: skip
+    body = WALLS + ends + (door if door_cm else "")
+    house = read_home(sh3d(home_xml(body, room=""), {"1": BOX_OBJ}), "test.sh3d")
+    assert len(house.rooms) == n
+
+
+def test_a_home_whose_outer_wall_ends_at_its_entrance_has_a_room() -> None:
+    open_wall = WALLS.replace(
+        "xStart='0' yStart='300' xEnd='0' yEnd='0'", "xStart='0' yStart='300' xEnd='0' yEnd='100'"
+    ).replace("wallAtEnd='a' xStart='0' yStart='300'", "xStart='0' yStart='300'")
+    house = read_home(sh3d(home_xml(open_wall, room="")), "test.sh3d")
+    (room,) = house.rooms
+    assert shapely.Polygon(room.polygon).area == pytest.approx(3.9 * 2.9, rel=0.02)
