@@ -71,3 +71,23 @@ def test_windows_across_the_street_shine_by_themselves() -> None:
     dim, bright = light_of("board"), light_of(f"{LIT} 0")
     gained = (bright.outdoor - dim.outdoor).reshape(-1, 3).max(0)
     np.testing.assert_allclose(gained, 45.0 / 179.0, rtol=0.02)
+
+
+def test_leaves_outside_are_seen_through_between_them() -> None:
+    house, camera = home(outside="board")
+    alpha = np.full((8, 8, 4), 255, np.uint8)
+    alpha[:, :4, 3] = 0
+    leaf = Material("leaf", texture_id="leaf", alpha_cutout=True, diffuse=(0, 0, 0))
+    corners = [(-9, -9), (9, -9), (9, 9), (-9, 9)]
+    sheets = tuple(rooms.quad([(x, y, -1 - 0.1 * k) for x, y in corners], 2) for k in range(24))
+    tree = Item("outside_tree", "", ItemKind.PLANT, "0", sheets, tags=(OUTSIDE,))
+    green = replace(house, items=(*house.items, tree), materials=(*house.materials, leaf))
+    scene = LightScene.load(green, {"leaf": alpha}, RECIPE, uniform_sky(SKY))
+    found, boarded = scene.render(camera, "0_0", FIELDS, 1), light_of("board")
+    seen = (light_of("").outdoor == np.array(SKY, np.float32)).all(-1)
+    left = seen & (np.arange(32) < 14)
+    right = seen & (np.arange(32) >= 18)
+    assert min(left.sum(), right.sum()) > 10
+    # The left half of every sheet is a hole: the board is there behind all 24, and no shadow of them.
+    np.testing.assert_allclose(found.outdoor[left], boarded.outdoor[left], rtol=1e-4)
+    assert (found.outdoor[right] < 1e-6).all()

@@ -23,8 +23,10 @@ from pbrs_farm.transport.kernels.surface_textures import (
     is_hole_at,
 )
 from pbrs_farm.transport.scene_tables.material_rows import (
+    CUTOFF,
     FIRST_MAP_TEXEL,
     GLASS,
+    KIND,
     MATERIAL_FLOATS,
     MIRROR,
     NULL,
@@ -39,6 +41,7 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
 
 _RAY_OFFSET = 2e-5  # of a point's largest coordinate plus 1 m
 MAX_TRANSPARENT = 16  # surfaces that a shadow ray passes
+MAX_SHEETS = 64  # with holes, that a ray passes which wants one answer
 LEAST_COS = 0.02  # of a shading normal to where it is seen from; one that turns away more is bent
 # With more faces or lamps the second tree costs more than it saves.
 MAX_FAST_FACES = 1_000_000
@@ -89,6 +92,8 @@ class DeviceScene:
             self._fast = scene_from_mesh(mi, tables.positions, tables.faces, watertight=False)
         transparent = tables.transparent
         self.has_transparent = bool(transparent.any())
+        rows = tables.material_rows[tables.face_tags & np.uint32(0xFFFF)]
+        self._has_holes = bool(((rows[:, CUTOFF] > 0) | (rows[:, KIND] == NULL)).any())
         self._opaque = self._all
         self._transparent: Any = None
         self._aims_again = False  # behind each transparent face, at where the shadow ray ends
@@ -127,6 +132,22 @@ class DeviceScene:
             face, bary = dr.select(again, face2, face), dr.select(again, bary2, bary)
             valid |= again
         return self._interaction(face, bary, d, valid, with_maps=True)
+
+    @dr.syntax
+    def intersect_past_holes(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
+        """The first surface along a ray that is not cut out; behind MAX_SHEETS it is what comes.
+
+        For rays that need one answer: paths go on behind a hole by themselves.
+        """
+        here = mi.Point3f(o)
+        if dr.hint(self._has_holes, mode="scalar"):
+            looks, n = mi.Bool(active), mi.UInt32(0)
+            while looks:
+                si = self.intersect(here, d, looks)
+                looks &= si.valid & si.is_cutout & (n < MAX_SHEETS)
+                here = dr.select(looks, offset_ray_origin(si.p, -si.ng), here)
+                n += 1
+        return self.intersect(here, d, active)
 
     def transmittance(self, o: Any, d: Any, distance: Any, active: Any) -> Any:
         """Color3f of light let through between o and o + distance d: 0 behind opaque faces.

@@ -75,7 +75,7 @@ class Outside:
         return Seen(valid, radiance, albedo)
 
     def _shown(self, home: DeviceScene, o: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
-        si = self._scene.intersect(o, d, active)
+        si = self._scene.intersect_past_holes(o, d, active)
         # The sun, unless the home or the outside stands before it.
         cos = dr.dot(si.n, self._sun)
         lit = si.valid & self._shines & (cos > 0) & (dr.dot(si.ng, self._sun) > 0)
