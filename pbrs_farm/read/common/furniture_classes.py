@@ -1,6 +1,6 @@
 """NYU40 class and kind of a piece of furniture, from its catalogue id, name, size and place.
 
-Reads the tables beside this file (classes of the default catalogue; words), nothing else.
+Reads the tables beside this file (classes of the default catalogue; words; words that describe), nothing else.
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib.resources import files
-from typing import Final
+from itertools import pairwise
+from typing import Final, NamedTuple
 
 from pbrs_farm.core.classes import NYU40_NAMES, PERSON, WINDOW
 from pbrs_farm.core.house import ItemKind
@@ -26,14 +27,29 @@ _PRIMITIVES: Final = frozenset(
 _PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
 # What follows these words describes the thing; the thing itself is named before them.
 _ASIDES: Final = """with and on of for from under without in mit und auf fur von aus ohne avec et
-    sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для
+    sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для w
     two three four five six"""
 _ASIDE: Final = frozenset(_ASIDES.split())
 _MODIFIERS: Final = frozenset({"wall", "kitchen"})  # say where an unknown thing stands
 _HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages that name the thing first
 _LONGEST_PHRASE: Final = 4  # words
 
-_PLANT: Final = "plant"
+# "Light" before these is a shade: light oak, light grey.
+_TINT_WORDS: Final = """ash beech beige birch blue brick brown concrete cream fabric gray green grey leather maple
+    marble metal oak orange pine pink purple red stone tile walnut wood wooden yellow"""
+_TINTS: Final = frozenset(_TINT_WORDS.split())
+# Beside these a kind of tree is a wood, a flower a pattern or a tint.
+_MATERIAL_WORDS: Final = """fabric gold grain laminate lumber parquet pattern plank planks plywood texture timber veneer
+    wallpaper wood wooden"""
+_OF_MATERIALS: Final = frozenset(_MATERIAL_WORDS.split())
+# "Bed room", "girl bedroom": a place, not the thing or the person.
+_ROOMS: Final = frozenset({"room", "bedroom", "bathroom", "toilet"})
+_OWNERS_OF_ROOMS: Final = """baby bath bed box boy child children closet computer game girl guest kid kids laundry locker man
+    men people plant shower storage toilet tv woman women"""
+_NAMERS_OF_ROOMS: Final = frozenset(_OWNERS_OF_ROOMS.split())
+
+PERSON_WORD: Final = "person"
+PLANT_WORD: Final = "plant"
 _STAIRS: Final = "stairs"
 
 # Least and largest longer horizontal side, least and largest height, in metres: what is smaller or
@@ -69,6 +85,7 @@ _SIZES: Final[Mapping[str, tuple[float, float, float, float]]] = {
 _RAISED_M: Final = (0.6, 1.8)  # above the floor of the level
 _LEAST_LAWN_M: Final = 1.0  # shorter side of grass that is ground
 _FLATTEST_PLANT: Final = 0.1  # height over shorter side: what is flatter covers the ground
+_SLIMMEST_CROWN: Final = 0.25  # of the longer side
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
 
@@ -83,6 +100,24 @@ class PieceSize:
 
 
 @dataclass(frozen=True, slots=True)
+class _Candidate:
+    """A class or kind that a word of a name stands for."""
+
+    label: str
+    is_noun: bool  # whether the word says what the whole name means
+    phrase: str = ""
+    is_first: bool = False  # the first word, in a language that names the thing first
+
+
+class _Describing(NamedTuple):
+    """Which nouns before it a word describes: the leg of a table, beech of a chair."""
+
+    after: frozenset[str]  # labels; "any" is all but persons and plants
+    but_not: frozenset[str]  # phrases
+    is_material: bool  # alone it names a plant or a material
+
+
+@dataclass(frozen=True, slots=True)
 class PieceClass:
     """What a piece of furniture is, and why.
 
@@ -93,6 +128,7 @@ class PieceClass:
     nyu40: int | None  # None = no class
     rule: str
     word: str = ""  # of the vocabulary: a class, plant or stairs
+    phrase: str = ""  # words of the name that say so
 
     @property
     def tag(self) -> str:
@@ -124,6 +160,17 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
     }
 
 
+@cache
+def _describing_words() -> Mapping[str, _Describing]:
+    found: dict[str, _Describing] = {}
+    for row in _rows_of_csv("describing_words.csv"):
+        after, but_not = (frozenset(row[key].split("|")) for key in ("after", "but not"))
+        # One value a row: words of a row do not describe each other.
+        rule = _Describing(after, but_not, row["is"] == "material")
+        found |= dict.fromkeys(row["words"].split("|"), rule)
+    return found
+
+
 def plain(text: str) -> str:
     """Lower case without accents; camelCase parted by spaces."""
     return folded(parted(text))
@@ -132,42 +179,87 @@ def plain(text: str) -> str:
 _LONGEST_NAME: Final = 500  # letters that are looked at
 
 
+def _words_in_order(name: str) -> list[str]:
+    """Words and numbers that stand alone; a number in a word ("chair01") means nothing.
+
+    What only says where a thing stands ("bed room") is left out.
+    """
+    words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
+    of_rooms = {
+        k
+        for k, (word, after) in enumerate(pairwise(words))
+        if word in _NAMERS_OF_ROOMS and after in _ROOMS
+    }
+    return [word for k, word in enumerate(words) if k not in of_rooms]
+
+
 @lru_cache(maxsize=4096)
-def _candidates(name: str) -> tuple[tuple[str, bool], ...]:
+def _candidates(name: str) -> tuple[_Candidate, ...]:
     return tuple(_found_candidates(name))
 
 
-def _found_candidates(name: str) -> Iterator[tuple[str, bool]]:
-    # The classes or kinds that the words of a name stand for, likeliest first, and whether the
-    # word is the name's noun. Words before an aside go first ("lamp with table" is a lamp).
-    # A number that stands alone begins one, a number in a word ("chair01") means nothing.
-    words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
+def _found_candidates(name: str) -> Iterator[_Candidate]:
+    # The classes or kinds that the words of a name stand for, likeliest first. Words before an
+    # aside go first ("lamp with table" is a lamp), and a number that stands alone begins one.
+    words = _words_in_order(name)
     aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
     # A phrase from the first word may hold an aside: "table de nuit".
     for n in range(min(_LONGEST_PHRASE, len(words)), 1, -1):
         whole = _class_of_phrase(" ".join(words[:n]))
         if whole is not None and n > aside:
-            yield whole[0], True
+            yield _Candidate(whole[0], is_noun=True)
     yield from _from_the_noun(words[:aside], is_head=True)
     yield from _from_the_noun(words[aside:], is_head=False)
 
 
-def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[tuple[str, bool]]:
-    found: list[tuple[str, bool, bool]] = []
+def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[_Candidate]:
+    found: list[_Candidate] = []
     k = len(words)
     # The last known word says what the thing is; more words go before one.
     while k > 0:
         for n in range(min(_LONGEST_PHRASE, k), 0, -1):
-            known = _class_of_phrase(" ".join(words[k - n : k]))
+            phrase = " ".join(words[k - n : k])
+            known = None if _is_a_tint(phrase, words, k) else _class_of_phrase(phrase)
             if known is not None and (k == len(words) or words[k - 1] not in _MODIFIERS):
                 is_first = known[1] and k == n
-                found.append((known[0], is_first or k == len(words), is_first))
+                is_noun = is_head and (is_first or k == len(words))
+                found.append(_Candidate(known[0], is_noun, phrase, is_first))
                 k -= n - 1
                 break
         k -= 1
+    # What the last word only describes goes before it: "table leg", "cabinet door glass".
+    noun = 0
+    for k in range(1, len(found)):
+        noun = k if _describes(found[noun], found[k]) else noun
+    if noun:
+        found.insert(0, replace(found.pop(noun), is_noun=found[0].is_noun))
     # A language that names the thing first goes by its first word.
-    for label, is_noun, _ in sorted(found, key=lambda f: not f[2]):
-        yield label, is_noun and is_head
+    yield from sorted(found, key=lambda c: not c.is_first)
+
+
+def _is_a_tint(phrase: str, words: list[str], end: int) -> bool:
+    """Whether words[..end], a phrase, name a colour or a wood there, not a lamp or a plant."""
+    if phrase == "light":
+        return end < len(words) and words[end] in _TINTS
+    is_said = phrase == "mat" or is_also_a_material(phrase)  # "wood mat": short for material
+    return is_said and not _OF_MATERIALS.isdisjoint(words)
+
+
+def is_also_a_material(phrase: str) -> bool:
+    """Whether a plant's word names as often a wood, a pattern or a tint: pine, rose."""
+    known = _describing_words().get(phrase)
+    return known is not None and known.is_material
+
+
+def _describes(last: _Candidate, before: _Candidate) -> bool:
+    rule = _describing_words().get(last.phrase)
+    if rule is None or rule is _describing_words().get(before.phrase):
+        return False
+    if before.phrase in rule.but_not:
+        return False
+    if "any" in rule.after:
+        return before.label not in (PERSON_WORD, PLANT_WORD)
+    return before.label in rule.after
 
 
 def _class_of_phrase(phrase: str) -> tuple[str, bool] | None:
@@ -190,8 +282,14 @@ def is_a_cover_of_ground(width: float, height: float, depth: float) -> bool:
     return side >= _LEAST_LAWN_M and height <= _FLATTEST_PLANT * side
 
 
+def stands_as_a_tree(width: float, height: float, depth: float) -> bool:
+    """Whether a thing called by a wood's name, as Pine, has a stem or a crown; metres."""
+    across, along = sorted((width, depth))
+    return height > along and across > _SLIMMEST_CROWN * along
+
+
 def _fits_its_size(label: str, place: PieceSize | None) -> bool:
-    if label == _PLANT and place is not None:
+    if label == PLANT_WORD and place is not None:
         return not is_a_cover_of_ground(place.width, place.height, place.depth)
     if place is None or label not in _SIZES:
         return True
@@ -207,13 +305,15 @@ def _fits_its_size(label: str, place: PieceSize | None) -> bool:
 def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
-    for label, is_noun in _candidates(name[:_LONGEST_NAME]):
+    for candidate in _candidates(name[:_LONGEST_NAME]):
+        label, is_noun = candidate.label, candidate.is_noun
         if not _fits_its_size(label, place):
             refused = True
             continue
-        stands_for = {_PLANT: "otherprop", _STAIRS: "otherstructure"}
+        stands_for = {PLANT_WORD: "otherprop", _STAIRS: "otherstructure"}
         found = NYU40_NAMES.index(stands_for.get(label, label))
-        return PieceClass(found, rule if is_noun or rule != "name" else "inner-word", label)
+        by = rule if is_noun or rule != "name" else "inner-word"
+        return PieceClass(found, by, label, candidate.phrase)
     return PieceClass(None, "size" if refused else "none")
 
 
@@ -235,7 +335,7 @@ def class_of_piece(
         return own if own.nyu40 is not None else PieceClass(known, "catalogue")
     # The catalogue is the surest, as long as the size agrees.
     if known is not None and _fits_its_size(NYU40_NAMES[known], place):
-        word = next((label for label, _ in (*_candidates(inner), *_candidates(name))), "")
+        word = next((c.label for c in (*_candidates(inner), *_candidates(name))), "")
         return PieceClass(known, "catalogue", word)
     own = _by_words(name, place, "name")
     if own.nyu40 is not None:
@@ -265,4 +365,4 @@ def kind_of(piece: PieceClass, nyu40: int, *, is_opening: bool, is_light: bool) 
         return ItemKind.LAMP
     if nyu40 == PERSON:
         return ItemKind.PERSON
-    return {_STAIRS: ItemKind.STAIRS, _PLANT: ItemKind.PLANT}.get(piece.word, ItemKind.OBJECT)
+    return {_STAIRS: ItemKind.STAIRS, PLANT_WORD: ItemKind.PLANT}.get(piece.word, ItemKind.OBJECT)

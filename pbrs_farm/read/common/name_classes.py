@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from pbrs_farm.core.classes import DOOR, FLOOR, LAMP, NYU40_NAMES, OTHERSTRUCTURE, WINDOW
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.home.names import words_of
-from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of
+from pbrs_farm.read.common.furniture_classes import (
+    PERSON_WORD,
+    PLANT_WORD,
+    PieceClass,
+    PieceSize,
+    class_of_piece,
+    is_a_cover_of_ground,
+    is_also_a_material,
+    kind_of,
+    plain,
+    stands_as_a_tree,
+)
 
-_WALL_WORDS: Final = "wall wallpaper wand waende tapete mur muro pared parete parede"
-_CEILING_WORDS: Final = "ceiling zimmerdecke decke plafond techo soffitto teto"
+_WALL_WORDS: Final = "wall wallpaper facade wand waende tapete mur muro pared parete parede"
+_CEILING_WORDS: Final = "ceiling celling zimmerdecke decke plafond techo soffitto teto"
 _FLOOR_WORDS: Final = (
     "floor flooring boden fussboden parquet parkett laminate laminat linoleum sol suelo pavimento"
 )
@@ -22,10 +35,18 @@ STRUCTURE_WORDS: Final = {
         (ItemKind.WALL, _WALL_WORDS),
         (ItemKind.CEILING, _CEILING_WORDS),
         (ItemKind.FLOOR, _FLOOR_WORDS),
-        (ItemKind.GROUND, "ground terrain"),
+        (ItemKind.GROUND, "ground terrain grassland lawn turf"),
     )
     for word in words.split()
 }
+# Fixed to walls and ceilings, and none of them.
+_BUILT_WORDS: Final = (
+    "beam column pillar pipe duct vent railing handrail banister balustrade skirting"
+)
+_PARTS_OF_BUILDINGS: Final = frozenset(_BUILT_WORDS.split())
+_LEAST_STRUCTURE_M: Final = 0.2  # a tile of a floor is as large
+_ROOMS_AND_CABINETS: Final = frozenset({"closet", "kitchen", "kitchenette", "pantry", "storage"})
+_REVIT_NAME: Final = re.compile(r'^M_|:.*:\d+$|[ "-].*:|:.*[ "-]')
 UNMAPPED: Final = "unmapped"
 """Tag of an item of which nothing says what it is."""
 
@@ -39,17 +60,69 @@ class NodeClass:
     is_tagged: bool  # said by extras or the mapping, not guessed
 
 
-def class_of_node_name(name: str) -> NodeClass | None:
-    """What the words of a node's, a product's or a material's name say that it is; None where they say nothing.
+def class_of_node_name(
+    name: str, *, materials: Sequence[str] = (), size: PieceSize | None = None
+) -> NodeClass | None:
+    """What a node's, a product's or a material's name says that it is; None where it says nothing.
 
     The words of pieces go before those of structure, so that a wall lamp is a lamp; names are in the
     languages of words.csv.
+
+    materials: of what the node shows; exporters write them behind its own name ("Sink_Chrome_0").
+    size: of what it shows, where known: between the words of a name the size decides, and a person
+    or a plant that its size refuses is none.
     """
-    piece = class_of_piece("", name)
+    said = (_class_of_words(text, size) for text in _likely_names(name, materials))
+    return next((seen for seen in said if seen is not None), None)
+
+
+def _likely_names(name: str, materials: Sequence[str]) -> Iterator[str]:
+    """What of a name may say what the thing is, the likeliest first; the whole comes last."""
+    own = _without_material(name, materials)
+    # "Kitchen_Sink_0": all of a room that is drawn in the material Sink.
+    if own != name and own.lower() not in _ROOMS_AND_CABINETS:
+        yield own
+    # Revit: "M_Table-Coffee:0610 x 0610mm:143210", family, type and id; a maker follows a dash.
+    is_revit = _REVIT_NAME.search(own) is not None
+    if is_revit:
+        for text in own.split(":"):
+            yield text.partition("-")[0]
+            yield text
+    yield name
+
+
+def _without_material(name: str, materials: Sequence[str]) -> str:
+    """ "Sink_mirror" of "Sink_mirror_mirror_toilet_0", whose material is mirror_toilet."""
+    numbered = re.fullmatch(r"(.+)_\d+", name)
+    if numbered is None:
+        return name
+    bare = _signs_alike(numbered[1])
+    for material in sorted(materials, key=len, reverse=True):
+        end = "_" + _signs_alike(re.sub(r"\.\d+$", "", material))
+        if len(end) > 1 and bare.endswith(end):
+            return name[: len(bare) - len(end)]
+        # Blender's number of a material comes without its dot.
+        end = "_" + _signs_alike(material.replace(".", ""))
+        if len(end) > 1 and bare.endswith(end):
+            return name[: len(bare) - len(end)]
+    return name
+
+
+def _signs_alike(text: str) -> str:
+    return re.sub(r"\W", "_", text).lower()
+
+
+def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
+    piece = _piece(name, size)
     nyu40 = piece.nyu40
-    if nyu40 is None or nyu40 == OTHERSTRUCTURE:
+    words = words_of(name)
+    if piece.word == PLANT_WORD and nyu40 is None:
+        # Ground called Grass is no plant, which repair would take out.
+        is_ground = size and is_a_cover_of_ground(size.width, size.height, size.depth)
+        return NodeClass(FLOOR, ItemKind.GROUND, is_tagged=False) if is_ground else None
+    is_structure = nyu40 is None or _only_describes(piece, name) or _is_wall(nyu40, words)
+    if is_structure and not (size and _is_small(size)):
         # Look for structure where the name says nothing more special.
-        words = words_of(name)
         for word, kind in STRUCTURE_WORDS.items():
             if word in words:
                 # The ground outside is labelled floor.
@@ -61,3 +134,39 @@ def class_of_node_name(name: str) -> NodeClass | None:
     is_opening = nyu40 in (DOOR, WINDOW)
     kind = kind_of(piece, nyu40, is_opening=is_opening, is_light=nyu40 == LAMP)
     return NodeClass(nyu40, kind, is_tagged=False)
+
+
+def _piece(name: str, size: PieceSize | None) -> PieceClass:
+    """The class of a name as of a piece: where its size refuses every word, the first word's.
+
+    A person and a plant need their size: repair takes them out.
+    """
+    piece = class_of_piece("", name, "", size)
+    if size is None:
+        return piece
+    if piece.nyu40 is None:
+        piece = class_of_piece("", name)
+        is_refused = piece.word in (PERSON_WORD, PLANT_WORD)
+    else:
+        shape = (size.width, size.height, size.depth)
+        is_refused = piece.word == PLANT_WORD and (
+            is_also_a_material(piece.phrase) and not stands_as_a_tree(*shape)
+        )
+    return PieceClass(None, "size", piece.word) if is_refused else piece
+
+
+def _only_describes(piece: PieceClass, name: str) -> bool:
+    """Whether the word of a plant or a person describes structure: "floor maple", "boy room wall"."""
+    if piece.word not in (PERSON_WORD, PLANT_WORD):
+        return False
+    last = words_of(re.findall(r"[^\W\d_]+", plain(name))[-1])
+    return not last.isdisjoint(STRUCTURE_WORDS) or is_also_a_material(piece.phrase)
+
+
+def _is_small(size: PieceSize) -> bool:
+    """Whether it is too small for a wall, a floor or a ceiling: the socket of a ceiling lamp."""
+    return max(size.width, size.height, size.depth) < _LEAST_STRUCTURE_M
+
+
+def _is_wall(nyu40: int, words: frozenset[str]) -> bool:
+    return nyu40 == OTHERSTRUCTURE and not words & _PARTS_OF_BUILDINGS

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import NOTHING_LEFT, USUAL_CUTOFF, Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
@@ -396,6 +397,17 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
     if glass or any(_lets_light_through(row) for row in rows.values()):
         return glass
     return frozenset(n for n, w in words.items() if w & _WINDOW and not w & FRAME_WORDS)
+
+
+def material_names(gltf: Gltf, node: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the materials in which a node's mesh is drawn; what is damaged has none."""
+    try:
+        primitives = entry(gltf, "meshes", node.get("mesh")).get("primitives")
+        numbers = [p.get("material") for p in primitives] if isinstance(primitives, list) else []
+        rows = [entry(gltf, "materials", n) for n in numbers if n is not None]
+    except (AttributeError, BadHouse):
+        return ()  # told where the mesh is read
+    return tuple(str(row.get("name", ""))[:200] for row in rows)
 
 
 def _lets_light_through(row: dict[str, Any]) -> bool:

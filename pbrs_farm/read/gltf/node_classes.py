@@ -7,6 +7,7 @@ No effects. The mapping file is JSON: {"nodes": {"Sofa*": "sofa", "Lamp_2": {"cl
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from itertools import chain
@@ -71,13 +72,16 @@ def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
     return found
 
 
-def class_of_node(name: str, extras: Any, mapping: Mapping) -> NodeClass | None:
+def class_of_node(
+    name: str, extras: Any, mapping: Mapping, materials: Sequence[str] = ()
+) -> NodeClass | None:
     """What a node is: by its extras, else by the user's mapping, else by the words of its name.
 
-    extras: `nyu40` or `class`, and `kind`. None where none of them says anything.
+    extras: `nyu40` or `class`, and `kind`; materials: names of those it shows. None where none of
+    them says anything.
     """
     tagged = _tagged(extras) if isinstance(extras, dict) else None
-    return tagged or mapping.of(name) or class_of_node_name(name)
+    return tagged or mapping.of(name) or class_of_node_name(name, materials=materials)
 
 
 # Words of nodes that only group others.

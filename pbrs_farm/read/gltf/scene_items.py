@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import FLOOR, LAMP, OTHERPROP
+from pbrs_farm.core.classes import LAMP, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening, transform_points
 from pbrs_farm.core.house import (
@@ -23,14 +23,14 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
-from pbrs_farm.read.common.furniture_classes import is_a_cover_of_ground
+from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.material_library import PANE_OPACITY, names_glass
-from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass
+from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_shells import planar_parts
 from pbrs_farm.read.gltf.document import Placed, meshes_of, object_at, placed_nodes
-from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials
+from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials, material_names
 from pbrs_farm.read.gltf.node_classes import Mapping, class_of_node, collection_of
 from pbrs_farm.read.gltf.scene_lights import emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
@@ -58,6 +58,8 @@ class _Thing:
     name: str
     seen: NodeClass
     extras: dict[str, Any]  # the root's
+    materials: tuple[str, ...] = ()  # names of the root's
+    is_by_name: bool = False  # whether the root's name says what it is
     parts: list[Placed] = field(default_factory=list)  # the root and what it owns below
 
 
@@ -147,7 +149,12 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         name = str(fields_json.get("name", ""))[:200]
         extras = object_at(fields_json, "extras")
         above = owner.get(node.path[:-1])
-        seen = class_of_node(name, extras, mapping) or members.get(node.path[:-1])
+        materials = material_names(gltf, fields_json)
+        own = class_of_node(name, extras, mapping, materials)
+        inherited = members.get(node.path[:-1])
+        if own and inherited and not own.is_tagged and _is_shown(own, inherited):
+            own = None
+        seen = own or inherited
         # A group whose name means several things is no item.
         if extras.get("group") is True:
             seen = None
@@ -162,12 +169,19 @@ def _gather_things(gltf: Gltf, mapping: Mapping) -> list[_Thing]:
         has_part = "mesh" in fields_json or has_light or extras.get("one") is True
         # Begin an item at the outermost node of a class, and at tagged ones below it.
         if (seen and (above is None or seen.is_tagged)) or (above is None and has_part):
-            above = _Thing(node, name, seen or _UNMAPPED, extras)
+            is_by_name = own is not None and (not own.is_tagged or extras.get("by_name") is True)
+            above = _Thing(node, name, seen or _UNMAPPED, extras, materials, is_by_name)
             found.append(above)
         if above is not None:
             owner[node.path] = above
             above.parts.append(node)
     return found
+
+
+def _is_shown(own: NodeClass, collection: NodeClass) -> bool:
+    """Whether a person or plant is what members of a collection show: a man among statues."""
+    living = (ItemKind.PERSON, ItemKind.PLANT)
+    return own.kind in living and collection.kind not in living
 
 
 def _item(
@@ -180,12 +194,17 @@ def _item(
 ) -> Item | None:
     surfaces: list[Surface] = []
     shining: dict[int, Emission] = {}
+    parts = list(_meshes(gltf, thing, notes, known, fields))
+    if thing.is_by_name and parts:
+        size = _size_of(parts)
+        sized = class_of_node_name(thing.name, materials=thing.materials, size=size)
+        is_tagged = thing.seen.is_tagged
+        thing.seen = replace(sized, is_tagged=is_tagged) if sized else _UNMAPPED
     kind = thing.seen.kind
     is_opening = kind in (ItemKind.WINDOW, ItemKind.DOOR)
     # What lets light through is a pane in an opening, glass elsewhere.
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     lights = _punctual_lights(gltf, thing)
-    parts = list(_meshes(gltf, thing, notes, known, fields))
     numbers = [number for _, meshes in parts for number, _ in meshes]
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
     for part, meshes in parts:
@@ -296,10 +315,24 @@ def _meshes(
 
 def _extent_m(meshes: Sequence[tuple[int | None, Mesh]], world_from_node: F64) -> float:
     """The longest side of the box around meshes where they stand."""
+    low, high = _bounds(meshes, world_from_node)
+    return float((high - low).max())
+
+
+def _bounds(meshes: Sequence[tuple[int | None, Mesh]], world_from_node: F64) -> tuple[F64, F64]:
     placed_points = [transform_points(world_from_node, m.positions) for _, m in meshes]
     low = np.min([p.min(0) for p in placed_points], 0)
-    high = np.max([p.max(0) for p in placed_points], 0)
-    return float((high - low).max())
+    return low, np.max([p.max(0) for p in placed_points], 0)
+
+
+def _size_of(parts: list[tuple[Placed, list[tuple[int | None, Mesh]]]]) -> PieceSize | None:
+    """How large the parts of a thing are together; None where they have no points."""
+    boxes = [_bounds(meshes, part.world_from_node) for part, meshes in parts if meshes]
+    if not boxes:
+        return None
+    low, high = np.min([b[0] for b in boxes], 0), np.max([b[1] for b in boxes], 0)
+    width, height, depth = (high - low).tolist()
+    return PieceSize(width, height, depth)
 
 
 def _finish_item(
@@ -309,12 +342,6 @@ def _finish_item(
     if lights and not surfaces:
         # A light without a shape is a lamp.
         seen = replace(seen, kind=ItemKind.LAMP, nyu40=LAMP)
-    if seen.kind is ItemKind.PLANT and not seen.is_tagged and surfaces:
-        corners = np.concatenate([s.positions for s in surfaces])
-        width, height, depth = np.ptp(corners.astype(np.float64), axis=0).tolist()
-        if is_a_cover_of_ground(width, height, depth):
-            # Ground called Grass is no plant, which repair would take out.
-            seen = replace(seen, kind=ItemKind.GROUND, nyu40=FLOOR)
     tags = [UNMAPPED] if seen is _UNMAPPED else []
     if any(np.linalg.det(p.world_from_node[:3, :3]) < 0 for p in thing.parts):
         tags.append("mirrored")

@@ -36,6 +36,7 @@ from pbrs_farm.home.names import words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
 from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary, names_glass
@@ -207,7 +208,7 @@ class _Building:
         if product.is_a("IfcCovering"):
             return self._class_of_covering(product, mesh)
         for word in (product.Name, product.ObjectType, _type_name(product)):
-            seen = class_of_node_name(str(word or ""))
+            seen = class_of_node_name(str(word or ""), size=_size_of(mesh))
             if seen is not None:
                 kind = ItemKind.LAMP if seen.nyu40 == LAMP else seen.kind
                 return kind, seen.nyu40, ()
@@ -470,6 +471,13 @@ def _part_of_wall(product: Any, mesh: ProductMesh) -> tuple[ItemKind, int, tuple
     if product.is_a("IfcPlate") and in_wall:
         return ItemKind.WALL, 1, ("curtain-wall",)
     return ItemKind.OBJECT, 38, ("curtain-wall",) if in_wall else ()
+
+
+def _size_of(mesh: ProductMesh) -> PieceSize | None:
+    if not len(mesh.positions):
+        return None
+    width, depth, height = np.ptp(mesh.world, axis=0).tolist()
+    return PieceSize(width, height, depth)
 
 
 def _swing(product: Any) -> tuple[str, ...]:

@@ -185,7 +185,9 @@ class StageNodes:
         own = class_of_node_name(prim.GetName())
         inner = [class_of_node_name(p.GetName()) for p in _visible_children(prim)]
         found = {seen for seen in inner if seen is not None}
-        if own is None and len(found) == 1:
+        if own is not None:
+            node["extras"]["by_name"] = True
+        elif len(found) == 1:
             own = next(iter(found))
         if own is None:
             node["extras"]["one"] = True

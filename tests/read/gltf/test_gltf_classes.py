@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from pbrs_farm.core.classes import FLOOR
+from pbrs_farm.core.classes import FLOOR, NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from tests.read.gltf.gltf_scenes import item, read, two_rooms
@@ -90,3 +90,24 @@ def test_a_storey_named_floor_is_no_floor() -> None:
 def test_a_wrong_mapping_row_is_refused_naming_it() -> None:
     with pytest.raises(BadHouse, match="names no class"):
         read(two_rooms(), mapping=b'{"nodes": {"A": "spaceship"}}')
+
+
+def test_materials_sizes_and_collections_tell_what_a_name_means() -> None:
+    s = two_rooms()
+    s.materials += [{"name": "mirror_toilet"}, {"name": "Table_Kitchen"}]
+    pane = s.box([1, 1, 0.1], [1.6, 1.8, 0.12], len(s.materials) - 2)
+    s.node("Sink_mirror_mirror_toilet_0", mesh=pane)
+    top = s.box([2, 0, 1], [3.2, 0.75, 1.8], len(s.materials) - 1)
+    s.node("Table_Table_Kitchen_0", mesh=top)
+    s.node("Pine", mesh=s.box([0.5, 0, 0.5], [3.5, 2, 0.6]))
+    man = s.node("Man_01", mesh=s.box([4, 0, 1], [4.4, 1.7, 1.3]))
+    s.node("Statues", children=[man])
+    s.node("Man_02", mesh=s.box([4.6, 0, 1], [5, 1.7, 1.3]))
+    s.node("Bottle_dining_table", mesh=s.box([2, 0.75, 1], [2.08, 1.05, 1.08]))
+    kinds = {i.name: (str(i.kind), NYU40_NAMES[i.nyu40]) for i in read(s).items}
+    assert kinds["Sink_mirror_mirror_toilet_0"] == ("object", "mirror")
+    assert kinds["Table_Table_Kitchen_0"] == ("object", "table")
+    assert kinds["Pine"] == ("object", "otherprop")
+    assert kinds["Man_01"] == ("object", "otherprop")
+    assert kinds["Man_02"] == ("person", "person")
+    assert kinds["Bottle_dining_table"] == ("object", "otherprop")

@@ -117,12 +117,15 @@ def test_classes_go_by_entity_then_predefined_type_then_words(tmp_path: Path) ->
     building.product("IfcFurniture", "Sessel 3", solid(), (2, 1, 0))
     building.product("IfcBuildingElementProxy", "Xyzzy", solid(), (3, 1, 0))
     building.product("IfcLightFixture", "L", solid(), (2, 2, 2))
+    lawn = [building.box_solid((0, 0, 0), (6, 6, 0.02))]
+    building.product("IfcBuildingElementProxy", "Surface:Grass:143210", lawn, (9, 0, -0.1))
     house = read(building, tmp_path)
     found = {i.name: (i.nyu40, i.kind.value, i.room_id) for i in house.items}
     assert found["S 12"] == (33, "object", "0_0")
     assert found["Sessel 3"] == (5, "object", "0_0")
     assert found["Xyzzy"] == (40, "object", "0_0")
     assert found["L"] == (35, "lamp", "0_0")
+    assert found["Surface:Grass:143210"][:2] == (2, "ground")
     assert [n.kind for n in house.notes] == ["unmapped-class"]
 
 

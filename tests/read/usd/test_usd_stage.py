@@ -90,6 +90,17 @@ def test_labels_old_and_new_say_the_class_and_a_component_is_one_item(tmp_path: 
     assert [n.place for n in house.notes if n.kind == "unmapped-class"] == ["/World/Obj_3"]
 
 
+def test_the_size_of_a_component_decides_about_its_name(tmp_path: Path) -> None:
+    home = room_home(tmp_path / "a.usda")
+    for name, high in (("Grass", 0.02), ("Fern", 0.6)):
+        thing = UsdGeom.Xform.Define(home.stage, f"/World/{name}")
+        Usd.ModelAPI(thing).SetKind(Kind.Tokens.component)
+        home.box(f"/World/{name}/part", [1, 0, 1], [4, high, 4])
+    house = read(home)
+    kinds = [item(house, name).kind for name in ("Grass", "Fern")]
+    assert kinds == [ItemKind.GROUND, ItemKind.PLANT]
+
+
 def test_instances_are_items_of_their_own_and_variants_and_payloads_are_followed(
     tmp_path: Path,
 ) -> None:
