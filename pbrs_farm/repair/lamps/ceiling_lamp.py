@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.classes import LAMP
+from pbrs_farm.core.classes import CEILING, LAMP, OTHERSTRUCTURE
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, corners_of_surfaces
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.mesh import distances_to_triangles
@@ -30,13 +30,17 @@ _ABOVE_FLOOR_M = 0.5  # structure lower than this is the floor
 _GRID_M = 0.25  # spacing of the places tried below a sloped ceiling
 
 
-def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0) -> Item:
+def ceiling_lamp(
+    house: House, room: Room, material: int, tag: str, flux_lm: float = 0.0
+) -> Item | None:
     """A ball below the ceiling, in the middle of the largest part of it that is free.
 
-    material: index of its bulb material. tag: why it was added; begins the item's id. flux_lm: its
+    None where nothing is above the room that it could hang from: an attic without a roof. material: index of its bulb material. tag: why it was added; begins the item's id. flux_lm: its
     luminous flux, kept within what one lamp gives; 0 = that of a lamp of Sweet Home 3D.
     """
     centre = place_of_lamp(house, room)
+    if centre is None:
+        return None
     radius = _RADIUS_M
     near = [i for i in house.items if _within_bounds(i, centre, 2 * radius)]
     # Shrink it until it touches nothing.
@@ -65,12 +69,12 @@ def ceiling_lamp(house: House, room: Room, material: int, tag: str, flux_lm: flo
     )
 
 
-def place_of_lamp(house: House, room: Room) -> F64:
+def place_of_lamp(house: House, room: Room) -> F64 | None:
     """(3,) middle of the largest circle in the room's ceiling that nothing tall takes part of:
     no cupboard, and no wall that stands inside the room's outline, as of a bathroom drawn in it.
 
-    Below the ceiling that is really there; where that is too low for a head, below its highest
-    place.
+    Below the ceiling that is really there; where that is too low for a head or open to the sky,
+    below its highest place. None where all is open.
     """
     # Take what reaches the ceiling out of the room's plan, unless nothing would be left.
     area = plan.polygon_of_room(room.polygon)
@@ -80,15 +84,18 @@ def place_of_lamp(house: House, room: Room) -> F64:
     circle = shapely.get_coordinates(shapely.maximum_inscribed_circle(largest, 0.05))
     # Measure how high it is there, and look for a higher place if it is low.
     places = circle[:1]
-    heights = heights_above(house, room, places)
-    if heights[0] < room.floor_y + _HEAD_M + _BELOW_CEILING_M:
+    heights = _heights_to_hang_from(house, room, places)
+    if not room.floor_y + _HEAD_M + _BELOW_CEILING_M <= heights[0] < np.inf:
         low, high = np.array(largest.bounds).reshape(2, 2)
         axes = [np.arange(low[k], high[k], _GRID_M) for k in range(2)]
         grid = np.stack([g.ravel() for g in np.meshgrid(*axes)], 1)
         inside = shapely.contains_xy(plan.grown(largest, -_RADIUS_M), grid[:, 0], grid[:, 1])
         places = np.concatenate([places, grid[inside]])
-        heights = heights_above(house, room, places)
-    best = int(np.argmax(np.minimum(heights, room.ceiling_y)))
+        heights = _heights_to_hang_from(house, room, places)
+    is_under = np.isfinite(heights)
+    if not is_under.any():
+        return None
+    best = int(np.argmax(np.where(is_under, np.minimum(heights, room.ceiling_y), -np.inf)))
     y = min(float(heights[best]), room.ceiling_y) - _BELOW_CEILING_M
     return np.array([places[best, 0], y, places[best, 1]])
 
@@ -102,6 +109,17 @@ def heights_above(house: House, room: Room, places: F64) -> F64:
     surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
     triangles = corners_of_surfaces(surfaces)
     return lowest_above(places, triangles, room.floor_y + _ABOVE_FLOOR_M)
+
+
+def _heights_to_hang_from(house: House, room: Room, places: F64) -> F64:
+    """As heights_above; where nothing of the building is above, of roofs that are things."""
+    heights = heights_above(house, room, places)
+    is_open = np.isinf(heights)
+    roofs = [s for i in house.items if i.nyu40 in (OTHERSTRUCTURE, CEILING) for s in i.surfaces]
+    if is_open.any() and roofs:
+        above = room.floor_y + _ABOVE_FLOOR_M
+        heights[is_open] = lowest_above(places[is_open], corners_of_surfaces(roofs), above)
+    return heights
 
 
 def _tall_footprint(item: Item, room: Room) -> plan.Shape | None:

@@ -39,7 +39,8 @@ def with_room_lighting(
     """Room.lit_by of every room, and a ceiling light in each that lacks one.
 
     fallback: in each room that has a floor, a ceiling and no light. in_every_room: in each that
-    people live in and that has no lamp of its own, whatever daylight it has. lamp_lx: what an
+    people live in and that has no lamp of its own, whatever daylight it has. No light hangs from the
+    sky: a room with nothing above gets none. lamp_lx: what an
     added light aims at on the floor; a room whose own lamps have little of the flux for that gets
     one for the rest. 0: all lights are alike, and a room with any lamp gets none.
     """
@@ -66,11 +67,15 @@ def with_room_lighting(
             tag = FALLBACK
         elif in_every_room and own_lm <= _DIM * wanted_lm and room.has_floor:
             tag = ADDED_LAMP if is_lived_in(room, area.area) else ""
-        if tag:
+        rest_lm = max(wanted_lm - own_lm, 0.0)
+        lamp = ceiling_lamp(here, room, len(house.materials), tag, rest_lm) if tag else None
+        if lamp is not None:
             lit_by.append(tag)
-            rest_lm = max(wanted_lm - own_lm, 0.0)
-            lights.append(ceiling_lamp(here, room, len(house.materials), tag, rest_lm))
+            lights.append(lamp)
             given[tag].append(room.id)
+        elif tag == FALLBACK:
+            # Nothing is above the room, whatever its source says.
+            lit_by.append("sky")
         rooms.append(replace(room, lit_by=tuple(lit_by)))
     materials = house.materials
     if lights:

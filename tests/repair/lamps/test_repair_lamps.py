@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import OTHERSTRUCTURE
 from pbrs_farm.core.house import (
     House,
     Item,
@@ -16,6 +18,7 @@ from pbrs_farm.core.house import (
     LightPart,
     Material,
     MaterialKind,
+    Room,
     Surface,
     corners_of_surfaces,
 )
@@ -275,30 +278,36 @@ def test_people_do_not_live_on_balconies_in_any_language(
     assert not is_lived_in(room, 1.9)
 
 
+def _place(home: House, room: Room) -> F64:
+    found = place_of_lamp(home, room)
+    assert found is not None
+    return found
+
+
 def test_the_added_lamp_hangs_clear_of_what_reaches_the_ceiling() -> None:
     home = builtin_home()
     room = home.rooms[0]
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
-    _, _, z = place_of_lamp(home, room)
+    _, _, z = _place(home, room)
     assert (z - z0) == pytest.approx((z1 - z0) / 2, abs=0.1)
     # A wardrobe to the ceiling over the left half of the room moves the lamp to the right half.
     middle = (x0 + x1) / 2
     size = np.array([(middle - x0) / 2, 1.2, (z1 - z0) / 2])
     wardrobe = box("w", np.array([(x0 + middle) / 2, 1.2, (z0 + z1) / 2]), size, 0)
     tall = Item("tall", "tall", ItemKind.OBJECT, "0", (wardrobe,))
-    assert place_of_lamp(home.with_items([*home.items, tall]), room)[0] > middle + 0.5
+    assert _place(home.with_items([*home.items, tall]), room)[0] > middle + 0.5
 
 
 def test_the_added_lamp_hangs_in_no_wall_that_stands_inside_the_room() -> None:
     home = builtin_home()
     room = home.rooms[0]
-    x, y, z = place_of_lamp(home, room)
+    x, y, z = _place(home, room)
     low, high = room.floor_y, room.ceiling_y
     part = box(
         "part", np.array([x, (low + high) / 2, z]), np.array([0.06, (high - low) / 2, 9.0]), 0
     )
     wall = Item("partition", "partition", ItemKind.WALL, room.level_id, (part,))
-    there = place_of_lamp(home.with_items([*home.items, wall]), room)
+    there = _place(home.with_items([*home.items, wall]), room)
     assert abs(there[0] - x) > 0.3
     assert there[1] == y
 
@@ -311,10 +320,39 @@ def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
     slope = Surface("slope", quad, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 0)
     roof = Item("roof", "roof", ItemKind.CEILING, "0", (slope,))
     items = [i for i in home.items if i.kind is not ItemKind.CEILING]
-    x, y, _ = place_of_lamp(home.with_items([*items, roof]), room)
+    x, y, _ = _place(home.with_items([*items, roof]), room)
     height = 0.9 + 1.5 * (x - x0) / (x1 - x0)
     assert y == pytest.approx(height - 0.2, abs=1e-3)
     assert y > 1.9
+
+
+def test_an_added_lamp_hangs_from_what_is_there_and_never_from_the_sky() -> None:
+    home = builtin_home()
+    room = home.rooms[0]
+    (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
+    # A ceiling over the first third of the room alone.
+    end, y = x0 + (x1 - x0) / 3, room.ceiling_y
+    quad = np.array([[x0, y, z0], [end, y, z0], [end, y, z1], [x0, y, z1]], np.float32)
+    part = Surface("part", quad, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 0)
+    items = [i for i in home.items if i.kind is not ItemKind.CEILING]
+    third = Item("third", "", ItemKind.CEILING, "0", (part,))
+    there = place_of_lamp(home.with_items([*items, third]), room)
+    assert there is not None
+    assert x0 < there[0] < end
+    assert place_of_lamp(home.with_items(items), room) is None
+    # A roof that is drawn as a thing carries a lamp as well.
+    high = replace(part, positions=part.positions + np.array([0, 0.3, 0], np.float32))
+    thing = Item("roof", "", ItemKind.OBJECT, "0", (high,), nyu40=OTHERSTRUCTURE)
+    assert place_of_lamp(home.with_items([*items, thing]), room) is not None
+
+
+def test_a_room_said_to_have_a_ceiling_that_is_not_there_is_lit_by_the_sky() -> None:
+    home = builtin_home()
+    items = [i for i in home.items if not i.lights and i.kind is not ItemKind.CEILING]
+    bare = replace(home, openings=()).with_items(items)
+    house, given = with_room_lighting(bare, fallback=True, in_every_room=True)
+    assert {r.lit_by for r in house.rooms} == {("sky",)}
+    assert (given.fallback, given.added) == ((), ())
 
 
 def test_a_room_without_a_ceiling_is_lit_by_the_sky_unless_a_storey_is_above() -> None:
