@@ -1,67 +1,109 @@
-"""The underside of a floor over a room without a ceiling; no effects."""
+"""The underside of a floor that is seen from below; no effects."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+import shapely
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import CEILING
 from pbrs_farm.core.house import House, Item, ItemKind, Room, Surface, corners_of_surfaces, part_of
 from pbrs_farm.core.mesh import unit_normals
+from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.added_ceilings import (
-    MAX_STOREY_GAP_M,
     MAX_UNDERSIDE_NORMAL_Y,
-    MIN_HOLE_M2,
     MIN_WALL_HEIGHT_M,
     cover_of_surfaces,
 )
 
+_STEP_M: Final = 0.2  # spacing of the places of a floor that are looked at from below
+_MOST_PLACES: Final = 2000  # of one floor: of a larger one they lie farther apart
+_LEAST_PLACES: Final = 3  # seen: fewer are the seam between a ceiling and a wall
+_APART_M: Final = 0.002  # a ceiling in the plane of an underside does not hide it
 UNDERSIDE: Final = "underside"
 """Tag of such ceilings."""
 
 
-def with_undersides(house: House) -> House:
-    """The house with what looks down of floors over rooms without a ceiling as items of their own.
+class _Stand(NamedTuple):
+    """What one stands on below a floor: a room's floor or the ground outside."""
 
-    What one sees above oneself is ceiling. The new items come last.
+    area: plan.Shape
+    y: float
+    room: Room | None
+
+
+def with_undersides(house: House) -> House:
+    """The house with what looks down of floors that are seen from below as items of their own.
+
+    What one sees above oneself is ceiling. A floor is seen from below where no ceiling and no
+    other floor lies between it and a room or the ground outside. The new items come last.
     """
-    below = [(r, plan.polygon_of_room(r.polygon)) for r in house.rooms if not r.has_ceiling]
-    if not below:
+    floors = [i for i in house.items if i.kind is ItemKind.FLOOR and i.n_faces]
+    lowest = min((room.floor_y for room in house.rooms), default=np.inf)
+    if not any(i.bounds[1, 1] > lowest + MIN_WALL_HEIGHT_M / 2 for i in floors):
         return house
+    stands = [_Stand(plan.polygon_of_room(r.polygon), r.floor_y, r) for r in house.rooms]
+    for ground in house.items:
+        if ground.kind is ItemKind.GROUND and ground.n_faces:
+            area = cover_of_surfaces(ground).area
+            stands.append(_Stand(area, float(ground.bounds[1, 1]), None))
+    covers = [i for i in house.items if i.kind in (ItemKind.FLOOR, ItemKind.CEILING)]
+    above = corners_of_surfaces([s for i in covers for s in i.surfaces])
     items: list[Item] = []
     made: list[Item] = []
     for item in house.items:
-        room = _room_below(item, below) if item.kind is ItemKind.FLOOR and item.n_faces else None
-        own, under = _parted(item) if room is not None else (item.surfaces, ())
-        if room is None or not under or not own:
+        is_floor = item.kind is ItemKind.FLOOR and item.n_faces
+        stand = _seen_from(item, stands, above) if is_floor else None
+        own, under = _parted(item) if stand is not None else (item.surfaces, ())
+        if stand is None or not under or not own:
             items.append(item)
             continue
         items.append(replace(item, surfaces=own))
+        level_id, room_id = item.level_id, None
+        if stand.room is not None:
+            level_id, room_id = stand.room.level_id, stand.room.id
         made.append(
             Item(
                 id=f"{UNDERSIDE}_{item.id}", name=f"Underside of {item.name or item.id}",
-                kind=ItemKind.CEILING, level_id=room.level_id, surfaces=under, nyu40=CEILING,
-                source_class="ceiling", room_id=room.id, tags=(UNDERSIDE,),
+                kind=ItemKind.CEILING, level_id=level_id, surfaces=under, nyu40=CEILING,
+                source_class="ceiling", room_id=room_id, tags=(UNDERSIDE,),
             )
         )  # fmt: skip
     return house.with_items([*items, *made])
 
 
-def _room_below(item: Item, below: Sequence[tuple[Room, plan.Shape]]) -> Room | None:
-    """The room without a ceiling that lies most below a floor."""
-    area, low_y = cover_of_surfaces(item)[:2]
-    shared = [
-        plan.common(area, shape).area
-        if room.floor_y + MIN_WALL_HEIGHT_M / 2 < low_y < room.ceiling_y + MAX_STOREY_GAP_M
-        else 0.0
-        for room, shape in below
-    ]
-    best = int(np.argmax(shared))
-    return below[best][0] if shared[best] > MIN_HOLE_M2 else None
+def _seen_from(item: Item, stands: Sequence[_Stand], above: F64) -> _Stand | None:
+    """Where one stands below a floor and sees most of it overhead; None where it is hidden.
+
+    above: triangles of all floors and ceilings, its own among them.
+    """
+    corners = corners_of_surfaces(item.surfaces)
+    under = corners[unit_normals(corners)[:, 1] < MAX_UNDERSIDE_NORMAL_Y]
+    if not len(under):
+        return None
+    low, high = item.bounds[:, [0, 2]]
+    step = max(_STEP_M, float(np.sqrt(np.prod(high - low) / _MOST_PLACES)))
+    axes = [np.arange(low[k] + step / 2, high[k], step) for k in range(2)]
+    grid = np.stack([g.ravel() for g in np.meshgrid(*axes)], 1)
+    under_y = lowest_above(grid, under, -np.inf)
+    grid, under_y = grid[np.isfinite(under_y)], under_y[np.isfinite(under_y)]
+    best, most = None, _LEAST_PLACES - 1
+    for stand in stands:
+        least_y = stand.y + MIN_WALL_HEIGHT_M / 2
+        overhead = under_y > least_y
+        if overhead.sum() <= most:
+            continue
+        overhead &= shapely.contains_xy(stand.area, grid[:, 0], grid[:, 1])
+        first_y = lowest_above(grid[overhead], above, least_y)
+        n_seen = int((under_y[overhead] <= first_y + _APART_M).sum())
+        if n_seen > most:
+            best, most = stand, n_seen
+    return best
 
 
 def _parted(item: Item) -> tuple[tuple[Surface, ...], tuple[Surface, ...]]:

@@ -9,14 +9,16 @@ import pytest
 import shapely
 
 from pbrs_farm.core.classes import CEILING
+from pbrs_farm.core.classes import FLOOR as FLOOR_CLASS
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair, summary_of_report
 from tests.read.sweethome3d.sh3d_source import WALLS, home_xml
-from tests.repair.wall_rooms import covers, house, room, walls_around
+from tests.repair.wall_rooms import FLOOR, covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)
 ON = RepairFields(add_ceilings=True, lamp_in_every_room=True)
@@ -55,6 +57,9 @@ def test_a_roofless_room_is_closed_at_its_walls_height_and_its_lamp_hangs_there(
 def test_without_the_field_the_sky_stays() -> None:
     after, report = repair(_open(), RepairFields(lamp_in_every_room=True))
     assert (_ceilings(after), report.added_ceilings) == ([], ())
+    # And no lamp hangs from it.
+    assert [i for i in after.items if i.kind is ItemKind.LAMP] == []
+    assert report.added_lamps == ()
 
 
 @pytest.mark.parametrize(
@@ -104,6 +109,34 @@ def test_the_underside_of_the_upper_floor_is_ceiling() -> None:
     assert _area_seen_from_below([i for i in after.items if i.id == "floor_1_0"]) == 0.0
     # Instance ids of what stood there before stay.
     assert [i.id for i in after.items][: len(before.items)] == [i.id for i in before.items]
+
+
+def test_a_floor_that_a_ceiling_hides_in_part_is_ceiling_where_it_is_seen() -> None:
+    before = _two_storeys(upper_ceiling=True)
+    low, high = before.rooms
+    hung = covers(room("0_0", (0.0, 0.0, 2.0, 3.0), ceiling_y=2.3), floor=False)
+    low = replace(low, has_ceiling=True)
+    after, _report = repair(replace(before, rooms=(low, high)).with_items([*before.items, *hung]), RepairFields())  # fmt: skip
+    assert "underside_floor_1_0" in [i.id for i in after.items]
+    # A ceiling over all of the room hides it.
+    whole = covers(room("0_0", RECT, ceiling_y=2.3), floor=False)
+    after, _report = repair(replace(before, rooms=(low, high)).with_items([*before.items, *whole]), RepairFields())  # fmt: skip
+    assert "underside_floor_1_0" not in [i.id for i in after.items]
+
+
+def test_the_underside_of_a_balcony_is_ceiling_over_the_ground() -> None:
+    before = _two_storeys(upper_ceiling=True)
+    low, high = before.rooms
+    balcony = room("1_1", (4.2, 0.0, 6.0, 3.0), floor_y=2.6, ceiling_y=5.1)
+    (slab,) = covers(balcony, ceiling=False)
+    land = horizontal("land", [[room("0_9", (-9.0, -9.0, 9.0, 9.0)).polygon]], -0.2, FLOOR, up=True)
+    ground = Item("land", "", ItemKind.GROUND, "0", (land,), nyu40=FLOOR_CLASS)
+    rooms = (low, high, replace(balcony, has_ceiling=False))
+    after, _report = repair(replace(before, rooms=rooms).with_items([*before.items, slab, ground]), RepairFields())  # fmt: skip
+    (under,) = [i for i in after.items if i.id == "underside_floor_1_1"]
+    assert (under.nyu40, under.room_id) == (CEILING, None)
+    # The lowest floor is seen from nowhere.
+    assert "underside_floor_0_0" not in [i.id for i in after.items]
 
 
 def test_each_of_two_roofless_storeys_gets_its_own_ceiling() -> None:
