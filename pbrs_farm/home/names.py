@@ -9,6 +9,29 @@ from typing import Final
 from pbrs_farm.core.house import Item
 
 RADIATORS: Final = frozenset({"radiator", "heater", "heizkorper", "heizkoerper", "radiateur"})
+# Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
+GLASS_WORDS: Final = frozenset(
+    ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",
+     "fensterglas", "verre", "vitre", "vitrage", "vidrio", "cristal", "vetro", "ruit")
+)  # fmt: skip
+MIRROR_WORDS: Final = frozenset(
+    ("mirror", "spiegel", "spiegelglas", "miroir", "espejo", "specchio", "espelho", "lustro",
+     "zrcadlo", "зеркало", "spegel")
+)  # fmt: skip
+FRAME_WORDS: Final = frozenset(
+    ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
+     "metal", "rahmen", "griff", "cadre", "marco", "telaio")
+)  # fmt: skip
+# Of what stands at a mirror or is glass that nobody sees through.
+_NO_MIRROR_WORDS: Final = FRAME_WORDS | {"back", "base", "lamp", "leg", "light", "stand"}
+_OPAQUE_GLASS_WORDS: Final = FRAME_WORDS | {
+    "black",
+    "ceramic",
+    "fiber",
+    "fibre",
+    "frosted",
+    "satin",
+}
 # Letters that no decomposition takes apart.
 _LETTERS: Final = str.maketrans({"ł": "l", "ø": "o", "ß": "ss", "đ": "d", "ı": "i", "æ": "ae"})
 
@@ -52,3 +75,24 @@ def words_of_item(item: Item) -> frozenset[str]:
     Whole words: "Woven basket" has no oven.
     """
     return words_of(f"{item.name} {item.source_class}")
+
+
+def names_glass(name: str) -> bool:
+    """Whether the name of a part of a window or door says that the part is glass.
+
+    Words of several languages. A name with a word of a frame ("glass door frame") is no glass.
+    """
+    words = words_of(name)
+    return bool(words & GLASS_WORDS) and not words & FRAME_WORDS
+
+
+def names_clear_glass(name: str) -> bool:
+    """Whether the name of a part of a piece says that one sees through it: "frosted glass" is none."""
+    words = words_of(name)
+    return bool(words & GLASS_WORDS) and not words & _OPAQUE_GLASS_WORDS
+
+
+def names_mirror(name: str) -> bool:
+    """Whether the name of a part of a piece says that it mirrors: a mirror's frame or lamp does not."""
+    words = words_of(name)
+    return bool(words & MIRROR_WORDS) and not words & _NO_MIRROR_WORDS

@@ -1,22 +1,25 @@
-"""Mirrors mirror, whatever their source says: the large flat part of a piece of that class; no effects.
+"""Mirrors mirror and panes are clear, also those that are part of another piece; no effects.
 
 Sources draw a mirror as a white or grey board, with or without a frame. What faces the room in the
 plane that holds most of the piece's area becomes a mirror's surface; frame, back and sides stay.
+Of other pieces (a dressing table, a cabinet with panes) the parts that are called mirror or glass
+count; the label stays the piece's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
-from pbrs_farm.core.classes import MIRROR
+from pbrs_farm.core.classes import MIRROR, TELEVISION, WHITEBOARD
 from pbrs_farm.core.house import (
     House,
     Item,
+    ItemKind,
     Material,
     MaterialKind,
     Room,
@@ -24,10 +27,15 @@ from pbrs_farm.core.house import (
     corners_of_surfaces,
 )
 from pbrs_farm.core.mesh import face_areas, unit_normals
+from pbrs_farm.home.names import names_clear_glass, names_mirror
 
 _REFLECTANCE: Final = 0.9
 _FLAT_COS: Final = 0.985  # of the angle between faces of one plane
 _PLANE_M: Final = 0.004  # across it
+_PANE_OPACITY: Final = 0.2  # as of glass that a source calls opaque
+_DARK: Final = 0.25  # of the brightest channel, sRGB: darker glass is a hob's or an oven's
+_THICKEST_PANE_M: Final = 0.02
+_OPAQUE_PIECES: Final = (MIRROR, TELEVISION, WHITEBOARD)
 _LEAST_M2: Final = 0.01  # of a mirror's glass
 _LEAST_SHARE: Final = 0.12  # of the piece's area
 _NEAR_BEST: Final = 0.7  # of the largest plane's area, from which facing the room decides
@@ -36,7 +44,7 @@ _NEAR_BEST: Final = 0.7  # of the largest plane's area, from which facing the ro
 def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
     """The house whose mirrors mirror, and the ids of the items that did not before.
 
-    A piece that has a mirror's material anywhere stays as it is; so does one without a flat part.
+    Of a piece of another class what is called a mirror counts. A piece that has a mirror's material anywhere stays as it is; so does one without a flat part.
     """
     materials = list(house.materials)
     glass: dict[int, int] = {}  # material as read -> its mirror
@@ -45,14 +53,82 @@ def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
     for item in house.items:
         kinds = {house.materials[s.material].kind for s in item.surfaces if len(s.faces)}
         faces = None
-        if item.nyu40 == MIRROR and MaterialKind.MIRROR not in kinds:
-            faces = _glass_of(item, rooms)
+        if MaterialKind.MIRROR not in kinds and item.kind is ItemKind.OBJECT:
+            if item.nyu40 == MIRROR:
+                faces = _glass_of(item, rooms)
+            else:
+                faces = _named_mirror(item, house.materials, rooms)
         if faces is None:
             items.append(item)
             continue
         items.append(_with_glass(item, faces, materials, glass))
         made.append(item.id)
     return replace(house, items=tuple(items), materials=tuple(materials)), tuple(made)
+
+
+def with_clear_panes(house: House) -> House:
+    """The house in which one sees through the panes of cabinets, tables and shelves.
+
+    Panes are thin flat parts that are called glass and drawn in one light, opaque colour.
+    """
+    materials = list(house.materials)
+    clear: dict[int, int] = {}  # material as read -> one that lets light through
+    items = []
+    for item in house.items:
+        panes = [
+            k
+            for k, s in enumerate(item.surfaces)
+            if item.kind is ItemKind.OBJECT
+            and item.nyu40 not in _OPAQUE_PIECES
+            and _is_pane(s, house.materials[s.material])
+        ]
+        if not panes:
+            items.append(item)
+            continue
+        surfaces = list(item.surfaces)
+        for k in panes:
+            number = surfaces[k].material
+            if number not in clear:
+                clear[number] = len(materials)
+                pane = replace(materials[number], kind=MaterialKind.GLASS, opacity=_PANE_OPACITY)
+                materials.append(pane)
+            surfaces[k] = replace(surfaces[k], material=clear[number])
+        items.append(replace(item, surfaces=tuple(surfaces)))
+    if not clear:
+        return house
+    return replace(house, items=tuple(items), materials=tuple(materials))
+
+
+def _is_pane(surface: Surface, material: Material) -> bool:
+    is_called = names_clear_glass(surface.name) or names_clear_glass(material.name)
+    is_plain = material.kind is MaterialKind.OPAQUE and material.texture_id is None
+    if not (is_called and is_plain and len(surface.faces)) or max(material.diffuse) < _DARK:
+        return False
+    corners = corners_of_surfaces([surface])
+    points = corners.reshape(-1, 3)
+    largest = unit_normals(corners)[np.argmax(np.nan_to_num(face_areas(corners)))]
+    return bool(np.ptp(points @ largest) < _THICKEST_PANE_M)
+
+
+def _named_mirror(
+    item: Item, materials: Sequence[Material], rooms: Mapping[str, Room]
+) -> Bools | None:
+    """(F,) which faces mirror of a piece with a part that is called a mirror; None without one."""
+    is_named = [
+        (names_mirror(s.name) or names_mirror(materials[s.material].name))
+        and materials[s.material].kind is MaterialKind.OPAQUE
+        for s in item.surfaces
+    ]
+    named = tuple(s for s, is_one in zip(item.surfaces, is_named, strict=True) if is_one)
+    own = _glass_of(replace(item, surfaces=named), rooms) if named else None
+    if own is None:
+        return None
+    rows = [
+        np.full(len(s.faces), is_one) for s, is_one in zip(item.surfaces, is_named, strict=True)
+    ]
+    faces = np.concatenate(rows)
+    faces[faces] = own
+    return faces
 
 
 def _glass_of(item: Item, rooms: Mapping[str, Room]) -> Bools | None:

@@ -16,7 +16,7 @@ from pbrs_farm.repair.lamps.room_lighting import GivenLights, with_room_lighting
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.furniture_audit import furniture_audit
 from pbrs_farm.repair.measure.leaks import Occluder, leaks_of_house
-from pbrs_farm.repair.mirrors import with_mirrors
+from pbrs_farm.repair.mirrors import with_clear_panes, with_mirrors
 from pbrs_farm.repair.repair_report import RepairReport, RoomAudit, SourceRepair, StructureReport
 from pbrs_farm.repair.small_repairs import (
     with_boxes_of_meshes,
@@ -49,6 +49,7 @@ def repair(
     house, faces = with_sound_faces(house)
     house, n_white = with_white_walls(house, fields.default_wall_rgb)
     house, mirrors = with_mirrors(house)
+    house = with_clear_panes(house)
 
     # Make walls, floors and ceilings watertight, with the openings cut.
     structure = repaired_structure(house, fields.wall_thickness_m)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from pbrs_farm.core.classes import MIRROR
+from pbrs_farm.core.classes import CABINET, DRESSER, MIRROR, OTHERFURNITURE, TELEVISION
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
-from pbrs_farm.repair.mirrors import with_mirrors
+from pbrs_farm.repair.mirrors import with_clear_panes, with_mirrors
 
 
 def board(name: str, size: tuple[float, float, float], at: tuple[float, float, float]) -> Surface:
@@ -104,3 +104,55 @@ def test_what_mirrors_already_or_is_no_mirror_or_has_no_flat_part_stays() -> Non
 def test_repair_tells_which_mirrors_it_made() -> None:
     _house, report = repair(with_item((board("all", (0.6, 0.9, 0.02), (0, 0, 0)),)), RepairFields())
     assert report.mirrors == ("glass",)
+
+
+DRESSING_TABLE = (
+    board("wood", (1.0, 0.05, 0.4), (0, -0.4, 0)),
+    board("Mirror_Glass", (0.6, 0.7, 0.02), (0, 0.2, 0)),
+    board("Mirror_Frame", (0.7, 0.05, 0.02), (0, 0.6, 0)),
+)
+
+
+def test_the_mirror_of_another_piece_mirrors_and_its_label_stays() -> None:
+    house, made = with_mirrors(with_item(DRESSING_TABLE, nyu40=DRESSER))
+    assert made == ("glass",)
+    normal, area = glass_of(house)
+    np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-6)
+    assert area == pytest.approx(0.42, abs=1e-5)
+    item = next(i for i in house.items if i.id == "glass")
+    assert (item.nyu40, item.n_faces) == (DRESSER, 36)
+    # By the material's name as well; a mirror's lamp is none.
+    for name, expected in (("Spiegel", ("glass",)), ("Mirror light", ())):
+        home = with_item((board("part 0", (0.6, 0.9, 0.02), (0, 0, 0)),), nyu40=DRESSER)
+        material = replace(home.materials[-1], name=name)
+        assert (
+            with_mirrors(replace(home, materials=(*home.materials[:-1], material)))[1] == expected
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "diffuse", "nyu40", "kind"),
+    [
+        ("Glass_door", (0.4, 0.9, 0.005), (0.8, 0.9, 0.9), CABINET, MaterialKind.GLASS),
+        ("Cabinet_Pane", (0.4, 0.9, 0.005), (1.0, 1.0, 1.0), CABINET, MaterialKind.GLASS),
+        ("Frosted glass", (0.4, 0.9, 0.005), (0.8, 0.9, 0.9), CABINET, MaterialKind.OPAQUE),
+        ("Glass", (0.4, 0.9, 0.3), (0.8, 0.9, 0.9), CABINET, MaterialKind.OPAQUE),
+        ("Glass", (0.4, 0.9, 0.005), (0.05, 0.05, 0.05), OTHERFURNITURE, MaterialKind.OPAQUE),
+        ("Glass", (0.4, 0.9, 0.005), (0.8, 0.9, 0.9), TELEVISION, MaterialKind.OPAQUE),
+        ("Wood", (0.4, 0.9, 0.005), (0.8, 0.9, 0.9), CABINET, MaterialKind.OPAQUE),
+    ],
+)
+def test_a_pane_of_a_piece_is_clear_and_other_glass_stays(
+    name: str,
+    size: tuple[float, float, float],
+    diffuse: tuple[float, float, float],
+    nyu40: int,
+    kind: MaterialKind,
+) -> None:
+    home = with_item((board(name, size, (0, 0, 0)), board("side", (0.4, 0.1, 0.3), (0, -0.5, 0))), nyu40=nyu40)  # fmt: skip
+    materials = list(home.materials)
+    materials[-2] = replace(materials[-2], diffuse=diffuse)
+    house = with_clear_panes(replace(home, materials=tuple(materials)))
+    item = next(i for i in house.items if i.id == "glass")
+    assert [house.materials[s.material].kind for s in item.surfaces] == [kind, MaterialKind.OPAQUE]
+    assert item.nyu40 == nyu40

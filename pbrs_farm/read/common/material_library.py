@@ -12,7 +12,6 @@ from PIL import Image, UnidentifiedImageError
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import USUAL_CUTOFF, Material, Texture
-from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.notes import Notes
 
 MAX_EDGE_PX: Final = 16384
@@ -21,15 +20,6 @@ _PNG: Final = "image/png"
 _KEPT: Final = {"PNG": _PNG, "JPEG": "image/jpeg", "MPO": "image/jpeg"}
 _TRIED: Final = ("PNG", "JPEG", "GIF", "BMP", "TIFF", "WEBP")
 PANE_OPACITY: Final = 0.2  # opacity of panes and glass that the source calls opaque
-# Words of names, accents folded: English, German, French, Spanish, Italian, Dutch, Swedish.
-GLASS_WORDS: Final = frozenset(
-    ("glass", "glazing", "pane", "windowpane", "windowglass", "glas", "scheibe", "verglasung",
-     "fensterglas", "verre", "vitre", "vitrage", "vidrio", "cristal", "vetro", "ruit")
-)  # fmt: skip
-FRAME_WORDS: Final = frozenset(
-    ("frame", "sill", "sash", "handle", "trim", "casing", "shutter", "blind", "curtain", "wood",
-     "metal", "rahmen", "griff", "cadre", "marco", "telaio")
-)  # fmt: skip
 
 
 class AlphaRange(NamedTuple):
@@ -221,12 +211,3 @@ class MaterialLibrary:
         except ValueError as error:
             self._notes.add("unreadable-texture", place, f"{shown}: {error}")
             return None
-
-
-def names_glass(name: str) -> bool:
-    """Whether the name of a part of a window or door says that the part is glass.
-
-    Words of several languages. A name with a word of a frame ("glass door frame") is no glass.
-    """
-    words = words_of(name)
-    return bool(words & GLASS_WORDS) and not words & FRAME_WORDS

@@ -13,11 +13,9 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import NOTHING_LEFT, USUAL_CUTOFF, Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
-from pbrs_farm.home.names import words_of
+from pbrs_farm.home.names import FRAME_WORDS, GLASS_WORDS, words_of
 from pbrs_farm.read.common.material_fields import noted_fields
 from pbrs_farm.read.common.material_library import (
-    FRAME_WORDS,
-    GLASS_WORDS,
     OPAQUE_ALPHA,
     LoadedTexture,
     MaterialLibrary,

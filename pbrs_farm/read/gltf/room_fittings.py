@@ -20,8 +20,7 @@ from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.classes import DOOR, OTHERSTRUCTURE, WALL, WINDOW
 from pbrs_farm.core.house import Box, Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import closed_edge_share
-from pbrs_farm.home.names import words_of
-from pbrs_farm.read.common.material_library import names_glass
+from pbrs_farm.home.names import names_glass, words_of
 from pbrs_farm.read.common.room_shells import bounds_of_shells, components, picked
 
 _WELD_M: Final = 1e-4  # corners this near are one

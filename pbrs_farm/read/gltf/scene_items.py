@@ -23,8 +23,9 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
+from pbrs_farm.home.names import names_glass, names_mirror
 from pbrs_farm.read.common.furniture_classes import PieceSize
-from pbrs_farm.read.common.material_library import PANE_OPACITY, names_glass
+from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
@@ -209,7 +210,9 @@ def _item(
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
     for part, meshes in parts:
         part_name = str(entry(gltf, "nodes", part.index).get("name", ""))
-        is_glass = is_opening and part.path != thing.root.path and names_glass(part_name)
+        is_own_part = part.path != thing.root.path
+        is_glass = is_opening and is_own_part and names_glass(part_name)
+        is_said = is_own_part and (names_glass(part_name) or names_mirror(part_name))
         for number, mesh in meshes:
             material, emission = materials.material(number, clear=clear)
             # Glass by its name alone is a pane, unless the file tags its kind.
@@ -222,6 +225,9 @@ def _item(
             emits = emits and (is_known or kind is ItemKind.LAMP)
             index = materials.as_bulb(material) if emits else materials.library.index(material)
             name = material.name or f"part {len(surfaces)}"
+            if is_said and kind is ItemKind.OBJECT and material.kind is MaterialKind.OPAQUE:
+                # By that name repair knows a mirror or a pane of a piece.
+                name = part_name
             laid = materials.laid(number, mesh)
             surface = placed(laid, part.world_from_node, name=name, material=index)
             if surface is None:

@@ -32,14 +32,14 @@ from pbrs_farm.core.house import (
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.geometry.plan_surfaces import horizontal
-from pbrs_farm.home.names import words_of
+from pbrs_farm.home.names import names_glass, words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder
-from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary, names_glass
+from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
 from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings

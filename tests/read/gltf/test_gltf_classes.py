@@ -111,3 +111,14 @@ def test_materials_sizes_and_collections_tell_what_a_name_means() -> None:
     assert kinds["Man_01"] == ("object", "otherprop")
     assert kinds["Man_02"] == ("person", "person")
     assert kinds["Bottle_dining_table"] == ("object", "otherprop")
+
+
+def test_the_mirror_and_the_pane_of_a_piece_are_known_by_their_nodes_names() -> None:
+    s = two_rooms()
+    s.materials += [{"name": "Chrome"}]
+    sheet = s.box([1, 1, 0.1], [1.6, 1.8, 0.11], len(s.materials) - 1)
+    parts = [s.node(name, mesh=sheet) for name in ("Mirror_Glass", "Mirror_Frame", "Drawer")]
+    s.node("Dressing_Table", children=parts)
+    assert [p.name for p in item(read(s), "Dressing_Table").surfaces] == [
+        "Mirror_Glass", "Chrome", "Chrome",
+    ]  # fmt: skip
