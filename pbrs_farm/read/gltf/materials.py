@@ -91,6 +91,8 @@ class SceneMaterials:
         glossy = specular_glossiness(fields_json)
         metallic, roughness = self._metal(fields_json, place)
         maps = self._maps(number, place)
+        if "specularGlossinessTexture" in maps:
+            roughness = 1.0  # the factor is in the map
         transmission = object_at(object_at(fields_json, "extensions"), "KHR_materials_transmission")
         passes = self._fraction(transmission, "transmissionFactor", 0.0, place)
         # Opacity is what blending lets through, or transmission, whichever is less.
@@ -159,10 +161,8 @@ class SceneMaterials:
         fields_json = entry(self._gltf, "materials", number)
         glossy, slots = specular_glossiness(fields_json), texture_slots(self._gltf, number)
         if not glossy:
-            pbr, info = (
-                object_at(fields_json, "pbrMetallicRoughness"),
-                slots.get("baseColorTexture"),
-            )
+            pbr = object_at(fields_json, "pbrMetallicRoughness")
+            info = slots.get("baseColorTexture")
             factor = numbers(self._gltf, pbr.get("baseColorFactor", [1] * 4), 4, f"{place}: colour")
             found = self._texture(info, place)
             return factor, found, info is not None and found is None

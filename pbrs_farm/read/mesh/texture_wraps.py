@@ -17,6 +17,7 @@ from pbrs_farm.read.mesh.obj import Mesh
 
 REPEAT, CLAMP, MIRROR = "repeat", "clamp", "mirror"
 _MOST_CUTS: Final = 64  # lines along which a mesh is cut for one direction of its picture
+_MOST_ADDED: Final = 50_000  # triangles that the cuts of one mesh may add
 _EDGE: Final = 1e-3  # coordinates that leave 0..1 by less lie within it: half a texel of 500
 
 
@@ -38,6 +39,7 @@ def leaves_picture(mesh: Mesh, wraps: tuple[str, str]) -> bool:
 
 def wrapped(mesh: Mesh, wraps: Wraps) -> Mesh | None:
     """The mesh as it looks with a picture that repeats; None where it would have to be cut too often."""
+    most = len(mesh.faces) + _MOST_ADDED
     for axis, (mode, size) in enumerate(zip(wraps.modes, wraps.size_px, strict=True)):
         assert mesh.uvs is not None
         low, high = float(mesh.uvs[:, axis].min()), float(mesh.uvs[:, axis].max())
@@ -52,6 +54,8 @@ def wrapped(mesh: Mesh, wraps: Wraps) -> Mesh | None:
             for cut in (end - half, end + half):
                 if low < cut < high and (mode == MIRROR or 0 <= cut <= 1):
                     mesh = _cut_along(mesh, axis, float(cut))
+                if len(mesh.faces) > most:
+                    return None
         mesh = _folded(mesh, axis, mode, half)
     return mesh
 

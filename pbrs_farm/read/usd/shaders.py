@@ -66,7 +66,6 @@ class _Picture(NamedTuple):
     channel: str  # the output that is taken: "rgb", "r", "g", "b", "a", MaterialX's "out"
     scale: tuple[float, ...] = (1.0,) * 4
     bias: tuple[float, ...] = (0.0,) * 4
-    has_scale: bool = False
     space: str = ""  # "raw", "sRGB", "" = what its use means
 
 
@@ -81,6 +80,7 @@ class Shaders:
         self.samplers: list[_Row] = [{"wrapS": _REPEAT, "wrapT": _REPEAT}]
         self.images: list[_Row] = []
         self.assets: list[Any] = []  # Sdf.AssetPath, _Masked or _Changed of each image
+        self._understood: dict[str, bool] = {}  # by the material's path
         self._uv_names: dict[str, str] = {}  # by the material's path
         self._uv_name = ""  # of the material that is being read
         self._numbers: dict[str, int] = {}
@@ -117,7 +117,11 @@ class Shaders:
 
     def is_understood(self, material: Any) -> bool:
         """Whether a material has a surface of which more than a picture is read."""
-        return surface_of(material)[1] is not None or bool(_omniverse(material))
+        path = str(material.GetPath())
+        if path not in self._understood:
+            known = surface_of(material)[1] is not None or bool(_omniverse(material))
+            self._understood[path] = known
+        return self._understood[path]
 
     def uv_name(self, material: Any) -> str:
         """The texture coordinates by which a material's first picture lies, "" where it names none."""
@@ -162,7 +166,7 @@ class Shaders:
             pbr |= {"metallicRoughnessTexture": info, "roughnessFactor": factor}
         normal = self._input(shader, words.normal, None)[1]
         if normal is not None:
-            row["normalTexture"] = self._normal(normal, name)
+            row["normalTexture"] = self._normal(normal)
         if alpha < 1 or has_picture:
             row |= self._alpha_mode(shader)
         self._add_glow(row, shader, words)
@@ -205,14 +209,14 @@ class Shaders:
             return {} if mode == 0 else _alpha_mode(cutoff if mode == 1 else 0.0)
         return _alpha_mode(threshold)
 
-    def _normal(self, picture: _Picture, place: str) -> _Row:
+    def _normal(self, picture: _Picture) -> _Row:
         """A normal map; its node's scale turns 0..1 into twice the map's own."""
         x, y = picture.scale[:2]
         if (x < 0) != (y < 0):
             # A map whose green points down: turn it over.
             values = PictureValues(scale=(1.0, -1.0, 1.0), bias=(0.0, 1.0, 0.0))
             picture = picture._replace(info=self._changed(picture.info, values))
-        times = abs(x) / 2 if picture.has_scale else 1.0
+        times = 1.0 if x == 1 else abs(x) / 2  # 1 is what a node without a scale has
         return picture.info | ({"scale": times} if times != 1 else {})
 
     def _colour(
@@ -330,7 +334,7 @@ class Shaders:
             self._info(asset, wraps), channel,
             scale=tuple(_component(scale, k, 1.0) for k in range(4)),
             bias=tuple(_component(bias, k, 0.0) for k in range(4)),
-            has_scale=scale is not None, space=self._colour_space(node),
+            space=self._colour_space(node),
         )  # fmt: skip
         turn = self._place_of_picture(node)
         return picture._replace(info=picture.info | {"extensions": turn}) if turn else picture
@@ -414,7 +418,8 @@ class Shaders:
             colour = _triple(self._input(shader, "glass_color", (1, 1, 1))[0], (1.0, 1.0, 1.0))
             return _pbr(name, [*colour, PANE_OPACITY], 0.0, 0.0) | {"alphaMode": "BLEND"}
         if not stem.startswith("OmniPBR"):
-            return self._other_mdl(name, asset, stem, place)
+            kind = str(shader.GetIdAttr().Get() or "")
+            return self._other_mdl(name, asset, stem or kind, place)
         colour = _triple(self._input(shader, "diffuse_color_constant", None)[0], (0.2, 0.2, 0.2))
         tint = np.array(_triple(self._input(shader, "diffuse_tint", None)[0], (1.0, 1.0, 1.0)))
         picture = self._mdl_picture(shader, "diffuse_texture")

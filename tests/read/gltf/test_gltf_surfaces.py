@@ -67,6 +67,7 @@ def test_a_metal_of_specular_glossiness_has_its_specular_colour_and_its_gloss_as
     gold = np.array([255, 200, 80]) / 255
     assert picture(house, look.texture_id)[0, 0] == pytest.approx(gold, abs=0.03)
     assert picture(house, look.roughness_texture_id)[0, 0, 1] == pytest.approx(0.2, abs=0.01)
+    assert look.roughness == 1  # times the picture
 
 
 def test_what_says_nothing_of_its_surface_is_no_metal() -> None:
@@ -176,6 +177,16 @@ def test_a_picture_goes_on_beyond_its_edges_as_its_sampler_says(mode: str, numbe
     )
     assert np.linalg.norm(area, axis=1).sum() / 2 == pytest.approx(1, abs=1e-6)
     assert not house.notes
+
+
+def test_a_mirrored_picture_that_goes_on_a_hundred_times_repeats_with_a_note() -> None:
+    s = scene_with({PBR: {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}, quarters())
+    s.more |= {"samplers": [{"wrapS": 33648}], "textures": [{"source": 0, "sampler": 0}]}
+    uvs = np.array([[0, 1], [100, 1], [100, 0], [0, 0]], np.float32)
+    s.meshes[-1]["primitives"][0]["attributes"]["TEXCOORD_0"] = s.writer.add_vertices(uvs)
+    house = read(s)
+    assert len(board(house)[0].faces) == 2
+    assert [n.kind for n in house.notes] == ["texture-layout"]
 
 
 def test_a_clamped_picture_that_is_not_left_keeps_its_mesh() -> None:

@@ -1,0 +1,30 @@
+"""Materials of models in OBJ: what their MTL says of colour and picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.read.common.model_materials import GREY, WHITE, ModelMaterials
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.mesh.mtl import ObjMaterial
+from tests.read.small_houses import png
+
+
+def look(folder: Path, mtl: ObjMaterial) -> Material:
+    materials = ModelMaterials(RootFolder(folder), Notes("m.obj", strict=False))
+    return materials.material(mtl, None, place="m", clear=MaterialKind.GLASS)
+
+
+@pytest.mark.parametrize("kd", [(0.0, 0.0, 0.0), GREY])
+def test_a_picture_beside_a_black_colour_or_none_is_shown_as_it_is(
+    tmp_path: Path, kd: tuple[float, float, float]
+) -> None:
+    mtl = ObjMaterial("wood", kd=kd, map_kd="p.png")
+    assert look(tmp_path, mtl).diffuse == GREY  # it is not there
+    (tmp_path / "p.png").write_bytes(png())
+    found = look(tmp_path, mtl)
+    assert (found.diffuse, found.texture_id is not None) == (WHITE, True)
