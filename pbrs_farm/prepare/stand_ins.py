@@ -152,8 +152,13 @@ class _Scene:
             if i.box is not None and BOX_ONLY in i.tags and NYU40_NAMES[i.nyu40] in _TABLES
         ]  # fmt: skip
         self._box_only = [i for i in house.items if BOX_ONLY in i.tags]
+        boxes = [i.box for i in self._box_only if i.box is not None]
+        self._centres = np.array([b.centre for b in boxes]).reshape(-1, 3)
+        self._halves = np.array([b.half for b in boxes]).reshape(-1, 3)
         self._grounds: dict[str, Polygon] = {}
-        self.placed: list[Item] = []  # stand-ins so far
+        self._place_by_item: dict[str, _Place | None] = {}
+        self._kitchens: dict[str, bool] = {}
+        self._placed: list[tuple[float, float, float, float, Item]] = []  # with bounds in plan
         self.boxes: Counter[str] = Counter()
         self.in_walls: Counter[str] = Counter()
 
@@ -172,6 +177,11 @@ class _Scene:
 
     def place_of(self, item: Item) -> _Place | None:
         """The room that a box-only thing names, else the nearest one on its storey; None = out of all."""
+        if item.id not in self._place_by_item:
+            self._place_by_item[item.id] = self._find_place(item)
+        return self._place_by_item[item.id]
+
+    def _find_place(self, item: Item) -> _Place | None:
         assert item.box is not None
         x, y, z = (float(v) for v in item.box.centre)
         here, best = Point(x, z), None
@@ -191,19 +201,29 @@ class _Scene:
                 best, nearest = place, away
         return best
 
-    def items_of(self, place: _Place | None) -> list[Item]:
-        """The box-only things of a room."""
-        return [i for i in self._box_only if place is not None and self.place_of(i) is place]
+    def is_kitchen(self, place: _Place | None) -> bool:
+        """Whether one cooks in a room: what it is called, else what stands in it."""
+        if place is None:
+            return False
+        if place.room.id not in self._kitchens:
+            items = [i for i in self._box_only if self.place_of(i) is place]
+            kind = room_kind(place.room, items, place.outline.area)
+            is_cooked = kind is not RoomKind.BATHROOM and is_cooked_in(items)
+            self._kitchens[place.room.id] = kind is RoomKind.KITCHEN or is_cooked
+        return self._kitchens[place.room.id]
 
     def stands_on_another(self, item: Item) -> bool:
         """Whether a thing's box begins on, or within, the box of another, above its foot."""
         assert item.box is not None
         low = float(item.box.centre[1] - item.box.half[1])
         here = Point(*item.box.centre[[0, 2]])
-        for other in self._box_only:
+        feet, tops = (self._centres[:, 1] + s * self._halves[:, 1] for s in (-1, 1))
+        away = np.hypot(*(self._centres - item.box.centre)[:, [0, 2]].T)
+        reach = np.hypot(self._halves[:, 0], self._halves[:, 2]) + _OVER_EDGE_M
+        near = (feet + _ON_FLOOR_M < low) & (low < tops + _ON_TOP_M) & (away <= reach)
+        for other in (self._box_only[n] for n in np.flatnonzero(near)):
             assert other.box is not None
-            foot, top = (float(other.box.centre[1] + s * other.box.half[1]) for s in (-1, 1))
-            if other is item or not foot + _ON_FLOOR_M < low < top + _ON_TOP_M:
+            if other.id == item.id:
                 continue
             if other.id not in self._grounds:
                 self._grounds[other.id] = _ground(other.box).buffer(_OVER_EDGE_M)
@@ -216,13 +236,13 @@ class _Scene:
         if not self.stands_on_another(item):
             return None
         low = float(target.centre[1] - target.half[1])
-        reach = (np.abs(target.axes) @ target.half)[[0, 2]]
-        x, z = target.centre[[0, 2]]
+        wide, _, deep = (float(v) for v in np.abs(target.axes) @ target.half)
+        x, _, z = (float(v) for v in target.centre)
         near = [
-            item_triangles(i) for i in self.placed
-            if (i.bounds[0, [0, 2]] < (x + reach[0], z + reach[1])).all()
-            and (i.bounds[1, [0, 2]] > (x - reach[0], z - reach[1])).all()
-        ]  # fmt: skip
+            item_triangles(below)
+            for x0, z0, x1, z1, below in self._placed
+            if x0 < x + wide and x1 > x - wide and z0 < z + deep and z1 > z - deep
+        ]
         if not near:
             return None
         spread = np.linspace(-0.4, 0.4, 5)
@@ -233,6 +253,11 @@ class _Scene:
         ]  # fmt: skip
         y = float(highest_below(np.array(places), np.concatenate(near), low + _ON_TOP_M).max())
         return y if low - y < _MOST_DROP_M else None
+
+    def remember(self, placed: Item) -> None:
+        """Keep a stand-in: things may stand on it."""
+        (x0, _, z0), (x1, _, z1) = placed.bounds.tolist()
+        self._placed.append((x0, z0, x1, z1, placed))
 
     def table_near(self, middle: F64, height: float) -> F64 | None:
         """The (x, z) of the nearest table on the same storey, within reach of a chair."""
@@ -257,7 +282,7 @@ def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Un
     for place, items in by_room.values():
         found |= kitchen_units(
             items, place.room.floor_y, scene.catalogue, scene.house.id,
-            is_kitchen=_is_kitchen(place, items),
+            is_kitchen=scene.is_kitchen(place),
             distance_to_wall=place.outline.exterior.distance,
             choose_front=partial(_likeliest_front, place=place, scene=scene),
         )  # fmt: skip
@@ -267,13 +292,6 @@ def _units_of_kitchens(box_only: list[Item], scene: _Scene) -> dict[str, list[Un
 def _likeliest_front(boxes: Sequence[Box], place: _Place, scene: _Scene) -> int:
     costs = [_front_cost(box, "base_cabinet", place, scene) for box in boxes]
     return costs.index(min(costs))
-
-
-def _is_kitchen(place: _Place | None, items: Sequence[Item]) -> bool:
-    if place is None:
-        return False
-    kind = room_kind(place.room, items, place.outline.area)
-    return kind is RoomKind.KITCHEN or (kind is not RoomKind.BATHROOM and is_cooked_in(items))
 
 
 def _add_units(mutable: MutableHouse, item: Item, units: list[Unit], scene: _Scene) -> None:
@@ -290,7 +308,7 @@ def _add_units(mutable: MutableHouse, item: Item, units: list[Unit], scene: _Sce
             placed = replace(placed, id=f"{item.id}_{number}")
         if unit.is_invented:
             placed = replace(placed, name=unit.piece.name, nyu40=unit.piece.nyu40)
-        scene.placed.append(placed)
+        scene.remember(placed)
         mutable.add(placed, "stand_ins", unit.piece)
 
 
@@ -318,12 +336,14 @@ def _stand_in(mutable: MutableHouse, item: Item, scene: _Scene) -> None:
         shape = scene.catalogue.shape(fit.piece)
         if shape is not None:
             placed = _placed(mutable, item, turned, fit, shape, place)
-            scene.placed.append(placed)
+            scene.remember(placed)
             mutable.add(placed, "stand_ins", fit.piece)
             return
     if scene.catalogue is not None:
         scene.boxes[item.name] += 1
-    mutable.add(_plain_box(mutable, item, target, place), "stand_ins")
+    plain = _plain_box(mutable, item, target, place)
+    scene.remember(plain)
+    mutable.add(plain, "stand_ins")
 
 
 def _chosen(
@@ -333,7 +353,7 @@ def _chosen(
     assert scene.catalogue is not None
     group = _group_of(item)
     if group in _BASINS:
-        group = "sink" if _is_kitchen(place, scene.items_of(place)) else "washbasin"
+        group = "sink" if scene.is_kitchen(place) else "washbasin"
     best: tuple[float, Box, _Fit] | None = None
     for turned in _turned(target, is_front_given=FRONT_GIVEN in item.tags):
         fit = _best(scene.catalogue, group, item, turned)

@@ -128,7 +128,7 @@ def test_walls_of_two_heights_without_a_slope_are_a_note(tmp_path: Path) -> None
     path = attic(tmp_path)
     value = json.loads(path.read_text())
     for wall in value["walls"]:
-        wall["polygonCorners"] = []
+        wall["polygonCorners"] = None
     path.write_text(json.dumps(value))
     (note,) = plan_from_file(path).left_out
     assert note.startswith("walls of 1.20 to 3.00 m have one ceiling, at 2.10 m")

@@ -138,6 +138,13 @@ def test_what_stands_on_a_thing_stands_on_its_stand_in(z: float, top: float) -> 
     assert of(furnished(mug, table)).bounds[0, 1] == pytest.approx(top, abs=1e-3)
 
 
+def test_what_stands_on_a_plain_box_stays_on_it() -> None:
+    plain = box_only("bed", (2.5, 0.375, 2.0), (4.0, 0.75, 0.5), number=1)
+    seat = box_only("chair", (2.5, 0.3, 2.0), (0.45, 0.6, 0.5), number=2)
+    cup = box_only("cup", (2.5, 0.85, 2.0), (0.09, 0.1, 0.09))
+    assert of(furnished(seat, plain, cup)).bounds[0, 1] == pytest.approx(0.75, abs=5e-3)
+
+
 def test_what_hangs_where_nothing_is_below_stays_where_it_is() -> None:
     table = box_only("dining_table", (2.5, 0.375, 2.0), (1.4, 0.75, 0.8), number=1)
     picture = box_only("painting", (2.5, 1.5, 0.03), (0.6, 0.4, 0.03))

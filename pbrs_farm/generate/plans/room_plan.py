@@ -47,7 +47,7 @@ class _Surface(BaseModel):
     category: Any = None
     dimensions: list[Finite] = Field(min_length=2, max_length=3)
     transform: list[Any] = Field(min_length=4, max_length=16)
-    polygonCorners: list[list[Finite]] = Field(default_factory=list, max_length=20_000)  # noqa: N815
+    polygonCorners: list[list[Finite]] | None = Field(None, max_length=20_000)  # noqa: N815
     completedEdges: list[Any] | None = None  # noqa: N815
     story: Any = 0
 
@@ -126,7 +126,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         height = max(y for top in tops for y in top.heights)
     outlines = [
         shape for k, f in enumerate(scan.floors, 1)
-        if len(f.polygonCorners) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
+        if len(f.polygonCorners or ()) >= 4 and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
     ]  # fmt: skip
     lines += _lines_in_gaps(path, scan, lines)
     walls_of_plan = [LineString(line) for line in lines if line[0] != line[1]]
@@ -162,7 +162,7 @@ def _upper_edge_of(path: Path, place: str, surface: _Surface, pose: F64) -> Wall
     """The upper edge in the plan, heights in the scan's own y: of its outline, else of its rectangle."""
     half_width, half_height = (v / 2 for v in surface.dimensions[:2])
     edge = [(-half_width, half_height), (half_width, half_height)]
-    corners = [(*c, 0.0, 0.0)[:2] for c in surface.polygonCorners]
+    corners = [(*c, 0.0, 0.0)[:2] for c in surface.polygonCorners or ()]
     if len(corners) >= 3:
         outline = largest_part(shapely.make_valid(Polygon(corners)))
         if outline is None:
@@ -205,7 +205,7 @@ def _floor_height(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) ->
 
 def _outline_of_floor(path: Path, place: str, floor: _Surface) -> Polygon:
     pose = _parse_pose(path, place, floor)
-    local = np.array([(*c, 0.0, 0.0, 0.0)[:3] for c in floor.polygonCorners])
+    local = np.array([(*c, 0.0, 0.0, 0.0)[:3] for c in floor.polygonCorners or ()])
     world = local @ pose[:3, :3].T + pose[:3, 3]
     return Polygon(world[:, [0, 2]])
 
