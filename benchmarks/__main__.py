@@ -26,6 +26,7 @@ DEFAULT: Final = {
 OWN_TARGET: Final = {
     "house": "house",
     "dress": "dress.dress",
+    "cloths": "dress.cloths",
     "made": "homes.made",
     "variety": "homes.variety",
     "light": "light.equal_time",

@@ -25,7 +25,7 @@ FLAT = 0.5  # cosine to a face's normal below which an edge only grazes it
 _STRUCTURE = (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND, ItemKind.PERSON)
 _OPENINGS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 _RUG, _CURTAIN, _BLINDS = 20, 16, 13  # NYU40
-_CLOTHS = ("#duvet", "#throw", "#crumpled_clothes", "#napkin")
+CLOTHS = ("#duvet", "#throw", "#crumpled_clothes", "#napkin")
 
 
 @dataclass(eq=False)
@@ -130,7 +130,11 @@ def _allowed(a: Thing, b: Thing) -> bool:
 def _deep(a: Thing, b: Thing) -> float:
     """How deep the deepest of some points of a lies inside b, metres."""
     points, _face = trimesh.sample.sample_surface(a.mesh, N_POINTS, seed=1)
-    points = np.concatenate([points, a.mesh.vertices[: 4 * N_POINTS]])
+    return depth_of_points(np.concatenate([points, a.mesh.vertices[: 4 * N_POINTS]]), b)
+
+
+def depth_of_points(points: Floats, b: Thing) -> float:
+    """How deep the deepest of points (N, 3) lies inside b, metres; 0 where all are outside."""
     points = points[((points > b.bounds[0]) & (points < b.bounds[1])).all(1)]
     if not len(points):
         return 0.0
@@ -184,7 +188,7 @@ def floating(things: Sequence[Thing]) -> list[tuple[str, float]]:
         if not thing.is_new or thing.item.kind in _STRUCTURE:
             continue
         # A cloth's hem hangs beside what it lies on.
-        ring_m = np.inf if thing.item.source_class.endswith(_CLOTHS) else RING_M
+        ring_m = np.inf if thing.item.source_class.endswith(CLOTHS) else RING_M
         gap = min((scene.gap(k, ways, ring_m) for ways in _ways_of(thing)), key=abs, default=np.inf)
         if gap > GAP_M:
             found.append((thing.item.id, round(float(gap), 4)))

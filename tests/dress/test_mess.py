@@ -14,14 +14,15 @@ from pbrs_farm.core.house import House, Item, Material
 from pbrs_farm.core.mesh import edges_are_paired, triangle_corners
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.clutter import add_clutter
+from pbrs_farm.dress.clutter.cloth_ground import CELL_M, Ground
 from pbrs_farm.dress.clutter.cloths import drop_clothes
 from pbrs_farm.dress.clutter.drapes import (
-    CELL_M,
+    MOST_STRETCH,
     Folds,
-    Ground,
-    add_folds,
-    drop_net,
+    Net,
+    drape,
     flat_net,
+    lie_flat,
     sheet_of,
 )
 from pbrs_farm.dress.clutter.placing import Placing, separate_pair
@@ -143,23 +144,27 @@ def test_clothes_on_a_seat_hang_on_no_post_behind_it() -> None:
     assert max(float(item.bounds[1, 1]) for item in found) < 0.65
 
 
-def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters_nothing() -> None:
-    block = solid("block", [0.5, 0.0, 0.5], [2.1, 0.5, 2.5])
-    corners, thick = item_triangles(block), 0.02
+FOLDS = Folds(9, 0.03, 0.04, (0.2, 0.6))
+
+
+def _ground(item: Item, thread_m: float) -> Ground:
+    """The ground of one item in a frame that begins at the world's origin."""
     grid = PlanGrid(np.zeros(2), 0.0, CELL_M, (260, 260))
-    ground = Ground.of(grid, corners, 0.0, 1.0, thick)
-    net, threads = flat_net((1.2, 1.0), 0.06, (0.6, 0.6, 1.5), 0.1)
-    made = [
-        add_folds(
-            drop_net(net, threads, ground, thick),
-            ground,
-            thick,
-            Folds(9, 0.03, 0.04, (0.2, 0.6)),
-            np.random.default_rng(2),
-        )
-        for _ in range(2)
-    ]
-    assert np.array_equal(*made)
+    return Ground.of(grid, item_triangles(item), 0.0, 1.0, thread_m / 2)
+
+
+def _fallen(net: Net, ground: Ground, thick_m: float) -> Net:
+    made = drape(net, ground, thick_m, FOLDS, np.random.default_rng(2))
+    assert made is not None
+    return made
+
+
+def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters_nothing() -> None:
+    block, thick = solid("block", [0.5, 0.0, 0.5], [2.1, 0.5, 2.5]), 0.02
+    corners, ground = item_triangles(block), _ground(block, 0.06)
+    net = flat_net((1.2, 1.0), 0.06, (0.6, 0.6, 1.5), 0.1)
+    made = [_fallen(net, ground, thick) for _ in range(2)]
+    assert np.array_equal(made[0].points, made[1].points)
     sheet = sheet_of("cloth", made[0], ground, thick)
     points = sheet.positions.astype(np.float64)
     places = np.unique(
@@ -171,9 +176,62 @@ def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters
     over = points[:, 1] - np.maximum(highest_below(points[:, [0, 2]], corners), 0.0)
     assert 0.0 < over.min() < 0.002
     assert points[:, 1].min() < 0.3
-    # Threads keep their lengths but for what folds take: cloth neither grows nor shrinks away.
-    spans = np.linalg.norm(np.diff(made[0], axis=1), axis=-1).sum(1)
-    assert float(np.median(spans)) == pytest.approx(1.2, rel=0.1)
+    # What folds take is drawn in from the edges: cloth neither grows nor shrinks away.
+    assert np.median(made[0].stretches()) == pytest.approx(1.0, abs=0.03)
+    assert sheet.uvs is not None
+    assert np.ptp(sheet.uvs, axis=0) == pytest.approx([1.2, 1.0], abs=1e-6)
+
+
+# A board across the bed's foot, its top above the mattress; the back of a sofa, thinner than threads are apart.
+@pytest.mark.parametrize(
+    ("parts", "size", "thread_m", "thick_m", "turn"),
+    [
+        ([([0.5, 0, 0.5], [2.1, 0.4, 2.4]), ([0.5, 0, 2.4], [2.1, 0.9, 2.44])], (1.8, 1.6), 0.065, 0.03, 0.0),
+        ([([0.5, 0, 1.5], [2.5, 0.45, 2.3]), ([0.5, 0, 1.4], [2.5, 0.9, 1.44])], (1.3, 0.9), 0.05, 0.008, 0.6),
+    ],
+    ids=["bed", "sofa"],
+)  # fmt: skip
+def test_cloth_is_not_torn_by_what_rises_below_it(
+    parts: list[tuple[list[float], list[float]]], size: tuple[float, float], thread_m: float,
+    thick_m: float, turn: float,
+) -> None:  # fmt: skip
+    ground = _ground(boards("piece", parts, BED), thread_m)
+    middle = (1.3, 0.95, 1.6)
+    made = _fallen(flat_net(size, thread_m, middle, turn), ground, thick_m)
+    stretches = made.stretches()
+    assert np.percentile(stretches, 99) < 1.2 < MOST_STRETCH
+    assert stretches.max() < 2.0
+    assert made.deepest_m(ground) == 0.0
+    # It fell, on both sides of what rises.
+    assert made.points[..., 1].min() < 0.6
+
+
+def test_cloth_that_finds_no_way_to_fall_lies_flat_where_that_is_level() -> None:
+    # A post of a hand's height through the middle of the net: it begins in it.
+    parts = [([0.5, 0, 0.5], [2.1, 0.4, 2.4]), ([1.2, 0.4, 1.2], [1.5, 0.9, 1.5])]
+    ground = _ground(boards("block", parts, BED), 0.05)
+    low = flat_net((1.0, 0.8), 0.05, (1.35, 0.41, 1.35), 0.0)
+    assert drape(low, ground, 0.008, FOLDS, np.random.default_rng(1)) is None
+    assert lie_flat(low, ground, 0.008) is None
+    beside = flat_net((1.0, 0.8), 0.05, (1.1, 0.41, 1.9), 0.0)
+    flat = lie_flat(beside, ground, 0.008)
+    assert flat is not None
+    assert np.ptp(flat.points[..., 1]) == 0.0
+    assert flat.stretches() == pytest.approx(np.ones(len(flat.stretches())))
+    assert float(flat.points[0, 0, 1]) == pytest.approx(0.4 + 0.004, abs=0.001)
+    assert 0.3 < np.ptp(flat.points[..., 0]) <= 1.0
+
+
+def test_a_point_leaves_what_is_solid_by_the_shorter_way() -> None:
+    ground = _ground(solid("block", [0.5, 0.0, 0.5], [1.5, 0.5, 1.5]), 0.02)
+    wide = ground.grown_m
+    points = np.array([[1.0, 0.48, 1.0], [1.46, 0.3, 1.0], [1.0, 0.3, 0.53], [2.0, 0.3, 1.0]]).T
+    moved = (points + ground.ways_out(points, 0.01)).T
+    assert moved[0] == pytest.approx([1.0, 0.51, 1.0])
+    # To a side it goes by a cell farther than the block is wide, and up to another that it touches.
+    assert moved[1] == pytest.approx([1.5 + wide + 0.01, 0.3, 1.0], abs=CELL_M + 1e-9)
+    assert moved[2] == pytest.approx([1.0, 0.3, 0.5 - wide - 0.01], abs=CELL_M + 1e-9)
+    assert moved[3] == pytest.approx([2.0, 0.3, 1.0])
 
 
 def test_shoes_stand_apart_and_on_their_soles() -> None:

@@ -82,9 +82,9 @@ def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
         sides = bed.columns[0] * bed.grid.cell_m, bed.columns[1] * bed.grid.cell_m
         rows = first, bed.rows[1] * bed.grid.cell_m
         duvet = lay_duvet(placing, scene, index, bed.grid, sides, rows, bed.level)
-        if rng.random() < placing.house.mess:
+        if rng.random() < placing.house.mess and duvet is not None:
             _drop_on(placing, scene, duvet)
-        return n + 1
+        return n + (duvet is not None)
     if rng.random() < 0.45 * placing.share:
         # A cushion leans where the pillows end, not across the bed's middle.
         made = soft.cushion.make(rng, placing.style)

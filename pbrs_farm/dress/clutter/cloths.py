@@ -6,38 +6,34 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import BED, CLOTHES, OTHERPROP
 from pbrs_farm.core.house import Material
-from pbrs_farm.dress.clutter.drapes import (
-    CELL_M,
-    TOUCH_M,
-    Folds,
-    Ground,
-    add_folds,
-    drop_net,
-    flat_net,
-    sheet_of,
-)
+from pbrs_farm.dress.clutter.cloth_ground import CELL_M, TOUCH_M, Ground
+from pbrs_farm.dress.clutter.drapes import Folds, Net, drape, flat_net, lie_flat, sheet_of
 from pbrs_farm.dress.clutter.placing import Placing
 from pbrs_farm.dress.style import Rgb, mix
+from pbrs_farm.dress.supports import plan_turn
 from pbrs_farm.dress.things.assembly import standing_piece
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.geometry.heights import highest_below
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
-_AROUND_M: Final = 0.2  # margin around the cloth in which obstacle heights are sampled
+_AROUND_M: Final = 0.35  # margin around the cloth in which obstacle heights are sampled
 _OVER_M: Final = 0.5  # obstacles that begin higher above the cloth's support are ignored
 _LINEN: Final[Rgb] = (0.91, 0.9, 0.88)
-_DUVET_M: Final = 0.03  # thick
+_DUVET_M, _THROW_M, _GARMENT_M = 0.03, 0.008, 0.006  # thick
 _SUNK_M, _MOST_GAP_M = 0.01, 0.04
 _BESIDE_M: Final = (
     0.15  # above the floor: what rises beside a bed keeps its duvet from hanging there
 )
-_SMALLER: Final = (1.0, 0.8, 0.6)  # sizes that clothes are tried at, by the first
+_INSIDE_M: Final = 0.03  # from the mattress's edge, where a duvet does not hang over it
+_BOARD_M: Final = 0.02  # above the mattress: what rises more at its foot is a board
+_SMALLER: Final = (1.0, 0.8, 0.6)  # sizes that clothes and throws are tried at, by the first
+_TRIES: Final = 4  # places on a seat where a throw is tried, at each size
+_FALLS: Final = 2  # of a throw; then it lies flat
 _MOST_RISE_M: Final = 0.1  # clothes fall only where nothing below them is higher than this
 _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 
@@ -45,13 +41,15 @@ _THREADS_M: Final = {"duvet": 0.065, "throw": 0.05, "clothes": 0.04}
 def lay_duvet(
     placing: Placing, scene: SceneTriangles, index: int, grid: PlanGrid, sides: tuple[float, float],
     rows: tuple[float, float], level: float,
-) -> F64:  # fmt: skip
-    """Lay a duvet over a mattress between its sides and rows; its triangles (F, 3, 3).
+) -> F64 | None:  # fmt: skip
+    """Lay a duvet over a mattress between its sides and rows; its triangles (F, 3, 3), None: left out.
 
     grid: the bed's, whose rows run from its head; sides, rows: metres in it. level: the mattress's.
     """
     rng = placing.rng
-    ground, shift = _ground_under_cloth(placing, scene, grid, sides, rows, level, _DUVET_M)
+    ground, shift = _ground_under_cloth(
+        placing, scene, grid, sides, rows, level, _THREADS_M["duvet"]
+    )
     # It hangs over each side as far as nothing stands beside the bed.
     out = float(rng.uniform(0.1, 0.26))
     free = [
@@ -59,40 +57,60 @@ def lay_duvet(
         for side, sign in zip(sides, (-1, 1), strict=True)
     ]
     low, high = (
-        s + sign * (out if ok else 0.01) for s, sign, ok in zip(sides, (-1, 1), free, strict=True)
+        s + sign * (out if ok else -_INSIDE_M)
+        for s, sign, ok in zip(sides, (-1, 1), free, strict=True)
     )
-    foot = rows[1] + (float(rng.uniform(0.0, 0.12)) if rng.random() < 0.5 else -0.03)
+    over = float(rng.uniform(0.0, 0.12)) if rng.random() < 0.5 else -_INSIDE_M
+    foot = rows[1] + (-_INSIDE_M if _has_footboard(ground, shift, sides, rows[1], level) else over)
     size = (high - low, foot - rows[0])
     middle = ((low + high) / 2 + shift[0], level + _DUVET_M, (rows[0] + foot) / 2 + shift[1])
     mess = placing.house.mess
-    net, threads = flat_net(
-        size, _THREADS_M["duvet"], middle, float(rng.normal(0, 0.015 + 0.05 * mess))
-    )
-    folds = Folds(int(6 + 26 * mess), 0.018 + 0.03 * mess, 0.05, (0.3, 1.0))
-    net = add_folds(drop_net(net, threads, ground, _DUVET_M), ground, _DUVET_M, folds, rng)
+    net = flat_net(size, _THREADS_M["duvet"], middle, float(rng.normal(0, 0.015 + 0.05 * mess)))
+    folds = Folds(int(16 + 26 * mess), 0.024 + 0.03 * mess, 0.06, (0.3, 1.0))
     tint = mix(
         _LINEN, placing.style.textiles[int(rng.integers(4))], float(rng.choice([0.0, 0.25, 0.6]))
     )
-    return _put_cloth(placing, "duvet", net, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
+    made = drape(net, ground, _DUVET_M, folds, rng)
+    made = made or _laid_flat(placing, "duvet", net, ground, _DUVET_M)
+    if made is None:
+        return None
+    return _put_cloth(placing, "duvet", made, ground, _DUVET_M, plain("duvet", tint, 0.95), BED)
 
 
 def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | None = None) -> None:
-    """Let a throw fall over items[index], where it was left. more: triangles that lie there, too."""
+    """Let a throw fall over items[index], where it was left. more: triangles that lie there, too.
+
+    Refused, and counted, where what rises beside the seat would hold it.
+    """
     rng = placing.rng
     (low, high), style = scene.bounds[index], placing.style
     across = float(max(high[0] - low[0], high[2] - low[2]))
-    grid, sides, rows = _over(low, high, float(rng.uniform(-np.pi, np.pi)))
-    at = low + (high - low) * rng.uniform(0.25, 0.75, 3)
+    # Its frame is the seat's own, whose straight sides are then straight in cells.
+    own = plan_turn(scene.items[index], scene.of_item(index).reshape(-1, 3))
+    grid, sides, rows = _over(low, high, own)
+    level = float(high[1])
     ground, _shift = _ground_under_cloth(
-        placing, scene, grid, sides, rows, float(high[1]), 0.008, more
+        placing, scene, grid, sides, rows, level, _THREADS_M["throw"], more
     )
-    x, z = _local(ground, at)
-    size = (min(1.3, 0.8 * across), min(0.9, 0.6 * across))
-    net, threads = flat_net(size, _THREADS_M["throw"], (x, float(high[1]) + 0.05, z), 0.0)
-    folds = Folds(10, 0.03, 0.03, (0.2, 0.7))
-    net = add_folds(drop_net(net, threads, ground, 0.008), ground, 0.008, folds, rng)
     tint = style.textiles[int(rng.integers(len(style.textiles)))]
-    _put_cloth(placing, "throw", net, ground, 0.008, plain("throw", tint, 1.0), OTHERPROP)
+    folds, made, n = Folds(20, 0.03, 0.035, (0.2, 0.7)), None, 0
+    for smaller in np.repeat(_SMALLER, _TRIES):
+        x, z = _local(ground, low + (high - low) * rng.uniform(0.25, 0.75, 3))
+        size = (smaller * min(1.3, 0.8 * across), smaller * min(0.9, 0.6 * across))
+        turn = float(rng.uniform(-np.pi, np.pi))
+        net = flat_net(size, _THREADS_M["throw"], (x, level + 0.05, z), turn)
+        # On a shelf beside the sofa a corner of it would stay up there.
+        if (ground.at(net.points[..., 0], net.points[..., 2]) > level + _MOST_RISE_M / 2).any():
+            continue
+        made, n = drape(net, ground, _THROW_M, folds, rng), n + 1
+        if made is not None or n == _FALLS:
+            break
+    if n == 0:
+        placing.refuse("a throw would hang on what rises beside the seat")
+        return
+    made = made or _laid_flat(placing, "throw", net, ground, _THROW_M)
+    if made is not None:
+        _put_cloth(placing, "throw", made, ground, _THROW_M, plain("throw", tint, 1.0), OTHERPROP)
 
 
 def drop_clothes(
@@ -106,35 +124,32 @@ def drop_clothes(
     rng, style = placing.rng, placing.style
     near = np.array([[at[0] - 0.3, level, at[1] - 0.3], [at[0] + 0.3, level, at[1] + 0.3]])
     grid, sides, rows = _over(near[0], near[1], float(rng.uniform(-np.pi, np.pi)))
-    ground, _shift = _ground_under_cloth(placing, scene, grid, sides, rows, level, 0.006)
+    ground, _shift = _ground_under_cloth(
+        placing, scene, grid, sides, rows, level, _THREADS_M["clothes"]
+    )
     x, z = _local(ground, np.array([at[0], level, at[1]]))
     size = (float(rng.uniform(0.3, 0.42)), float(rng.uniform(0.24, 0.36)))
     size = (0.14, 0.12) if napkin else size
     factor = 0.35 if napkin else 1.0
     for smaller in _SMALLER:
         w, d = (side * smaller for side in size)
-        net, threads = flat_net((w, d), factor * _THREADS_M["clothes"], (x, level + 0.15, z), 0.0)
-        # An outline that nobody laid out.
-        net[..., [0, 2]] += np.stack(
-            [
-                ndimage.gaussian_filter(rng.normal(0, 0.3 * factor * smaller, net.shape[:2]), 2.0)
-                for _ in range(2)
-            ],
-            -1,
-        )
+        net = flat_net((w, d), factor * _THREADS_M["clothes"], (x, level + 0.15, z), 0.0)
         # Over the posts of a back rest a corner of it would stay up there, and the cloth with it.
-        if (ground.at(net[..., 0], net[..., 2]) < level + _MOST_RISE_M).all():
+        under = ground.at(net.points[..., 0], net.points[..., 2])
+        if (under < level + _MOST_RISE_M).all():
             break
     else:
         placing.refuse("clothes would hang on what rises beside them")
         return
-    folds = Folds(16, 0.05 * factor, 0.028 * factor, (0.12 * factor, 0.4 * factor))
-    net = add_folds(drop_net(net, threads, ground, 0.006), ground, 0.006, folds, rng)
+    folds = Folds(14, 0.04 * factor, 0.04 * factor, (0.12 * factor, 0.4 * factor))
     r, g, b = (float(c) for c in rng.random(3))
     tint = mix((r, g, b), style.textiles[int(rng.integers(4))], 0.5)
     tint = mix(tint, _LINEN, 0.7 if napkin else 0.0)
     name, nyu40 = ("napkin", OTHERPROP) if napkin else ("crumpled_clothes", CLOTHES)
-    _put_cloth(placing, name, net, ground, 0.006, plain(name, tint, 0.95), nyu40)
+    made = drape(net, ground, _GARMENT_M, folds, rng)
+    made = made or _laid_flat(placing, name, net, ground, _GARMENT_M)
+    if made is not None:
+        _put_cloth(placing, name, made, ground, _GARMENT_M, plain(name, tint, 0.95), nyu40)
 
 
 def _over(
@@ -152,11 +167,10 @@ def _local(ground: Ground, at: F64) -> tuple[float, float]:
 
 def _ground_under_cloth(
     placing: Placing, scene: SceneTriangles, grid: PlanGrid, sides: tuple[float, float],
-    rows: tuple[float, float], level: float, thick_m: float,
-    more: F64 | None = None,
+    rows: tuple[float, float], level: float, thread_m: float, more: F64 | None = None,
 ) -> tuple[Ground, tuple[float, float]]:  # fmt: skip
     """What lies under cloth between sides and rows of a grid, and how far the frame is shifted."""
-    reach = _AROUND_M + 0.4
+    reach = _AROUND_M
     corner = grid.plan_of((sides[0] - reach) / grid.cell_m, (rows[0] - reach) / grid.cell_m)
     n = [int(np.ceil((span[1] - span[0] + 2 * reach) / CELL_M)) for span in (rows, sides)]
     own = PlanGrid(corner, grid.turn_rad, CELL_M, (n[0], n[1]))
@@ -168,7 +182,7 @@ def _ground_under_cloth(
     corners = np.concatenate(
         [corners, *placing.laid_near(low, high), *([more] if more is not None else [])]
     )
-    ground = Ground.of(own, corners, floor_y, level + _OVER_M, thick_m)
+    ground = Ground.of(own, corners, floor_y, level + _OVER_M, thread_m / 2)
     return ground, (reach - sides[0], reach - rows[0])
 
 
@@ -183,6 +197,19 @@ def _is_free_beside_bed(
     return bool((heights < placing.room.floor_y + _BESIDE_M).mean() > 0.95)
 
 
+def _has_footboard(
+    ground: Ground,
+    shift: tuple[float, float],
+    sides: tuple[float, float],
+    foot: float,
+    level: float,
+) -> bool:
+    """Whether something rises over the mattress where a duvet would hang over its foot."""
+    x = np.arange(sides[0], sides[1], CELL_M) + shift[0]
+    z = foot + shift[1] + np.arange(-0.02, 0.15, CELL_M)
+    return bool((ground.at(*np.meshgrid(x, z)) > level + _BOARD_M).any())
+
+
 def _gap_under_cloth(points: F64, ground: Ground) -> float:
     """How far cloth (N, 3) hangs over what it fell on, whose edges it was kept off; metres."""
     below = highest_below(points[:, [0, 2]], ground.corners, points[:, 1] + _SUNK_M)
@@ -190,11 +217,21 @@ def _gap_under_cloth(points: F64, ground: Ground) -> float:
     return min(max(gap, 0.0), _MOST_GAP_M)
 
 
+def _laid_flat(
+    placing: Placing, family: str, net: Net, ground: Ground, thick_m: float
+) -> Net | None:
+    """What found no way to fall, flat; None where that is no way either. Either is counted."""
+    made = lie_flat(net, ground, thick_m)
+    placing.refuse(f"{family} found no way to fall, {'left out' if made is None else 'lies flat'}")
+    return made
+
+
 def _put_cloth(
-    placing: Placing, family: str, net: F64, ground: Ground, thick_m: float, material: Material,
+    placing: Placing, family: str, made: Net, ground: Ground, thick_m: float, material: Material,
     nyu40: int,
 ) -> F64:  # fmt: skip
-    surface = sheet_of(family, net, ground, thick_m)
+    """Put cloth where it lies; its triangles (F, 3, 3)."""
+    surface = sheet_of(family, made, ground, thick_m)
     thing = standing_piece(family, [(surface, material)], group="blanket", nyu40=nyu40)
     points = surface.positions.astype(np.float64)
     if family != "duvet":

@@ -1,7 +1,9 @@
-"""Cloth that falls on what lies below it: a net of springs over heights; no effects.
+"""Cloth that falls on what lies below it: a net of threads that do not stretch; no effects.
 
 The net is relaxed by positions (Mueller et al., Position Based Dynamics, 2007): each step lets it
-fall, pulls its threads to their lengths and lifts it off what it met. Equal arguments give equal bits.
+fall, pulls its threads to their lengths and moves it out of what it met. It falls as a coarse net,
+gets its folds as a fine one, whose threads are then tightened (Provot, Deformation Constraints in a
+Mass-Spring Model, 1995). Equal arguments give equal bits.
 """
 
 from __future__ import annotations
@@ -14,65 +16,25 @@ from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
+from pbrs_farm.dress.clutter.cloth_ground import TOUCH_M, Ground
 from pbrs_farm.dress.textiles.hanging_cloth import solid_sheet
-from pbrs_farm.geometry.plan_grid import PlanGrid, cells_over
 
-CELL_M: Final = 0.0125  # cell size of the height map that cloth falls on
-TOUCH_M: Final = 0.0004  # gap between the cloth's lower side and what it lies on
-_STEPS: Final = 45  # time steps until the cloth lies
-_PULLS: Final = 3  # constraint iterations a step
-_FALL_M: Final = 0.006  # downward velocity that gravity adds in a step, metres a step
+MOST_STRETCH: Final = 1.3  # of the 99th percentile of edges, over their lengths at rest
+_STEPS: Final = 50  # time steps until the cloth lies
+_PULLS: Final = 2  # constraint iterations a step
+_FALL_M: Final = 0.004  # downward velocity that gravity adds in a step, metres a step
+_FASTEST_M: Final = 0.02  # a step: less than the thinnest board that holds cloth, grown
 _AIR: Final = 0.12  # share of velocity lost to drag in a step
-_CLEARED: Final = 3  # passes that lift edges of the net out of obstacles
-_MOST_LIFT_M: Final = 0.06
-_WALL_M: Final = 0.05  # a vertex deeper than this below the height map went through a wall
-_SLACK: Final = 0.2  # stiffness of a thread in compression; 1 in tension
+_GRIP: Final = 0.5  # share of a step along what it lies on that cloth does not slide
+_SHEAR: Final = 0.6  # stiffness of diagonals; 1 in threads
+_PUSH: Final = 0.2  # stiffness of a thread in compression; 1 in tension
 _BEND: Final = 0.25  # stiffness between vertices two threads apart: resists bending
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ground:
-    """What cloth falls on: a height map in cells of CELL_M, in a frame of its own (x, y up, z)."""
-
-    grid: PlanGrid  # its axes are the frame's
-    heights: F64  # (rows, columns) metres, obstacles grown by half a thickness and a cell
-    tight: F64  # the same, grown by half a thickness alone
-    corners: F64  # (F, 3, 3) of the world: what it falls on
-
-    @staticmethod
-    def of(grid: PlanGrid, corners: F64, floor_y: float, below_y: float, thick_m: float) -> Ground:
-        """The heights of triangles (F, 3, 3) of the world in the grid's cells, the floor's elsewhere.
-
-        below_y: what begins higher hangs over the cloth and holds nothing. thick_m: of the cloth.
-        """
-        hits = cells_over(grid, corners, touched=True)
-        heights = np.full(grid.shape, floor_y)
-        there = hits.low < below_y
-        cell = hits.row[there] * grid.shape[1] + hits.column[there]
-        np.maximum.at(heights.reshape(-1), cell, hits.high[there])
-        # The net runs in the cloth's middle: it keeps half a thickness from edges, and a cell, so
-        # that threads between two corners of the net do not cut them.
-        n = int(np.ceil(thick_m / 2 / CELL_M))
-        tight = np.asarray(ndimage.maximum_filter(heights, size=2 * n + 1))
-        return Ground(grid, np.asarray(ndimage.maximum_filter(tight, size=3)), tight, corners)
-
-    def at(self, x: F64, z: F64, *, is_tight: bool = False) -> F64:
-        """(...) heights under places of the frame.
-
-        x and z are metres in the frame, of any one shape; places beyond the grid take its border's
-        height. is_tight takes the heights grown by half a thickness alone.
-        """
-        heights = self.tight if is_tight else self.heights
-        row = np.clip((z / self.grid.cell_m).astype(np.int64), 0, heights.shape[0] - 1)
-        column = np.clip((x / self.grid.cell_m).astype(np.int64), 0, heights.shape[1] - 1)
-        return np.asarray(heights[row, column])
-
-    def world(self, points: F64) -> F64:
-        """(..., 3) points of the frame in the world."""
-        plan = self.grid.plan_of(
-            points[..., 0] / self.grid.cell_m, points[..., 2] / self.grid.cell_m
-        )
-        return np.stack([plan[..., 0], points[..., 1], plan[..., 1]], -1)
+_SHARPEST: Final = 0.75  # vertices two threads apart come no nearer than this share of them
+_TIGHT: Final = 1.1  # stretch at which tightening ends
+_TIGHTENED: Final = 32  # iterations of tightening at most
+_STEEPEST: Final = 0.75  # rise of a fold over a thread
+_SMALLER: Final = (1.0, 0.8, 0.6, 0.4)  # shares of a cloth that are tried flat
+_LEVEL_M: Final = 0.005  # heights under flat cloth differ by less
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,111 +47,181 @@ class Folds:
     length_m: tuple[float, float]
 
 
-def drop_net(net: F64, thread_m: tuple[float, float], ground: Ground, thick_m: float) -> F64:
-    """The net (R, C, 3) of vertices after it fell, with twice the resolution (2 R - 1, 2 C - 1, 3).
+@dataclass(frozen=True, slots=True, eq=False)
+class Net:
+    """Cloth as vertices (R, C, 3) in the frame of its ground, and its threads' lengths at rest."""
 
-    net: metres in the ground's frame. thread_m: rest lengths along rows and columns. Verlet steps with
-    drag, each followed by constraint iterations and collision with the height map. No vertex ends
-    lower than half the thickness above the ground.
+    points: F64
+    thread_m: tuple[float, float]  # between rows, between columns
+
+    def stretches(self) -> F64:
+        """(E,) the length of each thread and diagonal over that at rest."""
+        at = np.moveaxis(self.points, -1, 0)
+        down, across = self.thread_m
+        slant = float(np.hypot(down, across))
+        pairs = (
+            (at[:, :-1], at[:, 1:], down), (at[:, :, :-1], at[:, :, 1:], across),
+            (at[:, :-1, :-1], at[:, 1:, 1:], slant), (at[:, 1:, :-1], at[:, :-1, 1:], slant),
+        )  # fmt: skip
+        return np.concatenate([
+            (np.sqrt(((b - a) ** 2).sum(0)) / length).ravel() for a, b, length in pairs
+        ])  # fmt: skip
+
+    def deepest_m(self, ground: Ground) -> float:
+        """How deep the deepest vertex, or middle of a thread, lies in the ground; metres."""
+        at = np.moveaxis(self.points, -1, 0)
+        places = (at, (at[:, :-1] + at[:, 1:]) / 2, (at[:, :, :-1] + at[:, :, 1:]) / 2)
+        return max(float(ground.depths(p).max()) for p in places)
+
+
+def flat_net(
+    size: tuple[float, float], thread_m: float, middle: tuple[float, float, float], turn_rad: float
+) -> Net:
+    """A level net of width and depth about a middle, of at least 3 x 3 vertices.
+
+    Rows run along z and columns along x before the turn about +y; metres, in the ground's frame.
     """
-    at, before = net.copy(), net.copy()
-    above = thick_m / 2 + TOUCH_M
-    down, across = thread_m
-    slant = float(np.hypot(down, across))
-    for _ in range(_STEPS):
-        ahead = at + (at - before) * (1 - _AIR)
-        ahead[..., 1] -= _FALL_M
-        before, at = at, ahead
-        for _pull in range(_PULLS):
-            _pull_threads(at, 0, 1, down, 1.0)
-            _pull_threads(at, 1, 1, across, 1.0)
-            _pull_slants(at, slant)
-            _pull_threads(at, 0, 2, 2 * down, _BEND)
-            _pull_threads(at, 1, 2, 2 * across, _BEND)
-        _lift(at, before, ground, above)
-    # Double the vertices so that folds are round, and lift those that end in the ground.
-    fine = np.stack(
-        [
-            ndimage.zoom(
-                at[..., k],
-                (2 - 1 / len(at), 2 - 1 / at.shape[1]),
-                order=3,
-                mode="nearest",
-                grid_mode=False,
-            )
-            for k in range(3)
-        ],
-        -1,
+    n = [max(3, round(s / thread_m) + 1) for s in size]
+    x, z = np.meshgrid(*(np.linspace(-s / 2, s / 2, k) for s, k in zip(size, n, strict=True)))
+    c, s = np.cos(turn_rad), np.sin(turn_rad)
+    points = np.stack(
+        [c * x + s * z + middle[0], np.full(x.shape, middle[1]), c * z - s * x + middle[2]], -1
     )
-    least = ground.at(fine[..., 0], fine[..., 2]) + above
-    fine[..., 1] = np.maximum(fine[..., 1], least)
-    return fine
+    return Net(points, (size[1] / (n[1] - 1), size[0] / (n[0] - 1)))
 
 
-def _lift(at: F64, before: F64, ground: Ground, above: float) -> None:
-    low = ground.at(at[..., 0], at[..., 2]) + above - at[..., 1]
-    # Move what went through a wall back before it; lift what sank into the top, and stop it there.
-    through = low > _WALL_M
-    for k in (0, 2):
-        at[..., k] = np.where(through, before[..., k], at[..., k])
-    low = ground.at(at[..., 0], at[..., 2]) + above - at[..., 1]
-    held = low > 0
-    at[..., 1] = np.where(held, at[..., 1] + low, at[..., 1])
-    before[held] = at[held]
+def drape(
+    net: Net, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator
+) -> Net | None:
+    """The net after it fell, with folds and twice the resolution (2 R - 1, 2 C - 1, 3).
 
-
-def _pull_threads(at: F64, axis: int, apart: int, length: float, stiff: float) -> None:
-    """Enforce the rest length between vertices `apart` steps along `axis`, in place.
-
-    Stretching is corrected fully (times `stiff`), compression by _SLACK of that.
+    Folds are drawn from rng. None where cloth of these threads found no way to lie: where more than
+    one edge of a hundred is stretched by more than MOST_STRETCH, or it is in something by more than
+    thick_m.
     """
-    view = at if axis == 0 else at.swapaxes(0, 1)
-    for start in range(2 * apart):
-        # Correct pairs that share no vertex at once.
-        first = np.arange(start, view.shape[0] - apart, 2 * apart)
-        if not len(first):
-            continue
-        _pull(view, first, first + apart, length, stiff)
+    apart = thick_m / 2 + TOUCH_M
+    at = np.ascontiguousarray(np.moveaxis(net.points, -1, 0))
+    _fall(at, net.thread_m, ground, apart)
+    thread_m = net.thread_m[0] / 2, net.thread_m[1] / 2
+    fine = _folded(at, thread_m, folds, rng)
+    made = Net(np.moveaxis(fine, 0, -1), thread_m)
+    for k in range(_TIGHTENED):
+        _pull(fine, thread_m, push=0.0)
+        _pull_across(fine, thread_m, _SHARPEST, pull=0.0)
+        if k % 2:
+            _lift_threads(fine, ground, apart)
+        fine += ground.ways_out(fine, apart)
+        if k % 4 == 3 and _usual_most(made) < _TIGHT:
+            break
+    is_sound = _usual_most(made) <= MOST_STRETCH and made.deepest_m(ground) <= thick_m
+    return made if is_sound else None
 
 
-def _pull(view: F64, first: F64, second: F64, length: float, stiff: float) -> None:
-    a, b = view[first], view[second]
+def lie_flat(net: Net, ground: Ground, thick_m: float) -> Net | None:
+    """As much of a level net as lies flat where it is; None where too little does."""
+    middle = net.points.mean((0, 1))
+    for share in _SMALLER:
+        points = middle + share * (net.points - middle)
+        under = ground.at(points[..., 0], points[..., 2])
+        if np.ptp(under) < _LEVEL_M:
+            points[..., 1] = under.max() + thick_m / 2 + TOUCH_M
+            return Net(points, (share * net.thread_m[0], share * net.thread_m[1]))
+    return None
+
+
+def _usual_most(net: Net) -> float:
+    """The stretch that 99 of 100 edges stay below."""
+    return float(np.percentile(net.stretches(), 99))
+
+
+def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, apart: float) -> None:
+    """Let vertices (3, R, C) fall until they lie: Verlet steps with drag and grip; in place."""
+    before = at.copy()
+    for k in range(_STEPS):
+        start = at.copy()
+        at += np.clip((at - before) * (1 - _AIR), -_FASTEST_M, _FASTEST_M)
+        # Weight fades, so that threads end at their lengths.
+        at[1] -= _FALL_M * (1 - k / _STEPS)
+        for _pulled in range(_PULLS):
+            _pull(at, thread_m, _PUSH)
+            _pull_across(at, thread_m, 1.0, _BEND)
+        _lift_threads(at, ground, 0.0)
+        move = ground.ways_out(at, apart)
+        held = move.any(0)
+        at += move
+        at[:, held] -= _GRIP * (at - start)[:, held] * [[1.0], [0.0], [1.0]]
+        before = np.where(held, at, start)
+
+
+def _lift_threads(at: F64, ground: Ground, apart: float) -> None:
+    """Move threads out of what lies between their ends, in place; apart: metres from it.
+
+    Without it the back of a sofa passes between two threads, and edges look out of cloth.
+    """
+    for view in (at, at.swapaxes(1, 2)):
+        a, b = view[:, :-1], view[:, 1:]
+        # Half of it: a vertex has a thread to either side.
+        move = ground.ways_out((a + b) / 2, apart) / 2
+        a += move
+        b += move
+
+
+def _pull(at: F64, thread_m: tuple[float, float], push: float) -> None:
+    """Bring threads and diagonals to their lengths, in place; push: stiffness where they are shorter.
+
+    Pairs that share no vertex are corrected at once.
+    """
+    for view, length in zip((at, at.swapaxes(1, 2)), thread_m, strict=True):
+        for start in (0, 1):
+            a, b = view[:, start:-1:2], view[:, start + 1 :: 2]
+            _correct(a, b, length, 1.0, push)
+    slant = float(np.hypot(*thread_m))
+    for start in (0, 1):
+        a, b = at[:, start:-1:2], at[:, start + 1 :: 2]
+        _correct(a[:, :, :-1], b[:, :, 1:], slant, _SHEAR, _SHEAR * push)
+        _correct(a[:, :, 1:], b[:, :, :-1], slant, _SHEAR, _SHEAR * push)
+
+
+def _pull_across(at: F64, thread_m: tuple[float, float], share: float, pull: float) -> None:
+    """Bring vertices two threads apart to a share of two threads, in place; pull: where they are farther."""
+    for view, length in zip((at, at.swapaxes(1, 2)), thread_m, strict=True):
+        for start in range(4):
+            b = view[:, start + 2 :: 4]
+            _correct(view[:, start:-2:4], b, 2 * share * length, pull, _BEND)
+
+
+def _correct(a: F64, b: F64, length: float, pull: float, push: float) -> None:
     along = b - a
-    now = np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
-    step = 0.5 * stiff * along * (1 - length / now)
-    # Correct compression partly: a slack thread folds.
-    step = np.where(now < length, _SLACK * step, step)
-    view[first] = a + step
-    view[second] = b - step
+    now = np.maximum(np.sqrt((along**2).sum(0)), 1e-9)
+    share = 1 - length / now
+    along *= 0.5 * share * np.where(share > 0, pull, push)
+    a += along
+    b -= along
 
 
-def _pull_slants(at: F64, length: float) -> None:
-    for rows in (0, 1):
-        for sign in (1, -1):
-            first = at[rows:-1:2, :-1] if sign > 0 else at[rows:-1:2, 1:]
-            second = at[rows + 1 :: 2, 1:] if sign > 0 else at[rows + 1 :: 2, :-1]
-            n = min(len(first), len(second))
-            along = second[:n] - first[:n]
-            now = np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
-            step = 0.5 * 0.3 * along * (1 - length / now)
-            step = np.where(now < length, _SLACK * step, step)
-            first[:n] += step
-            second[:n] -= step
+def _folded(at: F64, thread_m: tuple[float, float], folds: Folds, rng: np.random.Generator) -> F64:
+    """Vertices (3, 2 R - 1, 2 C - 1) of a net (3, R, C) with ridges, as of cloth that nobody smoothed.
 
-
-def add_folds(
-    net: F64, ground: Ground, thick_m: float, folds: Folds, rng: np.random.Generator
-) -> F64:
-    """The net with random ridges, as of cloth that nobody smoothed; no vertex sinks into the ground.
-
-    net is (R, C, 3) float64 metres in the ground's frame; a new one comes back. thick_m is the
-    cloth's thickness. Ridges are drawn from rng, so the same generator gives the same folds.
+    Cloth has the length it had: what ridges take is drawn in from its edges.
     """
-    size = np.array([_length(net, 0), _length(net, 1)])
+    shape = 2 * at.shape[1] - 1, 2 * at.shape[2] - 1
+    rise = _ridges(shape, thread_m, folds, rng)
+    where = [_drawn_in(rise, axis, thread_m[axis]) / 2 for axis in (0, 1)]
+    fine = np.stack([ndimage.map_coordinates(c, where, order=3, mode="nearest") for c in at])
+    normal = np.cross(np.gradient(fine, axis=1), np.gradient(fine, axis=2), axis=0)
+    normal /= np.maximum(np.sqrt((normal**2).sum(0)), 1e-12)
+    return np.asarray(fine + rise * normal)
+
+
+def _ridges(
+    shape: tuple[int, int], thread_m: tuple[float, float], folds: Folds, rng: np.random.Generator
+) -> F64:
+    """Heights (R, C) of random bent ridges over a net, metres."""
+    size = np.array([thread * (n - 1) for thread, n in zip(thread_m, shape, strict=True)])
     v, u = np.meshgrid(
-        *(np.linspace(0, x, n) for x, n in zip(size, net.shape[:2], strict=True)), indexing="ij"
+        *(np.linspace(0, x, n) for x, n in zip(size, shape, strict=True)), indexing="ij"
     )
-    rise = np.zeros(net.shape[:2])
+    rise = np.zeros(shape)
     for _ in range(folds.n):
         # Draw a bent ridge line somewhere on the cloth: s along it, d across it.
         middle, angle = rng.uniform(0, 1, 2) * size, float(rng.uniform(0, np.pi))
@@ -200,56 +232,24 @@ def add_folds(
         d = -np.sin(angle) * du + np.cos(angle) * dv - bent * s**2
         ridge = np.exp(-((d / wide) ** 2)) * np.clip(1 - (2 * s / long) ** 2, 0, 1) ** 1.5
         rise = np.maximum(rise, float(rng.uniform(0.4, 1.0)) * folds.height_m * ridge)
-    normal = np.cross(np.gradient(net, axis=0), np.gradient(net, axis=1))
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    raised = net + rise[..., None] * normal
-    least = ground.at(raised[..., 0], raised[..., 2]) + thick_m / 2 + TOUCH_M
-    raised[..., 1] = np.maximum(raised[..., 1], least)
-    _clear_threads(raised, ground, thick_m / 2 + TOUCH_M)
-    return raised
+    return rise
 
 
-def _clear_threads(net: F64, ground: Ground, above: float) -> None:
-    """Lift both ends of edges and diagonals of the net that would cut through an obstacle."""
-    for _ in range(_CLEARED):
-        for a, b in (
-            (net[:-1], net[1:]), (net[:, :-1], net[:, 1:]), (net[:-1, :-1], net[1:, 1:]),
-            (net[:-1, 1:], net[1:, :-1]),
-        ):  # fmt: skip
-            for t in (0.25, 0.5, 0.75):
-                at = a + t * (b - a)
-                short = ground.at(at[..., 0], at[..., 2], is_tight=True) + above - at[..., 1]
-                lift = np.clip(short, 0.0, _MOST_LIFT_M)
-                a[..., 1] += lift
-                b[..., 1] += lift
+def _drawn_in(rise: F64, axis: int, thread_m: float) -> F64:
+    """(R, C) where each vertex lies along an axis, in threads, when ridges have taken their part."""
+    steep = np.clip(np.diff(rise, axis=axis) / thread_m, -_STEEPEST, _STEEPEST)
+    run = np.sqrt(1 - steep**2).cumsum(axis)
+    run = np.concatenate([np.zeros_like(run.take([0], axis)), run], axis)
+    return np.asarray(run + (rise.shape[axis] - 1 - run.take([-1], axis)) / 2)
 
 
-def _length(net: F64, axis: int) -> float:
-    return float(np.linalg.norm(np.diff(net, axis=axis), axis=-1).sum(axis).mean())
+def sheet_of(name: str, net: Net, ground: Ground, thick_m: float) -> Surface:
+    """A net of the ground's frame as a closed body of the world.
 
-
-def sheet_of(name: str, net: F64, ground: Ground, thick_m: float) -> Surface:
-    """A net of the ground's frame as a closed body of the world; texture coordinates in metres."""
-    points = ground.world(net)
-    run = [np.linalg.norm(np.diff(points, axis=k), axis=-1) for k in (0, 1)]
-    v = np.concatenate([np.zeros((1, net.shape[1])), np.cumsum(run[0], 0)])
-    u = np.concatenate([np.zeros((net.shape[0], 1)), np.cumsum(run[1], 1)], axis=1)
-    return solid_sheet(name, points, np.stack([u, v], -1), thick_m)
-
-
-def flat_net(
-    size: tuple[float, float], thread_m: float, middle: tuple[float, float, float], turn_rad: float
-) -> tuple[F64, tuple[float, float]]:
-    """A level net (R, C, 3) of width and depth about a middle, and its threads' lengths.
-
-    At least 3 x 3 vertices. Rows run along z and columns along x before the turn about +y; metres,
-    in the ground's frame. Threads' lengths are (between rows, between columns), as `drop_net` takes
-    them.
+    Texture coordinates are metres of the cloth at rest, so that patterns do not stretch with it.
     """
-    n = [max(3, round(s / thread_m) + 1) for s in size]
-    x, z = np.meshgrid(*(np.linspace(-s / 2, s / 2, k) for s, k in zip(size, n, strict=True)))
-    c, s = np.cos(turn_rad), np.sin(turn_rad)
-    net = np.stack(
-        [c * x + s * z + middle[0], np.full(x.shape, middle[1]), c * z - s * x + middle[2]], -1
+    rows, columns = net.points.shape[:2]
+    v, u = np.meshgrid(
+        np.arange(rows) * net.thread_m[0], np.arange(columns) * net.thread_m[1], indexing="ij"
     )
-    return net, (size[1] / (n[1] - 1), size[0] / (n[0] - 1))
+    return solid_sheet(name, ground.world(net.points), np.stack([u, v], -1), thick_m)
