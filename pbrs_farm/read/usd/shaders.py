@@ -28,7 +28,8 @@ _PICTURE_OF_MDL: Final = re.compile(r'texture_2d\s*\(\s*"([^"]+)"')
 _REPEAT: Final = 10497  # glTF's number for a picture that goes on beyond its edges
 _MODES: Final = ("uaddressmode", "vaddressmode")  # of MaterialX's image nodes
 _USUAL_IOR: Final = 1.5
-_MOST_NODES: Final = 8  # between a surface and its picture
+_MOST_NODES: Final = 16  # between a surface and its picture
+_MOST_FOLLOWED: Final = 1000  # connections that are followed for one material
 _FIRST_TILE: Final = "1001"  # of a picture in tiles: where u and v are within 0..1
 _TRANSFORMS: Final = {
     "UsdTransform2d": ("rotation", "scale", "translation"),
@@ -80,6 +81,8 @@ class Shaders:
         self.samplers: list[_Row] = [{"wrapS": _REPEAT, "wrapT": _REPEAT}]
         self.images: list[_Row] = []
         self.assets: list[Any] = []  # Sdf.AssetPath, _Masked or _Changed of each image
+        self._n_followed = 0  # connections of the material that is being read
+        self._n_nodes = 0  # between a surface and the node that is being read
         self._understood: dict[str, bool] = {}  # by the material's path
         self._uv_names: dict[str, str] = {}  # by the material's path
         self._uv_name = ""  # of the material that is being read
@@ -129,7 +132,7 @@ class Shaders:
         return self._uv_names.get(str(material.GetPath()), "") if material else ""
 
     def _row(self, material: Any) -> _Row:
-        self._uv_name = ""
+        self._uv_name, self._n_followed = "", 0
         name, place = material.GetPrim().GetName()[:100], str(material.GetPath())
         shader, words = surface_of(material)
         if words is not None:
@@ -279,10 +282,17 @@ class Shaders:
             if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
                 value = attribute.Get(self._time)
                 return (default if value is None else value), None
-            return self._followed(attribute, default, _MOST_NODES)
+            self._n_followed += 1
+            if self._n_nodes >= _MOST_NODES or self._n_followed > _MOST_FOLLOWED:
+                return default, None  # a node that is connected to itself, or nodes without end
+            self._n_nodes += 1
+            try:
+                return self._followed(attribute, default)
+            finally:
+                self._n_nodes -= 1
         return default, None
 
-    def _followed(self, output: Any, default: Any, depth: int) -> tuple[Any, _Picture | None]:
+    def _followed(self, output: Any, default: Any) -> tuple[Any, _Picture | None]:
         """What a node's output gives: its picture, a constant, else what its own inputs are connected to."""
         node = UsdShade.Shader(output.GetPrim())
         kind = str(node.GetIdAttr().Get() or "") if node else ""
@@ -297,21 +307,19 @@ class Shaders:
         if kind.startswith("UsdPrimvarReader"):
             value = self._input(node, "fallback", None)[0]
             return (default if value is None else value), None
-        for own in node.GetInputs() if node and depth else ():
+        for own in node.GetInputs() if node else ():
             if kind.startswith("ND_constant_"):
                 return self._input(node, own.GetBaseName(), default)
-            for attribute in own.GetValueProducingAttributes():
-                if UsdShade.Utils.GetType(attribute.GetName()) == UsdShade.AttributeType.Output:
-                    found = self._followed(attribute, default, depth - 1)
-                    if found[1] is not None:
-                        return found[0], self._through(found[1], node, kind, channel)
+            value, picture = self._input(node, own.GetBaseName(), default)
+            if picture is not None:
+                return value, self._through(picture, node, kind, channel)
         return default, None
 
     def _through(self, picture: _Picture, node: Any, kind: str, channel: str) -> _Picture:
         """A picture after a node that stands between it and its surface."""
         if kind.startswith(("ND_separate", "ND_extract")):
-            number = self._input(node, "index", 0)[0] if "extract" in kind else None
-            word = "rgba"[int(number)] if number is not None else channel.removeprefix("out")[:1]
+            number = _finite(self._input(node, "index", 0)[0], 0) if "extract" in kind else None
+            word = channel.removeprefix("out")[:1] if number is None else "rgba"[int(number) % 4]
             return picture._replace(channel={"x": "r", "y": "g", "z": "b"}.get(word, word))
         if not kind.startswith(("ND_normalmap", "ND_convert", "ND_dot", "ND_gltf")):
             place = str(node.GetPath())
@@ -386,9 +394,10 @@ class Shaders:
 
     def _first_tile(self, node: Any, asset: Any) -> Any:
         """The first tile of a picture in tiles (UDIM), with a note where there are more."""
-        attribute = node.GetInput("file").GetValueProducingAttributes()[0]
-        layer = attribute.GetPropertyStack(self._time)[0].layer
-        tiles = UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, layer)
+        producers = node.GetInput("file").GetValueProducingAttributes()
+        stack = producers[0].GetPropertyStack(self._time) if producers else ()
+        layer = stack[0].layer if stack else None
+        tiles = UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, layer) if layer else []
         for path, number in tiles:
             if number != _FIRST_TILE:
                 continue

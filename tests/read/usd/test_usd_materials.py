@@ -207,3 +207,15 @@ def test_a_mesh_has_the_texture_coordinates_that_its_picture_names(tmp_path: Pat
     other.Set([Gf.Vec2f(3 * u, 3 * v) for u, v in primvars.GetPrimvar("st").Get()])
     (found,) = [i for i in read(home).items if i.name == "Table"]
     assert max(s.uvs.max() for s in found.surfaces if s.uvs is not None) == 3
+
+
+def test_a_picture_that_is_connected_to_itself_is_no_picture(tmp_path: Path) -> None:
+    home = home_with(tmp_path / "a.usda")
+    loop, shader = material(home, "loop", "UsdPreviewSurface")
+    node = picture_node(home, "loop", "./none.png")
+    out = node.CreateOutput("rgb", Types.Float3)
+    node.GetInput("file").ConnectToSource(out)
+    node.CreateInput("fallback", Types.Float4).ConnectToSource(out)
+    shader.CreateInput("diffuseColor", Types.Color3f).ConnectToSource(out)
+    home.box("/World/Table", [1, 0, 1], [2, 1, 2], material=loop)
+    assert look(read(home), "loop").texture_id is None
