@@ -43,10 +43,14 @@ _MATERIAL_WORDS: Final = """fabric gold grain laminate lumber parquet pattern pl
     wallpaper wood wooden"""
 _OF_MATERIALS: Final = frozenset(_MATERIAL_WORDS.split())
 # "Bed room", "girl bedroom": a place, not the thing or the person.
-_ROOMS: Final = frozenset({"room", "bedroom", "bathroom", "toilet"})
-_OWNERS_OF_ROOMS: Final = """baby bath bed box boy child children closet computer game girl guest kid kids laundry locker man
-    men people plant shower storage toilet tv woman women"""
-_NAMERS_OF_ROOMS: Final = frozenset(_OWNERS_OF_ROOMS.split())
+_THINGS_OF_ROOMS: Final = (
+    "bath bed box closet computer game laundry locker plant shower storage toilet tv"
+)
+_OWNERS_OF_ROOMS: Final = "baby boy child children girl guest kid kids man men people woman women"
+_OF_A_ROOM: Final = {
+    "room": frozenset(f"{_THINGS_OF_ROOMS} {_OWNERS_OF_ROOMS}".split()),
+    **dict.fromkeys(("bedroom", "bathroom", "toilet"), frozenset(_OWNERS_OF_ROOMS.split())),
+}
 
 PERSON_WORD: Final = "person"
 PLANT_WORD: Final = "plant"
@@ -186,9 +190,7 @@ def _words_in_order(name: str) -> list[str]:
     """
     words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
     of_rooms = {
-        k
-        for k, (word, after) in enumerate(pairwise(words))
-        if word in _NAMERS_OF_ROOMS and after in _ROOMS
+        k for k, (word, after) in enumerate(pairwise(words)) if word in _OF_A_ROOM.get(after, ())
     }
     return [word for k, word in enumerate(words) if k not in of_rooms]
 

@@ -92,7 +92,7 @@ def _likely_names(name: str, materials: Sequence[str]) -> Iterator[str]:
 
 
 def _without_material(name: str, materials: Sequence[str]) -> str:
-    """ "Sink_mirror" of "Sink_mirror_mirror_toilet_0", whose material is mirror_toilet."""
+    """The name less a material's and a number: "Sink_mirror" of "Sink_mirror_mirror_toilet_0"."""
     numbered = re.fullmatch(r"(.+)_\d+", name)
     if numbered is None:
         return name
@@ -116,11 +116,7 @@ def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
     piece = _piece(name, size)
     nyu40 = piece.nyu40
     words = words_of(name)
-    if piece.word == PLANT_WORD and nyu40 is None:
-        # Ground called Grass is no plant, which repair would take out.
-        is_ground = size and is_a_cover_of_ground(size.width, size.height, size.depth)
-        return NodeClass(FLOOR, ItemKind.GROUND, is_tagged=False) if is_ground else None
-    is_structure = nyu40 is None or _only_describes(piece, name) or _is_wall(nyu40, words)
+    is_structure = nyu40 is None or _only_describes(piece, name) or _may_be_wall(nyu40, words)
     if is_structure and not (size and _is_small(size)):
         # Look for structure where the name says nothing more special.
         for word, kind in STRUCTURE_WORDS.items():
@@ -128,6 +124,10 @@ def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
                 # The ground outside is labelled floor.
                 label = FLOOR if kind is ItemKind.GROUND else NYU40_NAMES.index(kind.value)
                 return NodeClass(label, kind, is_tagged=False)
+    if piece.word == PLANT_WORD and nyu40 is None:
+        # Ground called Grass is no plant, which repair would take out.
+        is_ground = size and is_a_cover_of_ground(size.width, size.height, size.depth)
+        return NodeClass(FLOOR, ItemKind.GROUND, is_tagged=False) if is_ground else None
     if nyu40 is None:
         return None
     # A name tells openings and lamps only by their class.
@@ -168,5 +168,5 @@ def _is_small(size: PieceSize) -> bool:
     return max(size.width, size.height, size.depth) < _LEAST_STRUCTURE_M
 
 
-def _is_wall(nyu40: int, words: frozenset[str]) -> bool:
+def _may_be_wall(nyu40: int, words: frozenset[str]) -> bool:
     return nyu40 == OTHERSTRUCTURE and not words & _PARTS_OF_BUILDINGS

@@ -151,6 +151,9 @@ Painting_Woman | picture
 Picture_Girl | picture
 Poster_Girl | picture
 Girl_Bedroom | none
+Bed_Bedroom | bed
+Toilet_Bathroom_01 | toilet
+Bed_Room | none
 Boy_Room_Wall | wall
 Woman_Sitting | person
 Character_01 | person
@@ -286,6 +289,8 @@ def test_a_name_is_read_with_its_materials_parts_places_and_suffixes() -> None:
         ("Pine tree", PieceSize(4.0, 2.4, 5.0), "plant"),
         ("Grass", PieceSize(8.0, 0.02, 6.0), "ground"),
         ("Grass", PieceSize(0.4, 0.3, 0.4), "plant"),
+        ("Bamboo_Floor", PieceSize(4.0, 0.02, 3.0), "floor"),
+        ("Flower_Wallpaper", PieceSize(4.0, 2.4, 0.01), "wall"),
         ("Boy", PieceSize(6.0, 2.5, 8.0), "none"),
         ("Boy", PieceSize(0.5, 1.4, 0.3), "person"),
         ("Ceiling_connector", PieceSize(0.1, 0.04, 0.1), "none"),
