@@ -1,4 +1,4 @@
-"""Openings of doors and windows, found in the meshes of the walls they stand in; no effects.
+"""Openings of doors and windows: of holes that the source tells, else found in the walls' meshes; no effects.
 
 Where the wall is cut already, as SUNCG's are (docs/spec/suncg.md section 1.5), the quad is the hole itself and
 the cutter its plug, of the wall's thickness. In a wall without a hole they have the door's or window's size.
@@ -27,15 +27,32 @@ _PLANAR_M: Final = 0.01  # a wall that is thinner has one face
 _THICKER_M: Final = 0.15  # how far the cutter of a planar wall reaches to either side
 _LEAST_SHARE: Final = 0.02  # a direction that has less of the wall's upright area is no face of it
 _UP: Final = np.array([0.0, 1.0, 0.0])
+_SIDE_SHARE: Final = (
+    0.3  # of the largest direction's area: a direction that has less is no side of a wall
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Void:
+    """A hole that the source tells, and has cut out of walls already."""
+
+    id: str
+    level_id: str
+    walls: frozenset[str]  # ids of the wall items
+    points: F64  # (N, 3) world, corners of the body that was cut out
+    item: Item | None = None  # the door or window in it
+    is_window: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _WallFrame:
     """The upright faces of a wall that look one way, or back."""
 
+    item_id: str
     level_id: str
     normal: F64  # (3,) unit
     points: F64  # (V, 3) world
+    area_m2: float
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
@@ -54,6 +71,86 @@ def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     return tuple(found)
 
 
+def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str, Opening]:
+    """By the ids of their voids, the openings of holes that the source tells.
+
+    items: all of a house, walls among them. A void that cut nothing out of its walls, or leaves some of
+    their thickness (a niche), has no opening, nor has one without a door or window that lies in another's.
+    """
+    frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
+    found: dict[str, Opening] = {}
+    for void in sorted(voids, key=lambda v: v.item is None):
+        opening = _opening_of_void(void, frames)
+        if opening is None:
+            continue
+        if void.item is None and any(_lies_in(opening, o) for o in found.values()):
+            continue
+        found[void.id] = opening
+    return found
+
+
+def _lies_in(opening: Opening, other: Opening) -> bool:
+    middle, corners = opening.quad.mean(0), other.cutter.positions
+    inside = (middle > corners.min(0) - _BESIDE_M) & (middle < corners.max(0) + _BESIDE_M)
+    return bool(inside.all() and abs(opening.normal @ other.normal) > 0.9)
+
+
+def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None:
+    own = [f for f in frames if f.item_id in void.walls]
+    if not own:
+        return None
+    normal = _across_void(void, own)
+    axes = _axes_of_wall(normal)
+    body = void.points @ axes
+    low, high = body.min(0), body.max(0)
+    # The corners that the cut left in the wall are its rim.
+    wall = np.concatenate([f.points for f in own]) @ axes
+    rim = wall[(wall > low - _RIM_M).all(1) & (wall < high + _RIM_M).all(1)]
+    if len(rim) < 4 or np.ptp(rim[:, :2], axis=0).min() < LEAST_HOLE_M:
+        return None
+    ends = np.stack([np.maximum(low, rim.min(0)), np.minimum(high, rim.max(0))])
+    ends[:, 2] = rim[:, 2].min(), rim[:, 2].max()
+    # A niche leaves part of the wall's thickness.
+    sides = [p for f in own for p in _wall_points_around(f, axes, ends[0], ends[1])]
+    thick = np.ptp(np.concatenate([rim, *sides])[:, 2])
+    if void.item is None and np.ptp(rim[:, 2]) < thick - _RIM_M:
+        return None
+    # Walls beside it have holes of their own, or are cut.
+    others = [
+        points
+        for f in frames
+        if f.item_id not in void.walls
+        for points in _wall_points_around(f, axes, ends[0], ends[1])
+    ]
+    holes = [h for points in others if (h := _hole(points, ends[0], ends[1])) is not None]
+    return _opening(
+        void.id if void.item is None else f"{void.item.id}_hole", void.level_id, void.item,
+        is_window=void.is_window, axes=axes, ends=_across_walls(ends, [rim, *others]),
+        has_holes=True, is_cut=len(holes) == len(others),
+    )  # fmt: skip
+
+
+def _across_void(void: Void, own: Sequence[_WallFrame]) -> F64:
+    """(3,) the direction across the wall: of its largest sides the one that the door's leaf agrees with."""
+    largest = max(f.area_m2 for f in own)
+    sides = [f for f in own if f.area_m2 >= _SIDE_SHARE * largest]
+    leaf = void.item.box if void.item is not None else None
+    if leaf is None or len(sides) == 1:
+        return max(sides, key=lambda f: f.area_m2).normal
+    thin = leaf.axes[:, 2]
+    return max(sides, key=lambda f: (round(abs(float(f.normal @ thin)), 2), f.area_m2)).normal
+
+
+def _across_walls(ends: F64, walls: Sequence[F64]) -> F64:
+    """(2, 3) the ends of a hole, across all walls that it stands in."""
+    low, high = ends.copy()
+    low[2] = min(p[:, 2].min() for p in walls)
+    high[2] = max(p[:, 2].max() for p in walls)
+    if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
+        low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
+    return np.stack([low, high])
+
+
 def _frames(item: Item) -> list[_WallFrame]:
     """A frame for every direction that an item's larger upright faces have, to a degree."""
     corners = corners_of_surfaces(item.surfaces)
@@ -70,7 +167,8 @@ def _frames(item: Item) -> list[_WallFrame]:
         # Take the direction of the largest face of the group.
         best = n[here][area[here].argmax()] * [1, 0, 1]
         points = np.unique(corners[here].reshape(-1, 3), axis=0)
-        found.append(_WallFrame(item.level_id, best / np.linalg.norm(best), points))
+        normal = best / np.linalg.norm(best)
+        found.append(_WallFrame(item.id, item.level_id, normal, points, float(area[here].sum())))
     return found
 
 
@@ -101,26 +199,34 @@ def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Ope
     if holes:
         low[:2] = np.max([h[0] for h in holes], 0)
         high[:2] = np.min([h[1] for h in holes], 0)
-    # Reach across all walls that it stands in.
-    low[2] = min(p[:, 2].min() for p in standing)
-    high[2] = max(p[:, 2].max() for p in standing)
-    if high[2] - low[2] < _PLANAR_M:  # repair makes it a solid, to either side
-        low[2], high[2] = low[2] - _THICKER_M, high[2] + _THICKER_M
-    if (high - low)[:2].min() < LEAST_HOLE_M:
+    ends = _across_walls(np.stack([low, high]), standing)
+    if (ends[1] - ends[0])[:2].min() < LEAST_HOLE_M:
         return None
+    return _opening(
+        f"{item.id}_hole", item.level_id, item, is_window=item.kind is ItemKind.WINDOW, axes=axes,
+        ends=ends, has_holes=bool(holes), is_cut=len(holes) == len(standing),
+    )  # fmt: skip
+
+
+def _opening(
+    id_: str, level_id: str, item: Item | None, *, is_window: bool, axes: F64, ends: F64,
+    has_holes: bool, is_cut: bool,
+) -> Opening:  # fmt: skip
+    """The opening between two corners (2, 3) in axes along the wall, up and across it."""
+    low, high = ends
     # Lay the quad in the middle; a plug overlaps its hole, a cutter reaches out of the wall.
     middle = (low[2] + high[2]) / 2
     quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
-    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if holes else [0.0, 0.0, CUTTER_REACH_M])
+    grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if has_holes else [0.0, 0.0, CUTTER_REACH_M])
     return Opening(
-        id=f"{item.id}_hole",
-        level_id=item.level_id,
-        item_id=item.id,
-        is_window=item.kind is ItemKind.WINDOW,
+        id=id_,
+        level_id=level_id,
+        item_id=item.id if item is not None else None,
+        is_window=is_window,
         cutter=box_between(low - grown, high + grown, axes),
         quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
-        normal=normal,
-        is_cut=len(holes) == len(standing),
+        normal=axes[:, 2],
+        is_cut=is_cut,
     )
 
 

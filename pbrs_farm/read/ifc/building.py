@@ -5,6 +5,7 @@ Storeys are levels, spaces rooms; walls come with their openings cut. z up becom
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import CEILING, FLOOR, LAMP, OTHERPROP, WALL
+from pbrs_farm.core.classes import CEILING, DOOR, FLOOR, LAMP, OTHERPROP, WALL, WINDOW
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import (
     Box,
@@ -25,6 +26,7 @@ from pbrs_farm.core.house import (
     Level,
     Material,
     MaterialKind,
+    Opening,
     Room,
     Source,
     Surface,
@@ -40,13 +42,20 @@ from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
-from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
+from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.openings import openings
+from pbrs_farm.read.common.openings import openings, openings_of_voids
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors
 from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
+from pbrs_farm.read.ifc.doors_and_windows import (
+    glass_parts,
+    kind_of_opening,
+    swing,
+    tags_of_name,
+    voids_of_walls,
+)
 from pbrs_farm.read.ifc.meshes import ProductMesh, Style, meshes_of_products
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
@@ -61,8 +70,12 @@ _LEAST_ROOM_M: Final = 1.0  # least height of any other room
 _LEAST_ROOM_M2: Final = 0.3
 _COVERED: Final = 0.5  # share of a room that a slab covers to be its floor or ceiling
 _BELOW_SLAB_M: Final = 0.005  # a room's own ceiling hangs so far below a slab
-_THIN_M: Final = 0.045  # a part of a window that is no thicker may be its glass
 _OPENINGS: Final = (ItemKind.DOOR, ItemKind.WINDOW)
+# Entities of what stands in rooms: structure and openings are none of them, whatever their names say.
+_PIECES: Final = (
+    "IfcFurnishingElement", "IfcFlowTerminal", "IfcElectricAppliance", "IfcSanitaryTerminal",
+)  # fmt: skip
+_BETWEEN: Final = re.compile(r"[-:;,/&+()]")  # parts of a name
 _UPWARD: Final = 0.05  # y of the normal of a face of a body's top, at least
 _LEVEL_M: Final = 0.01  # a top whose heights differ less is level
 _ATTIC_WORDS: Final = ROOF_WORDS | {"attic", "dachraum", "dachboden", "loft", "чердак"}
@@ -124,7 +137,20 @@ class _Building:
         items += self._covers(list(zip(builder.rooms, tops, strict=True)), items, overheads)
         builder.items += [_sort_product(item, builder) for item in items]
         source = Source("ifc", self._path.name, keys.sha256(self._path.read_bytes()))
-        return builder.house(self._path.stem, source, openings=openings(builder.items))
+        return builder.house(self._path.stem, source, openings=self._openings(builder))
+
+    def _openings(self, builder: HouseBuilder) -> list[Opening]:
+        """The openings of voids in walls as the relations tell them; of other doors and windows as meshes do."""
+        by_id = {item.id: item for item in builder.items}
+        voids = list(
+            voids_of_walls(self._model, self._meshes, self._world, by_id, builder.level_of)
+        )
+        told = openings_of_voids(builder.items, voids)
+        filled = {o.item_id for o in told.values()}
+        rest = [i for i in builder.items if i.id not in filled]
+        of_item = {o.item_id: o for o in (*told.values(), *openings(rest)) if o.item_id is not None}
+        found = [of_item[i] for i in by_id if i in of_item]
+        return found + [o for o in told.values() if o.item_id is None]
 
     def _note_failed(self, products: Sequence[Any]) -> None:
         for product in products:
@@ -203,12 +229,19 @@ class _Building:
             return None
         if product.is_a("IfcPlate") or product.is_a("IfcMember"):
             return _part_of_wall(product, mesh)
+        names = [str(n) for n in (product.Name, product.ObjectType, _type_name(product)) if n]
+        if given is not None and given.item_kind in _OPENINGS:
+            return self._class_of_opening(product, given.item_kind, names, mesh)
         if given is not None and given.nyu40 >= 0:
-            return given.item_kind, given.nyu40, _swing(product)
+            return given.item_kind, given.nyu40, ()
         if product.is_a("IfcCovering"):
             return self._class_of_covering(product, mesh)
-        for word in (product.Name, product.ObjectType, _type_name(product)):
-            seen = class_of_node_name(str(word or ""), size=_size_of(mesh))
+        is_piece = any(product.is_a(entity) for entity in _PIECES)
+        for name in names:
+            seen = class_of_node_name(name, size=_size_of(mesh))
+            # A cabinet with two doors is no door.
+            if is_piece and seen is not None and not _is_piece(seen):
+                seen = _class_of_part_of_name(name)
             if seen is not None:
                 kind = ItemKind.LAMP if seen.nyu40 == LAMP else seen.kind
                 return kind, seen.nyu40, ()
@@ -219,15 +252,37 @@ class _Building:
         self, product: Any, mesh: ProductMesh
     ) -> tuple[ItemKind, int, tuple[str, ...]]:
         """Ceiling, floor or wall by where a covering of no known type lies."""
-        import ifcopenshell.util.element as element
-
         low, high = mesh.world.min(0), mesh.world.max(0)
         if high[2] - low[2] > (high - low)[:2].min():
             return ItemKind.WALL, WALL, ()
-        storey = element.get_container(product)
-        elevation = self._elevation(storey) if storey is not None else None
-        is_high = (low[2] + high[2]) / 2 > (elevation or 0.0) + _LEAST_ROOM_M
+        is_high = (low[2] + high[2]) / 2 > self._floor_z(product) + _LEAST_ROOM_M
         return (ItemKind.CEILING, CEILING, ()) if is_high else (ItemKind.FLOOR, FLOOR, ())
+
+    def _class_of_opening(
+        self, product: Any, kind: ItemKind, names: Sequence[str], mesh: ProductMesh
+    ) -> tuple[ItemKind, int, tuple[str, ...]]:
+        low_z, high_z = float(mesh.world[:, 2].min()), float(mesh.world[:, 2].max())
+        foot_m = low_z - self._floor_z(product)
+        found = kind_of_opening(product, kind, names, foot_m, high_z - low_z)
+        if found is ItemKind.WINDOW:
+            return found, WINDOW, ()
+        return found, DOOR, swing(product) if found is kind else tags_of_name(names)
+
+    def _floor_z(self, product: Any) -> float:
+        """z of the file, metres, of the floor of the storey that holds a product."""
+        import ifcopenshell.util.element as element
+        from ifcopenshell.util.placement import get_local_placement
+
+        storey = element.get_container(product, ifc_class="IfcBuildingStorey")
+        if storey is None:
+            return 0.0
+        z = float(get_local_placement(storey.ObjectPlacement)[2, 3]) * self._metres
+        building = element.get_aggregate(storey)
+        below = getattr(building, "ObjectPlacement", None)
+        building_z = float(get_local_placement(below)[2, 3]) * self._metres
+        # Some programs place every storey at the building's foot and tell its elevation alone.
+        is_placed = storey.ObjectPlacement is not None and abs(z - building_z) > _LEVEL_M
+        return z if is_placed else building_z + (self._elevation(storey) or 0.0)
 
     def _elevation(self, storey: Any) -> float | None:
         """Metres, z of the file; None where the storey tells none."""
@@ -243,7 +298,7 @@ class _Building:
         panes = np.zeros(len(mesh.faces), np.bool_)
         clear = (MaterialKind.PANE, MaterialKind.GLASS)
         if kind is ItemKind.WINDOW and not any(m.kind in clear for m in materials):
-            panes = _glass_parts(mesh)
+            panes = glass_parts(mesh)
         for k in (-1, *range(len(materials))):
             for is_pane in (False, True):
                 chosen = (style_of_face == k) & (panes == is_pane)
@@ -417,6 +472,16 @@ def _has_body(product: Any) -> bool:
     return bool(names & {"Body", "Facetation", "Body-FallBack"})
 
 
+def _is_piece(seen: NodeClass) -> bool:
+    return not seen.kind.is_structure and seen.kind not in _OPENINGS
+
+
+def _class_of_part_of_name(name: str) -> NodeClass | None:
+    """The class of the first part of a name that says a piece: a base cabinet of "Base Cabinet-2 Doors"."""
+    found = (class_of_node_name(part) for part in _BETWEEN.split(name))
+    return next((seen for seen in found if seen is not None and _is_piece(seen)), None)
+
+
 def _type_name(product: Any) -> str:
     import ifcopenshell.util.element as element
 
@@ -478,44 +543,6 @@ def _size_of(mesh: ProductMesh) -> PieceSize | None:
         return None
     width, depth, height = np.ptp(mesh.world, axis=0).tolist()
     return PieceSize(width, height, depth)
-
-
-def _swing(product: Any) -> tuple[str, ...]:
-    """Tags of how a door opens, by its own or its type's OperationType."""
-    import ifcopenshell.util.element as element
-
-    if not product.is_a("IfcDoor"):
-        return ()
-    kind = element.get_type(product)
-    word_of_type = getattr(product, "OperationType", None) or getattr(kind, "OperationType", None)
-    word = str(word_of_type or "")
-    if "ROLLINGUP" in word:
-        return ("garage",)
-    if "SLIDING" in word or "FOLDING" in word:
-        return ("sliding",)
-    if word.endswith("LEFT") or word.endswith("RIGHT"):
-        return ("hinge:left" if word.endswith("LEFT") else "hinge:right",)
-    return ()
-
-
-def _glass_parts(mesh: ProductMesh) -> Any:
-    """(F,) faces of the thin, large parts of a window without a clear style: its glass."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    rows, columns = mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel()
-    n = len(mesh.positions)
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    part = label[mesh.faces[:, 0]]
-    size = np.ptp(mesh.positions, axis=0)
-    whole = np.sort(size)[1:].prod()
-    panes = np.zeros(len(mesh.faces), np.bool_)
-    for k in np.unique(part):
-        extent = np.sort(np.ptp(mesh.positions[mesh.faces[part == k]].reshape(-1, 3), axis=0))
-        is_pane = extent[0] <= _THIN_M and extent[1] > 5 * extent[0] and extent[1] > 0.15
-        panes |= (part == k) & bool(is_pane and extent[1:].prod() > 0.15 * whole)
-    return panes
 
 
 def _top_of_item(item: Item) -> float:

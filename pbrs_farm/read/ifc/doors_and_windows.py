@@ -1,0 +1,157 @@
+"""Doors and windows of an IFC building: which is which, the holes they stand in, how they open, what is glass.
+
+No effects. Relations say which hole was cut out of which wall (IfcRelVoidsElement) and what stands in it
+(IfcRelFillsElement).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.classes import DOOR, WINDOW
+from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.home.names import words_of
+from pbrs_farm.read.common.name_classes import class_of_node_name
+from pbrs_farm.read.common.openings import Void
+from pbrs_farm.read.ifc.meshes import ProductMesh
+
+_THIN_M: Final = 0.045  # a part of a window that is no thicker may be its glass
+_THRESHOLD_M: Final = 0.3  # above the storey: a door begins lower
+_SILL_M: Final = 0.5  # above the storey: what begins higher may be a window
+_DOOR_HEIGHT_M: Final = 1.7  # least height of a door
+# Families of doors whose names do not say door (of Revit's libraries): all words of one.
+_DOOR_FAMILIES: Final = (
+    "single flush", "double flush", "single panel", "double panel", "raised panel", "sliding closet",
+    "bifold", "bi fold", "bypass", "pocket slider", "overhead rolling", "overhead sectional",
+)  # fmt: skip
+_WINDOW_FAMILIES: Final = (
+    "fixed", "casement", "awning", "hopper", "hung", "skylight", "sash", "transom", "archtop",
+)  # fmt: skip
+_SLIDING: Final = frozenset({"sliding", "slider", "bifold", "fold", "bypass", "pocket"})
+_GARAGE: Final = frozenset({"overhead", "garage"})
+
+
+def kind_of_opening(
+    product: Any, kind: ItemKind, names: Sequence[str], foot_m: float, height_m: float
+) -> ItemKind:
+    """Door or window. kind: what the entity says, which is wrong in some exports.
+
+    names: of the product and its type. foot_m: above the storey's floor. A window that is typed as a door,
+    or called one and stands on the floor as one, is a door; a door that is called a window and begins
+    above a sill is a window.
+    """
+    import ifcopenshell.util.element as element
+
+    row = element.get_type(product)
+    typed = row.is_a() if row is not None else ""
+    says_door = any(_says(n, DOOR, _DOOR_FAMILIES) for n in names)
+    says_window = any(_says(n, WINDOW, _WINDOW_FAMILIES) for n in names)
+    is_standing = foot_m < _THRESHOLD_M and height_m > _DOOR_HEIGHT_M
+    if kind is ItemKind.WINDOW and is_standing:
+        is_door = typed.startswith("IfcDoor") or (says_door and not says_window)
+        return ItemKind.DOOR if is_door else kind
+    if kind is ItemKind.DOOR and foot_m > _SILL_M:
+        is_window = typed.startswith("IfcWindow") or (says_window and not says_door)
+        return ItemKind.WINDOW if is_window else kind
+    return kind
+
+
+def _says(name: str, nyu40: int, families: Sequence[str]) -> bool:
+    words = words_of(name)
+    classes = (class_of_node_name(word) for word in words)
+    return any(c is not None and c.nyu40 == nyu40 for c in classes) or any(
+        words.issuperset(family.split()) for family in families
+    )
+
+
+def tags_of_name(names: Sequence[str]) -> tuple[str, ...]:
+    """Tags of how a door opens that its family tells, for doors whose entity has no operation."""
+    words = frozenset().union(*(words_of(name) for name in names))
+    if words & _GARAGE:
+        return ("garage",)
+    return ("sliding",) if words & _SLIDING else ()
+
+
+def voids_of_walls(
+    model: Any,
+    meshes: Mapping[int, ProductMesh],
+    world: F64,
+    items: Mapping[str, Item],
+    level_of: Callable[[float], str],
+) -> Iterator[Void]:
+    """The holes in walls, each with the door or window that fills it, if any does.
+
+    model: of ifcopenshell; meshes: by rows' numbers, of openings too; world: (4, 4) from z up; items: by id,
+    as the house has them. What fills a hole and is not drawn leaves it open.
+    """
+    for relation in model.by_type("IfcRelVoidsElement"):
+        opening = relation.RelatedOpeningElement
+        mesh = meshes.get(opening.id())
+        walls = _walls(relation.RelatingBuildingElement, items)
+        if mesh is None or not walls:
+            continue
+        fillings = [r.RelatedBuildingElement for r in opening.HasFillings or ()]
+        if not fillings and getattr(opening, "PredefinedType", None) == "RECESS":
+            continue
+        drawn = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
+        item = next((i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)), None)
+        points = mesh.world @ world[:3, :3].T + world[:3, 3]
+        kind = item.kind if item is not None else None
+        yield Void(
+            id=str(opening.GlobalId),
+            level_id=item.level_id if item is not None else level_of(float(points[:, 1].min())),
+            walls=walls,
+            points=points,
+            item=item,
+            is_window=kind is ItemKind.WINDOW
+            or (kind is None and any(f.is_a("IfcWindow") for f in fillings)),
+        )
+
+
+def _walls(product: Any, items: Mapping[str, Item]) -> frozenset[str]:
+    """Ids of the wall that a product is, or of the walls that it is put together from."""
+    parts = [p for r in getattr(product, "IsDecomposedBy", ()) or () for p in r.RelatedObjects]
+    ids = {str(p.GlobalId) for p in (product, *parts)}
+    return frozenset(i for i in ids if i in items and items[i].kind is ItemKind.WALL)
+
+
+def swing(product: Any) -> tuple[str, ...]:
+    """Tags of how a door opens, by its own or its type's OperationType."""
+    import ifcopenshell.util.element as element
+
+    if not product.is_a("IfcDoor"):
+        return ()
+    kind = element.get_type(product)
+    word_of_type = getattr(product, "OperationType", None) or getattr(kind, "OperationType", None)
+    word = str(word_of_type or "")
+    if "ROLLINGUP" in word:
+        return ("garage",)
+    if "SLIDING" in word or "FOLDING" in word:
+        return ("sliding",)
+    if word.endswith("LEFT") or word.endswith("RIGHT"):
+        return ("hinge:left" if word.endswith("LEFT") else "hinge:right",)
+    return ()
+
+
+def glass_parts(mesh: ProductMesh) -> Bools:
+    """(F,) faces of the thin, large parts of a window without a clear style: its glass."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    rows, columns = mesh.faces[:, [0, 1]].ravel(), mesh.faces[:, [1, 2]].ravel()
+    n = len(mesh.positions)
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    part = label[mesh.faces[:, 0]]
+    size = np.ptp(mesh.positions, axis=0)
+    whole = np.sort(size)[1:].prod()
+    panes = np.zeros(len(mesh.faces), np.bool_)
+    for k in np.unique(part):
+        extent = np.sort(np.ptp(mesh.positions[mesh.faces[part == k]].reshape(-1, 3), axis=0))
+        is_pane = extent[0] <= _THIN_M and extent[1] > 5 * extent[0] and extent[1] > 0.15
+        panes |= (part == k) & bool(is_pane and extent[1:].prod() > 0.15 * whole)
+    return panes
