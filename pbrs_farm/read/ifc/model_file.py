@@ -22,6 +22,9 @@ _MOST_ROWS: Final = 5_000_000
 _STRING: Final = re.compile(rb"'(?:[^']|'')*'")
 _COMMENT: Final = re.compile(rb"/\*.*?\*/", re.DOTALL)
 _NUMBER: Final = re.compile(rb"#(\d{1,18})(\s*=)?")
+_SCHEMA: Final = re.compile(r"(FILE_SCHEMA\s*\(\s*\(\s*')([^']{1,40})'", re.IGNORECASE)
+# What a schema's name begins with, and the one of its family that the library knows.
+_SCHEMAS: Final = (("IFC2X", "IFC2X3"), ("IFC4X", "IFC4X3_ADD2"), ("IFC4", "IFC4"))
 _NAMED: Final = ("Name", "Description", "ObjectType", "Tag", "LongName", "ElementType")
 
 
@@ -36,7 +39,9 @@ def model_of(path: Path) -> Any:
     data = _bytes_of(path)
     _check_step_file(data, path)
     try:
-        model = ifcopenshell.file.from_string(text_from_bytes(data, "replace"))
+        model = ifcopenshell.file.from_string(
+            _in_known_schema(text_from_bytes(data, "replace"), path)
+        )
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
         text = " ".join(str(error).split())[:200] or "the library cannot parse it"
         raise BadHouse(path, "", f"damaged: {text}") from None
@@ -44,6 +49,22 @@ def model_of(path: Path) -> Any:
         raise BadHouse(path, "", "has no IfcProject", hint="export the whole model again")
     _mend_names(model)
     return model
+
+
+def _in_known_schema(text: str, path: Path) -> str:
+    """The text with the schema of its family that the library knows. Raises BadHouse for another.
+
+    What houses are made of has the same attributes in IFC 2x, 2x2 and 2x3, and in the drafts of IFC4x3.
+    """
+    named = _SCHEMA.search(text)
+    schema = named[2].upper() if named else ""
+    near = next((known for begins, known in _SCHEMAS if schema.startswith(begins)), None)
+    if named is None or near is None:
+        hint = "export it as IFC2x3, IFC4 or IFC4x3"
+        raise BadHouse(
+            path, "FILE_SCHEMA", f"is {schema or 'missing'}, which is not read", hint=hint
+        )
+    return text[: named.start(2)] + near + text[named.end(2) :]
 
 
 def _bytes_of(path: Path) -> bytes:

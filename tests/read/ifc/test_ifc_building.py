@@ -203,7 +203,34 @@ def _cyclic(text: str) -> str:
     return "\n".join(rows)
 
 
+@pytest.mark.parametrize(
+    ("written", "schema"),
+    [
+        ("IFC2X_FINAL", "IFC2X3"),
+        ("IFC2X2_FINAL", "IFC2X3"),
+        ("IFC2X3_TC1", "IFC2X3"),
+        ("IFC4_ADD2", "IFC4"),
+        ("IFC4X3_RC2", "IFC4X3_ADD2"),
+    ],
+)
+def test_older_and_draft_schemas_are_read_as_the_one_of_their_family(
+    tmp_path: Path, written: str, schema: str
+) -> None:
+    building = IfcHouse(schema="IFC2X3" if schema == "IFC2X3" else "IFC4")
+    building.storey("EG", 0.0)
+    corners = [(0, 0), (4, 0), (4, 3), (0, 3)]
+    for k in range(4):
+        building.wall(f"W{k}", corners[(k + 1) % 4], corners[k], 0.0, 2.5)
+    building.space("Wohnen", corners, 0.0, 2.5)
+    path = tmp_path / "a.ifc"
+    path.write_text(building.text().replace(building.model.schema_identifier, written))
+    assert f"'{written}'" in path.read_text()
+    house = read_house(resolve(str(path)), ReadFields())
+    assert kinds(house) == {"ceiling": 1, "floor": 1, "wall": 4}
+
+
 DAMAGED = {
+    "schema": (lambda t: t.replace("'IFC4'", "'IFC151'"), "is IFC151, which is not read"),
     "empty": (lambda t: "", "does not begin with ISO-10303-21"),
     "xml": (lambda t: "<?xml version='1.0'?><ifcXML/>", "IFCXML"),
     "json": (lambda t: '{"header": {}}', "IFC5"),
