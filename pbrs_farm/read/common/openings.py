@@ -42,6 +42,7 @@ class Void:
     points: F64  # (N, 3) world, corners of the body that was cut out
     item: Item | None = None  # the door or window in it
     is_window: bool = False
+    undrawn: str = ""  # id of a door or window in it that has no mesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,11 +80,12 @@ def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str,
     """
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     found: dict[str, Opening] = {}
-    for void in sorted(voids, key=lambda v: v.item is None):
+    for void in sorted(voids, key=lambda v: (v.item is None, not v.undrawn)):
         opening = _opening_of_void(void, frames)
         if opening is None:
             continue
-        if void.item is None and any(_lies_in(opening, o) for o in found.values()):
+        is_free = void.item is None and not void.undrawn
+        if is_free and any(_lies_in(opening, o) for o in found.values()):
             continue
         found[void.id] = opening
     return found

@@ -37,6 +37,7 @@ from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.names import names_glass, words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.installation import need
+from pbrs_farm.read.common.doors_and_windows import fill_hole
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
@@ -51,6 +52,7 @@ from pbrs_farm.read.common.rooms import rooms_from_floors
 from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
 from pbrs_farm.read.ifc.doors_and_windows import (
     glass_parts,
+    hole_of_undrawn,
     kind_of_opening,
     swing,
     tags_of_name,
@@ -146,10 +148,20 @@ class _Building:
             voids_of_walls(self._model, self._meshes, self._world, by_id, builder.level_of)
         )
         told = openings_of_voids(builder.items, voids)
+        # Build what has no shape in the file to the size of its hole.
+        for void in voids:
+            if not void.undrawn or (opening := told.get(void.id)) is None:
+                continue
+            hole = hole_of_undrawn(opening, self._model.by_guid(void.undrawn))
+            room_id = builder.room_at(hole.centre)
+            item = fill_hole(hole, self._library, opening.level_id, room_id)
+            if item is not None:
+                builder.items.append(item)
+                told[void.id] = replace(opening, item_id=item.id)
         filled = {o.item_id for o in told.values()}
         rest = [i for i in builder.items if i.id not in filled]
         of_item = {o.item_id: o for o in (*told.values(), *openings(rest)) if o.item_id is not None}
-        found = [of_item[i] for i in by_id if i in of_item]
+        found = [of_item[i.id] for i in builder.items if i.id in of_item]
         return found + [o for o in told.values() if o.item_id is None]
 
     def _note_failed(self, products: Sequence[Any]) -> None:

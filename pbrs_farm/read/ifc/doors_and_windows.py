@@ -13,8 +13,9 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.classes import DOOR, WINDOW
-from pbrs_farm.core.house import Item, ItemKind
+from pbrs_farm.core.house import Item, ItemKind, Opening
 from pbrs_farm.home.names import words_of
+from pbrs_farm.read.common.doors_and_windows import Hole
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.openings import Void
 from pbrs_farm.read.ifc.meshes import ProductMesh
@@ -86,7 +87,7 @@ def voids_of_walls(
     """The holes in walls, each with the door or window that fills it, if any does.
 
     model: of ifcopenshell; meshes: by rows' numbers, of openings too; world: (4, 4) from z up; items: by id,
-    as the house has them. What fills a hole and is not drawn leaves it open.
+    as the house has them.
     """
     for relation in model.by_type("IfcRelVoidsElement"):
         opening = relation.RelatedOpeningElement
@@ -100,16 +101,36 @@ def voids_of_walls(
         drawn = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
         item = next((i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)), None)
         points = mesh.world @ world[:3, :3].T + world[:3, 3]
-        kind = item.kind if item is not None else None
+        undrawn = (
+            [f for f in fillings if f.is_a("IfcDoor") or f.is_a("IfcWindow")]
+            if item is None
+            else []
+        )
         yield Void(
             id=str(opening.GlobalId),
             level_id=item.level_id if item is not None else level_of(float(points[:, 1].min())),
             walls=walls,
             points=points,
             item=item,
-            is_window=kind is ItemKind.WINDOW
-            or (kind is None and any(f.is_a("IfcWindow") for f in fillings)),
+            is_window=item.kind is ItemKind.WINDOW
+            if item is not None
+            else any(f.is_a("IfcWindow") for f in undrawn),
+            undrawn=str(undrawn[0].GlobalId) if undrawn else "",
         )
+
+
+def hole_of_undrawn(opening: Opening, product: Any) -> Hole:
+    """What is to be built in an opening whose door or window, product, has no shape."""
+    normal = opening.normal
+    axes = np.stack([np.cross([0.0, 1.0, 0.0], normal), [0.0, 1.0, 0.0], normal], 1)
+    corners = opening.quad @ axes
+    depth = float(np.ptp(opening.cutter.positions @ normal))
+    width, height = np.ptp(corners, axis=0)[:2].tolist()
+    return Hole(
+        id=str(product.GlobalId), kind="window" if opening.is_window else "door",
+        centre=opening.quad.mean(0), size=(width, height, depth), axes=axes,
+        name=str(product.Name or "")[:200], source_class=product.is_a(),
+    )  # fmt: skip
 
 
 def _walls(product: Any, items: Mapping[str, Item]) -> frozenset[str]:

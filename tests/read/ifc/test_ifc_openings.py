@@ -87,6 +87,21 @@ def test_two_leaves_of_a_wall_with_a_hole_each_have_one_opening(tmp_path: Path) 
     assert opening.is_cut
 
 
+@pytest.mark.parametrize("entity", ["IfcDoor", "IfcWindow"])
+def test_a_door_or_window_without_a_shape_is_built_to_its_hole(tmp_path: Path, entity: str) -> None:
+    building, wall = a_room()
+    hole = building.hole(wall, 2.0, 1.0, 0.0, 2.0)
+    leaf = building.box_solid((0, 0.09, 0), (1.0, 0.11, 2.0))
+    found = building.fill(hole, entity, "D 7", [leaf])
+    found.Representation = None
+    house = read(building, tmp_path)
+    (opening,) = in_front(house)
+    item = next(i for i in house.items if i.id == opening.item_id)
+    assert (item.id, item.kind.value) == (found.GlobalId, entity.removeprefix("Ifc").lower())
+    assert np.ptp(item.bounds, axis=0)[:2] == pytest.approx([1.0, 2.0], abs=0.02)
+    assert item.tags == ("made",)
+
+
 # Name, sill, height, what the entity says -> what it is.
 NAMES = [
     ("M_Single-Flush:0864 x 2032mm:1423", 0.0, 2.03, "IfcWindow", "door"),
