@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils, UsdValidation
 
+from pbrs_farm.core import keys
+from pbrs_farm.core.house import NOTHING_LEFT, MaterialKind, Texture
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.export.forms.usd import write_usd
 from pbrs_farm.export.forms.usdz import write_usdz
 from pbrs_farm.export.home_pieces import exported_home
+from pbrs_farm.formats.house_glb import gltf_material
+from pbrs_farm.images import png_from_array
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home
@@ -35,6 +41,40 @@ def test_a_written_home_is_read_back_equal(written: dict[str, Path], form: str) 
     assert len(got.textures) == len(repaired_home().textures)
     kinds = [{m.kind for m in house.materials} for house in (repaired_home(), got)]
     assert kinds[0] == kinds[1]
+
+
+HOLED: tuple[dict[str, Any], ...] = (
+    {"alpha_cutoff": 0.7},
+    {"alpha_cutoff": NOTHING_LEFT},
+    {"kind": MaterialKind.GLASS, "opacity": 0.25},
+)
+
+
+@pytest.mark.parametrize("change", HOLED)
+def test_a_cut_out_keeps_its_cutoff_and_glass_its_holes(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    home = repaired_home()
+    pixels = np.full((4, 4, 4), 255, np.uint8)
+    pixels[:2, :, 3] = 90
+    data = png_from_array(pixels)
+    texture = Texture(keys.sha256(data)[:16], "leaf.png", "image/png", data)
+    (used,) = {s.material for s in home.items[-1].surfaces[:1]}
+    leaf = replace(home.materials[used], texture_id=texture.id, alpha_cutout=True, **change)
+    materials = [leaf if k == used else m for k, m in enumerate(home.materials)]
+    holed = replace(
+        home, materials=tuple(materials), textures={**home.textures, texture.id: texture}
+    )
+    write_usd(exported_home(holed), tmp_path)
+    got = read_house(resolve(str(tmp_path / f"{home.id}.usdc")), ReadFields())
+    cut = [m for m in got.materials if m.alpha_cutout]
+    assert cut
+    for m in cut:
+        assert (m.kind, m.alpha_cutoff) == (leaf.kind, pytest.approx(leaf.alpha_cutoff))
+        assert m.opacity == pytest.approx(leaf.opacity)
+    written = gltf_material(leaf, {texture.id: 0})
+    given = written if written["alphaMode"] == "MASK" else written["extras"]
+    assert given["alphaCutoff"] == leaf.alpha_cutoff
 
 
 @pytest.mark.parametrize("form", ["usdc", "usdz"])

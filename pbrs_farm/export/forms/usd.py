@@ -282,16 +282,18 @@ class _Stage:
         types, is_mask = Sdf.ValueTypeNames, row["alphaMode"] == "MASK"
         if row["alphaMode"] == "OPAQUE":
             return
+        threshold = float(row.get("alphaCutoff", USUAL_CUTOFF))
+        has_holes = (is_mask and threshold <= 1) or "alphaCutoff" in row["extras"]
         opacity = shader.CreateInput("opacity", types.Float)
-        if picture is not None and (is_mask or "alphaCutoff" in row["extras"]):
+        if picture is not None and has_holes:
             # Of clear glass with holes the picture's alpha is multiplied by the glass's opacity.
             picture.GetInput("scale").Set(Gf.Vec4f(*factor[:3], 1.0 if is_mask else factor[3]))
             opacity.ConnectToSource(picture.CreateOutput("a", types.Float))
         else:
             opacity.Set(0.0 if is_mask else factor[3])
         if is_mask:
-            threshold = float(row.get("alphaCutoff", USUAL_CUTOFF))
-            shader.CreateInput("opacityThreshold", types.Float).Set(min(threshold, 1.0))
+            least = threshold if has_holes else USUAL_CUTOFF
+            shader.CreateInput("opacityThreshold", types.Float).Set(least)
 
     def _picture(self, path: str, number: int, space: str) -> Any:
         from pxr import Sdf, UsdShade
