@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_node_name
 from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts
 from pbrs_farm.read.gltf.room_fittings import parted_fittings
@@ -64,7 +65,7 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
         kind = seen.kind if seen and seen.kind in _STRUCTURE else None
         groups.setdefault(None if kind is item.kind else kind, []).append(surface)
     if set(groups) == {None}:
-        return (_name_by_materials(item, kinds),)
+        return (_name_by_materials(item),)
     found = [replace(item, surfaces=tuple(groups.pop(None)))] if None in groups else []
     for kind, surfaces in groups.items():
         assert kind is not None
@@ -77,10 +78,15 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
     return tuple(found)
 
 
-def _name_by_materials(item: Item, classes: Sequence[object]) -> Item:
-    # An unknown thing is what all of its materials say.
-    one = class_of_node_name(item.surfaces[0].name) if item.surfaces else None
-    if UNMAPPED not in item.tags or one is None or any(c != one for c in classes):
+def _name_by_materials(item: Item) -> Item:
+    # An unknown thing is what all of its materials say, if its size agrees: a plane drawn in Grass
+    # is ground, a board of Pine no plant.
+    if UNMAPPED not in item.tags or not item.n_faces:
+        return item
+    width, height, depth = np.ptp(item.bounds, axis=0).tolist()
+    size = PieceSize(width, height, depth)
+    one, *others = [class_of_node_name(s.name, size=size) for s in item.surfaces]
+    if one is None or any(other != one for other in others):
         return item
     if one.kind in (ItemKind.LAMP, ItemKind.PERSON, ItemKind.DOOR, ItemKind.WINDOW):
         return item  # needs more than a class: light, a place in a wall

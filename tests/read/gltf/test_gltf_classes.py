@@ -122,3 +122,17 @@ def test_the_mirror_and_the_pane_of_a_piece_are_known_by_their_nodes_names() -> 
     assert [p.name for p in item(read(s), "Dressing_Table").surfaces] == [
         "Mirror_Glass", "Chrome", "Chrome",
     ]  # fmt: skip
+
+
+def test_a_material_names_a_thing_only_of_a_size_that_fits() -> None:
+    s = two_rooms()
+    boxes = {
+        "Plane.001": ("Grass", [-6, -0.3, -6], [10, -0.13, -0.13]),
+        "Cube.002": ("Pine", [1, 0, 1], [3, 1.9, 1.05]),
+        "Object_3": ("Leaves", [4, 0, 1], [4.4, 0.9, 1.4]),
+    }
+    for name, (material, low, high) in boxes.items():
+        s.materials.append({"name": material})
+        s.node(name, mesh=s.box(low, high, len(s.materials) - 1))
+    kinds = {i.name: str(i.kind) for i in read(s).items}
+    assert [kinds[name] for name in boxes] == ["ground", "object", "plant"]
