@@ -21,6 +21,7 @@ _LEAST_WIDTH_M: Final = 0.7
 _THICKEST_M: Final = 0.6  # of a wall that ends
 _LEAST_LONG_M: Final = 0.3  # of the wall behind its end
 _THINNEST_M: Final = 0.004
+_OFF_M: Final = 1e-3  # off the end itself
 _SQUARE: Final = 0.9  # least cosine between a wall's sides and the way out of its end
 _AT_EDGE_M: Final = 0.15  # walls nearer to the edge of a ground are its own
 HALF_M: Final = 0.05  # half the thickness that walls without one are given
@@ -35,10 +36,14 @@ def doorways(walls: Any, reach_m: float = _REACH_M) -> list[LineString]:
     gap between two ends may be there twice.
     """
     found = []
-    for ring in _rings(walls):
-        corners = shapely.get_coordinates(ring)[:-1]
-        for start, way in _ends(corners):
-            gap = _gap_before(start, way, walls)
+    rings = [shapely.get_coordinates(ring) for ring in _rings(walls)]
+    if not rings:
+        return []
+    faces: Any = shapely.linestrings(np.concatenate([np.stack([r[:-1], r[1:]], 1) for r in rings]))
+    near = shapely.STRtree(faces)
+    for ring in rings:
+        for start, way in _ends(ring[:-1]):
+            gap = _gap_before(start, way, near)
             if gap is not None:
                 tip = way * reach_m
                 found.append(LineString([start - tip, start + way * gap + tip]))
@@ -100,13 +105,13 @@ def _ends(corners: F64) -> list[tuple[F64, F64]]:
     return [(corners[k] + sides[k] / 2, out[k]) for k in np.flatnonzero(is_end)]
 
 
-def _gap_before(start: F64, way: F64, walls: Any) -> float | None:
-    """Metres from a wall's end to what stands before it, where that is as wide as a doorway."""
-    ahead = LineString([start + way * 1e-3, start + way * (WIDEST_M + 0.01)])
-    hit = shapely.intersection(ahead, walls)
-    if hit.is_empty:
+def _gap_before(start: F64, way: F64, faces: shapely.STRtree) -> float | None:
+    """Metres from a wall's end to the face that stands before it, where that is as wide as a doorway."""
+    ahead = LineString([start + way * _OFF_M, start + way * (WIDEST_M + _OFF_M)])
+    hit = shapely.intersection(faces.geometries[faces.query(ahead, "intersects")], ahead)
+    if not len(hit):
         return None
-    gap = float(hit.distance(Point(start)))
+    gap = float(shapely.distance(hit, Point(start)).min())
     return gap if NARROWEST_M <= gap <= WIDEST_M else None
 
 
