@@ -18,6 +18,7 @@ from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.repair import repair
+from tests.inputs import plan_files
 
 Place = tuple[float, float]
 KNEE_M, RIDGE_M = 1.2, 3.0
@@ -28,14 +29,8 @@ def surface(
     kind: str, a: Place, b: Place, low: float, high: float, corners: Sequence[Place] = ()
 ) -> dict[str, Any]:
     """A surface from a to b of the plan; corners: its outline in its own frame, y from its middle."""
-    length = math.dist(a, b)
-    x, z = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    middle = (a[0] + b[0]) / 2, (low + high) / 2, (a[1] + b[1]) / 2
-    return {
-        "category": {kind: {}}, "dimensions": [length, high - low, 0],
-        "transform": [x, 0, z, 0, 0, 1, 0, 0, -z, 0, x, 0, *middle, 1],
-        "polygonCorners": [[*c, 0] for c in corners], "completedEdges": [], "story": 0,
-    }  # fmt: skip
+    given = plan_files.surface(kind, a, b, math.dist(a, b), low, high)
+    return given | {"polygonCorners": [[*c, 0] for c in corners], "story": 0}
 
 
 def floor(ring: Sequence[Place]) -> dict[str, Any]:
