@@ -31,6 +31,12 @@ _HUNG_M: Final = 1.2  # what begins higher hangs
 _HUNG_HEIGHTS_M: Final = (0.3, 1.1)
 _HUNG_DEPTH_M: Final = 0.5
 _AT_WALL_M: Final = 0.2
+_ASIDE_M: Final = (
+    0.1  # middles of what stands in a run may lie so far beside it: scans are no better
+)
+_STANDS_OVER_M: Final = (
+    0.4  # of the middle of a sink's or hob's box above the worktop; higher is a hood
+)
 _SINK_M: Final = 0.8
 _COUNTERS: Final = frozenset({"kitchen", "counter", "countertop", "worktop", "island"})
 _COOKERS: Final = frozenset({"stove", "cooker", "hob", "cooktop", "stovetop", "range", "oven"})
@@ -79,8 +85,10 @@ class _Run:
         assert item.box is not None
         away = item.box.centre - self.origin
         x, z = float(away @ self.right), float(away @ self.front)
-        is_here = -0.05 <= x <= self.length + 0.05 and -0.1 <= z <= self.depth + 0.1
-        return x if is_here and float(away[1]) < self.height + 0.4 else None
+        is_along = -_ASIDE_M <= x <= self.length + _ASIDE_M
+        is_across = -_ASIDE_M <= z <= self.depth + _ASIDE_M
+        is_on_it = float(away[1]) < self.height + _STANDS_OVER_M
+        return x if is_along and is_across and is_on_it else None
 
     def box(self, low: float, high: float) -> Box:
         """The box of a unit between two places along it."""

@@ -245,6 +245,7 @@ class _Scene:
         ]
         if not near:
             return None
+        # Feel for it below its ground, off the edges: a round plate has no corners.
         spread = np.linspace(-0.4, 0.4, 5)
         across, along = target.axes[[0, 2], 0], target.axes[[0, 2], 2]
         places = [
