@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
+from pbrs_farm.core.checked_calls import Size, Vector, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.lenses import PINHOLE, Lens
@@ -22,6 +23,12 @@ from pbrs_farm.core.pinhole_faces import PinholeFaces, faces_of_directions
 
 # Full horizontal field of view of the published cameras: half-angle 0.5534 rad (docs/spec/suncg.md section 3).
 PAPER_HFOV_RAD = 2 * 0.5534
+
+DEFAULT_SIZE: Final = (640, 480)
+"""Width and height of pictures, pixels: of recipes that say none."""
+
+_OTHER_SIZE: Final = 0.2  # share that a principal point lies off the middle: no lens is so far off
+_SAME_SHARE: Final = 0.1  # of each other, two that are alike
 
 _FLIP: Final[F64] = np.diag(OPENCV_FROM_OPENGL)[:3]  # OpenGL's axes <-> OpenCV's
 
@@ -97,14 +104,17 @@ class Intrinsics:
         )
 
 
-def intrinsics_from_k(size: tuple[int, int], k: Any, hfov_deg: float) -> Intrinsics:
+def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> Intrinsics:
     """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view.
 
-    With K the field of view is ignored; without it pixels are square and hfov_deg lies between 0
-    and 175. Raises BadInput for a size below 1 pixel, such a field of view, or a K that is not (3,
-    3) finite numbers or has a skew or a focal length that is not positive. The lens is a pinhole.
+    size: None = DEFAULT_SIZE, with a field of view alone. With K the field of view is ignored; without
+    it pixels are square and hfov_deg lies between 0 and 175. Raises BadInput for a size below 1 pixel,
+    such a field of view, a K that is not (3, 3) finite numbers or has a skew or a focal length that is
+    not positive, and a K of a picture of another size. The lens is a pinhole.
     """
-    width, height = (int(v) for v in size)
+    if size is None and k is not None:
+        raise BadInput("camera", "size", "is missing", hint="the size of the pictures K is of")
+    width, height = (int(v) for v in (DEFAULT_SIZE if size is None else size))
     if min(width, height) < 1:
         raise BadInput("camera", "size", f"{width}x{height} is no size")
     if k is None:
@@ -116,7 +126,20 @@ def intrinsics_from_k(size: tuple[int, int], k: Any, hfov_deg: float) -> Intrins
     if not shape_fits or min(matrix[0, 0], matrix[1, 1]) <= 0 or abs(matrix[0, 1]) > 1e-9:
         raise BadInput("camera", "K", "expected 3 x 3 numbers: fx 0 cx, 0 fy cy, 0 0 1")
     fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    _check_size_of_k(width, height, cx, cy)
     return Intrinsics(width, height, fx, fy, cx, cy)
+
+
+def _check_size_of_k(width: int, height: int, cx: float, cy: float) -> None:
+    """Refuse a K whose principal point is the middle of a picture that is larger or smaller.
+
+    Off the middle by equal shares of width and height: a picture that was cut has others.
+    """
+    across, down = 2 * cx / width, 2 * cy / height
+    if abs(across - 1) > _OTHER_SIZE and abs(across - down) < _SAME_SHARE * across:
+        text = f"{width}x{height} is not that of K, whose middle is at ({cx:g}, {cy:g})"
+        hint = f"about {round(2 * cx)}x{round(2 * cy)}, or scale K"
+        raise BadInput("camera", "size", text, hint=hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +169,7 @@ class Camera:
     intrinsics: Intrinsics
     world_from_camera: Matrix4  # OpenGL axes, metres
     blur: CameraBlur | None = None  # of light; labels are sharp
+    has_own_size: bool = True  # False: it takes the size of the recipe it is rendered with
 
     @staticmethod
     def look(
@@ -161,6 +185,9 @@ class Camera:
         """
         # The camera looks along -z: build the right-handed frame from its back.
         back = -np.asarray(towards, np.float64)
+        across = np.cross(np.asarray(up, np.float64), back)
+        if not np.linalg.norm(across) > 0 or not np.isfinite(eye).all():
+            raise BadInput("camera", "", "eye, towards and up give no direction")
         back = back / np.linalg.norm(back)
         right = np.cross(np.asarray(up, np.float64), back)
         right = right / np.linalg.norm(right)
@@ -172,20 +199,22 @@ class Camera:
         return Camera(intrinsics, world_from_camera)
 
     @staticmethod
+    @checked_call
     def look_at(
-        eye: tuple[float, float, float] | F64,
-        target: tuple[float, float, float] | F64,
+        eye: Vector,
+        target: Vector,
         *,
-        size: tuple[int, int] = (640, 480),
+        size: Size | None = None,
         hfov_deg: float = 60.0,
         K: Any = None,
-        up: tuple[float, float, float] = (0.0, 1.0, 0.0),
+        up: Vector = (0.0, 1.0, 0.0),
     ) -> Camera:
         """A camera at eye that looks at target, world metres, y up.
 
-        size: (width, height) in pixels. hfov_deg: full horizontal field of view, unless K (3 x 3,
-        pixels of that size, x right, y down) is given. Raises BadInput for a target at the eye, an
-        up vector along the view, or a K that is none.
+        size: (width, height) in pixels; without it pictures have the size of the home's recipe.
+        hfov_deg: full horizontal field of view, unless K (3 x 3, pixels of the size given, x right, y
+        down) is given. Raises BadInput for a target at the eye, an up vector along the view, a K that
+        is none or of another size.
 
             >>> Camera.look_at((1, 1.5, 2), (3, 1.5, 2), size=(640, 480), hfov_deg=70).towards.tolist()
             [1.0, 0.0, 0.0]
@@ -197,29 +226,26 @@ class Camera:
             float(np.linalg.norm(towards)), 1e-9
         ):
             raise BadInput("camera", "", "eye, target and up give no direction")
-        return Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, up)
+        x, y, z = (float(v) for v in up)
+        found = Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, (x, y, z))
+        return replace(found, has_own_size=size is not None)
 
     @staticmethod
+    @checked_call
     def from_opencv(
-        world_from_camera: Any,
-        K: Any = None,
-        *,
-        size: tuple[int, int] = (640, 480),
-        hfov_deg: float = 60.0,
+        world_from_camera: Any, K: Any = None, *, size: Size | None = None, hfov_deg: float = 60.0
     ) -> Camera:
         """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
 
-        Raises BadInput for a pose that is no rigid motion.
+        size, hfov_deg and K as of look_at. Raises BadInput for a pose that is no rigid motion, a K that
+        is none or of another size.
 
             >>> Camera.from_opencv(np.diag([1, -1, -1, 1]), size=(64, 48)).eye.tolist()
             [0.0, 0.0, 0.0]
         """
-        pose = np.asarray(world_from_camera, np.float64)
-        turn = pose[:3, :3] if pose.shape == (4, 4) else np.zeros((3, 3))
-        is_rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
-        if not is_rigid or not np.isfinite(pose).all():
-            raise BadInput("camera", "world_from_camera", "is no rigid (4, 4) pose")
-        return Camera(intrinsics_from_k(size, K, hfov_deg), pose @ OPENCV_FROM_OPENGL)
+        pose = rigid_motion(world_from_camera, "camera", "world_from_camera")
+        intrinsics = intrinsics_from_k(size, K, hfov_deg)
+        return Camera(intrinsics, pose @ OPENCV_FROM_OPENGL, has_own_size=size is not None)
 
     @property
     def eye(self) -> F64:
@@ -245,7 +271,10 @@ class Camera:
         >>> Camera.look_at((0, 0, 0), (1, 0, 0)).with_size(64, 48).intrinsics.width_px
         64
         """
-        return replace(self, intrinsics=self.intrinsics.resized(width_px, height_px))
+        if min(width_px, height_px) < 1:
+            raise BadInput("with_size", "", f"{width_px}x{height_px} is no size")
+        found = self.intrinsics.resized(width_px, height_px)
+        return replace(self, intrinsics=found, has_own_size=True)
 
     def pixels_of(self, points: NDArray[np.floating]) -> F64:
         """(N, 2) pixel coordinates (x, y) of points (N, 3) of the world, in metres.
@@ -272,7 +301,10 @@ class Camera:
         return np.asarray(np.linalg.norm(local, axis=1))
 
     def _from_world(self, points: NDArray[np.floating]) -> F64:
-        moved = np.asarray(points, np.float64) - self.eye
+        given = np.asarray(points, np.float64)
+        if given.ndim != 2 or given.shape[1] != 3:
+            raise BadInput("camera", "points", f"expected (N, 3), got {given.shape}")
+        moved = given - self.eye
         return np.asarray(moved @ self.world_from_camera[:3, :3])
 
     @property
@@ -317,6 +349,28 @@ class Camera:
         grid[..., 1] = y[:, None]
         grid[..., 2] = -1.0
         return self.eye, grid @ self.world_from_camera[:3, :3].T
+
+
+def camera_of_recipe(camera: Camera, width_px: int, height_px: int) -> Camera:
+    """The camera at the size of a recipe's pictures if it has none of its own, with square pixels."""
+    if camera.has_own_size:
+        return camera
+    hfov_rad = 2 * math.atan(0.5 * camera.intrinsics.width_px / camera.intrinsics.fx)
+    found = Intrinsics.from_hfov(width_px, height_px, hfov_rad)
+    return replace(camera, intrinsics=found, has_own_size=True)
+
+
+def rigid_motion(matrix: Any, call: str, name: str) -> F64:
+    """A (4, 4) matrix that turns and moves, as an array; BadInput, naming the argument, for others."""
+    try:
+        found = np.asarray(matrix, np.float64)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    turn = found[:3, :3] if found.shape == (4, 4) else np.zeros((3, 3))
+    fits = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
+    if not fits or not np.isfinite(found).all() or not np.allclose(found[3], [0, 0, 0, 1]):
+        raise BadInput(call, name, "is no rigid (4, 4) motion: a rotation and metres")
+    return found
 
 
 @functools.lru_cache(maxsize=4)

@@ -6,15 +6,14 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from pbrs_farm.core.camera import DEFAULT_SIZE
+from pbrs_farm.core.checked_calls import MAX_EDGE_PX, MAX_VIEW_PIXELS
 from pbrs_farm.core.lighting import BULB_RADIUS_M
 from pbrs_farm.core.plugins import checked_names, plugins
 from pbrs_farm.core.shown_text import hint_of_choice
 
 MAX_SAMPLES: Final = 2**20
 """Of samples, mutations and chains: far above what anyone waits for, far below what never ends."""
-
-MAX_VIEW_PIXELS: Final = 2**27
-"""Of a picture."""
 
 CAMERA_PRESETS: Final = ("paper", "released", "photo")
 
@@ -226,8 +225,8 @@ class CameraFields(FieldGroup):
 class ImageFields(FieldGroup):
     """Size of the pictures."""
 
-    width_px: int = Field(640, gt=0, le=16384)
-    height_px: int = Field(480, gt=0, le=16384)
+    width_px: int = Field(DEFAULT_SIZE[0], gt=0, le=MAX_EDGE_PX)
+    height_px: int = Field(DEFAULT_SIZE[1], gt=0, le=MAX_EDGE_PX)
 
     @model_validator(mode="after")
     def _fits_memory(self) -> Self:

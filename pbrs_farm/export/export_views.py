@@ -7,17 +7,26 @@ the modules of `forms/`; docs/formats.md describes them.
 from __future__ import annotations
 
 import json
+from collections.abc import Collection, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import LEFT_OUT, ViewForm, form_of, forms_with_classes, new_folder
+from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, read_regular
 
+if TYPE_CHECKING:
+    from pbrs_farm.views.views import Views
 
+
+@checked_call
 def export(
     folder: str | Path,
     out: str | Path,
@@ -26,11 +35,12 @@ def export(
     selection: str | None = None,
     choice: Choice | None = None,
     shares: SplitShares | None = None,
+    views: Collection[tuple[str, str]] | None = None,
 ) -> tuple[int, int]:
     """Write the finished views of folder to out in the form of that name: (views, files written).
 
     out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl
-    keeps. choice: which layers and modes, at which size. shares: a folder for each split that has
+    keeps; views: only these (house, view). choice: which layers and modes, at which size. shares: a folder for each split that has
     views (train, val, test, by home), each whole in itself. Views without labels are left out.
     Raises BadInput for an unknown form or one of homes, classes of the user's for a form without
     classes, a folder without finished views, a selection that does not exist, or an out that holds
@@ -50,23 +60,50 @@ def export(
         hint = f"--to {', '.join(forms_with_classes())}"
         raise BadInput("--classes", "", f"{name} has no classes of your own", hint=hint)
     # A view is finished when its labels are there.
-    views = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
-    # Leave out views that the selection does not keep.
+    found = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
+    # Leave out views that are not asked for, and those that the selection does not keep.
+    if views is not None:
+        found = [v for v in found if (v.house.id, v.id) in views]
     if selection is not None:
         kept = _kept(folder, selection)
-        views = [v for v in views if (v.house.id, v.id) in kept]
-    if not views:
+        found = [v for v in found if (v.house.id, v.id) in kept]
+    if not found:
         raise BadInput(folder, "", "no finished view to export")
     with new_folder(out) as scratch:
         n_files = 0
-        by_split = _by_split(views, shares)
+        by_split = _by_split(found, shares)
         for split, own in by_split.items():
             part = scratch / split
             part.mkdir(exist_ok=True)
             n_files += form.write([ChosenView(v, choice) for v in own], part, choice)
         if form.finish is not None:
             n_files += form.finish(scratch, tuple(filter(None, by_split)), choice)
-    return len(views), n_files
+    return len(found), n_files
+
+
+def export_frames(
+    frames: Views, out: Path, name: str, *, layers: str | Sequence[str] | None = None,
+    modes: str | Sequence[str] | None = None, size: tuple[int, int] | None = None,
+    classes: str | Path | None = None, shares: SplitShares | None = None,
+) -> None:  # fmt: skip
+    """Write frames to out in the form of that name: what `Views.export` does.
+
+    Frames that lie in no folder are saved into one first. Raises BadInput as `export`, and for
+    frames of shards.
+    """
+    choice = Choice(
+        layers=None if layers is None else as_words(layers),
+        modes=None if modes is None else as_words(modes), size=size,
+        classes=None if classes is None else class_map(classes),
+    )  # fmt: skip
+    wanted = frozenset((ref.house, ref.view) for ref in frames.refs)
+    with TemporaryDirectory(prefix="pbrs-export-") as scratch:
+        if (Path(frames.source.url) / keys.FOLDERS[0]).is_dir():
+            folder = Path(frames.source.url)
+        else:
+            frames.save(scratch)
+            folder = Path(scratch)
+        export(folder, out, name, choice=choice, shares=shares, views=wanted)
 
 
 def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, list[ViewEntry]]:

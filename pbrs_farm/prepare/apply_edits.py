@@ -115,7 +115,7 @@ def _at_home(house: House, item: Item) -> Item:
         return replace(item, room_id=room.id, level_id=room.level_id)
     below = [level for level in house.levels if level.elevation <= y]
     level = max(below or house.levels, key=lambda one: one.elevation if below else -one.elevation)
-    return replace(item, level_id=level.id)
+    return replace(item, level_id=level.id, room_id=None)
 
 
 def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:

@@ -13,14 +13,27 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.camera import Camera, intrinsics_from_k
+from pbrs_farm.core.camera import Camera, camera_of_recipe, intrinsics_from_k, rigid_motion
+from pbrs_farm.core.checked_calls import (
+    MAX_EDGE_PX,
+    Count,
+    Positive,
+    Share,
+    Size,
+    Span,
+    Vector,
+    Where,
+    Whole,
+    checked_call,
+    warn_caller,
+)
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
@@ -34,10 +47,10 @@ from pbrs_farm.core.edits import (
     rows_of_matrix,
 )
 from pbrs_farm.core.errors import BadInput, BadRecipe
-from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.frames import linear_from_srgb, rotation_y
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
-from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.core.shown_text import did_you_mean, shown
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.prepare.source import SourceRef, resolve, variants
@@ -53,7 +66,13 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
 ItemLike = str | Item | Iterable[str | Item]
-Vector = Sequence[float]
+Colour = str | Sequence[float]
+Flux = Annotated[float, Where("0 to 10,000,000 lumen", lambda lm: 0 <= lm < 1e7)]
+Kelvin = Annotated[float, Where("1,000 to 20,000 kelvin", lambda k: 1000 <= k <= 20_000)]
+Angle = Annotated[float, Where("an angle above 0, 180 degrees at most", lambda a: 0 < a <= 180)]
+Edge = Annotated[int, Where(f"1 to {MAX_EDGE_PX} pixels", lambda px: 1 <= px <= MAX_EDGE_PX)]
+
+_WARM_WHITE_K = 3000.0  # of a bulb that is added
 
 
 @dataclass(frozen=True)
@@ -143,7 +162,8 @@ class Home:
 
     # What a home is made of: before its first edit.
 
-    def dress(self, seed: int, **fields: Any) -> Home:
+    @checked_call
+    def dress(self, seed: Count, **fields: Any) -> Home:
         """The home as people live in it: things, textiles, wear, by a seed (docs/dress.md).
 
         fields: of the recipe's group `dress`, such as clutter=0.5 or style="loft".
@@ -156,11 +176,10 @@ class Home:
             raise BadInput(self.id, "dress", "a home is dressed before it is edited")
         if self.source.dress_seed:
             raise BadInput(self.id, "dress", f"is dressed by seed {self.source.dress_seed} already")
-        if seed < 1:
-            raise BadInput(self.id, "dress", f"seed {seed}", hint="from 1 on")
         (source,) = variants(self.source, [seed])
         return replace(self, source=source).set(**{f"dress.{k}": v for k, v in fields.items()})
 
+    @checked_call
     def repair(self, **fields: Any) -> Home:
         """The home made watertight and lit, now; others are repaired when they are first looked at.
 
@@ -173,6 +192,7 @@ class Home:
         _ = home.house
         return home
 
+    @checked_call
     def export(self, folder: str | Path, to: str = "gltf") -> Path:
         """Write the home itself for another program: to = gltf, habitat, sdf, usd or usdz; the new folder.
 
@@ -187,6 +207,7 @@ class Home:
         export_house(self.house, Path(folder), to)
         return Path(folder)
 
+    @checked_call
     def set(self, **fields: Any) -> Home:
         """The home under other recipe fields: home.set(**{"light.spp": 64}).
 
@@ -201,6 +222,7 @@ class Home:
         _ = home.recipe
         return home
 
+    @checked_call
     def sun(self, azimuth: float | None = None, elevation: float | None = None) -> Home:
         """The home with the sun there, in degrees: azimuth from -z towards +x, elevation -90 to 90.
 
@@ -213,6 +235,7 @@ class Home:
         given = {name: value for name, value in fields.items() if value is not None}
         return self.set(**{"sky.kind": "sunsky", **given})
 
+    @checked_call
     def sky(self, panorama: str | Path) -> Home:
         """The home under a latitude-longitude HDR picture (.hdr or .exr), or one of a folder of them.
 
@@ -225,6 +248,7 @@ class Home:
 
     # Edits.
 
+    @checked_call
     def place(
         self,
         model: Model,
@@ -232,7 +256,7 @@ class Home:
         on: str | Item | Room | None = None,
         pose: Any = None,
         at: Vector | None = None,
-        seed: int = 0,
+        seed: Whole = 0,
         name: str = "",
     ) -> Home:
         """The home with one more thing.
@@ -243,7 +267,7 @@ class Home:
         stands, upright. name: of the new item, its model's id and a number without one.
 
         Raises BadInput where it fits nowhere, for a pose that is no rigid motion, a name that is
-        taken, an item there is not.
+        taken, an item there is not. What lies in no room is a warning.
 
             >>> home.place(can, on="dining table", seed=1).items["can 1"].id
             'can 1'
@@ -253,7 +277,7 @@ class Home:
         if sum(given is not None for given in (on, pose, at)) != 1:
             raise BadInput(self.id, model.id, "place it by one of on=, pose= and at=")
         if pose is not None:
-            matrix = _rigid(pose, f"pose of {model.id}")
+            matrix = rigid_motion(pose, "place", "pose")
         elif at is not None:
             matrix = upright_at(model, np.asarray(at, np.float64), 0.0)
         else:
@@ -261,14 +285,15 @@ class Home:
             matrix = self.renderer.call(lambda: free_pose(house, model, supports, seed))
         return self._edited(self._placing(model, matrix, name))
 
+    @checked_call
     def scatter(
         self,
         models: Sequence[Model],
-        n: int,
+        n: Count,
         *,
         on: str | Item | Room | None = None,
         in_: str = "",
-        seed: int = 0,
+        seed: Whole = 0,
         physics: bool = False,
     ) -> Home:
         """The home with n more things, models in turn by the seed.
@@ -288,8 +313,8 @@ class Home:
         else:
             from pbrs_farm.scene.placing import scattered_poses as poses
 
-        if not models or n < 1:
-            raise BadInput(self.id, "scatter", "give at least one model and n >= 1")
+        if not models:
+            raise BadInput("scatter", "models", "give at least one model")
         supports = self._supports(in_) if on is None else self._supports_named(on)
         house = self.house
         edits: list[PlaceModel] = []
@@ -297,6 +322,7 @@ class Home:
             edits.append(self._placing(model, matrix, "", taken=[edit.item for edit in edits]))
         return self._edited(*edits)
 
+    @checked_call
     def without(self, items: ItemLike) -> Home:
         """The home without items: ids, names, patterns such as "chair*", or items.
 
@@ -305,8 +331,11 @@ class Home:
         """
         return self._edited(RemoveItems(items=self._ids(items)))
 
+    @checked_call
     def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
         """The home with items moved by (x, y, z) metres and turned about the vertical of their middle.
+
+        What leaves every room is a warning.
 
         >>> moved = home.move("sofa", by=(0.1, 0, 0))
         >>> np.round(moved.items["sofa"].bounds - home.items["sofa"].bounds, 3)[0].tolist()
@@ -318,13 +347,10 @@ class Home:
         matrix = np.eye(4)
         matrix[:3, :3] = rotation_y(math.radians(turn_deg))
         matrix[:3, 3] = middle - matrix[:3, :3] @ middle + np.asarray(by, np.float64)
-        return self._edited(
-            MoveItems(items=ids, world_from_world=rows_of_matrix(_rigid(matrix, "move")))
-        )
+        return self._edited(MoveItems(items=ids, world_from_world=rows_of_matrix(matrix)))
 
-    def paint(
-        self, items: ItemLike, colour: str | Sequence[float], roughness: float | None = None
-    ) -> Home:
+    @checked_call
+    def paint(self, items: ItemLike, colour: Colour, roughness: Share | None = None) -> Home:
         """The home with items in one plain colour: "#c8b8a0", or sRGB in 0..1.
 
         >>> home.paint("sofa", "#c8b8a0").id == home.id
@@ -333,7 +359,8 @@ class Home:
         edit = PaintItems(items=self._ids(items), rgb=_rgb(colour), roughness=roughness)
         return self._edited(edit)
 
-    def material(self, items: ItemLike, picture: str | Path, scale_m: float = 1.0) -> Home:
+    @checked_call
+    def material(self, items: ItemLike, picture: str | Path, scale_m: Positive = 1.0) -> Home:
         """The home with items covered by a picture, repeated every scale_m metres.
 
         >>> home.material("sofa", "wood.png", scale_m=0.5).id == home.id
@@ -344,44 +371,52 @@ class Home:
             data = read_regular(path, MAX_DIGEST_BYTES)
         except OSError as error:
             raise BadInput(path, "", fault_of(error)) from None
-        if not scale_m > 0:
-            raise BadInput("material", "scale_m", f"{scale_m} is no length")
         edit = CoverItems(
             items=self._ids(items), path=str(path.resolve()), sha256=keys.sha256(data),
             scale_m=scale_m,
         )  # fmt: skip
         return self._edited(edit)
 
-    def light(self, items: ItemLike, lm: float, kelvin: float | None = None) -> Home:
-        """The home with lamps of another flux in lumen, and another colour where kelvin is given.
+    @checked_call
+    def light(
+        self, items: ItemLike, lm: Flux, kelvin: Kelvin | None = None, colour: Colour | None = None
+    ) -> Home:
+        """The home with lamps of another flux in lumen, and another colour where one is given.
 
-        >>> home.light("floor lamp", lm=800, kelvin=2700).id == home.id
-        False
+        kelvin: of a black body; or colour: "#ff9040", or sRGB in 0..1, whose brightness does not count.
+
+            >>> home.light("floor lamp", lm=800, kelvin=2700).id == home.id
+            False
         """
-        rgb = None if kelvin is None else _rgb_of_kelvin(kelvin)
-        return self._edited(SetLight(items=self._ids(items), lm=_flux(lm), rgb_linear=rgb))
+        rgb = _rgb_of_light("light", kelvin, colour)
+        return self._edited(SetLight(items=self._ids(items), lm=float(lm), rgb_linear=rgb))
 
+    @checked_call
     def add_light(
         self,
         at: Vector,
-        lm: float,
+        lm: Flux,
         *,
-        kelvin: float = 3000.0,
+        kelvin: Kelvin | None = None,
+        colour: Colour | None = None,
         towards: Vector | None = None,
-        angle_deg: float = 60.0,
+        angle_deg: Angle = 60.0,
         name: str = "",
     ) -> Home:
         """The home with one more bulb at (x, y, z), or a spot of a full angle where towards is given.
 
-        >>> len(home.add_light((2, 2.2, 2), lm=400).items) - len(home.items)
-        1
+        kelvin and colour as of light; 3000 kelvin without either. A bulb in no room is a warning.
+
+            >>> len(home.add_light((2, 2.2, 2), lm=400).items) - len(home.items)
+            1
         """
         aim = None if towards is None else np.asarray(towards, np.float64) - np.asarray(at)
         if aim is not None and not np.linalg.norm(aim) > 0:
             raise BadInput("add_light", "towards", "is where the light itself is")
+        rgb = _rgb_of_light("add_light", kelvin, colour) or _rgb_of_kelvin(_WARM_WHITE_K)
         edit = AddLight(
             item=name or self._free_name("light", ()), position=triple(np.asarray(at, np.float64)),
-            lm=_flux(lm), rgb_linear=_rgb_of_kelvin(kelvin),
+            lm=float(lm), rgb_linear=rgb,
             direction=None if aim is None else triple(aim / np.linalg.norm(aim)),
             cutoff_rad=math.radians(angle_deg) / 2,
         )  # fmt: skip
@@ -389,8 +424,25 @@ class Home:
 
     def _edited(self, *edits: Edit) -> Home:
         home = replace(self, source=self.source.edited(*edits))
-        _ = home.house  # what is wrong with an edit is an error where it is made
+        # What is wrong with an edit is an error where it is made.
+        self._warn_of_what_left(home.house, edits)
         return home
+
+    def _warn_of_what_left(self, after: House, edits: Sequence[Edit]) -> None:
+        """Warn of what edits put or moved into no room, where the home has rooms."""
+        was_in = {item.id: item.room_id is not None for item in self.house.items}
+        put: list[str] = []
+        for edit in edits:
+            if isinstance(edit, PlaceModel | AddLight):
+                put.append(edit.item)
+            elif isinstance(edit, MoveItems):
+                put += [name for name in edit.items if was_in[name]]
+        outside = [i for i in after.items if i.id in set(put) and i.room_id is None]
+        if outside and after.rooms:
+            x, y, z = outside[0].bounds.mean(0)
+            more = f", nor are {len(outside) - 1} more" if outside[1:] else ""
+            text = f"{shown(outside[0].id)} at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room"
+            warn_caller(f"{after.id}: {text}{more}")
 
     def _placing(
         self, model: Model, matrix: F64, name: str, taken: Sequence[str] = ()
@@ -408,6 +460,8 @@ class Home:
         for word in words:
             if isinstance(word, Item):
                 found[word.id] = None
+            elif not isinstance(word, str):
+                raise BadInput("items", repr(word), "expected names of items, or items")
             else:
                 found |= dict.fromkeys(item.id for item in self.items.named(word))
         return tuple(found)
@@ -426,6 +480,7 @@ class Home:
 
     # Looking and rendering.
 
+    @checked_call
     def plan(self, cameras: Sequence[Camera | Viewpoint] = ()) -> str:
         """Its plan as SVG text: rooms with names, outlines of items, lamps, and cameras if given.
 
@@ -436,8 +491,9 @@ class Home:
 
         return plan_svg(self.house, [self.viewpoint(camera).view for camera in cameras])
 
+    @checked_call
     def sketches(
-        self, cameras: Sequence[Camera | Viewpoint], edge_px: int = 160
+        self, cameras: Sequence[Camera | Viewpoint], edge_px: Edge = 160
     ) -> list[NDArray[np.uint8]]:
         """A small OpenGL picture (H, W, 3) sRGB from each camera, edge_px along its longer edge.
 
@@ -452,12 +508,14 @@ class Home:
             small.append(camera.with_size(*size))
         return self.renderer.sketches(self.source, self.recipe, small)
 
+    @checked_call
     def cameras(
-        self, preset: Literal["photo", "paper", "released"] | None = None, n: int = 0, **fields: Any
+        self, preset: str | None = None, n: Count | None = None, **fields: Any
     ) -> Viewpoints:
-        """Viewpoints by the rules of a preset, best first in each room; n: so many, spread over rooms.
+        """Viewpoints by the rules of a preset, best first in each room.
 
-        fields: of the recipe's group `cameras`, such as hfov_rad=1.2.
+        preset: photo, paper, released, or a plugin's; None = the recipe's. n: so many, spread over
+        rooms; None = all. fields: of the recipe's group `cameras`, such as hfov_rad=1.2.
 
             >>> len(home.cameras("photo", n=2))
             2
@@ -467,29 +525,38 @@ class Home:
         data = self.renderer.sampled(self.source, home.recipe)
         views = views_from_json(data, "cameras.json")
         rows = [(view.id, view.room_id, view.score) for view in views.values()]
-        chosen = plan.chosen_views(rows, n, home.recipe)
-        found = [Viewpoint(views[name], home.recipe.cameras) for name in chosen]
+        chosen = plan.chosen_views(rows, n or 0, home.recipe)
+        # They were scored in a small picture: hand them on at the size of the pictures to come.
+        size = home.recipe.image.width_px, home.recipe.image.height_px
+        found = [
+            Viewpoint(
+                replace(views[name], camera=views[name].camera.with_size(*size)),
+                home.recipe.cameras,
+            )
+            for name in chosen
+        ]
         report = CameraReport.model_validate(json.loads(data)["report"])
         return Viewpoints(found, report, self)
 
+    @checked_call
     def cameras_around(
         self,
         items: ItemLike | None = None,
-        n: int = 1,
+        n: Count = 1,
         *,
-        distance_m: tuple[float, float] = (0.5, 1.2),
-        elevation_deg: tuple[float, float] = (15.0, 65.0),
-        min_visible: float = 0.5,
-        size: tuple[int, int] = (640, 480),
+        distance_m: Span = (0.5, 1.2),
+        elevation_deg: Span = (15.0, 65.0),
+        min_visible: Share = 0.5,
+        size: Size | None = None,
         hfov_deg: float = 50.0,
         K: Any = None,
-        seed: int = 0,
+        seed: Whole = 0,
     ) -> Viewpoints:
         """n viewpoints that look at items each: at placed models where none are named.
 
         distance_m and elevation_deg: between which they are drawn. min_visible: the share of the
-        item looked at that nothing may hide. K: 3 x 3, instead of hfov_deg. Equal seeds give equal cameras. Raises BadInput where
-        fewer are found.
+        item looked at that nothing may hide. size: of the pictures, that of the recipe for None. K: 3 x 3,
+        of the size given, instead of hfov_deg. Equal seeds give equal cameras. Raises BadInput where fewer are found.
 
             >>> len(home.cameras_around("sofa", n=1))
             1
@@ -504,6 +571,10 @@ class Home:
         ]
         if not found:
             raise BadInput(self.id, "cameras", "no model was placed", hint="name items to look at")
+        if not distance_m[0] > 0:
+            raise BadInput("cameras_around", "distance_m", "expected metres above 0")
+        image = self.recipe.image
+        size = (image.width_px, image.height_px) if size is None and K is None else size
         house, intrinsics = self.house, intrinsics_from_k(size, K, hfov_deg)
         cameras = self.renderer.call(
             lambda: cameras_around(
@@ -513,6 +584,7 @@ class Home:
         )  # fmt: skip
         return Viewpoints([self.viewpoint(camera) for camera in cameras], home=self)
 
+    @checked_call
     def viewpoint(self, camera: Camera | Viewpoint) -> Viewpoint:
         """A camera as a viewpoint of this home, with the room that it is in.
 
@@ -521,7 +593,10 @@ class Home:
         """
         if isinstance(camera, Viewpoint):
             return camera
-        return viewpoint_of(camera, self.house, self.recipe.cameras)
+        rigid_motion(camera.world_from_camera, "camera", "world_from_camera")
+        image = self.recipe.image
+        sized = camera_of_recipe(camera, image.width_px, image.height_px)
+        return viewpoint_of(sized, self.house, self.recipe.cameras)
 
 
 class Rooms(Table):
@@ -551,6 +626,7 @@ class Rooms(Table):
             raise BadInput(self._house.id, at, "no such room", hint=did_you_mean(at, names))
         return found[0]
 
+    @checked_call
     def has(self, name: str) -> bool:
         """Whether a room has this id or name.
 
@@ -591,6 +667,7 @@ class Items(Table):
     def _same_name(self, name: str) -> list[Item]:
         return [item for item in self._items if item.name.lower() == name.lower()]
 
+    @checked_call
     def named(self, pattern: str) -> tuple[Item, ...]:
         """The items whose id, name or class matches, "chair*" for instance; BadInput where none does.
 
@@ -607,7 +684,8 @@ class Items(Table):
             raise self._unknown(pattern)
         return found
 
-    def near(self, name: str, within_m: float = 1.5) -> Items:
+    @checked_call
+    def near(self, name: str, within_m: Positive = 1.5) -> Items:
         """The items whose box lies within so many metres of an item's, nearest first.
 
         >>> len(home.items.near("dining table")) > 0
@@ -653,15 +731,6 @@ def _area(room: Room) -> float:
     return float(abs(np.dot(x, np.roll(z, -1)) - np.dot(z, np.roll(x, -1))) / 2)
 
 
-def _rigid(matrix: Any, place: str) -> F64:
-    found = np.asarray(matrix, np.float64)
-    turn = found[:3, :3] if found.shape == (4, 4) else np.zeros((3, 3))
-    fits = np.allclose(turn @ turn.T, np.eye(3), atol=1e-4) and np.linalg.det(turn) > 0
-    if not fits or not np.isfinite(found).all() or not np.allclose(found[3], [0, 0, 0, 1]):
-        raise BadInput(place, "", "is no rigid (4, 4) motion: a rotation and metres")
-    return found
-
-
 def _rgb(colour: str | Sequence[float]) -> tuple[float, float, float]:
     values: list[float] = []
     if isinstance(colour, str):
@@ -675,19 +744,26 @@ def _rgb(colour: str | Sequence[float]) -> tuple[float, float, float]:
     return values[0], values[1], values[2]
 
 
+def _rgb_of_light(
+    call: str, kelvin: float | None, colour: Colour | None
+) -> tuple[float, float, float] | None:
+    """Linear RGB of a light, its largest 1; None where neither says one."""
+    if colour is None:
+        return None if kelvin is None else _rgb_of_kelvin(kelvin)
+    if kelvin is not None:
+        raise BadInput(call, "colour", "give it or kelvin, not both")
+    rgb = linear_from_srgb(np.array(_rgb(colour)))
+    if not rgb.max() > 0:
+        raise BadInput(call, "colour", "is black", hint="lm=0 puts the light out")
+    return triple(rgb / rgb.max())
+
+
 def _rgb_of_kelvin(kelvin: float) -> tuple[float, float, float]:
-    if not 1000 <= kelvin <= 20_000:
-        raise BadInput("kelvin", f"{kelvin:g}", "expected 1,000 to 20,000")
     rgb = rgb_from_kelvin(kelvin)
     return triple(rgb / rgb.max())
 
 
-def _flux(lm: float) -> float:
-    if not 0 <= lm < 1e7:
-        raise BadInput("lm", f"{lm:g}", "expected 0 to 10,000,000 lumen")
-    return float(lm)
-
-
+@checked_call
 def load(
     home: str | Path,
     recipe: str | Path | Recipe = "fast",
@@ -711,7 +787,8 @@ def load(
     return Home(resolve(str(home), models=str(models)), recipe_of(recipe)).set(**settings)
 
 
-def make(seed: int, rooms: str = "", **options: Any) -> Home:
+@checked_call
+def make(seed: Whole, rooms: str | int = "", **options: Any) -> Home:
     """A home of a seed: drawn, furnished, the same on every machine (docs/homes.md).
 
     rooms: of bedrooms, "2" or "1..3". options: as of `made:` words, such as area="60..90".

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import warnings
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.checked_calls import Positive, checked_call, warn_caller
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.edits import ModelRef
 from pbrs_farm.core.errors import BadInput
@@ -94,11 +94,12 @@ class Model:
         return f"<Model {self.id}: {NYU40_NAMES[self.ref.nyu40]}, {size} m>"
 
 
+@checked_call
 def model(
     path: str | Path,
     *,
     category: str = "",
-    size_m: float | None = None,
+    size_m: Positive | None = None,
     unit: str = "m",
     up: str = "",
     name: str = "",
@@ -144,10 +145,11 @@ def model(
     if notes := found.notes:
         more = f"; and {len(notes) - 1} more: model.notes" if notes[1:] else ""
         text = f"{notes[0].place}: {notes[0].text} ({notes[0].kind}){more}"
-        warnings.warn(f"{path.parent}/{text}", stacklevel=2)
+        warn_caller(f"{path.parent}/{text}")
     return found
 
 
+@checked_call
 def models(pattern: str | Path, **options: object) -> list[Model]:
     """The models that a pattern or a folder names, in order of name; options as of `model`.
 

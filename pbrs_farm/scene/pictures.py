@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final, overload
 
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.checked_calls import (
+    Count,
+    Size,
+    as_words,
+    check_argument,
+    checked_call,
+    warn_caller,
+)
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
@@ -25,6 +32,8 @@ from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame, Views
 
 AnyCamera = Camera | Viewpoint
+Words = str | Iterable[str]
+"""Names of modes or layers: one, or several."""
 
 # Labels that every frame has, by the names that are asked for.
 _ALL: Final = tuple(mode.value for mode in ALL_MODES)
@@ -33,23 +42,24 @@ _ALWAYS: Final = ("depth", "normal", "valid", "semantic", "class40", "instance",
 
 @overload
 def render(
-    home: Home, cameras: AnyCamera, *, modes: Iterable[str] = ..., layers: Iterable[str] = ...,
-    size: tuple[int, int] | None = ..., observe: Callable[[str], None] | None = ...,
+    home: Home, cameras: AnyCamera, *, modes: Words = ..., layers: Words = ...,
+    size: Size | None = ..., observe: Callable[[str], None] | None = ...,
     progress: bool = ...,
 ) -> Frame: ...  # fmt: skip
 @overload
 def render(
-    home: Home, cameras: Sequence[AnyCamera], *, modes: Iterable[str] = ...,
-    layers: Iterable[str] = ..., size: tuple[int, int] | None = ...,
+    home: Home, cameras: Sequence[AnyCamera], *, modes: Words = ...,
+    layers: Words = ..., size: Size | None = ...,
     observe: Callable[[str], None] | None = ..., progress: bool = ...,
 ) -> Views: ...  # fmt: skip
+@checked_call
 def render(
     home: Home,
     cameras: AnyCamera | Sequence[AnyCamera],
     *,
-    modes: Iterable[str] = (Mode.MLT_IL_OL,),
-    layers: Iterable[str] = (),
-    size: tuple[int, int] | None = None,
+    modes: Words = (Mode.MLT_IL_OL,),
+    layers: Words = (),
+    size: Size | None = None,
     observe: Callable[[str], None] | None = None,
     progress: bool = False,
 ) -> Frame | Views:
@@ -58,7 +68,7 @@ def render(
     cameras: one of home.cameras(), or a Camera of your own; or several. modes: of opengl_dl,
     opengl_il, mlt_ol, mlt_il_ol; an empty list renders labels alone. layers: optional ones to make
     beside depth, normal, class and instance, which each frame has (`pbrs-farm layers` lists them).
-    size: (width, height); of a camera of your own its own size, else the recipe's. observe: called
+    size: (width, height); of a camera that was made with a size its own, else the recipe's. observe: called
     with the id of each frame that is done. progress: show bars on a terminal, lines in a notebook.
 
     The same bytes as `pbrs-farm run` makes of that home, recipe and view. A camera in no room is a
@@ -75,9 +85,7 @@ def render(
     for one in found:
         if one.room == OUTSIDE:
             x, y, z = one.camera.eye
-            warnings.warn(
-                f"{home.id}: the camera at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room", stacklevel=2
-            )
+            warn_caller(f"{home.id}: the camera at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room")
     recipe = _recipe_of_view(home, found, size)
     want = _wanted(modes, layers)
     with _progress_of(home, found, observe, progress) as tell:
@@ -115,10 +123,18 @@ def _progress_of(
         report(Event("end", home.id, None, ""))
 
 
-def _wanted(modes: Iterable[str], layers: Iterable[str]) -> Wanted:
+def _words(given: Words, name: str) -> tuple[str, ...]:
+    """Names as a tuple, of one or of several."""
+    found: tuple[str, ...] = as_words(given)
+    for word in found:
+        check_argument("render", name, word, str)
+    return found
+
+
+def _wanted(modes: Words, layers: Words) -> Wanted:
     # An empty list asks for labels alone, where the command line takes it for all modes.
-    asked = tuple(name for name in layers if name not in _ALWAYS)
-    return wanted_of(Wanted(modes=tuple(modes), layers=asked))
+    asked = tuple(name for name in _words(layers, "layers") if name not in _ALWAYS)
+    return wanted_of(Wanted(modes=_words(modes, "modes"), layers=asked))
 
 
 def _recipe_of_view(
@@ -147,15 +163,16 @@ def _recipe_of_view(
     return with_settings(home.recipe, settings)
 
 
+@checked_call
 def render_homes(
     homes: Home | Iterable[Home],
     out: str | Path,
     *,
     recipe: str | Path | Recipe | None = None,
-    views: int = 0,
-    modes: Iterable[str] = _ALL,
-    layers: Iterable[str] = (),
-    jobs: int = 1,
+    views: Count | None = None,
+    modes: Words = _ALL,
+    layers: Words = (),
+    jobs: Count = 1,
     observe: Callable[[Event], None] | None = None,
     progress: bool = False,
     **options: Any,
@@ -164,7 +181,7 @@ def render_homes(
 
     homes: also edited ones. out: a folder or s3://bucket/prefix; what is there already is not made
     again, so that a script that was killed goes on where it was. recipe: for all of them; None: the
-    homes' own, which must agree. views: of each home, 0 = all its sampled viewpoints. observe: hears
+    homes' own, which must agree. views: of each home, None = all its sampled viewpoints. observe: hears
     each step that ends. progress: show bars on a terminal, lines elsewhere, as `pbrs-farm run` does.
     options: what else `pbrs-farm run` makes of a house, by its option's name: pairs=True.
 
@@ -176,8 +193,10 @@ def render_homes(
         1
     """
     every = [homes] if isinstance(homes, Home) else list(homes)
+    for home in every:
+        check_argument("render_homes", "homes", home, Home)
     if not every:
-        raise BadInput("homes", "", "give at least one")
+        raise BadInput("render_homes", "homes", "give at least one")
     made_with = [_recipe_of_home(home, recipe) for home in every]
     for home, other in zip(every, made_with, strict=True):
         if other.digest() != made_with[0].digest():
@@ -202,12 +221,13 @@ def render_homes(
 
 
 def _wanted_of_words(
-    modes: Iterable[str], layers: Iterable[str], views: int, options: Mapping[str, Any]
+    modes: Words, layers: Words, views: int | None, options: Mapping[str, Any]
 ) -> Wanted:
     for name in options.keys() - Wanted.model_fields.keys():
         raise TypeError(f"render_homes() got an unexpected keyword argument {name!r}")
-    asked = tuple(modes) or ALL_MODES
-    return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=views, **options))
+    asked = _words(modes, "modes") or ALL_MODES
+    own = _words(layers, "layers")
+    return wanted_of(Wanted(modes=asked, layers=own, n_views=views or 0, **options))
 
 
 def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
@@ -219,6 +239,6 @@ def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:
 def _warn_of(summary: Summary) -> None:
     for what, message, command in summary.failures:
         again = f"; again by: {command}" if command else ""
-        warnings.warn(f"{what}: {message}{again}", stacklevel=3)
+        warn_caller(f"{what}: {message}{again}")
     for house, why in summary.without_views:
-        warnings.warn(f"{house}: no view: {why}", stacklevel=3)
+        warn_caller(f"{house}: no view: {why}")

@@ -10,11 +10,16 @@ from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
 
 class MemoryStore:
-    """Objects in a dictionary behind a lock; other processes do not see them."""
+    """Objects in a dictionary behind a lock; other processes see none but of a pickled copy."""
 
     def __init__(self) -> None:
         self._objects: dict[str, bytes] = {}  # key -> bytes
         self._lock = threading.Lock()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # A lock is of its process: a copy has its own.
+        with self._lock:
+            return (_store_of, (dict(self._objects),))
 
     @property
     def url(self) -> str:
@@ -54,3 +59,9 @@ class MemoryStore:
     def delete(self, key: str) -> None:
         with self._lock:
             self._objects.pop(check_key(key), None)
+
+
+def _store_of(objects: dict[str, bytes]) -> MemoryStore:
+    found = MemoryStore()
+    found._objects = objects
+    return found

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store import Store, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.views.views import Views
 
 
+@checked_call
 def open_views(place: str | Path | Store) -> Views:
     """The views of an output root, or of shards that `pbrs-farm pack` wrote.
 

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.checked_calls import as_words, check_fields
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
 from pbrs_farm.views.normal_axes import AXES
@@ -68,6 +69,8 @@ class SampleRequest:
     size: Size | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "layers", as_words(self.layers))
+        check_fields(self)
         for layer in self.layers:
             if layer not in LAYERS:
                 raise BadInput("layers", layer, "no such layer", hint=f"of {', '.join(LAYERS)}")

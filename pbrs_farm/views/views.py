@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import base64
 import html
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final, Protocol, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.checked_calls import Size, checked_call
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Item
 from pbrs_farm.core.house_split import SPLITS, SplitShares
 from pbrs_farm.core.layers import MOST_VARIANTS
+from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.class_map import ClassMap, class_map
 from pbrs_farm.views.stored_layers import ViewFacts
@@ -180,6 +184,7 @@ class Frame:
         """
         return self.source.layers(self.ref)
 
+    @checked_call
     def layer(self, name: str) -> NDArray[Any]:
         """A layer as it is stored, (H, W) or (H, W, C): "depth" in mm, "position" in metres, ...
 
@@ -199,6 +204,7 @@ class Frame:
             raise BadInput(self.source.url, self.id, "no picture in any mode")
         return self.picture(next(mode for mode in reversed(MODES) if mode in self.modes))
 
+    @checked_call
     def picture(self, mode: str) -> NDArray[np.uint8]:
         """(H, W, 3) sRGB in a lighting mode; BadInput for one that was not rendered.
 
@@ -250,6 +256,7 @@ class Frame:
         """
         return np.asarray(self._array("class40"), np.uint8)
 
+    @checked_call
     def classes_by(self, table: str | Path | ClassMap) -> NDArray[np.uint16]:
         """(H, W) classes of your own, 0 = none: a CSV file with columns from,id,name (docs/formats.md).
 
@@ -259,11 +266,7 @@ class Frame:
             >>> set(np.unique(frame.classes_by("mine.csv"))) <= {0, 1, 2}
             True
         """
-        classes, rows = class_map(table), self.table.get("instances")
-        if rows is None:
-            hint = "open the output folder itself"
-            raise BadInput(self.source.url, self.id, "has no table of instances", hint=hint)
-        return classes.label(self.instance, rows)
+        return class_map(table).label(self.instance, self._instance_rows())
 
     @property
     def instance(self) -> NDArray[np.uint16]:
@@ -282,7 +285,37 @@ class Frame:
         True
         """
         columns = ("id", "name", "class", "pixels", "visible_fraction", "truncated", "box2d")
-        return Table(columns, self.table["instances"])
+        return Table(columns, self._instance_rows())
+
+    @checked_call
+    def mask(self, thing: str | int | Item) -> NDArray[np.bool_]:
+        """(H, W) bool: where a thing is seen, or several.
+
+        thing: an item, its id ("mug 1") or that of a row of `instances`; or a name or class, "chair*"
+        for instance: all that match. Raises BadInput where none of it is in sight.
+
+            >>> frame.mask(frame.instances[0]["item"]).sum() == frame.instances[0]["pixels"]
+            np.True_
+        """
+        rows = self._instance_rows()
+        if isinstance(thing, str):
+            found = _rows_named(rows, thing)
+        elif isinstance(thing, Item):
+            found = [row for row in rows if row["item"] == thing.id]
+        else:
+            found = [row for row in rows if row["id"] == thing]
+        if not found:
+            word = thing.id if isinstance(thing, Item) else str(thing)
+            known = dict.fromkeys(row[key] for row in rows for key in ("item", "name", "class"))
+            raise BadInput(self.id, word, "is not in sight", hint=did_you_mean(word, known))
+        return np.isin(self.instance, [row["id"] for row in found])
+
+    def _instance_rows(self) -> list[dict[str, Any]]:
+        rows: list[dict[str, Any]] | None = self.table.get("instances")
+        if rows is None:
+            hint = "open the output folder itself"
+            raise BadInput(self.source.url, self.id, "has no table of instances", hint=hint)
+        return rows
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -299,6 +332,7 @@ class Frame:
         array: NDArray[Any] = getattr(sample, name)
         return array
 
+    @checked_call
     def save(self, place: str | Path) -> None:
         """Write the frame into a folder or s3://bucket/prefix, byte for byte as `run` does.
 
@@ -311,6 +345,15 @@ class Frame:
         """
         self.source.save([self.ref], place)
 
+    @checked_call
+    def export(self, out: str | Path, to: str = "coco", **choice: Any) -> Path:
+        """Write the frame in a form that other tools read, as Views.export.
+
+        >>> frame.export("one_coco", to="coco").is_dir()
+        True
+        """
+        return Views(self.source, (self.ref,), {}).export(out, to, **choice)
+
     def __repr__(self) -> str:
         width, height = self.size
         return f"<Frame {self.id} {width}x{height}: {', '.join(self.layers)}>"
@@ -320,6 +363,7 @@ class Frame:
         cells = "".join(figure_html(m, self.picture(m), _PICTURE_PX) for m in self.modes)
         return f"<div><code>{html.escape(self.id)}</code><br>{cells}</div>"
 
+    @checked_call
     def sample(self, request: SampleRequest | None = None) -> Sample:
         """The arrays of a request: colour in mlt_il_ol light and normals in OpenCV's axes for None.
 
@@ -359,6 +403,7 @@ class Views(Sequence[Frame]):
     def __iter__(self) -> Iterator[Frame]:
         return (Frame(ref, self.source) for ref in self.refs)
 
+    @checked_call
     def save(self, place: str | Path) -> None:
         """Write all of them into one place, as Frame.save.
 
@@ -367,6 +412,36 @@ class Views(Sequence[Frame]):
         1
         """
         self.source.save(self.refs, place)
+
+    @checked_call
+    def export(
+        self,
+        out: str | Path,
+        to: str = "coco",
+        *,
+        layers: str | Sequence[str] | None = None,
+        modes: str | Sequence[str] | None = None,
+        size: Size | None = None,
+        classes: str | Path | None = None,
+        shares: SplitShares | None = None,
+    ) -> Path:
+        """Write them in a form that other tools read into the new folder out, and give that.
+
+        to: coco, yolo, kitti, bop and the other forms of views of docs/formats.md. layers and modes: one
+        or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of your own
+        classes; shares: a folder a split. Raises BadInput for a form there is not, views it cannot hold,
+        an out that holds something, and frames of shards.
+
+            >>> sorted(path.name for path in views.export("coco", to="coco").iterdir())[:1]
+            ['annotations.json']
+        """
+        from pbrs_farm.export.export_views import export_frames
+
+        export_frames(
+            self, Path(out), to, layers=layers, modes=modes, size=size, classes=classes,
+            shares=shares,
+        )  # fmt: skip
+        return Path(out)
 
     def __repr__(self) -> str:
         return f"<{len(self)} frames of {len(self.homes)} homes in {self.source.url}>"
@@ -396,6 +471,7 @@ class Views(Sequence[Frame]):
         """
         return tuple(dict.fromkeys(m for ref in self.refs for m in self.source.modes(ref)))
 
+    @checked_call
     def only(
         self,
         *,
@@ -431,6 +507,19 @@ class Views(Sequence[Frame]):
         if not kept:
             raise BadInput(self.source.url, "", _nothing_left(split, len(refs), left_out))
         return replace(self, refs=kept, left_out=left_out)
+
+
+def _rows_named(rows: Sequence[Mapping[str, Any]], pattern: str) -> list[Mapping[str, Any]]:
+    """The rows whose item has an id, else a name or a class, that matches; case counts first."""
+    for keys, fold in ((("item",), str), (("name", "class"), str), (("name", "class"), str.lower)):
+        found = [
+            row
+            for row in rows
+            if any(fnmatchcase(fold(str(row[key])), fold(pattern)) for key in keys)
+        ]
+        if found:
+            return found
+    return []
 
 
 def _nothing_left(split: str | None, n_found: int, left_out: dict[str, str]) -> str:

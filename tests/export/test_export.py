@@ -275,7 +275,7 @@ def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
 
 
 def test_a_form_without_classes_refuses_those_of_the_user(root, tmp_path, own):
-    with pytest.raises(BadInput, match="--classes: released has no classes of your own"):
+    with pytest.raises(BadInput, match="classes: released has no classes of your own"):
         export(root, tmp_path / "x", "released", choice=own)
 
 

@@ -114,7 +114,7 @@ def test_another_lens_needs_positions(tmp_path):
     home = small_home().set(**fields)
     camera = home.cameras(n=1)[0]
     pf.render(home, camera, modes=[]).save(tmp_path / "none")
-    with pytest.raises(BadInput, match=r"fisheye needs the layer position .*--layers position"):
+    with pytest.raises(BadInput, match=r"fisheye needs the layer position .*with layers position"):
         export(tmp_path / "none", tmp_path / "x", "ply")
     pf.render(home, camera, modes=[], layers=["position"]).save(tmp_path / "some")
     assert export(tmp_path / "some", tmp_path / "y", "ply") == (1, 1)

@@ -12,7 +12,7 @@ import pytest
 
 import pbrs_farm as pf
 from pbrs_farm.check import verify
-from pbrs_farm.core.errors import BadInput, BadRecipe
+from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
@@ -148,22 +148,6 @@ def test_a_forked_child_is_told(tmp_path: Path) -> None:
         [sys.executable, "-c", _FORK], capture_output=True, text=True, timeout=120, cwd=Path.cwd()
     )
     assert "was forked from one that renders" in done.stdout, done.stderr
-
-
-@pytest.mark.parametrize(
-    ("call", "says"),
-    [
-        (lambda h: pf.render(h, []), "at least one"),
-        (lambda h: pf.render(h, h.cameras(n=1)[0], modes=["mlt"]), "no such lighting mode"),
-        (lambda h: pf.render(h, h.cameras(n=1)[0], layers=["albido"]), "did you mean albedo"),
-        (lambda h: pf.Camera.look_at((1, 1, 1), (1, 1, 1)), "no direction"),
-        (lambda h: pf.Camera.from_opencv(np.zeros((4, 4))), "no rigid"),
-        (lambda h: pf.Camera.look_at((1, 1, 1), (2, 1, 1), K=np.zeros((3, 3))), "fx 0 cx"),
-    ],
-)
-def test_a_bad_call_is_told(home: pf.Home, call, says: str) -> None:
-    with pytest.raises(BadInput, match=says):
-        call(home)
 
 
 def test_a_camera_in_no_room_is_a_warning(home: pf.Home) -> None:

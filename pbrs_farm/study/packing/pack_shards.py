@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
+from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import new_folder
@@ -37,6 +38,7 @@ class Packed:
     left_out: dict[str, str]  # id of a view -> why
 
 
+@checked_call
 def pack(
     views: Views,
     out: str | Path,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pbrs_farm.core.checked_calls import as_words, check_fields
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.views.dataset_json import WHOLE
@@ -36,10 +37,13 @@ class Packing:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        for name in ("layers", "modes"):
+            object.__setattr__(self, name, as_words(getattr(self, name)))
+        check_fields(self)
         for mode in self.modes:
             SampleRequest(self.layers, mode, size=self.size)  # says what is wrong
         if self.colour not in COLOURS:
-            raise BadInput("--colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
+            raise BadInput("colour", self.colour, "no such form", hint=f"of {', '.join(COLOURS)}")
         if self.views_per_shard < 1 or not 1 <= self.quality <= 100:
             text = f"{self.views_per_shard} views a shard, quality {self.quality}"
             raise BadInput("pack", "", text, hint="1 or more views, a quality of 1 to 100")
