@@ -63,22 +63,32 @@ def test_nerfstudios_poses_turn_the_home_to_z_up(root: Path, tmp_path: Path) -> 
 
 
 def test_colmaps_points_project_to_the_pixels_they_came_from(root: Path, tmp_path: Path) -> None:
+    from scipy.spatial.transform import Rotation
+
     export(root, tmp_path / "x", "colmap")
     sparse = only(tmp_path / "x") / "sparse/0"
-    rows = (sparse / "images.txt").read_text().split("\n\n")
-    number, *pose, camera, name = rows[0].split()
-    assert (number, camera, name) == ("1", "1", "frame_00000.png")
     model = (sparse / "cameras.txt").read_text().split()
     assert model[1:4] == ["PINHOLE", "64", "48"]
     fx, fy, cx, cy = map(float, model[4:])
-    # The first points are those of the first view, in the rows of a grid.
-    first = np.array((sparse / "points3D.txt").read_text().split("\n")[0].split()[1:4], float)
-    from scipy.spatial.transform import Rotation
-
-    w, x, y, z = map(float, pose[:4])
-    local = Rotation.from_quat([x, y, z, w]).apply(first) + np.array(pose[4:], float)
-    pixel = fx * local[0] / local[2] + cx, fy * local[1] / local[2] + cy
-    assert pixel == pytest.approx((8.5, 8.5), abs=0.05)
+    points = [line.split() for line in (sparse / "points3D.txt").read_text().splitlines()]
+    rows = (sparse / "images.txt").read_text().splitlines()
+    # gsplat and pycolmap take an empty line for the end of the file.
+    assert all(rows)
+    names = []
+    for pose_row, seen_row in zip(rows[::2], rows[1::2], strict=True):
+        number, w, x, y, z, *shift, camera, name = pose_row.split()
+        names.append(name)
+        assert camera == "1"
+        seen = np.array(seen_row.split(), float).reshape(-1, 3)
+        own = [points[int(n) - 1] for n in seen[:, 2]]
+        # Each point is seen by this picture alone, at the place in its row that its track says.
+        assert [point[8:] for point in own] == [[number, str(k)] for k in range(len(own))]
+        turn = Rotation.from_quat([float(v) for v in (x, y, z, w)])
+        local = turn.apply(np.array([point[1:4] for point in own], float)) + np.array(shift, float)
+        at = local[:, :2] / local[:, 2:] * (fx, fy) + (cx, cy)
+        np.testing.assert_allclose(at, seen[:, :2], atol=0.05)
+    assert names[0] == "frame_00000.png"
+    assert [point[0] for point in points] == [str(n) for n in range(1, len(points) + 1)]
 
 
 def test_tums_trajectory_is_read_back_as_the_same_poses(root: Path, tmp_path: Path) -> None:

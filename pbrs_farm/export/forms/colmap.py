@@ -14,13 +14,14 @@ from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
+_NO_POINT: Final = ("0.5 0.5 -1",)  # what a view sees that sees no surface: a pixel of no point
 
 
 def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """<house>/images/<view>.png and sparse/0/{cameras,images,points3D}.txt; the number of files.
 
     Poses are world to camera with OpenCV axes, in the home's world (metres, y up). Points are
-    surfaces behind every 16th pixel, with its colour and without tracks.
+    surfaces behind every 16th pixel, with its colour and that pixel as their track.
     """
     n_files = 0
     for house in dict.fromkeys(view.house.id for view in views):
@@ -28,19 +29,25 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         (out / house / "images").mkdir(parents=True)
         (out / house / "sparse/0").mkdir(parents=True)
         cameras: dict[str, int] = {}
-        images, points = [], []
+        images: list[str] = []
+        points: list[str] = []
         for number, view in enumerate(own, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             camera = cameras.setdefault(_camera_line(view), len(cameras) + 1)
-            # A line of its pose and an empty one: no points of it are named.
-            images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n\n")
-            points += _point_lines(view, picture)
+            pixels, lines = _points_of(view, picture)
+            # A line of its pose and one of what it sees. That is never empty, as COLMAP would allow:
+            # readers of gsplat and pycolmap take a line without a word for the end of the file.
+            first = len(points) + 1
+            seen = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
+            line = " ".join(seen or _NO_POINT)
+            images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n{line}\n")
+            points += [f"{line} 0 {number} {k}" for k, line in enumerate(lines)]
         _write_lines(
             out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for c, n in cameras.items())
         )
         _write_lines(out / house / "sparse/0/images.txt", images)
-        numbered = (f"{n} {point} 0\n" for n, point in enumerate(points, start=1))
+        numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
         _write_lines(out / house / "sparse/0/points3D.txt", numbered)
         n_files += len(own) + 3
     return n_files
@@ -68,8 +75,8 @@ def _pose_words(view: ChosenView) -> str:
     return " ".join(f"{v:.9g}" for v in (w, x, y, z, *camera_from_world[:3, 3]))
 
 
-def _point_lines(view: ChosenView, picture: str) -> list[str]:
-    """`x y z r g b` of a grid of the view's pixels."""
+def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[str]]:
+    """Of a grid of the view's pixels: where each lies in the picture, and its `x y z r g b`."""
     depth, rgb = view.array("depth"), view.array(picture)
     height, width = depth.shape
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
@@ -82,7 +89,8 @@ def _point_lines(view: ChosenView, picture: str) -> list[str]:
     pose = pose_opencv(view)
     world = local @ pose[:3, :3].T + pose[:3, 3]
     colours = rgb[rows, columns]
-    return [
+    found: list[list[float]] = pixels.tolist()
+    return found, [
         f"{x:.4f} {y:.4f} {z:.4f} {r} {g} {b}"
         for (x, y, z), (r, g, b) in zip(world.tolist(), colours.tolist(), strict=True)
     ]
