@@ -9,6 +9,7 @@ carry a fixed DateTime, so that equal images give equal bytes.
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.file_kinds import kind_of
 
 MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 
@@ -44,6 +46,8 @@ _MAGIC: Final = (
     (b"\x76\x2f\x31\x01", ".exr"),
     (b"#?", ".hdr"),
 )
+_RESOLUTION: Final = re.compile(rb"\n\r?\n([+-])([XY]) +[0-9]+ +([+-])[XY] +[0-9]+\r?\n")
+_HDR_HEADER_BYTES: Final = 65_536  # in which a Radiance picture says how it lies
 _TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
 
 
@@ -156,7 +160,7 @@ def layers_from_exr(data: bytes, name: str = "radiance.exr") -> dict[str, F32]:
     never go by their place. Raises BadInput naming the file for anything else, or a damaged one.
     """
     if _kind(data, name) != ".exr":
-        raise BadInput(name, "", "not an OpenEXR file")
+        raise _not_a("an OpenEXR file", data, name)
     pixels, spec = _decoded(data, name, ".exr", "float")
     return {
         channel: np.ascontiguousarray(pixels[..., i]) for i, channel in enumerate(spec.channelnames)
@@ -173,7 +177,7 @@ def array_from_png(
     name: for messages. Raises BadInput for what is no PNG, is damaged or is above MAX_FILE_PIXELS.
     """
     if _kind(data, name) != ".png":
-        raise BadInput(name, "", "not a PNG file")
+        raise _not_a("a PNG file", data, name)
     pixels, _spec = _decoded(data, name, ".png", "unknown")
     if pixels.dtype not in (np.uint8, np.uint16):
         raise BadInput(name, "", f"expected 8 or 16 bits, got {pixels.dtype}")
@@ -197,7 +201,7 @@ def decode_texture(data: bytes, name: str, media_type: str = "") -> NDArray[np.u
     """
     kind = _kind(data, f"{name} {media_type}".strip())
     if kind not in _TEXTURE_KINDS:
-        raise BadInput(name, "", "not a PNG, JPEG, GIF, BMP or TGA picture")
+        raise _not_a("a PNG, JPEG, GIF, BMP or TGA picture", data, name)
     pixels, spec = _decoded(data, name, kind, "uint8")
     # Part alpha from colour; drop it where it is opaque everywhere.
     channels = pixels.shape[2]
@@ -216,11 +220,11 @@ def decode_radiance(data: bytes, name: str) -> F32:
     """(H, W, 3) float32 linear of a Radiance .hdr or OpenEXR panorama; BadInput if unreadable.
 
     Values are as stored, not scaled or clipped. Channels are found by the names R, G and B, in
-    whatever order they lie; other channels are dropped.
+    whatever order they lie; other channels are dropped. Row 0 is the top, however a .hdr is stored.
     """
     kind = _kind(data, name)
     if kind not in (".hdr", ".exr"):
-        raise BadInput(name, "", "not a Radiance HDR or OpenEXR picture")
+        raise _not_a("a Radiance HDR or OpenEXR picture", data, name)
     pixels, spec = _decoded(data, name, kind, "float")
     # Find R, G and B by name: OpenEXR sorts channels.
     names = list(spec.channelnames)
@@ -228,7 +232,30 @@ def decode_radiance(data: bytes, name: str) -> F32:
         pixels = pixels[..., [names.index(channel) for channel in "RGB"]]
     elif pixels.shape[2] != 3:
         raise BadInput(name, "", f"expected channels R, G and B, got {', '.join(names)}")
-    return np.ascontiguousarray(pixels)
+    return np.ascontiguousarray(_upright(pixels, data) if kind == ".hdr" else pixels)
+
+
+def _not_a(wanted: str, data: bytes, name: str) -> BadInput:
+    kind = kind_of(data)
+    text = f"not {wanted}" if kind is None else f"is {kind.words}, not {wanted}"
+    return BadInput(name, "", text, hint="" if kind is None else kind.hint)
+
+
+def _upright(scanlines: NDArray[Any], data: bytes) -> NDArray[Any]:
+    """The scanlines of a Radiance picture as rows from the top, columns from the left.
+
+    The line before the pixels says which way they run ("-Y 64 +X 128" from the top, "+Y" from below,
+    "+X ... -Y" by columns), x to the right and y up (Ward, Radiance file formats).
+    """
+    found = _RESOLUTION.search(data[:_HDR_HEADER_BYTES])
+    if found is None:
+        return scanlines
+    first, axis, second = found.groups()
+    if axis == b"Y":
+        rows = scanlines[::-1] if first == b"+" else scanlines
+        return rows[:, ::-1] if second == b"-" else rows
+    columns = scanlines[::-1] if first == b"-" else scanlines
+    return (columns[:, ::-1] if second == b"+" else columns).swapaxes(0, 1)
 
 
 def _channels(array: NDArray[Any], allowed: tuple[int, ...]) -> int:

@@ -178,3 +178,25 @@ def test_no_temporary_file_stays(tmp_path, monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(BadInput):
         images.array_from_png(b"\x89PNG\r\n\x1a\n")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "order", ["-Y +X", "-Y -X", "+Y +X", "+Y -X", "+X -Y", "+X +Y", "-X -Y", "-X +Y"]
+)
+def test_a_radiance_picture_is_upright_however_it_is_stored(order: str) -> None:
+    upright = np.arange(1, 9, dtype=np.float32).reshape(2, 4)
+    major, minor = order.split()
+    # Scanlines run along the first axis, y upwards and x to the right.
+    lines = upright if major[1] == "Y" else upright.T
+    if major in ("+Y", "-X"):
+        lines = lines[::-1]
+    if minor in ("+Y", "-X"):
+        lines = lines[:, ::-1]
+    mantissa, exponent = np.frexp(lines)
+    value = (mantissa * 256).astype(np.uint8)
+    pixels = np.stack([value, value, value, (exponent + 128).astype(np.uint8)], axis=-1)
+    head = (
+        f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{major} {lines.shape[0]} {minor} {lines.shape[1]}\n"
+    )
+    found = images.decode_radiance(head.encode() + pixels.tobytes(), "sky.hdr")
+    np.testing.assert_allclose(found[..., 1], upright, rtol=0.01)
