@@ -675,7 +675,12 @@ class Items(Table):
         True
         """
         for key in (_ids, _words):
-            found = tuple(i for i in self._items if any(fnmatchcase(w, pattern) for w in key(i)))
+            # A name may hold what a pattern means something by: "chair [2]".
+            found = tuple(
+                i
+                for i in self._items
+                if any(w == pattern or fnmatchcase(w, pattern) for w in key(i))
+            )
             if found:
                 return found
         low = pattern.lower()

@@ -161,6 +161,8 @@ def models(pattern: str | Path, **options: object) -> list[Model]:
     text = str(pattern)
     if Path(text).is_dir():
         found = sorted(p for p in Path(text).rglob("*") if p.suffix.lower() in SUFFIXES)
+    elif Path(text).is_file():
+        found = [Path(text)]  # of a name that may hold [ and *
     else:
         found = sorted(Path(p) for p in glob.glob(text, recursive=True))  # noqa: PTH207
     if not found:

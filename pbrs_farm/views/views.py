@@ -515,7 +515,10 @@ def _rows_named(rows: Sequence[Mapping[str, Any]], pattern: str) -> list[Mapping
         found = [
             row
             for row in rows
-            if any(fnmatchcase(fold(str(row[key])), fold(pattern)) for key in keys)
+            if any(
+                word == fold(pattern) or fnmatchcase(word, fold(pattern))
+                for word in (fold(str(row[key])) for key in keys)
+            )
         ]
         if found:
             return found
