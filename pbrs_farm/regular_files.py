@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.file_kinds import HEAD_BYTES, other_kind, wrong_kind
 
 MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
 MAX_SCENE_BYTES: Final = 1_000_000_000  # of a scene or model with the files beside it
@@ -65,11 +66,41 @@ def read_given(
 
 
 def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
-    """The text of a file that a user names, as read_given; raises error where it is no UTF-8."""
+    """The text of a file that a user names, as read_given; raises error where it is no UTF-8.
+
+    And where its content is of a known kind that its name does not say, text or not.
+    """
+    data = read_given(path, MAX_TEXT_BYTES, error=error)
+    if other_kind(data, path) is not None:
+        text, hint = wrong_kind(data, path)
+        raise error(path, "", text, hint=hint)
     try:
-        return text_from_bytes(read_given(path, MAX_TEXT_BYTES, error=error))
+        return text_from_bytes(data)
     except UnicodeDecodeError:
         raise error(path, "", "cannot be read: is no UTF-8 text") from None
+
+
+@contextmanager
+def naming_kind(path: Path) -> Iterator[None]:
+    """What a reader raises of a file, said by what the file is where its name says another kind.
+
+    For readers of one kind: their words for a file of another are riddles ("byte 0: no valid JSON").
+    """
+    try:
+        yield
+    except BadInput as error:
+        text, hint = _kind_at(path)
+        if not text:
+            raise
+        raise type(error)(path, "", text, hint=hint) from None
+
+
+def _kind_at(path: Path) -> tuple[str, str]:
+    try:
+        with open_regular(path, MAX_DIGEST_BYTES) as file:
+            return wrong_kind(file.read(HEAD_BYTES), path)
+    except OSError:
+        return "", ""
 
 
 def text_from_bytes(data: bytes, errors: str = "strict") -> str:

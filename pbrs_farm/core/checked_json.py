@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from pbrs_farm.core.errors import BadHouse, BadInput
+from pbrs_farm.core.file_kinds import other_kind, wrong_kind
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 
 T = TypeVar("T")
@@ -49,6 +50,9 @@ def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHou
         place, text = "", str(fault)
     except ValueError:
         place, text = "", "a number has too many digits"
+    if other_kind(data, file) is not None:
+        text, hint = wrong_kind(data, file)
+        raise error(file, "", text, hint=hint)
     raise error(file, place, f"no valid JSON: {text}")
 
 

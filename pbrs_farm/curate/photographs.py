@@ -24,6 +24,7 @@ from pbrs_farm.regular_files import (
     MAX_DIGEST_BYTES,
     digest_of_regular,
     fault_of,
+    naming_kind,
     open_regular,
     read_given,
 )
@@ -161,9 +162,13 @@ def _stored_depth(path: Path) -> NDArray[Any]:
         layers = images.layers_from_exr(read_given(path), str(path))
         return layers.get("Z", next(iter(layers.values())))
     try:
-        return np.asarray(np.load(io.BytesIO(read_given(path)), allow_pickle=False))
+        found = np.load(io.BytesIO(read_given(path)), allow_pickle=False)
+        if not isinstance(found, np.ndarray):
+            raise ValueError("an archive of arrays")
+        return found
     except (ValueError, EOFError):
-        raise BadInput(path, "", "cannot be read as a numpy array") from None
+        with naming_kind(path):
+            raise BadInput(path, "", "cannot be read as a numpy array") from None
 
 
 def _depth_mm(depth: NDArray[Any], scale: float, file: str, place: str) -> NDArray[np.uint16]:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.file_kinds import other_kind, wrong_kind
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, changed_recipe
 from pbrs_farm.core.shown_text import hint_of_choice, shown
 from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
@@ -32,9 +33,14 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
     file that cannot be read, is no TOML, is too large, or sets what no recipe has.
     """
     try:
-        fields = tomllib.loads(text_from_bytes(read_regular(path, _MAX_BYTES)))
+        data = read_regular(path, _MAX_BYTES)
     except OSError as error:
         raise BadRecipe(f"{path}: {fault_of(error)}") from None
+    if other_kind(data, path) is not None:
+        text, hint = wrong_kind(data, path)
+        raise BadRecipe(f"{path}: {text}", hint=hint)
+    try:
+        fields = tomllib.loads(text_from_bytes(data))
     # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.
     except (ValueError, RecursionError) as error:
         raise BadRecipe(f"{path}: is no TOML: {error}") from None

@@ -20,6 +20,7 @@ from pbrs_farm.core.recipe import ReadFields, Recipe, with_settings
 from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
 from pbrs_farm.prepare.source import SourceRef, check_unchanged, home_id, model_of_object
 from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.regular_files import naming_kind
 
 if TYPE_CHECKING:
     from pbrs_farm.prepare.passes import FinishedHouse
@@ -47,7 +48,9 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
     if source.kind == "object":
         from pbrs_farm.read.objects.single_object import read_object
 
-        house = read_object(model_of_object(source.location), fields)
+        model = model_of_object(source.location)
+        with naming_kind(model.path):
+            house = read_object(model, fields)
         return replace(house, id=source.house_id, is_repaired=True)
     if source.kind == "builtin":
         from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -61,7 +64,8 @@ def _house_of(source: SourceRef, fields: ReadFields) -> House:
     if entry is None:
         raise BadHouse(source.location, "", f"is of a kind that is not read here: {source.kind}")
     # The source alone names its house: what a reader makes of its file's name is no matter.
-    return replace(entry.read(source.given, fields), id=home_id(source))
+    with naming_kind(source.given.path):
+        return replace(entry.read(source.given, fields), id=home_id(source))
 
 
 def _with_far_noted(house: House, fields: ReadFields) -> House:

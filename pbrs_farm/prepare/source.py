@@ -31,7 +31,7 @@ from pbrs_farm.prepare.formats import (
 from pbrs_farm.read.common.format import Format, GivenFile
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.regular_files import fault_of, real_path, text_given
+from pbrs_farm.regular_files import fault_of, naming_kind, real_path, text_given
 
 if TYPE_CHECKING:
     from pbrs_farm.read.objects.model_folders import ObjectModel
@@ -183,7 +183,7 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
     # Go by the word's form first, then by what lies at the path.
-    if word.startswith("{"):
+    if word.startswith('{"'):  # its JSON; a name may begin with a brace, too
         kind = "object"
     elif word == "builtin":
         kind = "builtin"
@@ -196,7 +196,8 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     elif not path.exists() and not path.suffix and "/" not in word:
         kind = "example"
     else:
-        entry = _format_at(path)
+        with naming_kind(path):
+            entry = _format_at(path)
         kind = entry.kind
         is_inside = entry.main_file and path.name == entry.main_file
         word = str(real_path(path.parent if is_inside else path))

@@ -23,7 +23,13 @@ from pbrs_farm.core.recipe import CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
 from pbrs_farm.prepare import passes
 from pbrs_farm.prepare.source import SourceRef
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
+from pbrs_farm.regular_files import (
+    MAX_TEXT_BYTES,
+    fault_of,
+    read_regular,
+    text_from_bytes,
+    text_given,
+)
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.store.object_store import Store, put_done
@@ -177,7 +183,7 @@ def camera_file_text(fields: CameraFields) -> str:
     path = Path(fields.file)
     names = path.with_name("room_camera_name.txt")
     try:
-        text = text_from_bytes(read_regular(path, MAX_TEXT_BYTES))
+        text = text_given(path)
         if path.name != "room_camera.txt" or not names.exists():
             return text
         from pbrs_farm.sample.room_camera_file import with_names

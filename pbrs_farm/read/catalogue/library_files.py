@@ -18,7 +18,7 @@ from pbrs_farm.read.catalogue.property_files import numbered_entries, numbers, p
 from pbrs_farm.read.common.resources import ZipResources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
 from pbrs_farm.read.sweethome3d.home_file.parse_furniture import FULL_CUT_OUT
-from pbrs_farm.regular_files import digest_of_regular, fault_of
+from pbrs_farm.regular_files import digest_of_regular, fault_of, naming_kind
 
 FURNITURE: Final = "PluginFurnitureCatalog.properties"
 JAR_FURNITURE: Final = "com/eteks/sweethome3d/io/DefaultFurnitureCatalog.properties"
@@ -76,7 +76,8 @@ def opened_archive(path: Path) -> tuple[ZipResources, str]:
     """
     try:
         sha256 = digest_of_regular(path)
-        return ZipResources(path, path.name), sha256
+        with naming_kind(path):
+            return ZipResources(path, path.name), sha256
     except FileNotFoundError:
         raise BadInput(path, "", "no such file or folder") from None
     except OSError as error:

@@ -32,7 +32,13 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.objects.single_object import model_surfaces, object_companions
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular, read_regular
+from pbrs_farm.regular_files import (
+    MAX_SCENE_BYTES,
+    fault_of,
+    naming_kind,
+    open_regular,
+    read_regular,
+)
 
 SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 MAX_EXTENT_M: Final = 100.0
@@ -83,10 +89,11 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
         raise BadInput(path, "", "changed since the home was made", hint="make the home again")
     notes = Notes(path.name, strict=fields.strict)
     read = _from_trimesh if _is_plain(path) else _from_reader
-    try:
-        shape = read(path, data, model, fields, notes)
-    except BadHouse as error:
-        raise BadInput(path, error.place, error.message.partition(": ")[2] or str(error)) from None
+    with naming_kind(path):
+        try:
+            shape = read(path, data, model, fields, notes)
+        except BadHouse as error:
+            raise BadInput(path, error.place, error.text, hint=error.hint) from None
     # Its class is the caller's category, whatever its nodes are called.
     own = [note for note in notes.all() if note.kind != "unmapped-class"]
     shape = replace(shape, notes=tuple(_with_file(note, path.name) for note in own))

@@ -17,13 +17,12 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import pairs_in, photo_from_pair
-from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
+from pbrs_farm.regular_files import text_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
 from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _FILES: Final = ("intrinsics.json", "intrinsics.txt")
-_MAX_BYTES: Final = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +77,7 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
 
 
 def _read_camera(path: Path) -> PhotoCamera:
-    try:
-        text = text_from_bytes(read_regular(path)[:_MAX_BYTES])
-    except (OSError, UnicodeDecodeError) as error:
-        why = fault_of(error) if isinstance(error, OSError) else "not text"
-        raise BadInput(path, "", why) from None
+    text = text_given(path)
     scale: float | None = None
     try:
         if path.suffix == ".json":

@@ -22,7 +22,7 @@ from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.images import array_from_png
-from pbrs_farm.regular_files import read_given
+from pbrs_farm.regular_files import naming_kind, read_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
 from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -124,7 +124,8 @@ def _prediction_array(path: Path, data: bytes) -> NDArray[Any]:
     try:
         array = np.load(io.BytesIO(data), allow_pickle=False)
     except (ValueError, OSError, EOFError):
-        raise BadInput(path, "", "not an array of numpy, or damaged") from None
+        with naming_kind(path):
+            raise BadInput(path, "", "not an array of numpy, or damaged") from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
         raise BadInput(path, "", "expected numbers")
     return array

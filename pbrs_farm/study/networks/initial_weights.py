@@ -13,6 +13,7 @@ from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import pip_command
+from pbrs_farm.regular_files import naming_kind
 from pbrs_farm.study.networks.edge_hed import EdgeHed
 from pbrs_farm.study.networks.vgg import convolutions
 
@@ -107,9 +108,10 @@ def _from_vgg(network: nn.Module, path: Path) -> dict[str, str]:
         names = sorted({int(n.split(".")[1]) for n in state if n.startswith("features.")})
         kernels = [(state[f"features.{k}.weight"], state[f"features.{k}.bias"]) for k in names]
     except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
-        raise BadInput(
-            path, "", "not a VGG-16 with torchvision's names (features.0.weight)"
-        ) from None
+        with naming_kind(path):
+            raise BadInput(
+                path, "", "not a VGG-16 with torchvision's names (features.0.weight)"
+            ) from None
     # Convolutions have four axes; batch normalisation may stand between them.
     kernels = [pair for pair in kernels if pair[0].ndim == 4]
     _fill(_vgg_of(network, str(path)), kernels, str(path))

@@ -18,6 +18,7 @@ from safetensors.torch import save_file
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.regular_files import naming_kind
 
 
 def write_tensor_file(path: Path, tensors: Mapping[str, Tensor], metadata: dict[str, str]) -> None:
@@ -109,7 +110,8 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
     except FileNotFoundError:
         raise BadInput(path, "", "no such file") from None
     except (OSError, KeyError, TypeError, ValueError):
-        raise BadInput(path, "", "not a checkpoint of `train`, or damaged") from None
+        with naming_kind(path):
+            raise BadInput(path, "", "not a checkpoint of `train`, or damaged") from None
 
 
 def _into(network: nn.Module, weights: dict[str, Tensor], path: Path) -> None:
