@@ -13,6 +13,7 @@ from pbrs_farm.generate.layout import Layout, layout
 from pbrs_farm.generate.openings import openings_of
 from pbrs_farm.generate.plan_walls import rooms_of, runs_of, walls_of
 from pbrs_farm.generate.programme import Programme, Wishes, drawn_programme, with_family
+from pbrs_farm.generate.slants import with_slants
 
 _PROGRAMMES: Final = 6  # programmes drawn and tried before the wish is refused
 
@@ -28,9 +29,10 @@ def drawn_plan(
     if programme:
         plans = (wishes and wishes.plans) or programme.plans
         where = layout(replace(programme, plans=plans), rng, is_fixed=True)
-    else:
-        where = _drawn_layout(rng, with_family(wishes or Wishes(), rng))
-    return plan_of_layout(where, drawn_height(where, rng), rng)
+        return plan_of_layout(where, drawn_height(where, rng), rng)
+    where = _drawn_layout(rng, with_family(wishes or Wishes(), rng))
+    plan = plan_of_layout(where, drawn_height(where, rng), rng)
+    return with_slants(plan, where.programme.family, rng)
 
 
 def drawn_height(where: Layout, rng: np.random.Generator) -> float:

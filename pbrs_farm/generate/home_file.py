@@ -384,7 +384,7 @@ def _straight_parts(wall: PlanWall) -> list[PlanWall]:
 
 
 def _joints(walls: tuple[PlanWall, ...]) -> dict[tuple[int, int], int]:
-    """(wall, end) -> the wall it is mitred with: where two ends meet at a right angle, alone."""
+    """(wall, end) -> the wall it is mitred with: where two ends meet at an angle, alone."""
     ends: dict[tuple[float, float], list[tuple[int, int]]] = {}
     for number, wall in enumerate(walls):
         for end, (x, z) in enumerate((wall.start, wall.end)):
@@ -393,13 +393,15 @@ def _joints(walls: tuple[PlanWall, ...]) -> dict[tuple[int, int], int]:
     for meeting in ends.values():
         # Of three ends at a corner the two of outer walls are mitred.
         pair = [m for m in meeting if walls[m[0]].is_outer] if len(meeting) > 2 else meeting
-        if len(pair) == 2 and _is_upright(walls[pair[0][0]]) != _is_upright(walls[pair[1][0]]):
+        if len(pair) == 2 and _turns(walls[pair[0][0]], walls[pair[1][0]]):
             joints[pair[0]], joints[pair[1]] = pair[1][0], pair[0][0]
     return joints
 
 
-def _is_upright(wall: PlanWall) -> bool:
-    return wall.start[0] == wall.end[0]
+def _turns(wall: PlanWall, other: PlanWall) -> bool:
+    """Whether two walls are out of line by more than a degree."""
+    (ux, uz), (vx, vz) = wall.normal, other.normal
+    return abs(ux * vz - uz * vx) > math.sin(math.radians(1))
 
 
 def _room_beside(plan: Plan, wall: PlanWall, side: int) -> PlanRoom | None:

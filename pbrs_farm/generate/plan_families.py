@@ -51,6 +51,8 @@ class PlanFamily(Record):
     court: _Share = 0.0  # a piece of a side is left out: the outline is a U
     notch: tuple[float, float] = (0.06, 0.12)  # how much, of the floor
     l_shaped: _Share = 0.25  # the living room has a second arm
+    slanted: _Share = 0.2  # one side is not at right angles to the others
+    bay: _Share = 0.2  # a window of a room to live in stands in a bay
     balcony: _Share = 0.4
     blind_shares: tuple[_Share, ...] = (0.45, 0.4, 0.15)  # of 0, 1, 2 sides without daylight
 

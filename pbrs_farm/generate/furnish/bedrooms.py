@@ -8,6 +8,8 @@ from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Stand, Templa
 
 _SIDE_M = 0.6  # free beside a bed
 _HEAD_GAP = 0.02
+_CHOICES = 12  # beds of a home, in the order of its preference
+_CHILDS_SHARE = 0.4  # of homes that take a bed made for a child before all others
 _BED_LIKES = Liking(corner=0.0, door=0.12, window_wall=-0.5)
 
 
@@ -44,7 +46,10 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
     """Beds for one in a corner, or along a wall; some of a child's have two floors."""
     beds = _beds(shelf, (0.7, 1.16))
     if child:
-        liked = [b for b in beds if {"child", "junior", "bunk", "captain"} & _words_of_piece(b)]
+        liked = [
+            b for b in beds
+            if {"child", "junior", "bunk", "captain"} & _words_of_piece(b) and shelf.likes(b, _CHILDS_SHARE)
+        ]  # fmt: skip
         beds = liked + [b for b in beds if b not in liked]
     stands = shelf.of("nightstand", width=(0.3, 0.55))
     found = []
@@ -87,8 +92,9 @@ def single_beds(shelf: Shelf, *, child: bool = False) -> tuple[Template, ...]:
 
 def _beds(shelf: Shelf, widths: tuple[float, float]) -> list[Piece]:
     beds = shelf.of("bed", width=widths, depth=(1.8, 2.35), height=(0.3, 1.9))
-    # Keep large ones for those who like them: order by preference, then by size where it is tight.
-    return [*beds[:2], *sorted(beds[2:], key=lambda b: b.size[0] * b.size[1])]
+    # Where it is too tight for the two that the home likes best, take the smallest of the next ones, not
+    # of all: that would be the same bed in every home.
+    return [*beds[:2], *sorted(beds[2:_CHOICES], key=lambda b: b.size[0] * b.size[1])]
 
 
 def _words_of_piece(piece: Piece) -> set[str]:
