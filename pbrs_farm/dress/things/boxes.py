@@ -1,4 +1,4 @@
-"""Boxes, cartons, baskets and bins of many forms; no effects."""
+"""Boxes, cartons and baskets of many forms; no effects."""
 
 from __future__ import annotations
 
@@ -195,65 +195,6 @@ def rope_side(
         for k in range(n):
             g, t = 1 - out + out * (k + 0.5) / n, h / n
             m.add(hoop(oval(w * g - t, d * g - t, n=16, power=4.0), (k + 0.5) * t, 0.52 * t, n=5))
-
-
-@thing(group="bin")
-def bin(m: Maker) -> None:
-    """A bin: for paper, of wire, with a pedal, a swing lid, square, of wicker, of felt."""
-    form, r, tall = m.integers(0, 10), m.uniform(0.11, 0.15), m.uniform(0.26, 0.36)
-    material = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
-    match form:
-        case 0 | 1:  # for paper
-            m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28),
-                of=material)  # fmt: skip
-        case 2:  # of wire
-            with m.of(m.metal):
-                m.add(cylinder(r * 0.85, 0, 0.004, n=20))
-                for t in (0.3, 0.65, 1.0):
-                    m.add(hoop(oval(2 * r * (0.85 + 0.15 * t), 2 * r * (0.85 + 0.15 * t), n=22),
-                        t * tall, 0.003, n=5))  # fmt: skip
-                for k in range(22):
-                    m.add(tube([(0.84 * r * cos(0.2856 * k), 0.002, 0.84 * r * sin(0.2856 * k)),
-                        (r * cos(0.2856 * k), tall, r * sin(0.2856 * k))], 0.0015, n=4))  # fmt: skip
-        case 3 | 4:  # with a pedal
-            h = tall * 1.2
-            m.add(revolve([(0, 0.012), (r * 0.98, 0.012), (r, 0.02), (r, h * 0.86), (0, h * 0.86)],
-                n=26), of=material)  # fmt: skip
-            m.add(cylinder(r * 1.02, 0, 0.0118, n=26),
-                of=plain("bin foot", (0.08, 0.08, 0.08), 0.6))  # fmt: skip
-            m.add(revolve(scaled(r, h, [(0, 0.8602), (1.02, 0.8602), (1.02, 0.89), (0.8, 0.97),
-                (0, 1)]), n=26), of=material if form == 3 else plain("lid", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-            m.add(bevelled((-0.03, 0.004, r * 0.9), (0.03, 0.018, r + 0.05), 0.003),
-                of=plain("pedal", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-            m.add(bevelled((-0.04, h * 0.82, -r - 0.015), (0.04, h * 0.9, -r * 0.9), 0.003),
-                of=plain("hinge", (0.1, 0.1, 0.1), 0.5))  # fmt: skip
-        case 5:  # a lid that swings
-            m.add(loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0),
-                (1.9 * r, 1.6 * r, 0.04, tall * 1.2)])), of=material)  # fmt: skip
-            m.add(loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
-                (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)])),
-                of=plain("lid", m.any_colour(), 0.5))  # fmt: skip
-        case 6:  # square
-            m.add(loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
-                (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall),
-                (1.7 * r - 0.006, 1.2 * r - 0.006, 0.018, 0.005)], n=3)), of=material)  # fmt: skip
-        case 7:  # of wicker
-            rope_side(m, 2 * r, 2 * r, 0.1, tall, 8, plain("wicker", mix((0.66, 0.52, 0.36),
-                m.any_colour(), m.pick(0.0, 0.3)), 0.9))  # fmt: skip
-        case 8:  # of felt, with two straps
-            m.add(vessel([(0, 0), (r * 0.98, 0), (r, tall)], 0.006, n=24), of=plain("felt",
-                m.pick((0.3, 0.31, 0.33), (0.55, 0.53, 0.5), (0.35, 0.22, 0.13)), 0.95))  # fmt: skip
-            for x in (-1.0, 1.0):
-                m.add(tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
-                    (x * r, tall * 1.12, 0.03), (x * r * 0.97, tall * 0.9, 0.04)], 0.02, n=3),
-                    0.005, n=6), of=plain("strap", (0.35, 0.22, 0.13), 0.6))  # fmt: skip
-        case 9:  # two for sorting
-            for x in (-0.115, 0.115):
-                m.add(bevelled((x - 0.11, 0, -0.14), (x + 0.11, tall * 1.25, 0.14), 0.008),
-                    of=plain("bin", m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))  # fmt: skip
-                m.add(bevelled((x - 0.112, tall * 1.2502, -0.142), (x + 0.112, tall * 1.32, 0.142),
-                    0.006), of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5),
-                    (0.75, 0.6, 0.15), (0.25, 0.25, 0.26)), 0.5))  # fmt: skip
 
 
 @thing(group="basket")

@@ -1,4 +1,4 @@
-"""Cups and drinking glasses; no effects."""
+"""Cups, and the handles that cups and glasses have; no effects."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pbrs_farm.dress.things import materials
 from pbrs_farm.dress.things.bodies import frustum, hoop, loft, revolve, smooth, tube, vessel
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import plain
-from pbrs_farm.dress.things.outlines import bent, oval, rings, scaled
+from pbrs_farm.dress.things.outlines import bent, oval, rings
 
 
 @thing(group="cup")
@@ -96,64 +96,6 @@ def cup(m: Maker) -> None:
             m.add(handle(r * 0.93, tall), of=materials.glass())
 
 
-@thing(group="glass")
-def glass(m: Maker) -> None:
-    """Tumblers.
-
-    Wine glasses, flutes, beer glasses, a whisky glass, a carafe, two that stand together, a drink with a straw.
-    """
-    form, r, tall = m.integers(0, 13), m.uniform(0.03, 0.04), m.uniform(0.09, 0.14)
-    m.name = "wine_glass" if form in (1, 2, 3, 4) else "tumbler"
-    drink = plain("drink", m.pick((0.35, 0.03, 0.06), (0.85, 0.75, 0.4), (0.8, 0.45, 0.1),
-        (0.45, 0.2, 0.06)), 0.1)  # fmt: skip
-    with m.of(materials.glass()):
-        match form:
-            case 0:  # a tumbler
-                m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.0025))
-            case 1 | 2 | 3:  # for wine, red or white; a flute
-                h, q = m.uniform(0.17, 0.22), r if form == 1 else r * 1.25 if form == 2 else 0.026
-                m.add(revolve([(0, 0), (0.034, 0), (0.032, 0.003), (0.005, 0.008),
-                    (0.004, h * 0.45), (0.02, h * 0.5), (q, h * (0.68 if form < 3 else 0.6)),
-                    (q * (0.85 if form < 3 else 0.95), h),
-                    (q * (0.85 if form < 3 else 0.95) - 0.0015, h - 0.0005),
-                    (q - 0.0015, h * (0.68 if form < 3 else 0.6)), (0.018, h * 0.52),
-                    (0, h * 0.49)], n=(16, 16, 20, 14)[form]))  # fmt: skip
-            case 4:  # for cocktails
-                m.add(revolve([(0, 0), (0.035, 0), (0.033, 0.003), (0.005, 0.008), (0.004, 0.1),
-                    (0.012, 0.105), (0.05, 0.165), (0.0485, 0.1655), (0.011, 0.109), (0, 0.107)],
-                    n=20))  # fmt: skip
-            case 5:  # for beer, waisted
-                m.add(vessel([(0, 0), (0.032, 0), (0.033, 0.03), (0.028, 0.06), (0.036, 0.15)],
-                    0.003, n=18))  # fmt: skip
-            case 6:  # cut, for whisky
-                m.add(loft(rings(oval, [(0.07, 0.07, 0), (0.078, 0.078, 0.085),
-                    (0.072, 0.072, 0.085), (0.062, 0.062, 0.02)], n=10), sharp=20.0))  # fmt: skip
-            case 7:  # a beer mug
-                m.add(vessel([(0, 0), (0.037, 0), (0.038, 0.12)], 0.004, n=18))
-                m.add(tube(bent([(0.036, 0.105, 0), (0.075, 0.105, 0), (0.073, 0.025, 0),
-                    (0.036, 0.025, 0)], 0.02, n=3), 0.005, n=6))  # fmt: skip
-            case 8:  # a carafe
-                m.add(vessel([(0, 0), (0.045, 0), (0.052, 0.03), (0.045, 0.09), (0.022, 0.15),
-                    (0.024, 0.2), (0.032, 0.225)], 0.003, n=20))  # fmt: skip
-            case 9:  # several tumblers
-                for k in range(m.integers(2, 5)):
-                    m.add(vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.0025, n=14),
-                        at=(0.09 * (k % 2), 0, 0.09 * (k // 2) if k > 1 else 0.0))  # fmt: skip
-            case 10:  # round, without a foot
-                m.add(vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1.05, 0.35), (1, 0.7),
-                    (0.85, 0.9)]), 0.0025, n=18))  # fmt: skip
-            case 11:  # a drink with a straw
-                m.add(vessel([(0, 0), (r * 0.85, 0), (r, 0.14)], 0.0025))
-                m.add(tube([(-0.01, 0.006, 0), (r * 0.9, 0.2, 0.005)], 0.0035, n=6),
-                    of=plain("straw", m.any_colour(), 0.5))  # fmt: skip
-            case 12:  # with rings
-                m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.9, 0.012), (r, 0.014), (r, 0.05),
-                    (r * 0.97, 0.052), (r * 0.97, 0.06), (r, 0.062), (r, tall)], 0.0025, n=16))  # fmt: skip
-    if form in (5, 7, 11):
-        m.add(revolve([(0, 0.005), (r * 0.7, 0.005), (r * 0.72, 0.028), (0.02, 0.06),
-            (r * 0.72, 0.09), (0, 0.09)], n=14), of=drink)  # fmt: skip
-
-
 def handle(radius: float, tall: float) -> Surface:
     """A cup's: a bent strip of six pieces, 8 mm wide, its ends inside the cup's side."""
     t = np.linspace(-0.5, 0.5, 7) * np.pi
@@ -168,9 +110,9 @@ def handle(radius: float, tall: float) -> Surface:
             x, y = along + out * depth
             points.append((x, y, side))
     # The caps at both ends, then two triangles a side between neighbouring stations.
-    faces = [(0, 2, 1), (0, 3, 2), (24, 25, 26), (24, 26, 27)]
+    faces = [(0, 1, 2), (0, 2, 3), (24, 26, 25), (24, 27, 26)]
     for k in range(6):
         for j in range(4):
             a, b = 4 * k + j, 4 * k + (j + 1) % 4
-            faces += [(a, b, b + 4), (a, b + 4, a + 4)]
+            faces += [(a, b + 4, b), (a, a + 4, b + 4)]
     return smooth("handle", np.array(points), np.array(faces, np.int32))

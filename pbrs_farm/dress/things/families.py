@@ -29,9 +29,12 @@ from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.things import (
     bathroom,
     beds,
+    bins,
+    chandeliers,
     joints,
     kitchen,
     lamps,
+    plants,
     radiators,
     seating,
     storage,
@@ -40,11 +43,13 @@ from pbrs_farm.dress.things import (
 from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.dress.things.maker import Family, described_in
 
-VERSION: Final = 4
+VERSION: Final = 5
 """Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
 # The order decides which piece a seed draws.
-_MODULES: Final = (kitchen, bathroom, seating, tables, storage, beds, lamps, radiators)
+_MODULES: Final = (
+    kitchen, bathroom, seating, tables, storage, beds, lamps, radiators, bins, chandeliers, plants,
+)  # fmt: skip
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need

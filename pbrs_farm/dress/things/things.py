@@ -8,6 +8,7 @@ from typing import Final
 from pbrs_farm.dress.things import (
     appliances,
     bath_things,
+    bins,
     bottles,
     bowls,
     boxes,
@@ -17,6 +18,7 @@ from pbrs_farm.dress.things import (
     desk_things,
     food,
     frames_and_candles,
+    glasses,
     ornaments,
     seating,
     soft,
@@ -28,8 +30,8 @@ from pbrs_farm.dress.things.maker import Thing, described_in
 
 THINGS: Final[Mapping[str, Thing[[]]]] = described_in(
     (
-        appliances, bath_things, bottles, bowls, boxes, clocks, clothes, cups, desk_things, food,
-        frames_and_candles, ornaments, seating, soft, tableware, toys, vases,
+        appliances, bath_things, bins, bottles, bowls, boxes, clocks, clothes, cups, desk_things, food,
+        frames_and_candles, glasses, ornaments, seating, soft, tableware, toys, vases,
     ),
     Thing,
 )  # fmt: skip
