@@ -21,7 +21,6 @@ from pbrs_farm.home.room_use import RoomKind
 # Faces of one small thing of a catalogue, where its kind gives no other limit.
 _MOST_FACES: Final = 1500
 _MOST_OF_MODEL: Final = 12_000  # faces of all things of one model in a home
-_GENERATED_SHARE: Final = 0.5  # chance that a thing is generated, where the catalogue has it, too
 _DESIGNS: Final = 1  # models of a kind in one home
 _MOST_TRIES: Final = 2  # models that are loaded to find them
 
@@ -36,6 +35,7 @@ class ThingKind(Record):
     is_round: bool = False  # it may face anywhere
     place: Place = Place.SURFACE  # of the catalogue's pieces
     most_faces: int = _MOST_FACES
+    made_share: float = 0.5  # chance that one is generated, where the catalogue has it, too
 
 
 # Of the generated things, those that a catalogue has, too, or that may face anywhere.
@@ -69,7 +69,7 @@ class Stock:
             return magazines(rng, self.covers, int(rng.integers(1, 6)))
         # Draw for all alike, so that what the catalogue holds moves no later draw.
         found = _thing_kind(kind)
-        is_made, number = rng.random() < _GENERATED_SHARE, int(rng.integers(1 << 30))
+        is_made, number = rng.random() < found.made_share, int(rng.integers(1 << 30))
         designs = [] if found.made and is_made else self._owned(kind)
         # Of one detailed model there are few in a home.
         designs = [d for d in designs if self._faces[d[0].id] + _n_faces(d[1]) <= _MOST_OF_MODEL]
