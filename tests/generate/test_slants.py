@@ -49,9 +49,9 @@ def assert_whole(new: Plan, old: Plan) -> None:
         assert polygon.is_valid
         assert polygon.buffer(1e-3).contains(Polygon(before.polygon))
     for opening in new.openings:
-        wall, room = new.walls[opening.wall], Polygon(new.rooms[opening.room].polygon)
+        wall, polygon = new.walls[opening.wall], Polygon(new.rooms[opening.room].polygon)
         assert opening.width / 2 < opening.along < wall.length - opening.width / 2
-        face = room.distance(Point(wall.at(opening.along)))
+        face = polygon.distance(Point(wall.at(opening.along)))
         assert face == pytest.approx(wall.thickness / 2, abs=2e-3)
 
 
