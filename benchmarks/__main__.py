@@ -31,6 +31,7 @@ OWN_TARGET: Final = {
     "variety": "homes.variety",
     "light": "light.equal_time",
     "light_pictures": "light.light_pictures",
+    "sky": "light.sky_lux",
     "light_tables": "light.light_tables",
     "denoised": "light.denoised",
     "growth": "light.growth",

@@ -343,9 +343,14 @@ class EmissionFields(FieldGroup):
 
     preset: Literal["photometric", "released"] = "photometric"
     sky_lx: float = Field(
-        10_000.0, gt=0, le=1e7, description="illuminance of the sky without sun on open ground"
+        10_000.0,
+        gt=0,
+        le=1e7,
+        description="illuminance of open ground by a clear sky without sun, which stands at 30 degrees",
     )
-    sun_lx: float = Field(60_000.0, ge=0, le=1e7, description="the sun's share, at most")
+    sun_lx: float = Field(
+        103_000.0, ge=0, le=1e7, description="the sun's, facing it, when it stands at the zenith"
+    )
     lamp_lm: float = Field(1_600.0, gt=0, le=1e7, description="a Sweet Home 3D lamp of power 0.5")
     lm_per_watt: float = Field(13.0, gt=0, le=1e4, description="SUNCG's watts")
     compensate_shades: bool = Field(True, description="flux is what leaves the lamp, shade and all")

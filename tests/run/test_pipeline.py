@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from pbrs_farm.images import array_from_png, layers_from_exr
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
+from pbrs_farm.transport.scene_tables.sky import clear_sky_lx
 
 OPTIONAL = [x.name for x in LAYERS if x.optional and x.step == "truth" and not x.partner]
 ALONE = [x for x in LAYERS if not x.partner]  # what a view has without a partner
@@ -83,7 +85,8 @@ def test_every_rooms_illuminance_is_recorded_once_and_each_view_repeats_its_own(
     described = json.loads((house / "house.json").read_text())
     assert set(rooms) == {room["id"] for room in described["rooms"]}
     assert all(row["outdoor_lx"] + row["indoor_lx"] > 0 for row in rooms.values())
-    assert record["sky"]["sky_lx"] == pytest.approx(10_000, rel=1e-3)
+    elevation_rad = math.radians(record["sky"]["sun_elevation_deg"])
+    assert record["sky"]["sky_lx"] == pytest.approx(clear_sky_lx(elevation_rad), rel=1e-3)
     assert "illuminance.json" in (house / "manifest.jsonl").read_text()
     for file in house.glob("views/*/view.json"):
         sheet = json.loads(file.read_text())

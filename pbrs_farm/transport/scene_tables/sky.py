@@ -1,8 +1,9 @@
 """Sky: outdoor light as one latitude-longitude image of the dome and one sun; no effects.
 
-Analytic skies and panorama have one photometric scale (docs/spec/sky.md): the dome without its sun
-gives `sky_lx` on open level ground, the sun at most `sun_lx` more. Rows run from the zenith (+y,
-row 0) to the nadir, columns with the azimuth atan2(x, -z).
+A clear sky, its sun and clouds have the level of standard tables at the sun's elevation, by day, dusk
+and night; `sky_lx` and `sun_lx` scale them. A panorama gives `sky_lx` on open level ground, its sun at
+most `sun_lx` more. Rows run from the zenith (+y, row 0) to the nadir, columns with the azimuth
+atan2(x, -z).
 """
 
 from __future__ import annotations
@@ -32,14 +33,20 @@ _NIGHT_DEG: Final = -30.0
 _NIGHT_FROM_DEG: Final = 12.0  # below the horizon: nautical twilight is over
 _HORIZON_RAD: Final = math.radians(1.0)  # elevation of the sun whose sky is used at sunset
 _BLUE_DEG: Final = 8.0  # below the horizon, where no glow is left
-# Degrees below the horizon -> log10 lx of a clear sky without a moon, after the twilight tables
-# of the US Naval Observatory.
-_TWILIGHT_LOG_LX: Final = ((0.0, 6.0, 12.0, 18.0), (2.7, 0.5, -2.1, -3.2))
+# Elevation of the sun in degrees -> log10 lx that a clear sky without its sun and without a moon gives
+# to open level ground: the US Naval Observatory's twilight tables, by day the means of CIE 110.
+_CLEAR_LOG_LX: Final = (
+    (-18.0, -12.0, -6.0, -3.0, 0.0, 2.0, 10.0, 30.0, 60.0, 90.0),
+    (-3.2, -2.1, 0.53, 1.6, 2.78, 3.15, 3.65, 4.0, 4.11, 4.15),
+)
+_CLEAR_LX: Final = 10_000.0  # of that table with the sun at 30 degrees: what sky_lx is the level of
+_OVERCAST_LX: Final = (300.0, 21_000.0)  # at sunset, and more by the sine of the elevation (IES)
+_OVERCAST_SHARE: Final = 0.5  # of the clear sky's light that clouds let through after sunset
 _TOWN_LX: Final = 0.3  # of street lamps in the air of a town
 _BLUE: Final = (0.35, 0.55, 1.0)
 _TOWN: Final = (1.0, 0.8, 0.6)
 _CLOUDS: Final = (0.94, 0.98, 1.06)
-_OPTICAL_DEPTH: Final = 0.21  # of clear air at the zenith, for the sun's light
+_OPTICAL_DEPTH: Final = 0.21  # of clear air at the zenith, for the sun's light (IES)
 _SUN_RAD: Final = math.radians(4)  # around a panorama's brightest texel, where its sun is sought
 _RING_RAD: Final = math.radians(
     6
@@ -124,10 +131,10 @@ def sky_for_house(
         rotation = _uniform(house_id, recipe.seed, "rotation") * 2 * math.pi
         return sky_from_panorama(panorama[0], panorama[1], recipe, rotation_rad=rotation)
     elevation, azimuth, is_overcast = _sun_of_house(recipe, house_id)
+    if is_overcast:
+        return overcast(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
     if elevation < 0:
         return evening(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
-    if is_overcast:
-        return overcast(recipe)
     return sunsky(recipe, elevation_rad=elevation, azimuth_rad=azimuth)
 
 
@@ -185,33 +192,67 @@ def sun_of_hour(hour: float, latitude_deg: float, day_of_year: int) -> tuple[flo
     return math.asin(max(-1.0, min(1.0, up))), math.atan2(east, north)
 
 
+def clear_sky_lx(elevation_rad: float) -> float:
+    """Illuminance of open level ground by a clear sky without its sun, which stands so high.
+
+    No moon and no town: 14,000 lx with the sun at the zenith, 600 at the horizon, 3.4 at 6 degrees
+    below, 0.0006 by night.
+
+        >>> round(clear_sky_lx(0.0))
+        603
+    """
+    return float(10 ** np.interp(math.degrees(elevation_rad), *_CLEAR_LOG_LX))
+
+
+def sun_normal_lx(elevation_rad: float, zenith_lx: float) -> float:
+    """Illuminance of a surface that faces the sun, above the horizon, through clear air.
+
+    zenith_lx: the same with the sun at the zenith. Air mass by Kasten and Young 1989.
+
+        >>> round(sun_normal_lx(0.5, 100_000.0), -3)
+        80000.0
+    """
+    degrees = math.degrees(elevation_rad)
+    air_mass = 1 / (math.sin(elevation_rad) + 0.50572 * (degrees + 6.07995) ** -1.6364)
+    return zenith_lx * math.exp(-_OPTICAL_DEPTH * (air_mass - 1))
+
+
 def evening(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     """A sky whose sun is below the horizon: its glow fades to blue, and by night to that of a town.
 
-    The level of the clear twilight sky is that of standard tables (500 lx at sunset, 3 at 6 degrees,
-    0.01 at 12), times sky_lx / 10,000; _TOWN_LX is added.
+    Its level is `clear_sky_lx` times sky_lx / 10,000; _TOWN_LX is added.
     """
     # The model's sky at sunset, bluer the lower the sun is.
     depth_deg = -math.degrees(elevation_rad)
     glow, _sun = _hosek(_direction(_HORIZON_RAD, azimuth_rad))
     glow[glow.shape[0] // 2 :] = 0.0
     share = min(depth_deg / _BLUE_DEG, 1.0)
-    level = float(np.interp(depth_deg, *_TWILIGHT_LOG_LX))
     dome = (1 - share) * _scaled_to(glow, 1.0) + share * _scaled_to(_even(_BLUE), 1.0)
-    dome *= 10**level * recipe.emission.sky_lx / 10_000.0
+    dome *= clear_sky_lx(elevation_rad) * recipe.emission.sky_lx / _CLEAR_LX
     dome += _scaled_to(_even(_TOWN), _TOWN_LX)
     name = "dusk" if depth_deg < _NIGHT_FROM_DEG else "night"
     sun = _direction(elevation_rad, azimuth_rad)
     return _with_ground(Sky(name, dome.astype(np.float32), sun, np.zeros(3)))
 
 
-def overcast(recipe: Recipe) -> Sky:
-    """The CIE's overcast sky: three times as bright at the zenith as at the horizon, no sun."""
+def overcast(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
+    """The CIE's overcast sky: three times as bright at the zenith as at the horizon, no sun seen.
+
+    elevation_rad: of the sun behind the clouds, which sets the level: 10,800 lx at 30 degrees (IES),
+    half of the clear sky's below the horizon, times sky_lx / 10,000; _TOWN_LX is added.
+    """
     height = np.maximum(directions(*DOME_SHAPE)[..., 1:2], 0.0)
     dome = (1 + 2 * height) / 3 * np.array(_CLOUDS)
     dome[dome.shape[0] // 2 :] = 0.0
-    scaled = _scaled_to(dome, recipe.emission.sky_lx).astype(np.float32)
-    return _with_ground(Sky("overcast", scaled, np.array([0.0, 1.0, 0.0]), np.zeros(3)))
+    at_sunset, more = _OVERCAST_LX
+    if elevation_rad >= 0:
+        level = at_sunset + more * math.sin(elevation_rad)
+    else:
+        level = _OVERCAST_SHARE * clear_sky_lx(elevation_rad)
+    scaled = _scaled_to(dome, level * recipe.emission.sky_lx / _CLEAR_LX)
+    scaled += _scaled_to(_even(_TOWN), _TOWN_LX)
+    sun = _direction(elevation_rad, azimuth_rad)
+    return _with_ground(Sky("overcast", scaled.astype(np.float32), sun, np.zeros(3)))
 
 
 def _even(rgb: tuple[float, float, float]) -> F64:
@@ -237,20 +278,18 @@ def _direction(elevation_rad: float, azimuth_rad: float) -> F64:
 def sunsky(recipe: Recipe, *, elevation_rad: float, azimuth_rad: float) -> Sky:
     """Hosek and Wilkie's clear sky (Mitsuba's `sunsky`) with the sun at that place.
 
-    elevation_rad: above the horizon. azimuth_rad: from -z towards +x. The dome is
-    scaled so that open level ground gets emission.sky_lx, the sun to emission.sun_lx at the
-    zenith, less the lower it stands.
+    elevation_rad: 0 or above. azimuth_rad: from -z towards +x. Open level ground gets `clear_sky_lx`
+    times emission.sky_lx / 10,000 of the dome; the sun gives what air leaves of emission.sun_lx.
     """
-    # Evaluate the model and scale its upper half to sky_lx.
+    # Evaluate the model, which has no sky for a sun that touches the horizon, and scale its upper half.
     sun = _direction(elevation_rad, azimuth_rad)
-    dome, sun_rgb = _hosek(sun)
+    dome, sun_rgb = _hosek(_direction(max(elevation_rad, _HORIZON_RAD), azimuth_rad))
     dome[dome.shape[0] // 2 :] = 0.0
-    scale = recipe.emission.sky_lx / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))
+    level = clear_sky_lx(elevation_rad) * recipe.emission.sky_lx / _CLEAR_LX
+    scale = level / (LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE))
     dome *= scale
-
-    # Dim the sun by the air before it, more the lower it stands; at the zenith it gives sun_lx.
-    air_mass = 1.0 / max(sun[1], 0.05)
-    lux = recipe.emission.sun_lx * math.exp(-_OPTICAL_DEPTH * (air_mass - 1.0))
+    # Dim the sun by the air before it.
+    lux = sun_normal_lx(elevation_rad, recipe.emission.sun_lx)
     irradiance = sun_rgb / (sun_rgb @ LUMINANCE) * lux / LM_PER_W
     return _with_ground(Sky("sunsky", dome, sun, irradiance, scale=scale))
 
@@ -272,15 +311,16 @@ def sky_from_panorama(
     shift = round(rotation_rad / (2 * math.pi) * picture.shape[1])
     picture = np.roll(picture, shift, axis=1)
     dome, sun, irradiance = _without_sun(picture)
-    # Scale the dome to sky_lx and the sun alike, but to sun_lx at most.
+    # Scale the dome to sky_lx and the sun alike, but to what clear air lets through at most.
     dome_lx = LM_PER_W * float(horizontal_irradiance(dome) @ LUMINANCE)
     if dome_lx <= 0:
         raise BadRecipe(f"panorama {name}: its upper half is black")
     scale = recipe.emission.sky_lx / dome_lx
     irradiance = irradiance * scale
-    sun_lx = LM_PER_W * float(irradiance @ LUMINANCE) * max(sun[1], 0.0)
-    if sun_lx > recipe.emission.sun_lx:
-        irradiance = irradiance * (recipe.emission.sun_lx / sun_lx)
+    sun_lx = LM_PER_W * float(irradiance @ LUMINANCE)
+    most_lx = sun_normal_lx(math.asin(min(max(sun[1], 0.0), 1.0)), recipe.emission.sun_lx)
+    if sun_lx > most_lx:
+        irradiance = irradiance * (most_lx / sun_lx)
     turned_rad = shift / picture.shape[1] * 2 * math.pi
     scaled = (dome * scale).astype(np.float32)
     return Sky(name, scaled, sun, irradiance, rotation_rad=turned_rad, scale=scale)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.transport.scene_tables.sky import (
     choose_panorama,
     drawn_time,
@@ -18,6 +18,12 @@ from pbrs_farm.transport.scene_tables.sky import (
 )
 
 FAST = recipe_from_name("fast")
+
+
+def clear(elevation_deg: float, *, overcast: bool = False) -> Recipe:
+    """A recipe whose sun is there."""
+    words = {"sky.sun_elevation_deg": str(elevation_deg), "sky.overcast": str(overcast).lower()}
+    return recipe_from_name("fast", words)
 
 
 def panorama(sun: float = 20_000.0) -> np.ndarray:
@@ -33,7 +39,7 @@ def test_a_panorama_of_any_scale_gives_one_sky_level_and_no_more_sun_than_allowe
 ) -> None:
     sky = sky_from_panorama("p", panorama() * factor, FAST, rotation_rad=1.0)
     assert sky.sky_lx == pytest.approx(10_000, rel=1e-3)
-    assert 0 < sky.sun_lx <= 60_000 * 1.001
+    assert 0 < sky.sun_lx <= 103_000
     assert sky.dome.max() < 100 * sky.dome.mean()
 
 
@@ -79,7 +85,7 @@ def test_a_third_of_houses_is_lit_by_lamps_and_paper_never() -> None:
     assert set(times) == {"day", "dusk", "night"}
     by_night = next(n for n, t in zip(names, times, strict=True) if t == "night")
     assert sky_for_house(FAST, by_night).sky_lx < 1
-    assert sky_for_house(recipe_from_name("fast", {"sky.time": "day"}), by_night).sky_lx > 9_000
+    assert sky_for_house(recipe_from_name("fast", {"sky.time": "day"}), by_night).sky_lx > 5_000
     for name in ("paper", "released"):
         assert recipe_from_name(name).sky.time == "day"
 
@@ -130,12 +136,36 @@ def test_the_lower_the_sun_below_the_horizon_the_darker_and_bluer_the_sky() -> N
     assert blue == sorted(blue)
 
 
+@pytest.mark.parametrize(
+    ("elevation_deg", "lux"),
+    [(60, 100e3), (30, 50e3), (10, 11e3), (2, 1.5e3), (0, 600), (-3, 40), (-6, 3.4), (-12, 0.31)],
+)
+def test_open_ground_has_the_lux_of_the_tables_by_clear_sky_sun_and_town(
+    elevation_deg: float, lux: float
+) -> None:
+    sky = sky_for_house(clear(elevation_deg), "h")
+    assert abs(math.log10((sky.sky_lx + sky.sun_lx) / lux)) < 0.06
+    assert sky.facts()["sun_elevation_deg"] == pytest.approx(elevation_deg, abs=1e-3)
+
+
+def test_the_sky_has_no_step_at_the_horizon() -> None:
+    above, at, below = (sky_for_house(clear(d), "h") for d in (0.05, 0.0, -0.05))
+    assert above.sky_lx == pytest.approx(at.sky_lx, rel=0.03)
+    assert below.sky_lx == pytest.approx(at.sky_lx, rel=0.06)
+    assert at.sun_lx == 0
+    np.testing.assert_allclose(below.dome[100], at.dome[100], rtol=0.1)
+
+
 def test_an_overcast_sky_is_three_times_as_bright_at_the_zenith_and_has_no_sun() -> None:
-    sky = sky_for_house(recipe_from_name("fast", {"sky.overcast": "true", "sky.time": "day"}), "h")
-    assert sky.sky_lx == pytest.approx(10_000, rel=1e-3)
+    sky = sky_for_house(clear(30, overcast=True), "h")
+    assert sky.sky_lx == pytest.approx(10_800, rel=1e-3)
     assert not sky.sun_irradiance.any()
+    assert sky.facts()["sun_elevation_deg"] == pytest.approx(30, abs=1e-3)
     zenith, horizon = sky.dome[0, 0, 1], sky.dome[127, 0, 1]
     assert zenith / horizon == pytest.approx(3, rel=0.02)
+    levels = [sky_for_house(clear(d, overcast=True), "h").sky_lx for d in (60, 10, 0, -1, -6, -20)]
+    assert levels == sorted(levels, reverse=True)
+    assert 250 < levels[2] < 350
 
 
 def test_the_hour_is_in_the_digest_of_a_sky() -> None:
