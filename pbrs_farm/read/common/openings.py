@@ -15,6 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Box, Item, ItemKind, Opening, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, face_areas
+from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.geometry.solids import box
 
 CUTTER_REACH_M: Final = 0.02  # how far a cutter reaches out of either face of a wall without a hole
@@ -53,6 +54,7 @@ class _WallFrame:
     level_id: str
     normal: F64  # (3,) unit
     points: F64  # (V, 3) world
+    corners: F64  # (F, 3, 3) world, of the faces
     area_m2: float
 
 
@@ -92,8 +94,8 @@ def openings_of_voids(items: Sequence[Item], voids: Sequence[Void]) -> dict[str,
 
 
 def _lies_in(opening: Opening, other: Opening) -> bool:
-    middle, corners = opening.quad.mean(0), other.cutter.positions
-    inside = (middle > corners.min(0) - _BESIDE_M) & (middle < corners.max(0) + _BESIDE_M)
+    quad, corners = opening.quad, other.cutter.positions
+    inside = (quad > corners.min(0) - _BESIDE_M) & (quad < corners.max(0) + _BESIDE_M)
     return bool(inside.all() and abs(opening.normal @ other.normal) > 0.9)
 
 
@@ -108,15 +110,20 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     # The corners that the cut left in the wall are its rim.
     wall = np.concatenate([f.points for f in own]) @ axes
     rim = wall[(wall > low - _RIM_M).all(1) & (wall < high + _RIM_M).all(1)]
-    if len(rim) < 4 or np.ptp(rim[:, :2], axis=0).min() < LEAST_HOLE_M:
+    has_rim = len(rim) >= 4 and np.ptp(rim[:, :2], axis=0).min() >= LEAST_HOLE_M
+    # Without a rim the cut took the wall beside it away too, or failed.
+    within = rim if has_rim else wall
+    low, high = np.maximum(low, within.min(0)), np.minimum(high, within.max(0))
+    if (high - low)[:2].min() < LEAST_HOLE_M:
         return None
-    ends = np.stack([np.maximum(low, rim.min(0)), np.minimum(high, rim.max(0))])
-    ends[:, 2] = rim[:, 2].min(), rim[:, 2].max()
-    # A niche leaves part of the wall's thickness.
-    sides = [p for f in own for p in _wall_points_around(f, axes, ends[0], ends[1])]
-    thick = np.ptp(np.concatenate([rim, *sides])[:, 2])
-    if void.item is None and np.ptp(rim[:, 2]) < thick - _RIM_M:
+    sides = [p for f in own for p in _wall_points_around(f, axes, low, high)]
+    if void.item is None and (not has_rim or _is_niche(rim, sides)):
         return None
+    depth = [rim] if has_rim else sides
+    if not depth:
+        return None
+    ends = np.stack([low, high])
+    is_bare = not _is_covered((low + high) / 2, axes, own)
     # Walls beside it have holes of their own, or are cut.
     others = [
         points
@@ -127,9 +134,25 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     holes = [h for points in others if (h := _hole(points, ends[0], ends[1])) is not None]
     return _opening(
         void.id if void.item is None else f"{void.item.id}_hole", void.level_id, void.item,
-        is_window=void.is_window, axes=axes, ends=_across_walls(ends, [rim, *others]),
-        has_holes=True, is_cut=len(holes) == len(others),
+        is_window=void.is_window, axes=axes, ends=_across_walls(ends, [*depth, *others]),
+        has_holes=is_bare, is_cut=is_bare and len(holes) == len(others),
     )  # fmt: skip
+
+
+def _is_niche(rim: F64, sides: Sequence[F64]) -> bool:
+    """Whether a hole with that rim leaves part of the wall's thickness."""
+    thick = np.ptp(np.concatenate([rim, *sides])[:, 2])
+    return bool(np.ptp(rim[:, 2]) < thick - _RIM_M)
+
+
+def _is_covered(place: F64, axes: F64, own: Sequence[_WallFrame]) -> bool:
+    """Whether faces of a wall's sides lie before or behind a place (3,) along, up and across it."""
+    sides = [f.corners @ axes for f in own if abs(float(f.normal @ axes[:, 2])) > 0.999]
+    if not sides:
+        return False
+    # Look across the wall as from below.
+    y = lowest_above(place[None, :2], np.concatenate(sides)[:, :, [0, 2, 1]], -np.inf)
+    return bool(np.isfinite(y[0]))
 
 
 def _across_void(void: Void, own: Sequence[_WallFrame]) -> F64:
@@ -170,7 +193,8 @@ def _frames(item: Item) -> list[_WallFrame]:
         best = n[here][area[here].argmax()] * [1, 0, 1]
         points = np.unique(corners[here].reshape(-1, 3), axis=0)
         normal = best / np.linalg.norm(best)
-        found.append(_WallFrame(item.id, item.level_id, normal, points, float(area[here].sum())))
+        area_m2 = float(area[here].sum())
+        found.append(_WallFrame(item.id, item.level_id, normal, points, corners[here], area_m2))
     return found
 
 

@@ -75,6 +75,19 @@ def test_a_hole_without_a_filling_is_an_open_hole_and_a_niche_is_none(tmp_path: 
     assert size_of(opening) == [0.9, 2.0, 0.2]
 
 
+def test_a_door_whose_wall_is_gone_beside_it_keeps_its_opening(tmp_path: Path) -> None:
+    building, wall = a_room()
+    hole = building.hole(wall, 2.0, 0.9, 0.0, 2.0)
+    leaf = building.box_solid((0, 0.08, 0), (0.9, 0.12, 2.0))
+    door = building.fill(hole, "IfcDoor", "Door", [leaf])
+    # A passage takes its jambs and its lintel away.
+    building.hole(wall, 1.9, 2.1, 0.0, 2.4)
+    of_item = {o.item_id: o for o in in_front(read(building, tmp_path))}
+    assert size_of(of_item[door.GlobalId]) == [0.9, 2.0, 0.2]
+    assert size_of(of_item[None]) == [2.1, 2.4, 0.2]
+    assert [o.is_cut for o in of_item.values()] == [True, True]
+
+
 def test_two_leaves_of_a_wall_with_a_hole_each_have_one_opening(tmp_path: Path) -> None:
     building, wall = a_room()
     outer = building.wall("Outer", (-6, -2.1), (0, -2.1), 0.0, 2.6, thick=0.1)
