@@ -123,7 +123,7 @@ def rooms_by_walls(ground: Polygon, lines: Sequence[LineString]) -> list[Polygon
     """
     inner = ground.buffer(-_AT_EDGE_M)
     within = [part for line in lines for part in shapely.get_parts(line.intersection(inner))]
-    if not within:
+    if not within or not ground.is_valid:
         return []
     edge = ground.exterior.buffer(HALF_M, join_style="mitre")
     standing = unary_union([edge, *(line.buffer(HALF_M, cap_style="flat") for line in within)])

@@ -129,6 +129,17 @@ def test_walls_of_two_heights_without_a_slope_are_a_note(tmp_path: Path) -> None
     assert note.startswith("walls of 1.20 to 3.00 m have one ceiling, at 2.10 m")
 
 
+def test_an_outline_without_area_is_the_walls_rectangle(tmp_path: Path) -> None:
+    path = attic(tmp_path)
+    value = json.loads(path.read_text())
+    for row in (*value["walls"], *value["doors"]):
+        row["polygonCorners"] = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    # A floor that crosses itself has no rooms within.
+    value["floors"][0]["polygonCorners"] = [[-2, -1.5, 0], [2, 1.5, 0], [2, -1.5, 0], [-2, 1.6, 0]]
+    path.write_text(json.dumps(value))
+    assert not any(w.tops for w in plan_from_file(path).plan.walls)
+
+
 def test_slopes_below_another_storey_are_a_note(tmp_path: Path) -> None:
     path = attic(tmp_path)
     value = json.loads(path.read_text())

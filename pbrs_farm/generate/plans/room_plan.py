@@ -110,7 +110,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
         if abs(pose[1, 1]) < _UPRIGHT:
             left_out.add("a wall that leans stands upright")
         walls.append((surface, pose))
-        top = _upper_edge_of(path, f"wall {k}", surface, pose)
+        top = _upper_edge_of(surface, pose)
         tops.append(top)
         lines.append((top.places[0], top.places[-1]))
     floor = _floor_height(path, scan, walls)
@@ -158,16 +158,15 @@ def _parse_pose(path: Path, place: str, surface: _Surface) -> F64:
     return pose if np.allclose(pose[3], [0, 0, 0, 1]) and pose[:3, 3].any() else pose.T
 
 
-def _upper_edge_of(path: Path, place: str, surface: _Surface, pose: F64) -> WallTop:
+def _upper_edge_of(surface: _Surface, pose: F64) -> WallTop:
     """The upper edge in the plan, heights in the scan's own y: of its outline, else of its rectangle."""
     half_width, half_height = (v / 2 for v in surface.dimensions[:2])
     edge = [(-half_width, half_height), (half_width, half_height)]
     corners = [(*c, 0.0, 0.0)[:2] for c in surface.polygonCorners or ()]
-    if len(corners) >= 3:
-        outline = largest_part(shapely.make_valid(Polygon(corners)))
-        if outline is None:
-            raise BadInput(path, f"{place}, polygonCorners", "has no area")
-        edge = upper_edge(outline)
+    outline = largest_part(shapely.make_valid(Polygon(corners))) if len(corners) >= 3 else None
+    if outline is not None:
+        own = upper_edge(outline)
+        edge = own if len(own) >= 2 else edge
     world = np.array([(x, y, 0.0) for x, y in edge]) @ pose[:3, :3].T + pose[:3, 3]
     places = tuple((float(x), float(z)) for x, _, z in world)
     return WallTop(places, tuple(float(y) for y in world[:, 1]))
@@ -179,9 +178,7 @@ def _lines_in_gaps(path: Path, scan: _Scan, lines: list[Line]) -> list[Line]:
     found = []
     for kind in ("doors", "windows", "openings"):
         for k, surface in enumerate(getattr(scan, kind), 1):
-            top = _upper_edge_of(
-                path, f"{kind} {k}", surface, _parse_pose(path, f"{kind} {k}", surface)
-            )
+            top = _upper_edge_of(surface, _parse_pose(path, f"{kind} {k}", surface))
             line = (top.places[0], top.places[-1])
             if LineString(line).difference(standing).length > surface.dimensions[0] / 2:
                 found.append(line)
