@@ -170,7 +170,9 @@ def whole_home(folder: Path) -> Path:
 
 
 def test_a_home_scanned_at_once_has_its_rooms(tmp_path: Path) -> None:
-    rooms = plan_from_file(whole_home(tmp_path)).plan.rooms
+    file = plan_from_file(whole_home(tmp_path))
+    assert file.left_out == ()
+    rooms = file.plan.rooms
     found = {r.type.value: r.area for r in rooms}
     assert found == {
         "living": pytest.approx(4.95 * 6, rel=0.03),

@@ -59,6 +59,8 @@ def test_walls_without_thickness_part_a_ground_and_close_at_doorways() -> None:
         LineString([(4.15, 3.5), (7.9, 3.5)]), *(LineString(s) for s in _sides(box(0, 0, 8, 6))),
     ]  # fmt: skip
     rooms = rooms_by_walls(box(0, 0, 8, 6), lines)
+    # But for the jambs, of which each takes its corner.
+    assert all(a.intersection(b).area < 0.01 for k, a in enumerate(rooms) for b in rooms[:k])
     assert sorted(r.area for r in rooms) == pytest.approx(
         [3.95 * 2.5, 3.95 * 3.5, 3.95 * 6], rel=0.02
     )
