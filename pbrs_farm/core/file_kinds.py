@@ -1,6 +1,6 @@
 """What a file is by its first bytes, whatever its name says: for messages of readers that cannot read it.
 
-No effects. A picture named .glb, a page of the net that was saved as .hdr or a pointer of Git LFS is
+No effects. A picture named .glb, an HTML page that was saved as .hdr or a pointer of Git LFS is
 named as what it is; a reader's own words ("no GLB file", "not UTF-8") would send people astray.
 """
 
@@ -62,7 +62,7 @@ _KINDS: Final = (
     _kind(rb"PAR1", "a Parquet table", ".parquet"),
     _kind(rb"SQLite format 3\0", "an SQLite database", ".db .sqlite .sqlite3"),
     _kind(rb"\x7fELF|MZ.{56}", "a program", ".so .exe .dll .bin"),
-    _kind(rb"\s*(<!DOCTYPE html|<html)", "a page of the net", ".html .htm .xhtml",
+    _kind(rb"\s*(<!DOCTYPE html|<html)", "an HTML page", ".html .htm .xhtml",
           "the address that it came from gives a page: fetch the file itself"),
     _kind(rb"version https://git-lfs\.github\.com/spec", "a pointer of Git LFS", "",
           "`git lfs pull` fetches the file that it stands for"),

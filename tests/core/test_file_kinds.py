@@ -44,7 +44,7 @@ CONTENTS = {
     "a PNG picture": _png(),
     "a ZIP archive": _zip(),
     "a PDF document": b"%PDF-1.7\n%\xe2\xe3\n",
-    "a page of the net": PAGE,
+    "an HTML page": PAGE,
     "a pointer of Git LFS": POINTER,
 }
 
