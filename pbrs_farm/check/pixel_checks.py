@@ -282,6 +282,45 @@ def _coincident(
     return rays.without_holes(found, origin, directions)
 
 
+def of_another_colour(
+    face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
+) -> Faces:
+    """(N,) a triangle of another material that each ray pierces where it meets face, or -1.
+
+    Both are right for a label that they share, and the picture shows either: it glitters.
+    """
+    triangles, rays = scene
+    found = np.full(len(face), -1, np.int64)
+    corners = triangles.vertices.astype(np.float64)[triangles.faces]
+    planes = _number_planes(corners)
+    order = np.argsort(planes, kind="stable")
+    last = np.searchsorted(planes[order], planes, side="right")
+    start = np.searchsorted(planes[order], planes, side="left")
+    distance = rays.distance(face, origin, directions)
+    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
+    for k in np.nonzero(face >= 0)[0]:
+        own = order[start[face[k]] : last[face[k]]]
+        own = own[triangles.material[own] != triangles.material[face[k]]]
+        if len(own):
+            gap = np.abs(_distances_pierced(triangles, own, origin, directions[k]) - distance[k])
+            if gap.min() * across[k] <= TIE_DEPTH_M:
+                found[k] = own[gap.argmin()]
+    return rays.without_holes(found, origin, directions)
+
+
+def _number_planes(corners: Floats) -> NDArray[np.int64]:
+    """(F,) the number of each triangle's plane, whichever way it looks; planes 0.1 mm apart differ."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.nan_to_num(normal)
+    largest = np.take_along_axis(normal, np.abs(normal).argmax(1)[:, None], 1)
+    normal *= np.where(largest < 0, -1.0, 1.0)
+    offset = np.einsum("fi,fi->f", normal, corners[:, 0])
+    keys = np.round(np.column_stack([normal * 1e3, offset / TIE_DEPTH_M])).astype(np.int64)
+    return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), np.int64)
+
+
 def _distances_pierced(
     triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats
 ) -> Floats:

@@ -24,7 +24,7 @@ from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
 from pbrs_farm.check.pair_checks import check_pairs
 from pbrs_farm.check.picture_checks import check_edges, check_histogram
-from pbrs_farm.check.pixel_checks import RAY_LAYERS, judge
+from pbrs_farm.check.pixel_checks import RAY_LAYERS, PixelChecks, judge, of_another_colour
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.sensor_checks import check_derived
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
@@ -36,6 +36,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
 SAMPLE = 2000  # pixels of each view that are recomputed by default
+MOST_COINCIDENT = 3  # of those, by chance: an edge where two things meet
 MAX_TIES = 0.0002  # share of pixels whose instance may be the other of two right answers
 
 
@@ -165,12 +166,36 @@ def _check_rays(
         for k in np.nonzero(verdict.coincident)[0]:
             pair = instance[verdict.first[k]], instance[verdict.face[k]]
             tally.coincide(view.place.partition("/")[0], (item[int(pair[0])], item[int(pair[1])]))
+        if scene is scenes.all:
+            _note_glitter(view, verdict, rows, columns, scene, tally)
         ties = int((verdict.tied & ~verdict.coincident).sum())
         for check, right in verdict.right.items():
             tally.add(f"{prefix}{check}", len(rows), ties=ties)
             # Name each wrong pixel.
             for k in np.nonzero(~right)[0]:
                 tally.fail(f"{prefix}{check}", view.place, f"row {rows[k]}, column {columns[k]}")
+
+
+def _note_glitter(
+    view: StoredView,
+    verdict: PixelChecks,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    scene: tuple[Triangles, Rays],
+    tally: Tally,
+) -> None:
+    """Tell of pixels that show either of two colours, where there are more than a few of a pair."""
+    triangles, _ = scene
+    origin, directions = view.rays(rows, columns)
+    other = of_another_colour(verdict.first, origin, directions, scene)
+    seen = np.nonzero((other >= 0) & ~verdict.coincident)[0]
+    pairs = np.stack([triangles.instance[verdict.first[seen]], triangles.instance[other[seen]]], 1)
+    kinds, n = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
+    for pair, count in zip(kinds, n, strict=True):
+        if count > MOST_COINCIDENT:
+            a, b = (triangles.item[int(i)] for i in pair)
+            for _ in range(count):
+                tally.coincide(view.place.partition("/")[0], (a, b))
 
 
 def _chosen(view: StoredView, n_pixels: int | None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -27,7 +27,7 @@ from pbrs_farm.repair.small_repairs import (
 )
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.added_ceilings import rooms_with_added_ceilings
-from pbrs_farm.repair.structure.frames_apart import with_frames_apart
+from pbrs_farm.repair.structure.frames_apart import with_frames_apart, with_parts_apart
 from pbrs_farm.repair.structure.undersides import with_undersides
 from pbrs_farm.repair.structure.watertight import repaired_structure, with_structure
 
@@ -57,6 +57,7 @@ def repair(
     house = replace(house, notes=(*house.notes, *_lost(structure.report)))
     house = with_undersides(house)
     house, n_apart = with_frames_apart(house)
+    house, n_parts_apart = with_parts_apart(house)
 
     house, sources, given = _with_light(house, fields, occluder_from)
     house = with_boxes_of_meshes(house)
@@ -74,7 +75,11 @@ def repair(
         faces=faces,
         mirrors=mirrors,
         structure=structure.report.model_copy(
-            update={"n_walls_made_white": n_white, "n_frames_moved": n_apart}
+            update={
+                "n_walls_made_white": n_white,
+                "n_frames_moved": n_apart,
+                "n_parts_moved": n_parts_apart,
+            }
         ),
         sources=tuple(sources),
         fallback_lights=given.fallback,

@@ -58,6 +58,7 @@ class StructureReport(Record):
     n_openings: int = 0
     n_openings_cut: int = 0  # the others touch no wall
     n_frames_moved: int = 0  # doors, windows and things that lay in the faces of walls or floors
+    n_parts_moved: int = 0  # parts of things that lay in the faces of others
     left_as_is: tuple[LeftAsIs, ...] = ()
     areas: tuple[SideArea, ...] = ()  # of every wall, floor and ceiling
     walls_lost: tuple[WallLoss, ...] = ()

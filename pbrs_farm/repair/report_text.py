@@ -66,6 +66,8 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
         yield f"{s.n_openings_cut} of {_n(s.n_openings, 'opening')} cut through the walls."
     if s.n_frames_moved:
         yield f"{_n(s.n_frames_moved, 'piece')} lay in the faces of walls: moved 0.5 mm out."
+    if s.n_parts_moved:
+        yield f"{_n(s.n_parts_moved, 'part')} lay in the faces of others: moved 0.5 mm out."
     for wall in s.walls_lost:
         yield (
             f"WALL LOST: of wall {wall.item_id} repair left {wall.after_m2:.1f} of "

@@ -1,7 +1,8 @@
-"""Things moved half a millimetre out of the faces of walls, floors and ceilings; no effects.
+"""Things moved half a millimetre out of the faces of walls and of one another; no effects.
 
 A frame as thick as its wall lies in the wall's own faces, and so does a picture drawn on it: a ray
-meets either of the two there, and no label is the only right one.
+meets either of the two there, and no label is the only right one. Where parts of a piece, or pieces
+that touch, share a face and are of two materials, the picture glitters.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
+from pbrs_farm.core.house import House, Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, unit_normals
 
 MOVED_M = 5e-4
@@ -25,6 +27,9 @@ _COINCIDE_M = 1e-4  # faces nearer than this are one to a ray
 _PARALLEL = 0.9999  # cosine
 _TURN = 0.015  # between unit normals whose cosine is that
 _LEAST_AREA_M2 = 1e-5  # that two faces must share
+_SEEN_M2 = 1e-3  # that parts must share: less is a few pixels from near
+_LEAST_FACE_M2 = 1e-4  # of a face: smaller ones are of what is round
+_ROUNDS = 3  # parts that lie in one plane by threes are moved by steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +58,104 @@ def with_frames_apart(house: House) -> tuple[House, int]:
     return (house.with_items(items), n_moved) if n_moved else (house, 0)
 
 
+def with_parts_apart(house: House) -> tuple[House, int]:
+    """The house with parts of things moved out of others' faces, and how many parts were.
+
+    A part is what a thing has of one material. Of two that share area in one plane and look one way
+    the later is moved, unless another face lies within reach.
+    """
+    moved = set[tuple[int, int]]()
+    for _ in range(_ROUNDS):
+        house, found = _move_parts_once(house)
+        moved |= found
+        if not found:
+            break
+    return house, len(moved)
+
+
+def _move_parts_once(house: House) -> tuple[House, set[tuple[int, int]]]:
+    """The house with the later of any two parts moved, and (item, material) of those that were."""
+    parts = [
+        (k, m)
+        for k, item in enumerate(house.items)
+        if not item.kind.is_structure
+        for m in dict.fromkeys(s.material for s in item.surfaces if len(s.faces))
+    ]
+    corners = [
+        corners_of_surfaces(s for s in house.items[k].surfaces if s.material == m) for k, m in parts
+    ]
+    of = np.repeat(np.arange(len(parts)), [len(c) for c in corners])
+    every = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    items, moved = list(house.items), set[tuple[int, int]]()
+    for part, other, normal, offset in _pairs_in_one_plane(every, of):
+        k, material = parts[part]
+        mine, its = (_Faces(c, unit_normals(c)) for c in (every[of == part], every[of == other]))
+        if _is_met(mine, its, normal, offset):
+            continue
+        surfaces = [
+            _moved_in_plane(s, normal, offset) if s.material == material else s
+            for s in items[k].surfaces
+        ]
+        items[k] = replace(items[k], surfaces=tuple(surfaces))
+        moved.add(parts[part])
+    return (house.with_items(items) if moved else house), moved
+
+
+def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, int, F64, float]]:
+    """(later part, earlier part, normal, offset) where two parts share area in a plane.
+
+    corners: (F, 3, 3) of all parts, of: (F,) the part of each, ascending. A part comes once a plane.
+    """
+    vectors = area_vectors(corners)
+    twice = np.linalg.norm(vectors, axis=1)
+    faces = np.flatnonzero(twice > 2 * _LEAST_FACE_M2)
+    normals = vectors[faces] / twice[faces, None]
+    offsets = np.einsum("fi,fi->f", normals, corners[faces, 0])
+    keys = np.round(np.column_stack([normals * 1e3, offsets / _COINCIDE_M])).astype(np.int64)
+    plane = np.unique(keys @ [1, 4_001, 16_008_001, 64_048_012_001], return_inverse=True)[1]
+    order = np.argsort(plane, kind="stable")
+    own = of[faces[order]]
+    start = np.r_[0, np.flatnonzero(np.diff(plane[order])) + 1][: len(order)]
+    end = np.r_[start[1:], len(order)]
+    found = []
+    # Faces of a plane are in the order of their parts: where the first and the last differ are several.
+    for k in np.flatnonzero(own[start] != own[end - 1]):
+        group = order[start[k] : end[k]]
+        normal, offset = normals[group[0]], float(offsets[group[0]])
+        members = {
+            int(p): corners[faces[group[of[faces[group]] == p]]]
+            for p in np.unique(of[faces[group]])
+        }
+        boxes = {p: (c.min((0, 1)), c.max((0, 1))) for p, c in members.items()}
+        for part in sorted(members, reverse=True):
+            low, high = boxes[part]
+            for other in members:
+                if other >= part:
+                    continue
+                spans = np.minimum(high, boxes[other][1]) - np.maximum(low, boxes[other][0])
+                # Of their boxes the two longer sides bound the area, but for a plane's slant.
+                longer = np.sort(spans)[1:]
+                if spans.min() < -_COINCIDE_M or longer[0] < 0 or 2 * longer.prod() < _SEEN_M2:
+                    continue
+                axes = np.linalg.svd(normal[None])[2][1:]
+                shared = shapely.intersection(
+                    _outline_of_faces(members[part], axes), _outline_of_faces(members[other], axes)
+                )
+                if float(shapely.area(shared)) > _SEEN_M2:
+                    found.append((part, other, normal, offset))
+                    break
+    return found
+
+
+def _moved_in_plane(surface: Surface, normal: F64, offset: float) -> Surface:
+    """The surface with its corners in a plane moved along the normal, so that its faces stay joined."""
+    in_plane = np.abs(surface.positions.astype(np.float64) @ normal - offset) < _COINCIDE_M
+    if not in_plane.any():
+        return surface
+    shift = np.where(in_plane[:, None], MOVED_M * normal, 0.0)
+    return replace(surface, positions=(surface.positions + shift).astype(np.float32))
+
+
 def _move_out_of_planes(item: Item, walls: Sequence[Item]) -> Item:
     low, high = item.bounds
     own, around = _faces_of_structure([item], low, high), _faces_of_structure(walls, low, high)
@@ -65,13 +168,8 @@ def _move_out_of_planes(item: Item, walls: Sequence[Item]) -> Item:
         if any(normal @ n > _PARALLEL and abs(offset - o) < 2 * _COINCIDE_M for n, o in done):
             continue
         done.append((normal, offset))
-        # Move all of the item's corners in that plane, so that its faces stay joined.
-        for k, s in enumerate(item.surfaces):
-            in_plane = np.abs(s.positions.astype(np.float64) @ normal - offset) < _COINCIDE_M
-            if in_plane.any():
-                shift = np.where(in_plane[:, None], MOVED_M * normal, 0.0)
-                positions = (surfaces[k].positions + shift).astype(np.float32)
-                surfaces[k] = replace(surfaces[k], positions=positions)
+        for k, surface in enumerate(surfaces):
+            surfaces[k] = _moved_in_plane(surface, normal, offset)
     same = all(a is b for a, b in zip(surfaces, item.surfaces, strict=True))
     return item if same else replace(item, surfaces=tuple(surfaces))
 

@@ -12,7 +12,7 @@ from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.structure.frames_apart import MOVED_M, with_frames_apart
+from pbrs_farm.repair.structure.frames_apart import MOVED_M, with_frames_apart, with_parts_apart
 from tests.repair.wall_rooms import WALL, covers, house, room, walls_around
 
 RECT = (0.0, 0.0, 4.0, 3.0)
@@ -78,3 +78,37 @@ def test_a_thing_drawn_on_a_wall_or_floor_is_moved_out_of_it(
     assert low[axis] == pytest.approx(moved_to, abs=1e-6)
     assert high[axis] == pytest.approx(moved_to, abs=1e-6)
     assert report.structure.n_frames_moved == 1
+
+
+def _oven(pane_depth_m: float, pane_half_m: float = 0.2) -> Item:
+    """An oven with its front at z = 0.5, and a pane in it that reaches to z = pane_depth_m."""
+    body = box("body", np.array([1.0, 0.4, 0.2]), np.array([0.3, 0.4, 0.3]), 0)
+    half = np.array([pane_half_m, pane_half_m, 0.02])
+    pane = box("pane", np.array([1.0, 0.4, pane_depth_m - 0.02]), half, 1)
+    return Item("oven", "oven", ItemKind.OBJECT, "0", (body, pane), nyu40=24)
+
+
+def _front(item: Item, material: int) -> float:
+    return float(max(s.positions[:, 2].max() for s in item.surfaces if s.material == material))
+
+
+def test_a_pane_in_the_plane_of_its_door_is_moved_out_of_it() -> None:
+    after, n = with_parts_apart(house([_oven(0.5)], [room("0_0", RECT)]))
+    assert n == 1
+    assert _front(after.items[0], 0) == pytest.approx(0.5, abs=1e-6)
+    assert _front(after.items[0], 1) == pytest.approx(0.5 + MOVED_M, abs=1e-6)
+    assert with_parts_apart(after)[1] == 0
+
+
+@pytest.mark.parametrize(("depth_m", "half_m"), [(0.501, 0.2), (0.49, 0.2), (0.5, 0.01)])
+def test_a_part_that_shares_no_face_to_be_seen_stays(depth_m: float, half_m: float) -> None:
+    source = house([_oven(depth_m, half_m)], [room("0_0", RECT)])
+    assert with_parts_apart(source) == (source, 0)
+
+
+def test_three_pieces_in_one_plane_are_all_apart() -> None:
+    pieces = [replace(_oven(0.3), id=name, name=name) for name in ("a", "b", "c")]
+    after, n = with_parts_apart(house(pieces, [room("0_0", RECT)]))
+    fronts = sorted(_front(item, 0) for item in after.items)
+    assert n > 0
+    assert np.diff(fronts).min() > 0.9 * MOVED_M
