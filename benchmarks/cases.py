@@ -1,7 +1,7 @@
 """How many files that were read wrongly once still are: `make bench NAME=cases` -> out/bench/cases.json.
 
-The cases are those of tests/cases. With them stand the formats that run from end to end and what
-hostile inputs do.
+The cases are those of tests/cases. With them stand the formats that run from end to end, how far cloths
+are stretched in dressed homes, and what hostile inputs do.
 """
 
 from __future__ import annotations
@@ -11,10 +11,11 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks import hostile
+from benchmarks.dress import cloths
 from benchmarks.figures import write_report
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -29,6 +30,7 @@ UNITS: Final = {
     "inputs": "formats that are read",
     "inputs.run": "of them that `run`, a farm's worker and, where one is written, `run` of our own export make a home of",
     "inputs.not_run": "the others",
+    "cloth.stretch_p99": cloths.UNITS["cloth.stretch_p99"],
     "hostile.inputs": "hostile files and words",
     "hostile.failures": "of them that did harm",
 }
@@ -40,20 +42,21 @@ _BY_WORKERS: Final = (
 
 
 def main() -> None:
-    """Run every case and every format, then the hostile inputs; write the report."""
+    """Run every case and every format, then cloths and hostile inputs; write the report."""
     wrong = _faults({one.name: _asked(one) for one in CASES.values()})
     not_run = _faults(_trials_of_formats())
     for title, said in _not_made_by_workers().items():
         not_run.setdefault(title, said)
     n_formats = len(every_format())
     hostile_inputs, hostile_failures = hostile.counted(())
-    figures = {
+    figures: dict[str, Any] = {
         "cases": len(CASES),
         "cases.wrong": len(wrong),
         "cases.wrong_names": sorted(wrong),
         "inputs": n_formats,
         "inputs.run": n_formats - len(not_run),
         "inputs.not_run": sorted(not_run),
+        "cloth.stretch_p99": cloths.figures()["cloth.stretch_p99"],
         "hostile.inputs": hostile_inputs,
         "hostile.failures": hostile_failures,
     }

@@ -123,7 +123,7 @@ _CRATES: Final[dict[str, tuple[int, dict[str, Any], bool]]] = {
 
 
 def _crate_at(k: int) -> tuple[list[float], list[float]]:
-    return [0.3 + 0.7 * k, 0.0, 1.9], [0.8 + 0.7 * k, 0.5, 2.4]
+    return [0.6 + 0.6 * k, 0.0, 1.9], [1.0 + 0.6 * k, 0.5, 2.4]
 
 
 def _crates() -> Scene:
@@ -275,9 +275,11 @@ def _write_wraps(folder: Path) -> Path:
         s = room()
         _with_pictures(s, _encoded(colours), wrapS=mode, wrapT=mode)
         s.materials.append(_textured("Rug floor"))
-        s.nodes[0]["mesh"] = _floor(
-            s, 1, np.array([[-1, 2], [2, 2], [2, -1], [-1, -1]], np.float32)
-        )
+        # The floor's uv go from -1 to 2 on each of its sides.
+        floor = s.box([0, -0.12, 0], [4, 0, 3.5], 1)
+        uvs = np.tile(np.array([[-1, 2], [2, 2], [2, -1], [-1, -1]], np.float32), (6, 1))
+        s.meshes[floor]["primitives"][0]["attributes"]["TEXCOORD_0"] = s.writer.add_vertices(uvs)
+        s.nodes[0]["mesh"] = floor
         (folder / f"{name}.glb").write_bytes(s.glb())
     return folder
 
