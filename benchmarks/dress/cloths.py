@@ -95,14 +95,17 @@ def _measured(cloth: Thing, solid: list[Thing]) -> dict[str, Any]:
 
 
 def stretches(item: Item) -> Floats:
-    """(E,) the length of each edge of a cloth's upper and lower side over that at rest."""
+    """(E,) the length of each edge of a cloth's middle over that at rest.
+
+    The middle lies between the two sides: of a bend the outer side is longer and the inner shorter.
+    """
     surface, n = item.surfaces[0], _vertices_of_side(item)
     assert surface.uvs is not None
-    at, rest = surface.positions.astype(np.float64), surface.uvs.astype(np.float64)
-    faces = surface.faces
+    points, rest = surface.positions.astype(np.float64), surface.uvs[:n].astype(np.float64)
+    at = (points[:n] + points[n : 2 * n]) / 2
+    faces = surface.faces[(surface.faces < n).all(1)]
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    # The rim has vertices of its own: its edges cross the cloth's thickness.
-    ends = np.unique(np.sort(ends[(ends < 2 * n).all(1)], axis=1), axis=0)
+    ends = np.unique(np.sort(ends, axis=1), axis=0)
     length, at_rest = (np.linalg.norm(x[ends[:, 0]] - x[ends[:, 1]], axis=1) for x in (at, rest))
     return np.asarray(length / at_rest)
 
