@@ -109,13 +109,15 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
     vectors = area_vectors(corners)
     twice = np.linalg.norm(vectors, axis=1)
     faces = np.flatnonzero(twice > 2 * _LEAST_FACE_M2)
+    if not len(faces):
+        return []
     normals = vectors[faces] / twice[faces, None]
     offsets = np.einsum("fi,fi->f", normals, corners[faces, 0])
     keys = np.round(np.column_stack([normals * 1e3, offsets / _COINCIDE_M])).astype(np.int64)
     plane = np.unique(keys @ [1, 4_001, 16_008_001, 64_048_012_001], return_inverse=True)[1]
     order = np.argsort(plane, kind="stable")
     own = of[faces[order]]
-    start = np.r_[0, np.flatnonzero(np.diff(plane[order])) + 1][: len(order)]
+    start = np.r_[0, np.flatnonzero(np.diff(plane[order])) + 1]
     end = np.r_[start[1:], len(order)]
     found = []
     # Faces of a plane are in the order of their parts: where the first and the last differ are several.

@@ -112,3 +112,8 @@ def test_three_pieces_in_one_plane_are_all_apart() -> None:
     fronts = sorted(_front(item, 0) for item in after.items)
     assert n > 0
     assert np.diff(fronts).min() > 0.9 * MOVED_M
+
+
+def test_a_home_without_things_stays_as_it_is() -> None:
+    source = house([*walls_around(RECT), *covers(room("0_0", RECT))], [room("0_0", RECT)])
+    assert with_parts_apart(source) == (source, 0)
