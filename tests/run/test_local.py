@@ -121,7 +121,7 @@ def test_a_view_that_came_out_black_is_told(
         ("0_0_0", "black"),
         ("0_0_1", "black"),
     ]
-    making._report(argparse.Namespace(json=False), summary, 1.0)
+    making._report(argparse.Namespace(json=False, out=str(tmp_path)), summary, 1.0)
     assert "0_0_1: dark: black" in capsys.readouterr().err
     # A second run finds them done and tells it again.
     assert len(run(tmp_path, "black").dark) == 2
