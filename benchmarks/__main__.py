@@ -27,6 +27,7 @@ OWN_TARGET: Final = {
     "house": "house",
     "dress": "dress.dress",
     "cloths": "dress.cloths",
+    "house_cost": "homes.house_cost",
     "made": "homes.made",
     "variety": "homes.variety",
     "light": "light.equal_time",
