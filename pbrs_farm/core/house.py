@@ -368,7 +368,7 @@ class Source:
 
     kind: str  # "sweethome3d", "suncg", "gltf", "object" or "builtin"
     file: str
-    sha256: str  # of the source's bytes
+    sha256: str  # of the source's bytes; of a generated home the digest of its word
     package: str = ""  # distribution package and version it was fetched from
     author: str = ""
     licence: str = ""

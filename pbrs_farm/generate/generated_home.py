@@ -14,7 +14,7 @@ from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.generate.drawn_home import drawn_home
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.generate.home_file import HomeContents, home_contents
 from pbrs_farm.generate.programme import Programme, Wishes
 from pbrs_farm.generate.staircase import Stair
 
@@ -24,9 +24,14 @@ class GeneratedHome:
     """A home that was made."""
 
     storeys: tuple[Storey, ...]  # from below
-    data: bytes  # of its .sh3d
+    contents: HomeContents
     origin: str
     stair: Stair | None = None  # between them
+
+    @property
+    def data(self) -> bytes:
+        """Its .sh3d, packed anew at each call."""
+        return self.contents.archive()
 
 
 def generate_home(
@@ -45,8 +50,8 @@ def generate_home(
     shelf = catalogue if home.furniture else EMPTY
     drawn = drawn_home(rng, shelf, wishes=wishes, programme=programme, style=home.style)
     said = origin_of_home(home, shelf, programme)
-    data = home_file(drawn.storeys, shelf, rng, drawn.stair, name=home.name, origin=said)
-    return GeneratedHome(drawn.storeys, data, said, drawn.stair)
+    contents = home_contents(drawn.storeys, shelf, rng, drawn.stair, name=home.name, origin=said)
+    return GeneratedHome(drawn.storeys, contents, said, drawn.stair)
 
 
 def origin_of_home(home: MadeHome, catalogue: Catalogue, programme: Programme | None = None) -> str:
@@ -76,5 +81,5 @@ def furnish_storeys(
         storeys.append(Storey(plan, (*own, *drawn)))
     words = [repr(own) for own in given_pieces if own]
     digest = keys.digest("own plan", VERSION, seed, style, key, catalogue.digest, *words)
-    data = home_file(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
-    return GeneratedHome(tuple(storeys), data, f"plan {digest}")
+    contents = home_contents(storeys, catalogue, rng, name=name, origin=f"plan {digest}")
+    return GeneratedHome(tuple(storeys), contents, f"plan {digest}")

@@ -44,7 +44,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
     Storey,
 )
-from pbrs_farm.generate.model_file import material_name, model_files
+from pbrs_farm.generate.model_file import material_name, obj_file, side_files
 from pbrs_farm.generate.opening_models import OpeningDesign, drawn_design, opening_model
 from pbrs_farm.generate.plan_families import FLAT, PlanFamily, plan_families
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
@@ -104,20 +104,34 @@ def home_file(
     name: str = "home",
     origin: str = "",
 ) -> bytes:
-    """The bytes of a .sh3d; equal arguments give equal bytes. origin: what it was made from.
+    """The bytes of a .sh3d; equal arguments, those of home_contents, give equal bytes."""
+    return home_contents(storeys, catalogue, rng, stair, name=name, origin=origin).archive()
+
+
+def home_contents(
+    storeys: Sequence[Storey],
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+    stair: Stair | None = None,
+    *,
+    name: str = "home",
+    origin: str = "",
+) -> HomeContents:
+    """What a .sh3d of storeys holds; equal arguments, equal contents. origin: what it was made from.
 
     storeys: from below; stair: between the first two. Pieces whose model the catalogue cannot load
     are left out.
     """
     plan, placed = storeys[0].plan, [p for s in storeys for p in s.pieces]
-    home = ET.Element("home", {
+    contents = HomeContents()
+    home = contents.home
+    home.attrib |= {
         "version": VERSION, "name": f"{name}.sh3d", "camera": "topCamera",
         "wallHeight": _cm(plan.height),
-    })  # fmt: skip
+    }  # fmt: skip
     # Without a level that is shown, the program's plan would be blank.
     if len(storeys) > 1:
         home.set("selectedLevel", "level-0")
-    contents = _Contents()
     _add_properties(home, placed, origin)
     _add_surroundings(home, plan)
     family = plan_families()[plan.family or FLAT]
@@ -139,8 +153,7 @@ def home_file(
         _add_walls(home, storey.plan, paints, level)
     for storey, level in zip(storeys, levels, strict=True):
         _add_rooms(home, storey.plan, paints, floors, contents, level, has_stair=stair is not None)
-    xml = ET.tostring(home, encoding="UTF-8", xml_declaration=True)
-    return contents.archive(xml)
+    return contents
 
 
 def _fork(rng: np.random.Generator) -> np.random.Generator:
@@ -151,11 +164,14 @@ def _fork(rng: np.random.Generator) -> np.random.Generator:
     return copy
 
 
-class _Contents:
-    """The files of the archive beside Home.xml; each model once."""
+class HomeContents:
+    """What a home's file holds: Home.xml as a tree, and the contents that it names; each model once."""
 
     def __init__(self) -> None:
-        self._files: dict[str, bytes] = {}
+        self.home = ET.Element("home")
+        self.shapes: dict[str, Shape] = {}
+        """The models, by the path of their OBJ."""
+        self._files: dict[str, bytes | Shape] = {}
         self._models: dict[str, str] = {}
         self.icon = "icon.png"
         picture = np.full((32, 32, 4), 255, np.uint8)
@@ -166,9 +182,10 @@ class _Contents:
         """The path of a shape's model; key: what tells it from others."""
         if key not in self._models:
             folder = str(len(self._models))
-            for name, data in model_files(shape).items():
+            path = f"{folder}/model.obj"
+            self._models[key], self._files[path], self.shapes[path] = path, shape, shape
+            for name, data in side_files(shape).items():
                 self._files[f"{folder}/{name}"] = data
-            self._models[key] = f"{folder}/model.obj"
         return self._models[key]
 
     def picture(self, picture: Picture) -> str:
@@ -178,15 +195,21 @@ class _Contents:
         self._files[path] = picture.texture.data
         return path
 
-    def archive(self, xml: bytes) -> bytes:
+    def read(self, name: str) -> bytes | None:
+        """The bytes of a content, None if there is none of that name."""
+        data = self._files.get(name)
+        return obj_file(data) if isinstance(data, Shape) else data
+
+    def archive(self) -> bytes:
         """The ZIP with Home.xml first."""
         buffer = io.BytesIO()
+        xml = ET.tostring(self.home, encoding="UTF-8", xml_declaration=True)
         with zipfile.ZipFile(buffer, "w") as archive:
-            for name, data in {"Home.xml": xml, **self._files}.items():
+            for name in ("Home.xml", *self._files):
                 info = zipfile.ZipInfo(name, _ZIP_TIME)
                 packed = name.endswith((".png", ".jpg"))
                 info.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
-                archive.writestr(info, data)
+                archive.writestr(info, xml if name == "Home.xml" else self.read(name) or b"")
         return buffer.getvalue()
 
 
@@ -254,7 +277,7 @@ def _add_levels(
 
 
 def _add_stairs(
-    home: ET.Element, stair: Stair, rise: float, contents: _Contents, paints: Paints
+    home: ET.Element, stair: Stair, rise: float, contents: HomeContents, paints: Paints
 ) -> ET.Element:
     shape = staircase(stair, rise, paints.design.colour)
     (x, z), (low, high) = stair.middle, shape.bounds
@@ -270,7 +293,7 @@ def _add_stairs(
 
 
 def _add_opening(
-    home: ET.Element, plan: Plan, opening: PlanOpening, contents: _Contents, paints: Paints
+    home: ET.Element, plan: Plan, opening: PlanOpening, contents: HomeContents, paints: Paints
 ) -> ET.Element:
     wall = plan.walls[opening.wall]
     shape = opening_model(opening, wall.thickness, paints.design)
@@ -304,7 +327,7 @@ def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
 
 
 def _add_piece(
-    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: _Contents,
+    home: ET.Element, placed: PlacedPiece, catalogue: Catalogue, contents: HomeContents,
     height: float, level: dict[str, str],
 ) -> None:  # fmt: skip
     piece = placed.piece
@@ -436,7 +459,7 @@ def _drawn_floors(
 
 
 def _add_rooms(
-    home: ET.Element, plan: Plan, paints: Paints, floors: dict[str, Picture], contents: _Contents,
+    home: ET.Element, plan: Plan, paints: Paints, floors: dict[str, Picture], contents: HomeContents,
     level: dict[str, str], *, has_stair: bool,
 ) -> None:  # fmt: skip
     first = len(home.findall("room"))

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas
 
+MTL: Final = "model.mtl"
 _DECIMALS: Final = 5  # of coordinates in metres
+_NORMAL_DECIMALS: Final = 4
+_UV_DIGITS: Final = 5
+_MOST_DECIMALS: Final = 12  # a float32 times 10^12 is still exact in double precision
+_POWERS: Final = np.array([float(f"1e{n}") for n in range(-_MOST_DECIMALS, 16)])
 _ENDINGS: Final = {"image/png": "png", "image/jpeg": "jpg"}
 # What Sweet Home 3D makes of a group by its name.
 _GROUPS: Final = {
@@ -22,37 +29,104 @@ _GROUPS: Final = {
 }
 
 
-def model_files(shape: Shape) -> dict[str, bytes]:
-    """model.obj, model.mtl and the textures of a shape, by file name; equal shapes, equal bytes.
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenSurface:
+    """A surface as a reader of the OBJ finds it: numbers in double precision, rounded as written."""
 
-    The textures are as the shape has them, not encoded anew. The caller writes the files side by
-    side: the OBJ names its MTL, and that its pictures.
+    group: str
+    material: str
+    positions: F64  # (V, 3)
+    faces: I32  # (F, 3)
+    uvs: F64 | None  # (V, 2)
+    normals: F64 | None  # (V, 3)
+
+
+def written_surfaces(shape: Shape) -> Iterator[WrittenSurface]:
+    """The surfaces that obj_file writes, without writing them; equal to what parsing gives, bit by bit."""
+    for number, given in enumerate(shape.surfaces):
+        surface = _visible_surface(given)
+        if len(surface.faces):
+            yield WrittenSurface(
+                _group_name(shape, surface, number),
+                material_name(shape, surface.material),
+                _rounded(surface.positions, _DECIMALS),
+                surface.faces,
+                None if surface.uvs is None else _to_digits(surface.uvs, _UV_DIGITS),
+                None if surface.normals is None else _rounded(surface.normals, _NORMAL_DECIMALS),
+            )
+
+
+def _rounded(values: NDArray[np.floating], decimals: int) -> F64:
+    """What float() makes of f"{value:.{decimals}f}".
+
+    A float32 times a power of ten up to 10^12 is exact in double precision, so that rounding it and
+    dividing gives the nearest double of the decimal number, as parsing does.
+    """
+    if values.dtype != np.float32:
+        return _as_text(values, f".{decimals}f")
+    return np.asarray(np.round(values.astype(np.float64), decimals))
+
+
+def _to_digits(values: NDArray[np.floating], digits: int) -> F64:
+    """What float() makes of f"{value:.{digits}g}"; the same reason, digit by digit."""
+    size = np.abs(values.astype(np.float64))
+    # Count decimals from the first digit that is not 0; compare, since a logarithm is not exact.
+    exponent = np.searchsorted(_POWERS, size, side="right") - 1 - _MOST_DECIMALS
+    decimals = digits - 1 - exponent
+    is_exact = (size == 0) | ((decimals >= 0) & (decimals <= _MOST_DECIMALS))
+    if values.dtype != np.float32 or not is_exact.all():
+        return _as_text(values, f".{digits}g")
+    scale = _POWERS[_MOST_DECIMALS + np.clip(decimals, 0, _MOST_DECIMALS)]
+    return np.asarray(np.rint(values.astype(np.float64) * scale) / scale)
+
+
+def _as_text(values: NDArray[np.floating], form: str) -> F64:
+    numbers = [float(format(value, form)) for value in values.ravel().tolist()]
+    return np.array(numbers, np.float64).reshape(values.shape)
+
+
+def obj_file(shape: Shape) -> bytes:
+    """model.obj of a shape; equal shapes, equal bytes. It names the MTL of side_files."""
+    return "\n".join((f"mtllib {MTL}", *_obj_lines(shape), "")).encode()
+
+
+def side_files(shape: Shape) -> dict[str, bytes]:
+    """model.mtl and the textures of a shape, by file name; they lie beside model.obj.
+
+    The textures are as the shape has them, not encoded anew.
     """
     pictures = {
         texture_id: f"texture{k}.{_ENDINGS.get(texture.media_type, 'png')}"
         for k, (texture_id, texture) in enumerate(sorted(shape.textures.items()))
     }
-    obj = "\n".join(("mtllib model.mtl", *_obj_lines(shape), ""))
     mtl = "\n".join((*_mtl_lines(shape, pictures), ""))
-    files = {"model.obj": obj.encode(), "model.mtl": mtl.encode()}
-    return files | {name: shape.textures[i].data for i, name in pictures.items()}
+    pixels = {name: shape.textures[i].data for i, name in pictures.items()}
+    return {MTL: mtl.encode()} | pixels
+
+
+def _group_name(shape: Shape, surface: Surface, number: int) -> str:
+    return f"{_GROUPS.get(shape.materials[surface.material].kind, 'part')}_{number}"
 
 
 def _obj_lines(shape: Shape) -> Iterator[str]:
     n_points = n_uvs = n_normals = 1
     for number, given in enumerate(shape.surfaces):
         surface = _visible_surface(given)
-        kind = shape.materials[surface.material].kind
-        yield f"g {_GROUPS.get(kind, 'part')}_{number}"
+        yield f"g {_group_name(shape, surface, number)}"
         yield f"usemtl {material_name(shape, surface.material)}"
         yield from (
             f"v {x:.{_DECIMALS}f} {y:.{_DECIMALS}f} {z:.{_DECIMALS}f}"
             for x, y, z in surface.positions.tolist()
         )
         if surface.uvs is not None:
-            yield from (f"vt {u:.5g} {v:.5g}" for u, v in surface.uvs.tolist())
+            yield from (
+                f"vt {u:.{_UV_DIGITS}g} {v:.{_UV_DIGITS}g}" for u, v in surface.uvs.tolist()
+            )
         if surface.normals is not None:
-            yield from (f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in surface.normals.tolist())
+            yield from (
+                f"vn {x:.{_NORMAL_DECIMALS}f} {y:.{_NORMAL_DECIMALS}f} {z:.{_NORMAL_DECIMALS}f}"
+                for x, y, z in surface.normals.tolist()
+            )
         yield from _face_lines(surface, n_points, n_uvs, n_normals)
         n_points += len(surface.positions)
         n_uvs += 0 if surface.uvs is None else len(surface.uvs)

@@ -86,13 +86,13 @@ def _with_far_noted(house: House, fields: ReadFields) -> House:
 
 def _generated_house(source: SourceRef, fields: ReadFields) -> House:
     from pbrs_farm.generate.generated_home import generate_home
-    from pbrs_farm.read.sweethome3d.home import read_home
+    from pbrs_farm.prepare.generated_house import house_of_contents
 
     (home,) = made_homes(source.location)
     # An empty home needs no package, so that it is made where none can be read.
     catalogue = catalogue_of_words("") if home.furniture else EMPTY
-    data = generate_home(home, catalogue).data
-    house = read_home(data, f"{home.name}.sh3d", fields=fields)
+    contents = generate_home(home, catalogue).contents
+    house = house_of_contents(contents, f"{home.name}.sh3d", source.sha256, fields)
     credit = house.source.attribution.replace("pbrs_farm", _GENERATED_BY, 1)
     its_source = replace(house.source, kind="made", file=source.location, attribution=credit)
     return replace(house, id=home_id(source), source=its_source)

@@ -224,8 +224,25 @@ def _mesh_of_part(part: _Part, pools: tuple[F64, ...], file: str) -> tuple[Mesh 
     sizes = np.array([len(x.split()) for x in part.lines], np.int64)
     if not sizes.sum():
         return None, len(sizes)
-    # Triangulate, and drop triangles without area.
     indices = _indices(part, pools, file)
+    crease = 0.0 if part.is_flat else DEFAULT_CREASE_RAD
+    return mesh_from_corners(part.group, part.material, indices, sizes, pools, crease)
+
+
+def mesh_from_corners(
+    group: str,
+    material: str,
+    indices: I64,
+    sizes: I64,
+    pools: tuple[F64, ...],
+    crease_rad: float = DEFAULT_CREASE_RAD,
+) -> tuple[Mesh | None, int]:
+    """The mesh of polygons, None of none with an area, and how many triangles were dropped.
+
+    indices: (n corners, 3) of position, uv and normal from 0, -1 = none; sizes: corners of each
+    polygon; pools: positions (V, 3), uvs (T, 2), normals (N, 3).
+    """
+    # Triangulate, and drop triangles without area.
     corners = triangulated_corners(pools[0][indices[:, 0]], sizes)
     index = indices[corners]
     v = index[:, :, 0]
@@ -248,16 +265,15 @@ def _mesh_of_part(part: _Part, pools: tuple[F64, ...], file: str) -> tuple[Mesh 
     if (index[:, :, 2] >= 0).all():
         normal_pool, normal_index = pools[2], index[:, :, 2]
     else:
-        crease = 0.0 if part.is_flat else DEFAULT_CREASE_RAD
-        normal_pool, normal_index = crease_normals(points, index[:, :, 0], crease)
+        normal_pool, normal_index = crease_normals(points, index[:, :, 0], crease_rad)
     keys = np.stack([index[:, :, 0], uv_index if has_uvs else 0 * normal_index, normal_index], -1)
     # Make a vertex of each different (position, uv, normal).
     unique, faces = _unique_rows(keys.reshape(-1, 3))
     normals = normal_pool[unique[:, 2]]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     mesh = Mesh(
-        part.group,
-        part.material,
+        group,
+        material,
         points[unique[:, 0]],
         faces.reshape(-1, 3).astype(np.int32),
         uv_pool[unique[:, 1]] if has_uvs else None,

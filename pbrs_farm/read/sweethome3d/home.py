@@ -23,7 +23,7 @@ from pbrs_farm.read.common.resources import Resources
 from pbrs_farm.read.common.room_limits import HINT, check_outlines
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
-from pbrs_farm.read.sweethome3d.home_file.container import open_container
+from pbrs_farm.read.sweethome3d.home_file.container import Container, open_container
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,
     HomeRoom,
@@ -129,8 +129,24 @@ def read_home(
     files that refer to them. package: where the file came from; package_note: what is odd about
     it (homes_package.Package). Raises BadHouse, which names the file and the place.
     """
-    fields, file = fields or ReadFields(), PurePath(name).name
-    container = open_container(data, file, resources)
+    container = open_container(data, PurePath(name).name, resources)
+    sha256, fields = keys.sha256(data), fields or ReadFields()
+    return house_from_container(
+        container, name, sha256, fields, package=package, package_note=package_note
+    )
+
+
+def house_from_container(
+    container: Container,
+    name: str,
+    sha256: str,
+    fields: ReadFields,
+    *,
+    package: str = "",
+    package_note: str = "",
+) -> House:
+    """As read_home, of a home file that is taken apart; sha256: of what the home is known by."""
+    file = PurePath(name).name
     notes = Notes(file, strict=fields.strict)
     plan = _read_plan(container.root, file, fields, notes)
     if package_note:
@@ -154,13 +170,16 @@ def read_home(
     structure = wall_items(plan, outlines, materials, house_level)
     structure += plane_items(rooms, ceilings, materials, *cuts)
     # Place the furniture last: it stands in rooms and cuts walls.
-    pieces, openings = _read_pieces(plan, materials, outlines, rooms, house_level, file, fields)
+    models = PieceModels(materials, file, fields.max_model_triangles, container.parsed)
+    pieces, openings = _read_pieces(
+        plan, models, materials, outlines, rooms, house_level, file, fields
+    )
     items = _numbered((*structure, *pieces), file)
-    sha, stem = keys.sha256(data), PurePath(file).stem
+    stem = PurePath(file).stem
     return House(
-        id=keys.house_id(stem, sha),
+        id=keys.house_id(stem, sha256),
         name=PurePath(plan.name).stem or stem,
-        source=_source_of_plan(plan, file, sha, package),
+        source=_source_of_plan(plan, file, sha256, package),
         levels=_levels_of_plan(plan, house_level),
         rooms=room_nouns(rooms, ceilings),
         items=items,
@@ -240,6 +259,7 @@ def _house_levels(plan: HomePlan, notes: Notes) -> dict[str, str]:
 
 def _read_pieces(
     plan: HomePlan,
+    models: PieceModels,
     materials: HomeMaterials,
     outlines: dict[str, Outline],
     rooms: list[ReadRoom],
@@ -247,8 +267,6 @@ def _read_pieces(
     file: str,
     fields: ReadFields,
 ) -> tuple[list[Item], tuple[Opening, ...]]:
-    # Keep models and walls that pieces share.
-    models = PieceModels(materials, file, fields.max_model_triangles)
     walls = _standing_walls(plan, outlines)
     cutter_material = materials.painted(Paint(), "cut", "")
     found: list[StandingPiece] = []

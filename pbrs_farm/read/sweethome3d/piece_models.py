@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,11 +98,18 @@ def role_of(group: str) -> str:
 class PieceModels:
     """Parsed models by content name; notes what cannot be read."""
 
-    def __init__(self, materials: HomeMaterials, file: str, max_triangles: int) -> None:
+    def __init__(
+        self,
+        materials: HomeMaterials,
+        file: str,
+        max_triangles: int,
+        parsed: Mapping[str, ObjModel] | None = None,
+    ) -> None:
+        """parsed: models that need no reading."""
         self._materials = materials
         self._file = file
         self._max_triangles = max_triangles
-        self._parsed: dict[str, ObjModel | None] = {}
+        self._parsed: dict[str, ObjModel | None] = dict(parsed or {})
         self._models: dict[tuple[str, Transformations], PieceModel] = {}
 
     def get(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import posixpath
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml.common import DefusedXmlException
@@ -12,6 +13,7 @@ from defusedxml.ElementTree import fromstring
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.resources import Resources, ZipResources
 from pbrs_farm.read.common.source_files import Layered
+from pbrs_farm.read.mesh.obj import ObjModel
 from pbrs_farm.read.sweethome3d.home_file.java_home import RESAVE, root_from_java
 
 MAX_XML_BYTES = 16 * 2**20
@@ -20,10 +22,14 @@ MAX_DEPTH = 200  # nested elements
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """The root element <home> and whatever holds models and textures."""
+    """The root element <home> and whatever holds models and textures.
+
+    parsed: models by content name that need no reading: those of a home that was just generated.
+    """
 
     root: Element
     contents: Resources
+    parsed: Mapping[str, ObjModel] = field(default_factory=dict)
 
 
 def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
