@@ -116,8 +116,9 @@ def _samples_of_plan(polygon: F64) -> F64:
 def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
     """The items, slabs that are roofs made ceilings: by their names, or by their place.
 
-    rooms: those that the building tells; a slab under one is no roof. By its place a slab is a roof that
-    lies on walls, and on which neither a room nor a wall of a storey stands (parapets do).
+    rooms: those that the building tells; a slab under one is no roof, nor is one with the walls of a
+    storey around it, whatever its name. By its place a slab is a roof that lies on walls, and on which
+    neither a room nor a wall of a storey stands (parapets do).
     """
     walls = [i.bounds for i in items if i.kind is ItemKind.WALL]
     bounds = np.array(walls).reshape(-1, 2, 3)
@@ -127,7 +128,10 @@ def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
             item.kind is ItemKind.FLOOR
             and item.source_class.startswith("IfcSlab")
             and not _carries_room(item, rooms)
-            and (is_called_roof(item.name) or _is_placed_as_roof(item, bounds))
+            and (
+                (is_called_roof(item.name) and not _carries_storey(item, bounds))
+                or _is_placed_as_roof(item, bounds)
+            )
         )
         found.append(replace(item, kind=ItemKind.CEILING, nyu40=CEILING) if is_roof else item)
     return found
@@ -147,12 +151,32 @@ def _carries_room(slab: Item, rooms: Sequence[Room]) -> bool:
     return bool(covered > _CARRIES * plan.area)
 
 
+def _carries_storey(slab: Item, walls: F64) -> bool:
+    """Whether walls around most of a slab stand on it: a roof beside a higher house has one. walls: (W, 2, 3) bounds."""
+    low, high = slab.bounds
+    on_it = [w for w in _walls_above(slab, walls) if w[0, 1] > low[1] - _JOINT_M]
+    if not on_it:
+        return False
+    reach = np.minimum(np.max(on_it, (0, 1)), high) - np.maximum(np.min(on_it, (0, 1)), low)
+    return bool((reach > _HALF * (high - low))[[0, 2]].all())
+
+
+def _walls_above(slab: Item, walls: F64) -> F64:
+    """Those of the walls (W, 2, 3) over a slab that are as high as a storey above it."""
+    near = _walls_over_or_under(slab, walls)
+    return near[near[:, 1, 1] > slab.bounds[1, 1] + _HEADROOM_M]
+
+
+def _walls_over_or_under(slab: Item, walls: F64) -> F64:
+    # Not those that only touch its edge.
+    low, high = slab.bounds
+    overlap = np.minimum(walls[:, 1], high) - np.maximum(walls[:, 0], low)
+    return walls[(overlap[:, [0, 2]] > 0.0).all(1)]
+
+
 def _is_placed_as_roof(slab: Item, walls: F64) -> bool:
     """Whether a slab lies on walls and carries none. walls: (W, 2, 3) bounds."""
     low, high = slab.bounds
-    # Keep walls over or under the slab, not those that only touch its edge.
-    overlap = np.minimum(walls[:, 1], high) - np.maximum(walls[:, 0], low)
-    near = walls[(overlap[:, [0, 2]] > 0.0).all(1)]
-    carried = near[:, 1, 1] > high[1] + _HEADROOM_M
+    near = _walls_over_or_under(slab, walls)
     carrying = (near[:, 1, 1] > low[1] - _JOINT_M) & (near[:, 0, 1] < high[1] - _HEADROOM_M)
-    return bool(carrying.any() and not carried.any())
+    return bool(carrying.any() and not len(_walls_above(slab, walls)))

@@ -138,14 +138,30 @@ def test_a_space_on_a_roof_under_the_sky_is_no_room(tmp_path: Path) -> None:
     assert [n.kind for n in house.notes] == ["degenerate-room"]
 
 
-def test_a_slab_that_carries_a_storey_is_no_roof_whatever_it_is_called(tmp_path: Path) -> None:
+@pytest.mark.parametrize("has_spaces", [True, False])
+def test_a_slab_that_carries_a_storey_is_no_roof_whatever_it_is_called(
+    tmp_path: Path, has_spaces: bool
+) -> None:
     building = IfcHouse()
     for k in range(2):
         building.storey(f"{k}. OG", 2.85 * k)
-        storey_of_two_rooms(building, 2.85 * k, slab=False)
+        storey_of_two_rooms(building, 2.85 * k, spaces=has_spaces, slab=False)
         floor = building.box_solid((0, 0, -0.25), (7.6, 3.4, 0))
         building.product("IfcSlab", "Roof slab", [floor], (0, 0, 2.85 * k))
     house = read(building, tmp_path)
     slabs = [i for i in house.items if i.name == "Roof slab"]
     assert [i.kind for i in slabs] == [ItemKind.FLOOR] * 2
     assert np.ptp([i.bounds[1, 1] for i in slabs]) == pytest.approx(2.85)
+
+
+def test_a_roof_beside_a_higher_house_carries_no_storey(tmp_path: Path) -> None:
+    building = IfcHouse()
+    for k in range(2):
+        building.storey(f"{k}. OG", 2.85 * k)
+        storey_of_two_rooms(building, 2.85 * k, spaces=False)
+    # A garage, its roof laid into the wall of the house.
+    building.wall("Garage", (11.0, 0), (11.0, 3.4), 0.0, 2.4)
+    roof_slab = building.box_solid((7.5, 0, 0), (11.0, 3.4, 0.2))
+    building.product("IfcSlab", "Garage roof", [roof_slab], (0, 0, 2.4))
+    house = read(building, tmp_path)
+    assert [i.kind for i in house.items if i.name == "Garage roof"] == [ItemKind.CEILING]
