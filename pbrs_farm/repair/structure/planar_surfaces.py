@@ -17,16 +17,18 @@ from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, bounds
 from pbrs_farm.repair.structure.closed_shells import shells_from_item
 from pbrs_farm.repair.structure.prisms import (
+    MAX_UV_OFF,
     Plane,
     UvMap,
+    UvPart,
     affine_uv_map,
     level_plane,
     plane_of_points,
+    uv_parts,
 )
 
 Faces = TypeVar("Faces", I32, I64)
 
-_MAX_UV_OFF = 1e-3  # texture widths; beyond it a texture is no affine map of the plan
 _SAME_FACING = 1.0 - 1e-6  # cosine between normals of one plane
 _LEVEL_M = 0.01  # an underside that rises less is level
 _MOST_FACETS = (
@@ -47,7 +49,8 @@ class PlanarSurface:
     is_ceiling: bool
     area: plan.Shape  # what it covers, seen from above
     plane: Plane
-    uv: UvMap | None  # None: metres in plan
+    uv: UvMap | None  # of the whole; None: metres in plan, save where uv_parts are
+    uv_parts: tuple[UvPart, ...]  # where its texture lies in several ways
     material: int
     name: str  # of the surface it comes from
 
@@ -144,13 +147,15 @@ def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
             area = plan.polygon_of_triangles(positions, faces)
             if plane is None or shapely.is_empty(area):
                 continue
+            uv, parts = _uv_maps(surface, faces)
             yield PlanarSurface(
                 item=index,
                 room_id=item.room_id,
                 is_ceiling=item.kind is ItemKind.CEILING,
                 area=area,
                 plane=plane,
-                uv=_uv_map(surface, faces),
+                uv=uv,
+                uv_parts=parts,
                 material=surface.material,
                 name=surface.name,
             )
@@ -175,11 +180,11 @@ def facets(positions: F64, faces: Faces) -> list[Faces]:
     return [faces[members] for _, _, members in groups]
 
 
-def _uv_map(surface: Surface, faces: I32) -> UvMap | None:
+def _uv_maps(surface: Surface, faces: I32) -> tuple[UvMap | None, tuple[UvPart, ...]]:
     # Fit the texture by an affine map of the plan, so that it carries on where the slab grows.
     if surface.uvs is None:
-        return None
+        return None, ()
+    positions, uvs = surface.positions.astype(np.float64), surface.uvs.astype(np.float64)
     used = np.unique(faces)
-    points = surface.positions[used].astype(np.float64)
-    uv, off = affine_uv_map(points, surface.uvs[used].astype(np.float64))
-    return None if off > _MAX_UV_OFF else uv
+    uv, off = affine_uv_map(positions[used], uvs[used])
+    return (uv, ()) if off <= MAX_UV_OFF else (None, uv_parts(positions, faces, uvs))

@@ -9,6 +9,7 @@ import manifold3d
 import numpy as np
 import shapely
 from manifold3d import Manifold
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.repair.structure import plan_geometry as plan
@@ -18,6 +19,9 @@ UvMap = Callable[[F64], F64]
 """Texture coordinates (N, 2) of positions (N, 3)."""
 
 _ON_PLANE_M = 1e-3  # points of a plane lie no farther from it
+MAX_UV_OFF = 1e-3
+"""Texture widths; beyond it a texture is no affine map of the plan."""
+_MOST_UV_PARTS = 200  # a solid each, over which the texture lies in a way of its own
 # Half the width of what parts rings; the next where one is too small.
 _CRUMBS_M = (1e-5, 1e-4, 1e-3)
 
@@ -76,6 +80,46 @@ def affine_uv_map(positions: F64, uvs: F64) -> tuple[UvMap, float]:
         return np.asarray(_affine_columns(positions) @ affine)
 
     return uv, float(np.abs(uv(positions) - uvs).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UvPart:
+    """A part of a flat surface over which one map lays its texture."""
+
+    area: plan.Shape
+    uv: UvMap
+
+
+def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPart, ...]:
+    """The parts of a flat surface on which one affine map lays its texture; none where they are too many.
+
+    positions: (V, 3) whose x and z count, faces: (F, 3), uvs: (V, 2). A picture that ends or is mirrored
+    within a surface lies another way in each part.
+    """
+    parts = []
+    left = faces
+    while len(left):
+        if len(parts) == _MOST_UV_PARTS:
+            return ()
+        corners = np.unique(left)
+        uv, off = affine_uv_map(positions[corners], uvs[corners])
+        if off > MAX_UV_OFF:
+            # Not one map for all: that of the largest face, for all faces that it fits.
+            largest = left[np.argmax(_plan_areas(positions, left))]
+            uv, _ = affine_uv_map(positions[largest], uvs[largest])
+        fits = np.abs(uv(positions) - uvs).max(1) <= MAX_UV_OFF
+        mine = fits[left].all(1)
+        if not mine.any():
+            return ()
+        parts.append(UvPart(plan.polygon_of_triangles(positions, left[mine]), uv))
+        left = left[~mine]
+    return tuple(parts)
+
+
+def _plan_areas(positions: F64, faces: NDArray[np.integer]) -> F64:
+    a, b, c = (positions[faces[:, k]][:, [0, 2]] for k in range(3))
+    u, v = b - a, c - a
+    return np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
 
 
 def _affine_columns(positions: F64) -> F64:

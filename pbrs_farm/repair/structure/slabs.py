@@ -15,7 +15,7 @@ from manifold3d import Manifold
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import Plane, polygons_of, solid_prisms
+from pbrs_farm.repair.structure.prisms import Plane, UvMap, polygons_of, solid_prisms
 from pbrs_farm.repair.structure.walls import Wall
 
 GAP_M = 0.05
@@ -123,8 +123,19 @@ def slab(
         near, far = surface.plane.raised(away * near_m), surface.plane.raised(away * far_m)
         low, high = (near, far) if surface.is_ceiling else (far, near)
         tags = (tag, hidden, hidden) if surface.is_ceiling else (hidden, tag, hidden)
-        solids += solid_prisms(polygons_of(area), low, high, tags, table, surface.uv)
+        for part, uv in _parts_by_uv(surface, area) if tag is face else ((area, surface.uv),):
+            solids += solid_prisms(polygons_of(part), low, high, tags, table, uv)
     return solids
+
+
+def _parts_by_uv(surface: PlanarSurface, area: plan.Shape) -> list[tuple[plan.Shape, UvMap | None]]:
+    """The parts of an area of its slab, each with the map that lays the texture on it."""
+    if not surface.uv_parts:
+        return [(area, surface.uv)]
+    # What lies beyond the surface, under walls, goes on as its first part does.
+    beyond = plan.without(area, *(part.area for part in surface.uv_parts))
+    within = [(plan.common(area, part.area), part.uv) for part in surface.uv_parts]
+    return [(beyond, surface.uv_parts[0].uv), *within]
 
 
 def bridge_gaps(

@@ -101,6 +101,37 @@ def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
         assert coinciding_share(after, origin) < 1e-3  # fmt: skip
 
 
+def test_a_floor_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
+    """Left of x = 2 the picture lies once a metre, right of it one texel goes on, as a wrap of clamp has it."""
+    r = room("0_0", RECT)
+    floor, ceiling = covers(r)
+    points = np.array([(x, 0.0, z) for x in (0.0, 2.0, 2.0, 4.0) for z in (0.0, 3.0)], np.float32)
+    uvs = np.where(np.arange(8)[:, None] < 4, points[:, [0, 2]], 0.25).astype(np.float32)
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6]], np.int32)
+    sheet = replace(
+        floor.surfaces[0], positions=points, faces=faces, uvs=uvs,
+        normals=np.tile(np.float32([0, 1, 0]), (8, 1)),
+    )  # fmt: skip
+    drawn = replace(floor, surfaces=(sheet,))
+    after, _ = _repaired(house([*walls_around(RECT), drawn, ceiling], [r]))
+    assert len(unpaired_edges(after)) == 0
+    seen = [s for i in after.items if i.id == floor.id for s in i.surfaces if s.name == "floor"]
+    area = {"left": 0.0, "right": 0.0}
+    for surface in seen:
+        assert surface.uvs is not None
+        for face in surface.faces:
+            x, z = surface.positions[face][:, 0], surface.positions[face][:, 2]
+            if x.min() < -1e-3 or x.max() > 4 + 1e-3 or z.min() < -1e-3 or z.max() > 3 + 1e-3:
+                continue  # under the walls
+            side = "left" if x.mean() < 2 else "right"
+            expected = np.column_stack([x, z]) if side == "left" else np.full((3, 2), 0.25)
+            assert surface.uvs[face] == pytest.approx(expected, abs=1e-4)
+            area[side] += 0.5 * abs(
+                np.linalg.det([[x[1] - x[0], z[1] - z[0]], [x[2] - x[0], z[2] - z[0]]])
+            )
+    assert area == pytest.approx({"left": 6.0, "right": 6.0}, rel=1e-3)
+
+
 def test_a_floor_goes_on_through_a_doorway() -> None:
     a, b = room("0_0", RECT), room("0_1", (4.3, 0.0, 8.0, 3.0))
     walls = [
