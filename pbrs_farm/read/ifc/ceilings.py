@@ -164,14 +164,14 @@ def _carries_storey(slab: Item, walls: F64) -> bool:
 def _walls_above(slab: Item, walls: F64) -> F64:
     """Those of the walls (W, 2, 3) over a slab that are as high as a storey above it."""
     near = _walls_over_or_under(slab, walls)
-    return near[near[:, 1, 1] > slab.bounds[1, 1] + _HEADROOM_M]
+    return np.asarray(near[near[:, 1, 1] > slab.bounds[1, 1] + _HEADROOM_M])
 
 
 def _walls_over_or_under(slab: Item, walls: F64) -> F64:
     # Not those that only touch its edge.
     low, high = slab.bounds
     overlap = np.minimum(walls[:, 1], high) - np.maximum(walls[:, 0], low)
-    return walls[(overlap[:, [0, 2]] > 0.0).all(1)]
+    return np.asarray(walls[(overlap[:, [0, 2]] > 0.0).all(1)])
 
 
 def _is_placed_as_roof(slab: Item, walls: F64) -> bool:

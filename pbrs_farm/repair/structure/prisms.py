@@ -96,7 +96,7 @@ def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPa
     positions: (V, 3) whose x and z count, faces: (F, 3), uvs: (V, 2). A picture that ends or is mirrored
     within a surface lies another way in each part.
     """
-    parts = []
+    parts: list[UvPart] = []
     left = faces
     while len(left):
         if len(parts) == _MOST_UV_PARTS:
@@ -119,7 +119,7 @@ def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPa
 def _plan_areas(positions: F64, faces: NDArray[np.integer]) -> F64:
     a, b, c = (positions[faces[:, k]][:, [0, 2]] for k in range(3))
     u, v = b - a, c - a
-    return np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    return np.asarray(np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
 def _affine_columns(positions: F64) -> F64:
