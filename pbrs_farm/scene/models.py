@@ -143,9 +143,11 @@ def model(
     found = Model(known, up)
     # Read it now: a bad file is an error here, not in a run.
     if notes := found.notes:
-        more = f"; and {len(notes) - 1} more: model.notes" if notes[1:] else ""
-        text = f"{notes[0].place}: {notes[0].text} ({notes[0].kind}){more}"
-        warn_caller(f"{path.parent}/{text}")
+        # One of each kind: a map that is not read must not hide a picture that is missing.
+        told = list({note.kind: note for note in reversed(notes)}.values())[::-1]
+        more = f"; and {len(notes) - len(told)} more: model.notes" if notes[len(told) :] else ""
+        text = "; ".join(f"{note.place}: {note.text} ({note.kind})" for note in told)
+        warn_caller(f"{path.parent}/{text}{more}")
     return found
 
 

@@ -210,6 +210,7 @@ def test_what_is_missing_or_guessed_of_a_model_is_noted_without_a_traceback(
         model = pf.model(tmp_path / name)
     assert sorted(note.kind for note in model.notes) == kinds
     assert len(heard) == bool(kinds)
+    assert all(f"({kind})" in str(heard[0].message) for kind in kinds)
     assert "Traceback" not in capfd.readouterr().err
 
 
