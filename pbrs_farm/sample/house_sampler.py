@@ -105,6 +105,7 @@ def _photographed(sampler: PhotoSampler) -> Sampling:
             reports[room.id] = RoomReport(room_id=room.id, name=room.name, reason=reason)
         else:
             scored.append(sampler.room_candidates(room))
+    scored = sampler.with_better_scores(scored)
     # Choose among all of them, so that of two near-duplicates the better one stays.
     chosen = sampler.choose(scored)
     views: list[View] = []

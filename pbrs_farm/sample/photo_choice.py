@@ -46,6 +46,10 @@ _ROUNDS: Final = 3
 MOST_WORSE: Final = 0.25
 """By how much of score less than its sector's best a view may be taken for its likeness."""
 
+LIKELY_BY_SCORE: Final = 8
+LIKELY_BY_GAIN: Final = 24
+"""Candidates of a sector that may still be chosen after a look at smaller pictures: by score, by gain."""
+
 _Name = tuple[str, int]
 """A candidate's room and number."""
 
@@ -102,14 +106,15 @@ class _Sector:
 class PhotoChoice:
     """The choice among all candidates of one home.
 
-    lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures.
+    lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures; None: no view is
+    compared with another, so that near-duplicates stay.
     """
 
     fields: CameraFields
     lens: Intrinsics
-    depth_of: DepthOf
+    depth_of: DepthOf | None
     _shown: F64 = field(default_factory=lambda: np.zeros(len(NYU13_NAMES)))  # sum over views
-    _taken: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+    _taken: set[_Name] = field(default_factory=set)
     _looked_at: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
@@ -118,6 +123,35 @@ class PhotoChoice:
         Sectors take turns by their best score, over all rooms, so that of two near-duplicates the better
         one stays.
         """
+        sectors = self._filled_sectors(rooms)
+        for sector in sectors:
+            sector.scored.verdict[sector.taken] = Verdict.WINNER
+        return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
+
+    def likely(self, rooms: Sequence[RoomCandidates]) -> dict[str, NDArray[np.intp]]:
+        """Room id -> numbers of the candidates that may be chosen once their scores are known better.
+
+        Of each sector the best by score, and those that add most to the views that would be chosen
+        of the others. Writes the verdict of low scores.
+        """
+        found: dict[str, list[int]] = {scored.room.id: [] for scored in rooms}
+        sectors = self._filled_sectors(rooms)
+        for sector in sectors:
+            taken = list(sector.taken)
+            for number in taken:
+                self._give_up(sector, number)
+            gain = self._gain(sector.scored, sector.candidates)
+            by_gain = sector.candidates[np.argsort(-gain, kind="stable")]
+            n = self.fields.per_sector
+            best = sector.scored.ranked(sector.number)[: LIKELY_BY_SCORE * n]
+            numbers = np.union1d(best, by_gain[: LIKELY_BY_GAIN * n])
+            found[sector.scored.room.id] += numbers.tolist()
+            for number in taken:
+                self._take(sector, number)
+        return {room: np.array(sorted(numbers), np.intp) for room, numbers in found.items()}
+
+    def _filled_sectors(self, rooms: Sequence[RoomCandidates]) -> list[_Sector]:
+        """The sectors that have candidates, the one with the best first, each with its views."""
         # Let every sector that has a candidate take its turn, the best first.
         sectors = [
             _Sector(scored, number, ranked)
@@ -137,9 +171,7 @@ class PhotoChoice:
         for _ in range(_ROUNDS if self.fields.likeness > 0 else 0):
             if not sum(self._exchange(sector) for sector in sectors):
                 break
-        for sector in sectors:
-            sector.scored.verdict[sector.taken] = Verdict.WINNER
-        return {(sector.scored.room.id, sector.number): sector.taken for sector in sectors}
+        return sectors
 
     def _leave_out_low_scores(self, sector: _Sector, *, is_first: bool) -> None:
         """Reject candidates below min_score; a room's first view, its best, needs min_room_score alone."""
@@ -193,22 +225,21 @@ class PhotoChoice:
 
     def _take(self, sector: _Sector, number: int) -> None:
         sector.taken.append(number)
-        self._taken[sector.scored.room.id, number] = self._look(sector.scored, number)
+        self._taken.add((sector.scored.room.id, number))
         self._shown = self._shown + sector.scored.nyu13[number]
 
     def _give_up(self, sector: _Sector, number: int) -> None:
         sector.taken.remove(number)
-        del self._taken[sector.scored.room.id, number]
+        self._taken.remove((sector.scored.room.id, number))
         self._shown = self._shown - sector.scored.nyu13[number]
 
     def _is_near_duplicate(self, scored: RoomCandidates, number: int) -> bool:
-        camera, depth = self._look(scored, number)
-        return any(overlap(camera, depth, *o) > MOST_OVERLAP for o in self._taken.values())
-
-    def _look(self, scored: RoomCandidates, number: int) -> tuple[Camera, F32]:
-        """A candidate's camera and depth picture; remembered."""
+        if self.depth_of is None:
+            return False
         name = scored.room.id, number
         if name not in self._looked_at:
             camera = scored.candidates.cameras(np.array([number]), self.lens)[0]
             self._looked_at[name] = camera, self.depth_of([camera])[0]
-        return self._looked_at[name]
+        # Every view that is taken was looked at before.
+        others = (self._looked_at[other] for other in self._taken)
+        return any(overlap(*self._looked_at[name], *other) > MOST_OVERLAP for other in others)

@@ -1,19 +1,23 @@
 """Views as a person would photograph a home: the preset `photo`; no effects of its own.
 
 Candidates are the paper's (one a grid cell and sector), held as people hold cameras. Each gets
-the score of photo_score.py from a small picture; photo_choice.py chooses among those of all rooms.
+the score of photo_score.py from a tiny picture, and those that may be chosen a better one from a small
+picture; photo_choice.py chooses among those of all rooms.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
@@ -30,6 +34,12 @@ from pbrs_farm.sample.photo_score import (
 )
 from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
 
+Size = tuple[int, int]  # width and height of a picture, px
+
+TINY: Final = 0.3  # of the edges of a small picture: a tenth of its pixels
+_LEAST_TINY_PX: Final = 24  # edge of a picture that tells furniture from walls
+_TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
+
 
 @dataclass(slots=True, eq=False)
 class PhotoSampler:
@@ -43,32 +53,52 @@ class PhotoSampler:
     geometry: Geometry
 
     def room_candidates(self, room: Room) -> RoomCandidates:
-        """Every candidate of a room, rejected by a rule or scored.
+        """Every candidate of a room, rejected by a rule or scored from a tiny picture.
 
-        Deterministic by seed, house and room. Small pictures are traced for what the rules about
-        position leave: this is where the time goes.
+        Deterministic by seed, house and room. Pictures are traced for what the rules about position
+        leave: this is where the time goes.
         """
-        # Reject by position first, and look at what is left through small pictures.
         f = self.fields
         names = (self.seed, self.house.id, room.id)
         candidates = grid_candidates(room_grid(room), f, names)
         verdict = rejections(self.house, room, f, candidates, self.geometry, self.counter)
-        score = np.full(len(candidates), -np.inf)
-        eligible = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
-        size = (f.coarse_width_px, f.coarse_height_px)
-        seen = self._shares(candidates.cameras(eligible, self._intrinsics(*size)))
+        n = len(candidates)
+        nothing = np.zeros((n, len(NYU13_NAMES)))
+        placed = RoomCandidates(room, candidates, verdict, np.zeros(n), nothing, np.zeros(n))
+        left = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
+        return self._scored(placed, left, *self._first_sizes)
 
+    def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
+        """The candidates that may be chosen, scored anew from small pictures; no other has a score.
+
+        rooms: all of the house at once, as room_candidates gives them.
+        """
+        if self._first_sizes == self._sizes:
+            return list(rooms)
+        first = [replace(scored, verdict=scored.verdict.copy()) for scored in rooms]
+        likely = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), None).likely(first)
+        return [self._scored(scored, likely[scored.room.id], *self._sizes) for scored in first]
+
+    def _scored(
+        self, placed: RoomCandidates, which: NDArray[np.intp], size: Size, depth_size: Size
+    ) -> RoomCandidates:
+        """The candidates numbered by which (M,) with scores from pictures of a size; no other has one."""
+        f, candidates = self.fields, placed.candidates
+        seen = self._shares(candidates.cameras(which, self._intrinsics(*size)), depth_size)
         # Rules about the picture come before any comparison of scores.
+        rule = np.full(len(which), Verdict.LOWER_SCORE, np.uint8)
         one = (seen.largest > f.max_item_fraction) | (seen.wall > f.max_wall_fraction)
-        verdict[eligible[one | (seen.opening > f.max_opening_fraction)]] = Verdict.FILLED_BY_ONE
-        verdict[eligible[seen.n_objects < f.min_objects]] = Verdict.FEW_OBJECTS
-        score[eligible] = np.where(
-            verdict[eligible] == Verdict.LOWER_SCORE, photo_score(seen), -np.inf
-        )
-        nyu13, framing = np.zeros((len(score), seen.nyu13.shape[1])), np.zeros(len(score))
-        tilt_deg = np.degrees(np.arcsin(-candidates.towards[eligible, 1]))
-        nyu13[eligible], framing[eligible] = seen.nyu13, framing_cost(seen, tilt_deg)
-        return RoomCandidates(room, candidates, verdict, score, nyu13, framing)
+        rule[one | (seen.opening > f.max_opening_fraction)] = Verdict.FILLED_BY_ONE
+        rule[seen.n_objects < f.min_objects] = Verdict.FEW_OBJECTS
+        # Give the others the score of what they show.
+        n = len(candidates)
+        verdict, score = placed.verdict.copy(), np.full(n, -np.inf)
+        nyu13, framing = np.zeros((n, seen.nyu13.shape[1])), np.zeros(n)
+        tilt_deg = np.degrees(np.arcsin(-candidates.towards[which, 1]))
+        verdict[which] = rule
+        score[which] = np.where(rule == Verdict.LOWER_SCORE, photo_score(seen), -np.inf)
+        nyu13[which], framing[which] = seen.nyu13, framing_cost(seen, tilt_deg)
+        return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
         """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
@@ -108,12 +138,25 @@ class PhotoSampler:
     def _n_items(self) -> int:
         return len(self.house.items)
 
-    def _shares(self, cameras: list[Camera]) -> PhotoShares:
-        """What small pictures of these cameras show."""
+    @property
+    def _sizes(self) -> tuple[Size, Size]:
+        """Of small pictures and of their depth."""
+        return (self.fields.coarse_width_px, self.fields.coarse_height_px), DEPTH_SIZE
+
+    @property
+    def _first_sizes(self) -> tuple[Size, Size]:
+        """Of tiny pictures and of their depth; those of small ones where tiny ones would show nothing."""
+        width, height = (round(TINY * px) for px in self._sizes[0])
+        if min(width, height) < _LEAST_TINY_PX:
+            return self._sizes
+        return (width, height), _TINY_DEPTH_SIZE
+
+    def _shares(self, cameras: list[Camera], depth_size: Size) -> PhotoShares:
+        """What pictures of these cameras show."""
         rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
-        depth = self.depth_of([camera.with_size(*DEPTH_SIZE) for camera in cameras])
-        flat = depth.reshape(len(cameras), DEPTH_SIZE[0] * DEPTH_SIZE[1])
+        depth = self.depth_of([camera.with_size(*depth_size) for camera in cameras])
+        flat = depth.reshape(len(cameras), depth_size[0] * depth_size[1])
         return photo_shares(counts, flat, item_roles(self.house), self.fields.min_object_fraction)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.classes import NYU13_NAMES
@@ -185,6 +188,37 @@ def test_focal_lengths_take_five_values_about_the_fields() -> None:
     plain = Intrinsics.from_hfov(80, 60, FIELDS.hfov_rad).fx
     assert {round(v.camera.intrinsics.fx / plain, 3) for v in views} <= {0.9, 0.95, 1, 1.05, 1.1}
     assert len({v.camera.intrinsics.fx for v in views}) > 1
+
+
+def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_them() -> None:
+    house = with_classes(furnished(5.0, 6.0))
+    geometry = geometry_from_house(house)
+    caster, n_looks = Caster(geometry), Counter[tuple[int, int]]()
+    fields = FIELDS.model_copy(
+        update={"coarse_width_px": 160, "coarse_height_px": 120, "cell_m": 0.25}
+    )
+
+    def counted(cameras: Sequence[Camera]) -> NDArray[np.uint32]:
+        i = cameras[0].intrinsics
+        n_looks[i.width_px, i.height_px] += len(cameras)
+        return caster.item_counts(cameras)
+
+    sampler = PhotoSampler(house, fields, 0, counted, caster.depth_pictures, geometry)
+    tiny = [sampler.room_candidates(house.rooms[0])]
+    few = sampler.with_better_scores(tiny)
+    assert 0 < 4 * n_looks[160, 120] < n_looks[48, 36]
+    # Compare with the choice among all candidates, each looked at in a small picture.
+    left = np.flatnonzero(np.isfinite(tiny[0].score))
+    every = sampler._scored(tiny[0], left, (160, 120), DEPTH_SIZE)
+    by_all, by_few = sampler.choose([every]), sampler.choose(few)
+    score = every.score
+    assert sum(map(len, by_few.values())) == sum(map(len, by_all.values())) > 2
+    best = sum(score[k].sum() for k in by_all.values())
+    assert sum(score[k].sum() for k in by_few.values()) >= 0.98 * best
+    assert (
+        few[0].score[np.concatenate([*by_few.values()])]
+        == score[np.concatenate([*by_few.values()])]
+    ).all()
 
 
 def test_the_same_house_and_seed_give_the_same_views() -> None:
