@@ -21,6 +21,10 @@ UvMap = Callable[[F64], F64]
 _ON_PLANE_M = 1e-3  # points of a plane lie no farther from it
 MAX_UV_OFF = 1e-3
 """Texture widths; beyond it a texture is no affine map of the plan."""
+FACE_M = 0.02
+"""Thickness of the layer with the visible face, where a solid is a layer before a base."""
+BASE_BEHIND_M = 0.01
+"""The base begins this far behind the face, inside that layer."""
 _MOST_UV_PARTS = 200  # a solid each, over which the texture lies in a way of its own
 # Half the width of what parts rings; the next where one is too small.
 _CRUMBS_M = (1e-5, 1e-4, 1e-3)

@@ -15,7 +15,14 @@ from manifold3d import Manifold
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable
 from pbrs_farm.repair.structure.planar_surfaces import PlanarSurface
-from pbrs_farm.repair.structure.prisms import Plane, UvMap, polygons_of, solid_prisms
+from pbrs_farm.repair.structure.prisms import (
+    BASE_BEHIND_M,
+    FACE_M,
+    Plane,
+    UvMap,
+    polygons_of,
+    solid_prisms,
+)
 from pbrs_farm.repair.structure.walls import Wall
 
 GAP_M = 0.05
@@ -23,9 +30,6 @@ GAP_M = 0.05
 
 SAME_HEIGHT_M = 0.01
 """Floors (or ceilings) nearer in height than this are one level, and separated in plan."""
-
-_FACE_M = 0.02  # thickness of the layer with the visible face
-_BASE_BEHIND_M = 0.01  # the base begins this far behind the face, inside that layer
 
 
 def footprints_of_surfaces(
@@ -117,8 +121,8 @@ def slab(
     solids = []
     # Stack the two layers from the face outwards.
     for area, near_m, far_m, tag in (
-        (own, 0.0, _FACE_M, face),
-        (footprint, _BASE_BEHIND_M, thickness_m, hidden),
+        (own, 0.0, FACE_M, face),
+        (footprint, BASE_BEHIND_M, thickness_m, hidden),
     ):
         near, far = surface.plane.raised(away * near_m), surface.plane.raised(away * far_m)
         low, high = (near, far) if surface.is_ceiling else (far, near)

@@ -13,16 +13,28 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.mesh import unit_normals
 from pbrs_farm.repair.structure import plan_geometry as plan
-from pbrs_farm.repair.structure.booleans import Patch, Tag, TagTable, bounds, solid_from_patches
+from pbrs_farm.repair.structure.booleans import (
+    Patch,
+    Tag,
+    TagTable,
+    bounds,
+    solid_from_patches,
+    unite,
+)
 from pbrs_farm.repair.structure.closed_shells import flat_patch, shells_from_item
 from pbrs_farm.repair.structure.planar_surfaces import facets
 from pbrs_farm.repair.structure.prisms import (
+    BASE_BEHIND_M,
+    FACE_M,
+    MAX_UV_OFF,
     Plane,
+    UvMap,
     affine_uv_map,
     level_plane,
     plane_of_points,
     polygons_of,
     prism,
+    uv_parts,
 )
 
 REVEAL = "reveal"
@@ -192,8 +204,31 @@ def _thickened(
     patches = extrude(flat.patch, normal, thickness_m)
     if patches is None:
         return None
-    solid = solid_from_patches(patches, table)
+    solid = _with_texture_in_parts(flat.patch, normal, thickness_m, table)
+    if solid is None:
+        solid = solid_from_patches(patches, table)
     return None if solid is None else _wall_of_solid(item, index, solid, patches, thickened=True)
+
+
+def _with_texture_in_parts(
+    patch: Patch, normal: F64, thickness_m: float, table: TagTable
+) -> Manifold | None:
+    """The flat patch as a solid whose texture lies another way in each part of its face; None: one way.
+
+    A layer a part, before a base that they overlap, as slabs have it: no seam goes through.
+    """
+    local, _axes = _in_frame_of_wall(patch, normal)
+    if affine_uv_map(local, patch.uvs)[1] <= MAX_UV_OFF:
+        return None
+    layers = []
+    for part in uv_parts(local, patch.faces, patch.uvs):
+        solid = _prism_behind(patch, normal, part.area, (0.0, FACE_M), part.uv)
+        layers.append(solid_from_patches(solid, table))
+    if not layers:
+        return None
+    whole = plan.polygon_of_triangles(local, patch.faces)
+    base = _prism_behind(patch, normal, whole, (BASE_BEHIND_M, thickness_m), None)
+    return unite(s for s in (solid_from_patches(base, table), *layers) if s is not None)
 
 
 def extrude(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
@@ -201,27 +236,34 @@ def extrude(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None
 
     normal: (3,) unit, out of the face that is kept. uv is carried on by its affine map.
     """
-    # Span a frame: along the wall, out of its face, up.
+    local, _axes = _in_frame_of_wall(patch, normal)
+    # Carry the texture on by the affine map that fits it.
+    uv, _ = affine_uv_map(local, patch.uvs)
+    whole = plan.polygon_of_triangles(local, patch.faces)
+    return _prism_behind(patch, normal, whole, (0.0, thickness_m), uv) or None
+
+
+def _in_frame_of_wall(patch: Patch, normal: F64) -> tuple[F64, F64]:
+    """(V, 3) positions along the wall, out of its face and up, from the first; (3, 3) those axes as rows."""
     along = np.cross([0.0, 1.0, 0.0], normal)
     if np.linalg.norm(along) < 1e-6:
         along = np.array([1.0, 0.0, 0.0])
     along = along / np.linalg.norm(along)
     axes = np.stack([along, normal, np.cross(along, normal)])
-    origin = patch.positions[0]
-    local = (patch.positions - origin) @ axes.T
-    # Carry the texture on by the affine map that fits it.
-    uv, _ = affine_uv_map(local, patch.uvs)
+    return (patch.positions - patch.positions[0]) @ axes.T, axes
 
-    # Raise a prism behind the face, in that frame, and turn it back.
-    polygons = polygons_of(plan.polygon_of_triangles(local, patch.faces))
-    if not polygons:
-        return None
+
+def _prism_behind(
+    patch: Patch, normal: F64, area: plan.Shape, behind_m: tuple[float, float], uv: UvMap | None
+) -> list[Patch]:
+    """The patches of prisms over an area in the wall's frame, between two depths behind its face."""
+    _local, axes = _in_frame_of_wall(patch, normal)
     tags = (
         Tag(patch.tag.item, "back", patch.tag.material),
         patch.tag,
         Tag(patch.tag.item, "rim", patch.tag.material),
     )
-    parts = [
-        p for q in polygons for p in prism(q, level_plane(-thickness_m), level_plane(0.0), tags, uv)
-    ]
+    near, far = (level_plane(-depth) for depth in behind_m)
+    parts = [p for q in polygons_of(area) for p in prism(q, far, near, tags, uv)]
+    origin = patch.positions[0]
     return [Patch(p.tag, p.positions @ axes + origin, p.faces, p.uvs, p.normals) for p in parts]

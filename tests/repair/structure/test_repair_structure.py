@@ -132,6 +132,33 @@ def test_a_floor_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
     assert area == pytest.approx({"left": 6.0, "right": 6.0}, rel=1e-3)
 
 
+def test_a_wall_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
+    r = room("0_0", RECT)
+    walls = planar_walls(RECT)
+    drawn = next(w for w in walls if np.ptp(w.bounds[:, 2]) == 0 and w.bounds[0, 2] == 0)
+    points = np.array([(x, y, 0.0) for x in (0.0, 2.0, 2.0, 4.0) for y in (0.0, 2.5)], np.float32)
+    uvs = np.where(np.arange(8)[:, None] < 4, points[:, [0, 1]], 0.25).astype(np.float32)
+    faces = np.array([[0, 2, 3], [0, 3, 1], [4, 6, 7], [4, 7, 5]], np.int32)
+    sheet = replace(
+        drawn.surfaces[0], positions=points, faces=faces, uvs=uvs,
+        normals=np.tile(np.float32([0, 0, 1]), (8, 1)),
+    )  # fmt: skip
+    walls[walls.index(drawn)] = replace(drawn, surfaces=(sheet,))
+    after, report = _repaired(house([*walls, *covers(r)], [r]))
+    assert len(unpaired_edges(after)) == 0
+    assert _sky(report) == 0
+    seen = [s for i in after.items if i.id == drawn.id for s in i.surfaces if s.name == "plane"]
+    for surface in seen:
+        assert surface.uvs is not None
+        corners, uv = surface.positions[surface.faces], surface.uvs[surface.faces]
+        is_left = corners[..., 0].mean(1) < 2
+        assert uv[is_left] == pytest.approx(corners[is_left][..., :2], abs=1e-4)
+        assert (uv[~is_left] == 0.25).all()
+        assert is_left.any()
+        assert not is_left.all()
+    assert seen
+
+
 def test_a_floor_goes_on_through_a_doorway() -> None:
     a, b = room("0_0", RECT), room("0_1", (4.3, 0.0, 8.0, 3.0))
     walls = [
