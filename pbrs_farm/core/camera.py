@@ -133,10 +133,13 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
 def _check_size_of_k(width: int, height: int, cx: float, cy: float) -> None:
     """Refuse a K whose principal point is the middle of a picture that is larger or smaller.
 
-    Off the middle by equal shares of width and height: a picture that was cut has others.
+    Off the middle by equal shares of width and height: a picture that was cut has others. So has one
+    whose width and height were mixed up: turned round it fits.
     """
     across, down = 2 * cx / width, 2 * cy / height
-    if abs(across - 1) > _OTHER_SIZE and abs(across - down) < _SAME_SHARE * across:
+    is_scaled = abs(across - down) < _SAME_SHARE * across
+    is_turned = max(abs(2 * cx / height - 1), abs(2 * cy / width - 1)) < _SAME_SHARE
+    if abs(across - 1) > _OTHER_SIZE and (is_scaled or is_turned):
         text = f"{width}x{height} is not that of K, whose middle is at ({cx:g}, {cy:g})"
         hint = f"about {round(2 * cx)}x{round(2 * cy)}, or scale K"
         raise BadInput("camera", "size", text, hint=hint)

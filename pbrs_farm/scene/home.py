@@ -65,7 +65,9 @@ from pbrs_farm.transport.scene_tables.area_emitters import rgb_from_kelvin
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
-ItemLike = str | Item | Iterable[str | Item]
+Row = Mapping[str, Any]
+"""Of `home.items`."""
+ItemLike = str | Item | Row | Iterable[str | Item | Row]
 Colour = str | Sequence[float]
 Flux = Annotated[float, Where("0 to 10,000,000 lumen", lambda lm: 0 <= lm < 1e7)]
 Kelvin = Annotated[float, Where("1,000 to 20,000 kelvin", lambda k: 1000 <= k <= 20_000)]
@@ -455,11 +457,13 @@ class Home:
         return next(f"{stem} {k}" for k in range(1, len(used) + 2) if f"{stem} {k}" not in used)
 
     def _ids(self, items: ItemLike) -> tuple[str, ...]:
-        words = [items] if isinstance(items, str | Item) else list(items)
+        words = [items] if isinstance(items, str | Item | Mapping) else list(items)
         found: dict[str, None] = {}
         for word in words:
             if isinstance(word, Item):
                 found[word.id] = None
+            elif isinstance(word, Mapping) and "id" in word:
+                found[self.items[str(word["id"])].id] = None
             elif not isinstance(word, str):
                 raise BadInput("items", repr(word), "expected names of items, or items")
             else:

@@ -165,3 +165,9 @@ def test_a_home_is_dressed_once_and_before_its_edits(home: pf.Home) -> None:
     assert dressed.id == f"{home.id}-d2"
     with pytest.raises(BadInput, match="already"):
         dressed.dress(seed=3)
+
+
+def test_rows_of_items_name_the_items_they_are_of(home: pf.Home) -> None:
+    row = home.items[len(home.items) - 1]
+    assert home.without(row).id == home.without(row["id"]).id
+    assert row["id"] not in {item["id"] for item in home.without([row]).items}

@@ -144,6 +144,11 @@ WRONG: list[tuple[str, Call, str]] = [
         lambda g: pf.Camera.from_opencv(np.eye(4), K, size=(640, 480)),
         "size: 640x480 is not that of K.*1280x960",
     ),
+    (
+        "Camera.from_opencv",
+        lambda g: pf.Camera.from_opencv(np.eye(4), K, size=(960, 1280)),
+        "size: 960x1280 is not that of K.*1280x960",
+    ),
     ("Camera.with_size", lambda g: g.camera.with_size(0, 4), "with_size: 0x4"),
     ("Camera.pixels_of", lambda g: g.camera.pixels_of(np.zeros(3)), "points: expected .N, 3."),
     ("Camera.depths_of", lambda g: g.camera.depths_of(np.zeros((2, 2))), "points"),
