@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from functools import lru_cache
 from typing import Final
 
 from pbrs_farm.core.house import Item
@@ -58,6 +59,7 @@ def parted(text: str) -> str:
     return re.sub(r"(?<=[^\W\d_])(?=[A-Z][a-z])|(?<=[a-z])(?=[A-Z])", " ", text)
 
 
+@lru_cache(1 << 14)
 def words_of(name: str) -> frozenset[str]:
     """Folded words of letters alone; camelCase adds its parts, a plural adds its singular.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,13 @@ _CUBE_PX: Final = 12  # width of a face of the cube around the eye
 _COUNTS_PER_CALL: Final = 1 << 22  # numbers in a table of counts: bounds memory
 _CAMERAS_PER_CALL: Final = 384  # a multiple of the six faces of a cube
 _AXES: Final = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+
+
+class EnclosureLimits(NamedTuple):
+    """When items enclose an eye."""
+
+    bounds: F64  # (I, 2, 3), NaN for what never does
+    most: F64  # (I,) share of all directions that an item may cover without enclosing the eye
 
 
 def count_items(
@@ -89,12 +96,15 @@ def _in_standing_wall(house: House, eyes: F64) -> Bools:
     return inside
 
 
-def enclosed(house: House, eyes: F64, counter: ItemCounter) -> Bools:
+def enclosed(
+    house: House, eyes: F64, counter: ItemCounter, limits: EnclosureLimits | None = None
+) -> Bools:
     """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
 
-    Counts the pixels of the six faces of a cube around the eyes that some item's box holds.
+    Counts the pixels of the six faces of a cube around the eyes that some item's box holds. limits:
+    of this house, where they are at hand.
     """
-    bounds, most = _enclosing(house)
+    bounds, most = limits or enclosure_limits(house)
     inside = np.zeros(len(eyes), np.bool_)
     held = np.flatnonzero(_held_by(bounds, eyes))
     cube = Intrinsics.from_hfov(_CUBE_PX, _CUBE_PX, math.pi / 2)
@@ -129,11 +139,12 @@ def _cube_poses(eyes: F64) -> F64:
     return poses.reshape(-1, 4, 4)
 
 
-def _enclosing(house: House) -> tuple[F64, F64]:
-    """Each item's bounds (I, 2, 3) and the share of all directions (I,) that makes it enclose."""
+def enclosure_limits(house: House) -> EnclosureLimits:
+    """When each item of a house encloses an eye; looks at all vertices, so keep it where rooms are many."""
     bounds = np.array([item.bounds for item in house.items], np.float64).reshape(-1, 2, 3)
     bounds[[item.is_outside for item in house.items]] = np.nan  # it encloses no eye
     structure = np.array([item.kind.is_structure for item in house.items], np.bool_)
     with np.errstate(invalid="ignore"):
         shell = np.prod(bounds[:, 1] - bounds[:, 0], axis=1) > MAX_OBJECT_M3
-    return bounds, np.where(structure | shell, MAX_STRUCTURE_SHARE, MAX_OBJECT_SHARE)
+    most = np.where(structure | shell, MAX_STRUCTURE_SHARE, MAX_OBJECT_SHARE)
+    return EnclosureLimits(bounds, most)

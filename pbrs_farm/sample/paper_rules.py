@@ -15,7 +15,7 @@ from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.candidates import Candidates, Grid
 from pbrs_farm.sample.clearance import near_any_triangle
-from pbrs_farm.sample.eye_probes import ItemCounter, enclosed, not_above_floor
+from pbrs_farm.sample.eye_probes import EnclosureLimits, ItemCounter, enclosed, not_above_floor
 
 _CHUNK = 4096  # candidates judged at once: bounds memory
 
@@ -36,11 +36,13 @@ def rejections(
     candidates: Candidates,
     geometry: Geometry,
     counter: ItemCounter,
+    limits: EnclosureLimits | None = None,
 ) -> NDArray[np.uint8]:
     """(N,) verdict of each candidate: the first rule of place that rejects it, or LOWER_SCORE.
 
     In order: inside the room's polygon, farther than the clearance from every triangle, a floor
-    or furniture below rather than a wall or ceiling, not enclosed by one item. Memory is bounded.
+    or furniture below rather than a wall or ceiling, not enclosed by one item. Memory is bounded. limits: of
+    enclosure_limits, where they are at hand.
     """
     verdict = np.full(len(candidates), Verdict.LOWER_SCORE, np.uint8)
     eye = candidates.eye
@@ -51,7 +53,7 @@ def rejections(
     rules: tuple[tuple[Verdict, Callable[[F64], Bools]], ...] = (
         (Verdict.NEAR_OBSTACLE, lambda p: near_any_triangle(p, geometry, fields.clearance_m)),
         (Verdict.NOT_ABOVE_FLOOR, lambda p: not_above_floor(house, p, counter)),
-        (Verdict.ENCLOSED, lambda p: enclosed(house, p, counter)),
+        (Verdict.ENCLOSED, lambda p: enclosed(house, p, counter, limits)),
     )
     places = np.flatnonzero(inside)
     for start in range(0, len(places), _CHUNK):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -22,10 +23,11 @@ from pbrs_farm.core.house import Geometry, House, Room
 from pbrs_farm.core.recipe import CameraFields
 from pbrs_farm.sample.camera_report import REJECTIONS, RoomReport, SectorReport, Verdict
 from pbrs_farm.sample.candidates import grid_candidates
-from pbrs_farm.sample.eye_probes import ItemCounter, count_items
+from pbrs_farm.sample.eye_probes import EnclosureLimits, ItemCounter, count_items, enclosure_limits
 from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_choice import PhotoChoice, RoomCandidates
 from pbrs_farm.sample.photo_score import (
+    ItemRoles,
     PhotoShares,
     framing_cost,
     item_roles,
@@ -41,7 +43,7 @@ _LEAST_TINY_PX: Final = 24  # edge of a picture that tells furniture from walls
 _TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class PhotoSampler:
     """The sampler of one home. counter: pixels of each item; depth_of: small depth pictures."""
 
@@ -61,7 +63,9 @@ class PhotoSampler:
         f = self.fields
         names = (self.seed, self.house.id, room.id)
         candidates = grid_candidates(room_grid(room), f, names)
-        verdict = rejections(self.house, room, f, candidates, self.geometry, self.counter)
+        verdict = rejections(
+            self.house, room, f, candidates, self.geometry, self.counter, self._limits
+        )
         n = len(candidates)
         nothing = np.zeros((n, len(NYU13_NAMES)))
         placed = RoomCandidates(room, candidates, verdict, np.zeros(n), nothing, np.zeros(n))
@@ -118,7 +122,7 @@ class PhotoSampler:
         f = self.fields
         full = self._intrinsics(f.score_width_px, f.score_height_px)
         cameras = scored.candidates.cameras(np.array(chosen, np.intp), full)
-        columns = np.flatnonzero(item_roles(self.house).furniture)
+        columns = np.flatnonzero(self._roles.furniture)
         counts = [
             r for _part, rows in count_items(self.counter, cameras, self._n_items) for r in rows
         ]
@@ -133,6 +137,14 @@ class PhotoSampler:
             )
             for k, (number, camera, row) in enumerate(zip(chosen, cameras, counts, strict=True))
         ]
+
+    @cached_property
+    def _roles(self) -> ItemRoles:
+        return item_roles(self.house)
+
+    @cached_property
+    def _limits(self) -> EnclosureLimits:
+        return enclosure_limits(self.house)
 
     @property
     def _n_items(self) -> int:
@@ -157,7 +169,7 @@ class PhotoSampler:
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
         depth = self.depth_of([camera.with_size(*depth_size) for camera in cameras])
         flat = depth.reshape(len(cameras), depth_size[0] * depth_size[1])
-        return photo_shares(counts, flat, item_roles(self.house), self.fields.min_object_fraction)
+        return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
         f = self.fields

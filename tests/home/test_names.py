@@ -53,3 +53,8 @@ def test_a_home_theater_heats_no_home() -> None:
     assert theater == bare
     assert any(bare)
     assert not any(heater)
+
+
+def test_the_words_of_a_name_are_found_once() -> None:
+    assert words_of("Wardrobes left") == {"wardrobes", "wardrobe", "left"}
+    assert words_of("Wardrobes left") is words_of("Wardrobes left")

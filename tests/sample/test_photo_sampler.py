@@ -15,8 +15,9 @@ from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import CameraFields, recipe_from_name
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.sample import sample_cameras
+from pbrs_farm.sample import photo_sampler, sample_cameras
 from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.sample.eye_probes import EnclosureLimits, enclosure_limits
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import (
@@ -219,6 +220,22 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
         few[0].score[np.concatenate([*by_few.values()])]
         == score[np.concatenate([*by_few.values()])]
     ).all()
+
+
+def test_what_encloses_an_eye_is_found_once_for_all_rooms(monkeypatch: pytest.MonkeyPatch) -> None:
+    house, found = furnished(), list[House]()
+
+    def counted(of: House) -> EnclosureLimits:
+        found.append(of)
+        return enclosure_limits(of)
+
+    monkeypatch.setattr(photo_sampler, "enclosure_limits", counted)
+    geometry = geometry_from_house(house)
+    caster = Caster(geometry)
+    sampler = PhotoSampler(house, FIELDS, 0, caster.item_counts, caster.depth_pictures, geometry)
+    for _ in range(2):
+        assert (sampler.room_candidates(house.rooms[0]).verdict == Verdict.NEAR_OBSTACLE).any()
+    assert found == [house]
 
 
 def test_the_same_house_and_seed_give_the_same_views() -> None:
