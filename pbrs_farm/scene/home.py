@@ -65,8 +65,7 @@ from pbrs_farm.transport.scene_tables.area_emitters import rgb_from_kelvin
 if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
-Row = Mapping[str, Any]
-"""Of `home.items`."""
+Row = Annotated[Mapping[str, Any], Where("a row of home.items", lambda row: "id" in row)]
 ItemLike = str | Item | Row | Iterable[str | Item | Row]
 Colour = str | Sequence[float]
 Flux = Annotated[float, Where("0 to 10,000,000 lumen", lambda lm: 0 <= lm < 1e7)]
