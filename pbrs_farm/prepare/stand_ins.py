@@ -482,11 +482,16 @@ def _inside(target: Box, area: Polygon) -> Box | None:
 
 
 def _turned(target: Box, *, is_front_given: bool) -> Iterator[Box]:
-    """The box with its front as given, or in each of the four ways that it may look."""
-    yield target
+    """The box with its front as given, or in each of the ways that it may look: four, two if it is flat."""
     if is_front_given:
+        yield target
         return
-    for quarter in (1, 2, 3):
+    width, depth = (float(2 * h) for h in target.half[[0, 2]])
+    quarters: Sequence[int] = range(4)
+    if min(width, depth) < _THIN_M and max(width, depth) > 2 * min(width, depth):
+        # A flat screen looks across its thin side.
+        quarters = (0, 2) if depth < width else (1, 3)
+    for quarter in quarters:
         right, up, front = target.axes.T
         for _ in range(quarter):
             right, front = front, -right

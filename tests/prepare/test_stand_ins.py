@@ -151,6 +151,16 @@ def test_what_hangs_where_nothing_is_below_stays_where_it_is() -> None:
     assert of(furnished(picture, table)).bounds[0, 1] == pytest.approx(1.3, abs=0.01)
 
 
+@pytest.mark.parametrize("size", [(1.0, 0.6, 0.06), (0.06, 0.6, 1.0)])
+def test_a_flat_screen_looks_across_its_thin_side(size: tuple[float, float, float]) -> None:
+    # Its sides fit a screen that is modelled .62 m wide better than its front does.
+    screens = catalogue(("tv", (0.62, 0.18, 0.6), 25), ("tv", (0.95, 0.1, 0.6), 25))
+    item = of(furnished(box_only("television", (2.5, 1.3, 2.0), size), shelf=screens))
+    width, _height, depth = np.ptp(item.bounds, axis=0)
+    assert (width > depth) == (size[0] > size[2])
+    assert max(width, depth) == pytest.approx(1.0, abs=0.01)
+
+
 def test_a_given_front_is_kept() -> None:
     item = of(
         furnished(box_only("bed", (2.5, 0.4, 1.1), (1.6, 0.8, 2.1), math.pi, is_front_given=True))
