@@ -111,8 +111,12 @@ def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPa
             # Not one map for all: that of the largest face, for all faces that it fits.
             largest = left[np.argmax(_plan_areas(positions, left))]
             uv, _ = affine_uv_map(positions[largest], uvs[largest])
-        fits = np.abs(uv(positions) - uvs).max(1) <= MAX_UV_OFF
-        mine = fits[left].all(1)
+        # Pictures repeat: tiles that all begin at 0 lie as one floor whose picture goes on.
+        off_by = (uv(positions) - uvs)[left]
+        whole = np.rint(off_by)
+        mine = (np.abs(off_by - whole) <= MAX_UV_OFF).all((1, 2)) & (
+            np.ptp(whole, axis=1) == 0
+        ).all(1)
         if not mine.any():
             return ()
         parts.append(UvPart(plan.polygon_of_triangles(positions, left[mine]), uv))

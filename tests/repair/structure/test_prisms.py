@@ -8,7 +8,7 @@ import shapely
 
 from pbrs_farm.core.mesh import face_areas, triangle_corners, unit_normals
 from pbrs_farm.repair.structure.booleans import Tag, TagTable, patches_from_solid
-from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms
+from pbrs_farm.repair.structure.prisms import level_plane, solid_prisms, uv_parts
 
 RECTANGLE = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
 DENTED = [(0.0, 0.0), (2.0, 1.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
@@ -37,3 +37,14 @@ def test_a_prism_whose_hole_touches_its_outline_keeps_volume_and_upright_sides(
     corners = triangle_corners(patch.positions, patch.faces)
     up = np.abs(unit_normals(corners)[:, 1])
     assert face_areas(corners)[(up > 1e-3) & (up < 0.999)].sum() < 1e-9
+
+
+def test_tiles_of_one_picture_each_are_one_part_and_a_turned_one_another() -> None:
+    corners = np.array([[x, 0.0, z] for x in range(3) for z in (0.0, 1.0)], np.float64)
+    positions = corners[[0, 2, 3, 1, 2, 4, 5, 3]]
+    tile = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float64)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    (one,) = uv_parts(positions, faces, np.concatenate([tile, tile]))
+    assert one.area.area == pytest.approx(2.0)
+    turned = uv_parts(positions, faces, np.concatenate([tile, 1 - tile[:, ::-1]]))
+    assert [part.area.area for part in turned] == pytest.approx([1.0, 1.0])
