@@ -46,9 +46,8 @@ _ROUNDS: Final = 3
 MOST_WORSE: Final = 0.25
 """By how much of score less than its sector's best a view may be taken for its likeness."""
 
-LIKELY_BY_SCORE: Final = 8
-LIKELY_BY_GAIN: Final = 24
-"""Candidates of a sector that may still be chosen after a look at smaller pictures: by score, by gain."""
+_LIKELY_BY_SCORE: Final = 8
+"""Candidates of a sector, best first, whose scores are worth knowing better whatever they add."""
 
 _Name = tuple[str, int]
 """A candidate's room and number."""
@@ -100,6 +99,7 @@ class _Sector:
     number: int  # in its room
     candidates: NDArray[np.intp]
     taken: list[int] = field(default_factory=list)
+    ahead: set[int] = field(default_factory=set)  # numbers that added most when a view was chosen
 
 
 @dataclass(slots=True, eq=False)
@@ -131,23 +131,13 @@ class PhotoChoice:
     def likely(self, rooms: Sequence[RoomCandidates]) -> dict[str, NDArray[np.intp]]:
         """Room id -> numbers of the candidates that may be chosen once their scores are known better.
 
-        Of each sector the best by score, and those that add most to the views that would be chosen
-        of the others. Writes the verdict of low scores.
+        Of each sector the best by score, and those that add most whenever a view is chosen here: the
+        same choice with better scores finds them again. Writes the verdict of low scores.
         """
-        found: dict[str, list[int]] = {scored.room.id: [] for scored in rooms}
-        sectors = self._filled_sectors(rooms)
-        for sector in sectors:
-            taken = list(sector.taken)
-            for number in taken:
-                self._give_up(sector, number)
-            gain = self._gain(sector.scored, sector.candidates)
-            by_gain = sector.candidates[np.argsort(-gain, kind="stable")]
-            n = self.fields.per_sector
-            best = sector.scored.ranked(sector.number)[: LIKELY_BY_SCORE * n]
-            numbers = np.union1d(best, by_gain[: LIKELY_BY_GAIN * n])
-            found[sector.scored.room.id] += numbers.tolist()
-            for number in taken:
-                self._take(sector, number)
+        found: dict[str, set[int]] = {scored.room.id: set() for scored in rooms}
+        for sector in self._filled_sectors(rooms):
+            best = sector.scored.ranked(sector.number)[: _LIKELY_BY_SCORE * self.fields.per_sector]
+            found[sector.scored.room.id] |= sector.ahead | set(best.tolist())
         return {room: np.array(sorted(numbers), np.intp) for room, numbers in found.items()}
 
     def _filled_sectors(self, rooms: Sequence[RoomCandidates]) -> list[_Sector]:
@@ -193,8 +183,9 @@ class PhotoChoice:
             if len(sector.taken) == self.fields.per_sector or not len(left):
                 return
             # Rank again after each: what a view adds depends on those that are taken.
-            at = int(np.argmax(self._gain(sector.scored, left)))
-            number, left = int(left[at]), np.delete(left, at)
+            order = np.argsort(-self._gain(sector.scored, left), kind="stable")
+            sector.ahead.update(left[order[:_TRIES]].tolist())
+            number, left = int(left[order[0]]), np.delete(left, order[0])
             if self._is_near_duplicate(sector.scored, number):
                 sector.scored.verdict[number] = Verdict.NEAR_DUPLICATE
             else:
@@ -209,6 +200,7 @@ class PhotoChoice:
             gain = self._gain(sector.scored, others)
             # Try the better ones from the best down; a view is no near-duplicate of itself.
             order = others[np.argsort(-gain, kind="stable")][:_TRIES].tolist()
+            sector.ahead.update(order)
             better = order[: order.index(number)] if number in order else order
             free = (k for k in better if not self._is_near_duplicate(sector.scored, k))
             self._take(sector, next(free, number))
