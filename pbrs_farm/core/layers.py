@@ -288,6 +288,8 @@ LAYERS: Final[tuple[Layer, ...]] = (*OWN_LAYERS, *_of_plugins(), *_pictures_of_p
 
 LAYER: Final = {layer.name: layer for layer in LAYERS}
 
+_VARIANTS: Final = {LAYER[f"mlt_il_ol.{n}"].file for n in range(1, MOST_VARIANTS + 1)}
+
 OPTIONAL: Final = tuple(x.name for x in LAYERS if x.optional and x.step == "truth")
 """The names that --layers takes."""
 
@@ -303,13 +305,14 @@ def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
 
 
 def layer_table() -> str:
-    """The layers as a Markdown table."""
+    """The layers as a Markdown table; further pictures by other cameras share a row."""
     rows = ["| file | channels | type | unit | nothing |", "|---|---|---|---|---|"]
-    rows += [
-        f"| `{x.file}`{' ...' if x.name == 'mlt_il_ol.1' else ''} | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |"
-        for x in LAYERS
-        if not x.name.startswith("mlt_il_ol.") or x.name.endswith(".1")
-    ]
+    first, last = (LAYER[f"mlt_il_ol.{n}"] for n in (1, MOST_VARIANTS))
+    for x in LAYERS:
+        if x.file in _VARIANTS and x is not first:
+            continue
+        file = f"`{first.file}` to `{last.file}`" if x is first else f"`{x.file}`"
+        rows.append(f"| {file} | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |")
     return "\n".join(rows)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.check import verify
-from pbrs_farm.core.layers import LAYERS
+from pbrs_farm.core.layers import LAYERS, MOST_VARIANTS
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import array_from_png, layers_from_exr
 from pbrs_farm.run.local import run_local
@@ -31,6 +31,7 @@ def small() -> Recipe:
             "image.height_px": "72",
             "light.spp": "4",
             "light.pilot_spp": "0",
+            "tone.variants": str(MOST_VARIANTS),
             "cameras.cell_m": "1.0",
             "cameras.score_width_px": "160",
             "cameras.score_height_px": "120",
