@@ -372,3 +372,11 @@ def test_json_that_ends_early_names_the_place(
     path.write_text(path.read_text()[:-40])
     with pytest.raises(BadInput, match="line 1 column"):
         plan_from_file(path)
+
+
+def test_a_plan_whose_scale_is_null_is_as_it_is_drawn(tmp_path: Path) -> None:
+    path = write_react_planner(tmp_path)
+    drawn = plan_from_file(path).plan
+    value = json.loads(path.read_text()) | {"scale": None}
+    rooms = plan_from_file(_written(path, value)).plan.rooms
+    assert [room.polygon for room in rooms] == [room.polygon for room in drawn.rooms]

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any, Final, TypeGuard
+from typing import Annotated, Any, Final, TypeGuard
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 from shapely.geometry import Polygon
 
 from pbrs_farm.core.checked_json import checked
@@ -43,9 +43,14 @@ class _Layer(BaseModel):
     name: Any = ""
 
 
+def _one_for_none(value: Any) -> Any:
+    """The scale of a plan that was drawn, not traced, which editors write as null."""
+    return 1.0 if value is None else value
+
+
 class _File(BaseModel):
     unit: str = "cm"
-    scale: float = Field(1.0, gt=1e-12, lt=1e12)
+    scale: Annotated[float, BeforeValidator(_one_for_none)] = Field(1.0, gt=1e-12, lt=1e12)
     layers: dict[str, _Layer] = Field(min_length=1, max_length=50)
 
 

@@ -26,7 +26,7 @@ _SILL_M: Final = 0.5  # above the storey: what begins higher may be a window
 _DOOR_HEIGHT_M: Final = 1.7  # least height of a door
 # Families of doors whose names do not say door (of Revit's libraries): all words of one.
 _DOOR_FAMILIES: Final = (
-    "single flush", "double flush", "single panel", "double panel", "raised panel", "sliding closet",
+    "single flush", "double flush", "single glass", "double glass", "single panel", "double panel", "raised panel", "sliding closet",
     "bifold", "bi fold", "bypass", "pocket slider", "overhead rolling", "overhead sectional",
 )  # fmt: skip
 _WINDOW_FAMILIES: Final = (

@@ -153,8 +153,9 @@ def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
         try:
             lamps[words[0]] = _lamp_materials(words[1:])
         except (ValueError, IndexError):
-            text = "expected counts, each with as many materials: 1 material_3 1 material_2"
-            raise BadHouse(name, f"line {number}", text) from None
+            # All houses share the table: one row that nobody understands costs one lamp its bulbs.
+            text = "expected counts, each with as many materials (1 material_3 1 material_2): repair adds its bulb"
+            notes.add("unreadable-row", f"{name}: line {number}", f"{words[0]}: {text}")
     return lamps
 
 
@@ -171,7 +172,10 @@ def _lamp_materials(words: list[str]) -> LampMaterials:
 
 def _material_position(word: str) -> int:
     """The position in the MTL of `material_3`, as the released table writes it, or of a bare 3."""
-    return int(word.rpartition("_")[2])
+    position = int(word.rpartition("_")[2])
+    if position < 0:
+        raise ValueError("a position before the first")
+    return position
 
 
 def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:

@@ -125,6 +125,8 @@ NAMES = [
     ("M_Fixed:2800mm x 2410mm", 0.0, 2.41, "IfcWindow", "window"),
     ("Window by the door", 0.0, 2.1, "IfcWindow", "window"),
     ("Single-Flush", 1.0, 1.0, "IfcWindow", "window"),
+    ("Double-Glass 1:1730 x 2032mm", 0.0, 2.03, "IfcWindow", "door"),
+    ("Fenstertür 2-flg", 0.0, 2.1, "IfcWindow", "door"),
     ("Single-Flush", 0.0, 2.03, "IfcDoor", "door"),
     ("M_Casement:819mm x 759mm", 0.9, 0.8, "IfcDoor", "window"),
     ("Fenster 3", 0.9, 1.2, "IfcDoor", "window"),

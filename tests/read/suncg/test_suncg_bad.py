@@ -122,6 +122,18 @@ def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "row", ["lamp 3 1", "lamp 1 bulb 0", "lamp 0 2 material_1", "lamp 1 -1 0", "lamp"]
+)
+def test_a_row_of_the_lamps_that_nobody_understands_costs_one_lamp_and_no_house(
+    root: Path, row: str
+) -> None:
+    (root / "metadata/light_geometry_compact.txt").write_text(f"other 1 material_0 0\n{row}\n")
+    (note,) = [n for n in read(root).notes if n.kind == "unreadable-row"]
+    assert "light_geometry_compact.txt: line 2" in str(note)
+    assert "lamp: expected counts" in note.text
+
+
+@pytest.mark.parametrize(
     ("name", "text", "message"),
     [
         ("object/chair/chair.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "4 of 3 does not exist"),
@@ -129,9 +141,6 @@ def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
         ("object/chair/chair.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "not a finite"),
         ("object/chair/chair.obj", "v 0 0 0\nv 1 x 0\nv 0 1 0\nf 1 2 3\n", "not a number"),
         ("object/chair/chair.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "not an index"),
-        ("metadata/light_geometry_compact.txt", "lamp 3 1\n", "line 1"),
-        ("metadata/light_geometry_compact.txt", "a 1 material_0 0\nlamp 1 bulb 0\n", "line 2"),
-        ("metadata/light_geometry_compact.txt", "lamp 0 2 material_1\n", "line 1"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "Sun"}]}', r"lamp\[0\]"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": "PointLight", "power": 3}]}', "position"),
         ("metadata/suncgModelLights.json", '{"lamp": [{"type": []}]}', r"lamp\[0\]"),
