@@ -55,7 +55,7 @@ def main(homes: tuple[str, ...] = HOMES, against: str = "") -> None:
     units = {
         "house_cost.cpu_s": "s of CPU a home: house, cameras and illuminance",
         "house_cost.ratio": "of the other checkout's CPU",
-        "house_cost.same_houses": "share of homes with the same bytes",
+        "house_cost.same_houses": "share of homes with the same house.glb",
         "house_cost.same_views": "share of the other checkout's cameras that are chosen here, too",
         "house_cost.score_ratio": "sum of the scores of all views, of the other checkout's",
     }
@@ -105,14 +105,13 @@ def _cost(home: str) -> dict[str, Any]:
     with mock.patch.object(finished_house, "PASSES", passes):
         for step in STEPS:
             timed(step, run_step)(step, work)
-    glb, description, cameras = (
-        store.get(keys.house_key(house_id, name))
-        for name in ("house.glb", "house.json", "cameras.json")
+    glb, cameras = (
+        store.get(keys.house_key(house_id, name)) for name in ("house.glb", "cameras.json")
     )
     views = views_from_json(cameras, home).values()
     return {
         "cpu_s": cpu_s,
-        "house": hashlib.sha256(glb + description).hexdigest(),
+        "house": hashlib.sha256(glb).hexdigest(),
         "views": [f"{v.id} {v.camera.world_from_camera.round(4).tolist()}" for v in views],
         "scores": [v.score for v in views],
     }
