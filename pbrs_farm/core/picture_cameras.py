@@ -110,10 +110,6 @@ def picture_camera(name: str, tone: ToneFields, sensor: SensorFields, seed: int)
         z = deviation * float(rng.normal())
         held = values.get(f, getattr(tone, f))
         values[f] = round(held * 2**z if f == "contrast" else held + z, 4)
-    values["camera"] = name  # type: ignore[assignment]  # the one word among numbers
-    is_plain = sensor == SensorFields()
-    return PictureCamera(
-        name,
-        tone.model_copy(update=values),
-        SensorFields(preset=row.sensor) if is_plain and row.sensor != "none" else sensor,
-    )  # fmt: skip
+    if sensor == SensorFields() and row.sensor != "none":
+        sensor = SensorFields(preset=row.sensor)
+    return PictureCamera(name, tone.model_copy(update={**values, "camera": name}), sensor)
