@@ -352,7 +352,7 @@ def _vignette(light: Floats, sensor: SensorFields) -> Floats:
 
 
 def _roll_off(light: Floats, white: float) -> Floats:
-    """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; from 1 on it pales."""
+    """Straight to 0.6, then 0.6 + k log(1 + (x - 0.6) / k), which is 1 at white; from a luminance of 1 on it pales."""
     # The sum rises with k, so that halving its logarithm finds it.
     low, high = -9.3, 9.3
     for _ in range(100):
@@ -364,5 +364,6 @@ def _roll_off(light: Floats, white: float) -> Floats:
     over = np.maximum(top - 0.6, 0)
     target = np.where(top > 0.6, np.minimum(0.6 + k * np.log1p(over / k), 1), top)
     scaled = light * np.divide(target, top, out=np.ones_like(top), where=top > 0)
-    pale = np.clip(np.log2(np.maximum(top, 1)) / max(np.log2(white), 1e-3), 0, 1)
+    level = np.maximum(light @ _LUMINANCE, 1)[..., None]
+    pale = np.clip(np.log2(level) / max(np.log2(white), 1e-3), 0, 1)
     return np.asarray(scaled * (1 - pale) + target * pale)

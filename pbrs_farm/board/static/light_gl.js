@@ -40,7 +40,8 @@ vec3 rolledOff(vec3 rgb) {
   float soft = SHOULDER + u_knee * log(1.0 + max(top - SHOULDER, 0.0) / u_knee);
   float target = top > SHOULDER ? min(soft, 1.0) : top;
   vec3 scaled = rgb * (top > 0.0 ? target / top : 1.0);
-  float fade = clamp(log2(max(top, 1.0)) * u_pale, 0.0, 1.0);
+  float level = dot(rgb, vec3(0.2126, 0.7152, 0.0722));
+  float fade = clamp(log2(max(level, 1.0)) * u_pale, 0.0, 1.0);
   return mix(scaled, vec3(target), fade);
 }
 

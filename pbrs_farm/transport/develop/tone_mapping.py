@@ -150,7 +150,7 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
 def roll_off(rgb: F64, white: float) -> F64:
     """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
 
-    It maps the largest component and keeps the hue; from 1 on colours pale, and at white they are
+    It maps the largest component and keeps the hue; from a luminance of 1 on colours pale, and at white they are
     white, as a sensor's channels saturate one after the other.
     """
     # Leave what lies on the straight part as it is: most of a picture.
@@ -166,8 +166,9 @@ def _shoulder(rgb: F64, top: F64, white: float) -> F64:
     # Its slope at the shoulder is 1, so that it goes on without a bend.
     knee = knee_of(white)
     target = np.minimum(_SHOULDER + knee * np.log1p((top - _SHOULDER) / knee), 1.0)
-    # Scale all three components alike; pale by stops.
-    pale = np.clip(np.log2(np.maximum(top, 1)) / max(math.log2(white), _LEAST_STOPS), 0, 1)
+    # Scale all three components alike; pale by stops of luminance: a bright red stays red.
+    level = np.maximum(rgb @ LUMINANCE, 1)[:, None]
+    pale = np.clip(np.log2(level) / max(math.log2(white), _LEAST_STOPS), 0, 1)
     return np.asarray(rgb * (target / top) * (1 - pale) + target * pale)
 
 

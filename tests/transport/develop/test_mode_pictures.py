@@ -55,6 +55,12 @@ def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -
     np.testing.assert_allclose(above, below, atol=2e-6)
 
 
+def test_a_bright_red_stays_red_and_a_bright_garden_pales() -> None:
+    red, garden = roll_off(np.array([[[2.0, 0.05, 0.05], [6.0, 9.0, 4.0]]]), 10.0)[0]
+    assert red[1] < 0.05
+    assert garden.min() > 0.85
+
+
 def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
     sky = np.geomspace(4, 60, 12).reshape(1, -1, 1).repeat(3, -1)
 
