@@ -44,7 +44,9 @@ class PlaceModel(Record):
 
 
 class RemoveItems(Record):
-    """Take items away, and the holes that doors and windows among them cut stay."""
+    """Take items away; the holes that doors and windows among them cut stay, and so do the instance
+    ids of all other items.
+    """
 
     do: Literal["remove"] = "remove"
     items: tuple[str, ...]

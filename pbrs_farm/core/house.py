@@ -226,6 +226,11 @@ Light is not scattered by it; labels and pictures have it behind glass.
 LIT: Final = "lit"
 """Begins the name of a material of such an item that shines by itself: windows at night."""
 
+REMOVED: Final = "removed"
+"""Tag of an item that an edit took away: without surfaces, it holds its place, so that the instance
+ids of the others stay.
+"""
+
 BOX_ONLY: Final = "box-only"
 """Tag of an item without surfaces of which the source gives class and box alone.
 
@@ -287,6 +292,11 @@ class Item:
         out.
         """
         return OUTSIDE in self.tags
+
+    @property
+    def is_removed(self) -> bool:
+        """An edit took it away; its instance id stays its own."""
+        return REMOVED in self.tags
 
     @property
     def n_faces(self) -> int:

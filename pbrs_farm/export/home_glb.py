@@ -51,10 +51,9 @@ def glb_of_pieces(
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     lights: list[dict[str, Any]] = []
-    instance = {id(item): k + 1 for k, item in enumerate(house.items)}
     roots = []
     for piece in pieces:
-        extras = item_extras(piece.item, instance[id(piece.item)])
+        extras = item_extras(piece.item, piece.instance)
         if house.is_repaired and piece.item.kind is ItemKind.WALL:
             extras["solid"] = True  # cut by repair: not to be parted by its planes
         if not in_place:

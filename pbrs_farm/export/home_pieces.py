@@ -85,6 +85,7 @@ class Piece:
     """
 
     item: Item
+    instance: int  # in labels of the home's views
     name: str  # unique in the home: letters, digits and _
     world_from_local: F64  # (4, 4) rigid
     surfaces: tuple[Surface, ...]  # local
@@ -171,19 +172,24 @@ class ExportedHome:
 
 
 def exported_home(house: House) -> ExportedHome:
-    """The home in the frames of its items, without what lies before its windows.
+    """The home in the frames of its items, without what lies before its windows or was removed.
 
     Each item becomes a piece: its meshes in a frame of its own, a name that is unique and that files
     can have, lamps in lumen, and whether it stands still. Collision parts, masses and the walkable
     floor are computed when they are asked for.
     """
-    house = replace(house, items=tuple(item for item in house.items if not item.is_outside))
+    numbered = [
+        (number, item)
+        for number, item in enumerate(house.items, 1)
+        if not item.is_outside and not item.is_removed
+    ]
+    house = replace(house, items=tuple(item for _number, item in numbered))
     names = _unique_names(house.items)
     bounds = np.array([item.bounds for item in house.items]).reshape(-1, 2, 3)
     floors = {room.id: room.floor_y for room in house.rooms}
     found = [
-        _piece(item, name, _rests(k, house.items, bounds, floors))
-        for k, (item, name) in enumerate(zip(house.items, names, strict=True))
+        _piece(item, number, name, _rests(k, house.items, bounds, floors))
+        for k, ((number, item), name) in enumerate(zip(numbered, names, strict=True))
     ]
     return ExportedHome(house, tuple(found))
 
@@ -202,7 +208,7 @@ def _unique_names(items: Iterable[Item]) -> list[str]:
     return found
 
 
-def _piece(item: Item, name: str, is_resting: bool) -> Piece:
+def _piece(item: Item, instance: int, name: str, is_resting: bool) -> Piece:
     frame = np.eye(4)
     box = item.oriented_box
     size = 2 * box.half if item.surfaces else np.zeros(3)
@@ -215,7 +221,9 @@ def _piece(item: Item, name: str, is_resting: bool) -> Piece:
     local_from_world = np.asarray(np.linalg.inv(frame), np.float64)
     surfaces = tuple(_surface_in_frame(s, local_from_world) for s in item.surfaces if len(s.faces))
     is_fixed = item.kind in BUILDING or item.nyu40 in _FIXED or not is_resting
-    return Piece(item, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights)))
+    return Piece(
+        item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights))
+    )
 
 
 def _surface_in_frame(surface: Surface, b_from_a: F64) -> Surface:

@@ -27,6 +27,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import (
     MAX_INSTANCES,
+    REMOVED,
     Box,
     House,
     Item,
@@ -125,8 +126,18 @@ def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:
         replace(opening, item_id=None) if opening.item_id in gone else opening
         for opening in house.openings
     )
-    kept = tuple(item for item in house.items if item.id not in gone)
-    return replace(house, items=kept, openings=openings)
+    # Their places stay, empty: labels of all others keep their numbers.
+    items = tuple(
+        _emptied(item, k) if item.id in gone else item for k, item in enumerate(house.items, 1)
+    )
+    return replace(house, items=items, openings=openings)
+
+
+def _emptied(item: Item, instance: int) -> Item:
+    """What stands in a removed item's place. Its id is free: a new item may have it."""
+    return Item(
+        f"removed/{instance}", item.name, ItemKind.OBJECT, item.level_id, (), tags=(REMOVED,)
+    )
 
 
 def _move(house: House, edit: MoveItems, _fields: ReadFields) -> House:
@@ -298,7 +309,7 @@ def _changed(house: House, ids: Collection[str], change: Callable[[Item], Item])
 
 
 def _found(house: House, ids: Collection[str]) -> None:
-    known = {item.id for item in house.items}
+    known = {item.id for item in house.items if not item.is_removed}
     for name in ids:
         if name not in known:
             raise BadInput(house.id, name, "no such item", hint=did_you_mean(name, sorted(known)))

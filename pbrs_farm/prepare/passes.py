@@ -269,7 +269,7 @@ PASSES: Final = (
         "surroundings", 1, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
-    Pass("edits", 2, (), _edit, lambda source, _recipe: bool(source.edits)),
+    Pass("edits", 3, (), _edit, lambda source, _recipe: bool(source.edits)),
 )  # fmt: skip
 
 PASS: Final = {p.name: p for p in PASSES}

@@ -643,9 +643,12 @@ class Items(Table):
     """A home's items: rows of instance id, item id, name, class, room, size and middle in metres."""
 
     def __init__(self, house: House, items: Sequence[Item] | None = None) -> None:
-        """house: finished. items: some of its items; None: all but what lies before its windows."""
+        """house: finished. items: some of its items; None: all but what lies before its windows.
+
+        What an edit removed is not there.
+        """
         self._house = house
-        inside = (item for item in house.items if not item.is_outside)
+        inside = (item for item in house.items if not item.is_outside and not item.is_removed)
         self._items = tuple(inside if items is None else items)
         instance = {item.id: k for k, item in enumerate(house.items, 1)}
         room_names = {room.id: room.name for room in house.rooms}

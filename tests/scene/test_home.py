@@ -13,6 +13,7 @@ from PIL import Image
 import pbrs_farm as pf
 from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.house import Item, MaterialKind
+from pbrs_farm.formats.glb import gltf_from_glb
 from tests.scene.homes import can, crate, small_home
 
 
@@ -65,9 +66,35 @@ def test_a_change_is_a_new_home_with_an_id_of_its_own(home: pf.Home) -> None:
     assert bare.id == home.without("sofa").id
     assert bare.id.startswith(f"{home.id}-e")
     assert bare.id != home.without("bed").id
-    assert len(bare.house.items) == len(home.house.items) - 1
+    assert len(bare.items) == len(home.items) - 1
     assert len(home.items) == 37  # what lies before its windows is no part of it
     assert bare.without("bed").source.unedited == home.source
+
+
+def test_whatever_is_removed_all_others_keep_their_instance_ids(
+    home: pf.Home, tmp_path: Path
+) -> None:
+    def ids(of: pf.Home) -> dict[str, int]:
+        return {row["id"]: row["instance"] for row in of.items}
+
+    both = home.place(can(tmp_path), at=(2, 0, 2)).place(crate(tmp_path), at=(1, 0, 2))
+    bare = both.without(["sofa", "can 1"])
+    gone = {both.items["sofa"].id, "can 1"}
+    assert ids(bare) == {key: k for key, k in ids(both).items() if key not in gone}
+    # The name is free again; the thing that takes it is another instance.
+    again = bare.place(can(tmp_path), at=(2, 0, 1), name="can 1")
+    assert ids(again)["can 1"] == max(ids(both).values()) + 1
+    # Labels and the stored file have these ids, and nothing of what is gone.
+    camera = pf.Camera.look_at((3.5, 1.6, 3.5), (1, 0, 1.5), hfov_deg=90)
+    frames = [pf.render(one, camera, modes=["opengl_dl"]) for one in (both, again)]
+    seen = [{r["name"]: r["id"] for r in f.table["instances"]} for f in frames]
+    assert seen[0]["crate"] == seen[1]["crate"]
+    assert ids(both)["crate 1"] == seen[0]["crate"]
+    data = gltf_from_glb((bare.export(tmp_path / "out") / f"{bare.id}.glb").read_bytes(), "")
+    rows = [node["extras"] for node in data.document["nodes"] if node.get("extras")]
+    assert {row["item"]: row["instance"] for row in rows} == ids(bare)
+    with pytest.raises(BadInput, match="no such item"):
+        bare.without("sofa")
 
 
 def test_things_move_turn_and_take_their_colour(home: pf.Home, tmp_path: Path) -> None:
