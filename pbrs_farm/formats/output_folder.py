@@ -11,14 +11,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.store.object_store import LAYOUT
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomOutline:
+    """Where a room lies: its floor's polygon and height."""
+
+    polygon: Points2  # (N, 2) plan (x, z), metres, N >= 3
+    floor_y: float  # world, metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +39,7 @@ class OutputHouse:
     name: str
     attribution: str  # the line to carry, or ""
     rooms: dict[str, str] = field(default_factory=dict)  # id -> name
+    outlines: dict[str, RoomOutline] = field(default_factory=dict)  # id -> where, if it is told
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +102,19 @@ def _house(folder: Path) -> OutputHouse:
     }
     name = shown(facts.get("name") or folder.name)
     credit = shown(source.get("attribution") or "", MAX_MESSAGE)
-    return OutputHouse(folder.name, name, credit, rooms)
+    return OutputHouse(folder.name, name, credit, rooms, _outlines(facts.get("rooms") or ()))
+
+
+def _outlines(rooms: Any) -> dict[str, RoomOutline]:
+    found = {}
+    for room in rooms:
+        try:
+            polygon, floor_y = np.array(room["polygon"], np.float64), float(room["floor_y"])
+        except (KeyError, TypeError, ValueError):
+            continue
+        if polygon.ndim == 2 and polygon.shape[1] == 2 and len(polygon) >= 3:
+            found[str(room["id"])] = RoomOutline(polygon, floor_y)
+    return found
 
 
 def _first(words: Any) -> str:

@@ -13,6 +13,7 @@ from pbrs_farm.export.export_views import export
 from pbrs_farm.export.forms.captions import caption
 from pbrs_farm.export.nouns import counted, plural
 from pbrs_farm.formats.class_map import ClassMap, ClassRule
+from pbrs_farm.formats.output_folder import OutputHouse, RoomOutline
 from tests.scene.homes import small_home
 
 # Camera axes are x right, y down, z forward; the world is y up: turn about x.
@@ -37,8 +38,8 @@ def view_of(*rows: dict, room: str = "Bedroom", classes: ClassMap | None = None,
         "world_from_camera_opencv": WORLD_FROM_CAMERA.tolist(), "instances": list(rows), **facts,
     }  # fmt: skip
     view = SimpleNamespace(
-        facts=table, choice=Choice(classes=classes), house=SimpleNamespace(id="h"), id="v",
-        entry=SimpleNamespace(room_name=room, room_id="0_0"),
+        facts=table, choice=Choice(classes=classes), id="v",
+        house=OutputHouse("h", "h", "", {"0_0": room}), entry=SimpleNamespace(room_id="0_0"),
     )  # fmt: skip
     return cast(ChosenView, view)
 
@@ -83,6 +84,32 @@ def test_things_are_counted_and_named_by_what_they_are():
 )  # fmt: skip
 def test_a_room_is_what_its_name_means(room, said):
     assert text(room=room) == f"The picture shows {said}."
+
+
+def square(x: float, z: float, floor_y: float = -1.0) -> RoomOutline:
+    """A room of 4 x 4 m whose least corner is there."""
+    return RoomOutline(np.array([[x, z], [x + 4, z], [x + 4, z + 4], [x, z + 4]]), floor_y)
+
+
+@pytest.mark.parametrize(
+    ("left_m", "right_m", "said"),
+    [
+        (3.0, 3.0, "a hall"),  # the walls of the room that it stands in
+        (6.5, 3.0, "a kitchen"),  # 60 of 100 columns see through a doorway
+        (0.0, 3.0, "a hall"),  # nothing does not count
+        (60.0, 60.0, "a hall"),  # all lies outside
+    ],
+)
+def test_a_room_is_the_one_that_is_seen(left_m, right_m, said):
+    # The eye looks along -z from the origin; the kitchen is the next room there.
+    rooms = {"0_0": "Hall", "0_1": "Kitchen", "1_0": "Attic"}
+    places = {"0_0": square(-2, -3), "0_1": square(-4, -7.1), "1_0": square(-4, -7.1, 2)}
+    depth = np.full((80, 100), right_m * 1000, np.uint16)
+    depth[:, :60] = left_m * 1000
+    view = view_of(K=[[250, 0, 50], [0, 250, 40], [0, 0, 1]])
+    view.house = OutputHouse("h", "h", "", rooms, places)
+    view.array = {"depth": depth}.get
+    assert caption(view)["text"] == f"The picture shows {said}."
 
 
 def test_a_study_with_a_bed_is_a_studio():

@@ -2,7 +2,7 @@
 
     captions.jsonl  images/<house>/<view>.png
 
-Effects: reads views, writes files. The words are a function of the labels alone: which room, which
+Effects: reads views, writes files. The words are a function of the labels alone: which room is seen, which
 things and how many, and where the largest of them are to each other.
 """
 
@@ -17,13 +17,15 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
 from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.nouns import counted, listed, noun_of
 from pbrs_farm.export.sequences import pose_opencv
+from pbrs_farm.formats.output_folder import RoomOutline
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 LEAST_VISIBLE: Final = 0.3
@@ -34,6 +36,8 @@ _RELATED: Final = 6  # largest things that relations are given of
 _SAID: Final = 4  # relations in the text
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
 _TOUCH_M: Final = 0.05  # between a thing and what it stands on
+_BEFORE_M: Final = 0.1  # a surface, where it is asked which room is seen
+_POINTS: Final = 20_000  # of a view, about, that tell its room
 _SLACK_M: Final = 0.02  # by which things that stand apart may overlap
 _ROOMS: Final = {
     RoomKind.LIVING: "living room", RoomKind.BEDROOM: "bedroom", RoomKind.KITCHEN: "kitchen",
@@ -191,18 +195,55 @@ def _first_sentence(view: ChosenView, things: Sequence[_Seen]) -> str:
 
 
 def _room(view: ChosenView) -> str:
-    """What the view's room is for, else what it is called; "" for a model without context."""
+    """What the room that is seen is for, else what it is called; "" for a model without context."""
     if view.house.id.startswith("object_"):
         return ""
-    name = view.entry.room_name
+    room_id = seen_room(view)
+    name = view.house.rooms.get(room_id, room_id)
     kind = named_kind(name)
     # A studio is a study in some languages and a home of one room in others.
     if kind is RoomKind.OFFICE and any(row["class"] == "bed" for row in view.facts["instances"]):
         return "a studio"
     if kind in _ROOMS:
         return counted(1, _ROOMS[kind])
-    is_named = name not in (view.entry.room_id, f"Room {view.entry.room_id}", "")
+    is_named = name not in (room_id, f"Room {room_id}", "")
     return f'a room called "{name}"' if is_named else "a room"
+
+
+def seen_room(view: ChosenView) -> str:
+    """The room of most of the points that are seen; the eye's where none lies in a room.
+
+    A point is of the room whose floor it is above, a hand's breadth before the surface, so that a
+    wall is of the room that it is seen from.
+    """
+    outlines = view.house.outlines
+    points = _seen_points(view) if outlines else np.zeros((0, 3))
+    if not len(points):
+        return view.entry.room_id
+    rooms = sorted(outlines, key=lambda one: -outlines[one].floor_y)
+    inside = [_is_over(points, outlines[room]) for room in rooms]
+    # Of rooms above each other the highest below the point.
+    first = np.argmax([*inside, np.ones(len(points), bool)], axis=0)
+    counts = np.bincount(first, minlength=len(rooms) + 1)[:-1]
+    return rooms[int(counts.argmax())] if counts.any() else view.entry.room_id
+
+
+def _is_over(points: F64, room: RoomOutline) -> Mask:
+    plan = shapely.contains_xy(shapely.Polygon(room.polygon), points[:, 0], points[:, 2])
+    return np.asarray(plan & (points[:, 1] > room.floor_y - _BEFORE_M))
+
+
+def _seen_points(view: ChosenView) -> F64:
+    """(N, 3) points before the surfaces of a grid of pixels, world, metres."""
+    depth = view.array("depth")
+    step = max(1, int(np.sqrt(depth.size / _POINTS)))
+    y, x = (g.ravel() for g in np.mgrid[: depth.shape[0] : step, : depth.shape[1] : step])
+    z = depth[y, x] / 1000
+    y, x, z = y[z > 0], x[z > 0], z[z > 0]
+    rays = intrinsics_of(view.facts).directions(np.stack([x + 0.5, y + 0.5], axis=1))
+    before = np.maximum(z - _BEFORE_M / np.maximum(np.linalg.norm(rays, axis=1), 1), 0)
+    pose = pose_opencv(view)
+    return np.asarray((rays * before[:, None]) @ pose[:3, :3].T + pose[:3, 3])
 
 
 def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
