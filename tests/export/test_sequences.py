@@ -143,6 +143,8 @@ def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
     p2, p3 = (out / "calib/000000.txt").read_text().strip().split("\n")
     left, right = (np.array(p.split()[1:], float).reshape(3, 4) for p in (p2, p3))
     assert (left - right)[0, 3] == pytest.approx(left[0, 0] * 0.065)
+    # Its pixels count from the centre of the first: the middle of 64 x 48 is (31.5, 23.5).
+    assert left[:2, 2] == pytest.approx([31.5, 23.5])
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.cutouts import CutOuts
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item
-from pbrs_farm.export.chosen_view import Choice, ChosenView, blenderproc_k, require_lens
+from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.masks import compressed_runs
@@ -238,7 +238,7 @@ def _pose_row(row: dict[str, Any], numbers: dict[str, int]) -> dict[str, Any]:
 def _scene_camera(view: ChosenView) -> dict[str, Any]:
     camera_from_world = np.linalg.inv(np.array(view.facts["world_from_camera_opencv"]))
     return {
-        "cam_K": [v for line in blenderproc_k(view.facts["K"]) for v in line],
+        "cam_K": [v for line in k_of_whole_centres(view.facts["K"]) for v in line],
         "depth_scale": 1.0,
         "cam_R_w2c": camera_from_world[:3, :3].ravel().tolist(),
         "cam_t_w2c": (camera_from_world[:3, 3] * _MM).tolist(),
@@ -246,7 +246,7 @@ def _scene_camera(view: ChosenView) -> dict[str, Any]:
 
 
 def _camera_json(view: ChosenView) -> dict[str, Any]:
-    (fx, _skew, cx), (_zero, fy, cy), _last = blenderproc_k(view.facts["K"])
+    (fx, _skew, cx), (_zero, fy, cy), _last = k_of_whole_centres(view.facts["K"])
     width, height = view.facts["width_px"], view.facts["height_px"]
     return {
         "fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, blenderproc_k
+from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, k_of_whole_centres
 from pbrs_farm.export.form import ViewForm
 from pbrs_farm.installation import install_command
 
@@ -70,7 +70,7 @@ def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
     pose = view.facts["world_from_camera_opengl"]
     lens = {name: view.facts[name] for name in ("lens", "depth") if name in view.facts}
     data["campose"] = json.dumps(
-        {"cam_K": blenderproc_k(view.facts["K"]), "cam2world_matrix": pose} | lens
+        {"cam_K": k_of_whole_centres(view.facts["K"]), "cam2world_matrix": pose} | lens
     )
     return data
 

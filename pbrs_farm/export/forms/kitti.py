@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
+from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
 from pbrs_farm.export.form import ViewForm
 from pbrs_farm.export.sequences import SequenceFrame, frames_by_house, required_picture
 from pbrs_farm.images import png_from_array
@@ -87,9 +87,13 @@ def kitti_flow(flow: NDArray[np.float32], valid: NDArray[np.bool_]) -> NDArray[n
 
 
 def _calibration(frame: SequenceFrame) -> str:
-    """P2 and P3: (3, 4) projections of both pictures in the left camera's frame."""
+    """P2 and P3: (3, 4) projections of both pictures in the left camera's frame, metres.
+
+    Pixels count from the centre of the first one, as in KITTI's own tools (drawBox3D.m adds 1 for
+    MATLAB, whose first pixel's centre is (1, 1)).
+    """
     require_lens(frame.left, "kitti")
-    k = np.array(frame.left.facts["K"], np.float64)
+    k = np.array(k_of_whole_centres(frame.left.facts["K"]), np.float64)
     lines = [_projection("P2", k, 0.0)]
     if frame.right is not None:
         eyes = [
@@ -107,5 +111,6 @@ def _projection(name: str, k: NDArray[np.float64], baseline_m: float) -> str:
 FORM = ViewForm(
     "kitti",
     write_kitti,
-    "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`",
+    "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`"
+    " (its P2 and P3 count from the centre of the first pixel)",
 )
