@@ -32,6 +32,30 @@ WriteHome: TypeAlias = "Callable[[ExportedHome, Path], int]"
 
 
 @dataclass(frozen=True, slots=True)
+class Convention:
+    """How a form counts pixels and points its axes: a row of the table in docs/formats.md.
+
+    first_pixel: where the centre of the first pixel lies in K and in pixel coordinates, along x and
+    along y: 0.5 as in view.json, 0 of forms whose readers count from it; None of a form with neither.
+    has_k: whether K, or focal lengths and principal point, stand in the form's files. axes: of poses,
+    normals and points. depth: its unit, and along what; "" for none.
+    """
+
+    first_pixel: float | None
+    has_k: bool
+    axes: str
+    depth: str = ""
+
+    @property
+    def row(self) -> str:
+        """Its cells."""
+        at = self.first_pixel
+        k = "as view.json" if at == 0.5 else f"cx, cy less {0.5 - (at or 0):g}"
+        pixel = "-" if at is None else f"({at:g}, {at:g})"
+        return " | ".join((pixel, k if self.has_k else "-", self.axes or "-", self.depth or "-"))
+
+
+@dataclass(frozen=True, slots=True)
 class ViewForm:
     """A form of finished views: what `pbrs-farm export --to NAME` writes of them.
 
@@ -45,7 +69,7 @@ class ViewForm:
     --split it is called once for each of train, val and test. help: what is written, in Markdown.
     has_classes: whether classes of a user's own can stand in for NYU40's. finish: called once after
     all splits with the whole folder, the names of the splits (() without) and the Choice; returns
-    the number of files it added.
+    the number of files it added. convention: None where a form says nothing of its own.
     """
 
     of: ClassVar[str] = "views"
@@ -55,6 +79,7 @@ class ViewForm:
     help: str
     has_classes: bool = False
     finish: Callable[[Path, tuple[str, ...], Choice], int] | None = None
+    convention: Convention | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +149,16 @@ def forms_table(of: str) -> str:
     return "\n".join(rows)
 
 
+def conventions_table() -> str:
+    """How the package's forms of views count pixels, point axes and measure depth, in Markdown."""
+    rows = ["| form | centre of the first pixel | K | axes | depth |", "|---|---|---|---|---|"]
+    for name in form_names():
+        convention = getattr(form_of(name), "convention", None)
+        if convention is not None and name not in plugins(_GROUP):
+            rows.append(f"| `{name}` | {convention.row} |")
+    return "\n".join(rows)
+
+
 def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
     """Write left_out.txt, `<house>/<view>: <why>` a line, where there are views; the number of files.
 
@@ -160,4 +195,5 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 if __name__ == "__main__":
-    sys.stdout.write("\n\n".join(forms_table(of) for of in ("views", "homes")) + "\n")
+    tables = (forms_table("views"), conventions_table(), forms_table("homes"))
+    sys.stdout.write("\n\n".join(tables) + "\n")

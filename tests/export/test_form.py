@@ -12,7 +12,7 @@ from pbrs_farm.export import forms
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_homes import export_homes
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.form import form_names, form_of, forms_table
+from pbrs_farm.export.form import conventions_table, form_names, form_of, forms_table
 from pbrs_farm.formats.class_map import class_map
 from tests.check.roots import make_root
 
@@ -36,6 +36,13 @@ def test_a_form_is_called_as_its_file(name: str) -> None:
 @pytest.mark.parametrize("of", ["views", "homes"])
 def test_the_docs_have_the_table(of: str) -> None:
     assert forms_table(of) in DOCS.read_text()
+
+
+def test_the_docs_say_how_each_form_of_views_counts_pixels() -> None:
+    table = conventions_table()
+    assert table in DOCS.read_text()
+    views = [name for name in form_names() if form_of(name).of == "views"]
+    assert [line.split("`")[1] for line in table.splitlines()[2:]] == views
 
 
 def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
 from pbrs_farm.export.export_homes import stored_house
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
 from pbrs_farm.raycast.caster import cut_outs_of_house
@@ -265,4 +265,7 @@ FORM = ViewForm(
     " `models_info.json` in mm, `camera.json`, `train_pbr/<scene>/` with `rgb`, `depth`, `mask`,"
     " `mask_visib`, `scene_camera.json`, `scene_gt.json`, `scene_gt_info.json`,"
     " `scene_gt_coco.json`; a scene is a home; its K counts from the centre of the first pixel",
+    convention=Convention(
+        0, has_k=True, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"
+    ),
 )

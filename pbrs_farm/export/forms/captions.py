@@ -22,7 +22,7 @@ import shapely
 from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.nouns import counted, listed, noun_of
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import RoomOutline
@@ -264,4 +264,5 @@ FORM = ViewForm(
     "`captions.jsonl`, a line a view: `file_name` (`images/<house>/<view>.png`), `text` in plain"
     " English, `objects` (`id`, `noun`, `box2d`), `relations` (`subject`, `relation`, `object` by id)",
     has_classes=True,
+    convention=Convention(0.5, has_k=False, axes=""),
 )

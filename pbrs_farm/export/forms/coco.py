@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
 
@@ -151,4 +151,5 @@ FORM = ViewForm(
     "`annotations.json` (NYU40 categories, compressed run lengths), `images/<house>/<view>.png`;"
     " panoptic: `panoptic.json`, `panoptic/<house>/<view>.png` (id = R + 256 G + 65536 B)",
     has_classes=True,
+    convention=Convention(0.5, has_k=True, axes="camera x right, y down, z forward"),
 )

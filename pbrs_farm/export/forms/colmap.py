@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
@@ -96,4 +96,11 @@ def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[
     ]
 
 
-FORM = ViewForm("colmap", write_colmap, "a text model: cameras, images, points from depth")
+FORM = ViewForm(
+    "colmap",
+    write_colmap,
+    "a text model: cameras, images, points from depth",
+    convention=Convention(
+        0.5, has_k=True, axes="camera x right, y down, z forward; the home's world, y up, m"
+    ),
+)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, k_of_whole_centres
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.installation import install_command
 
 
@@ -90,4 +90,10 @@ FORM = ViewForm(
     " camera axes), `category_id_segmaps`, `instance_segmaps`, `instance_attribute_maps`, `campose`"
     " (its `cam_K` counts from the centre of the first pixel: cx = (W - 1) / 2); `index.jsonl`",
     has_classes=True,
+    convention=Convention(
+        0,
+        has_k=True,
+        axes="camera x right, y up, z backward; the home's world, y up, m",
+        depth="m, along the axis (`depth` where no pin-hole)",
+    ),
 )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import SequenceFrame, frames_by_house, required_picture
 from pbrs_farm.images import png_from_array
 
@@ -113,4 +113,10 @@ FORM = ViewForm(
     write_kitti,
     "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`"
     " (its P2 and P3 count from the centre of the first pixel)",
+    convention=Convention(
+        0,
+        has_k=True,
+        axes="left camera x right, y down, z forward; m",
+        depth="256 steps a px of disparity",
+    ),
 )

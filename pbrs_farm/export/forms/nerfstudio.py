@@ -11,7 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.lenses import COEFFICIENTS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import required_picture
 
 # z up, as nerfstudio has it  <-  y up.
@@ -83,5 +83,13 @@ def _frame(view: ChosenView, folder: Path) -> tuple[dict[str, Any], int]:
 
 
 FORM = ViewForm(
-    "nerfstudio", write_nerfstudio, "`transforms.json` (z up, OpenGL axes), pictures, depth in mm"
+    "nerfstudio",
+    write_nerfstudio,
+    "`transforms.json` (z up, OpenGL axes), pictures, depth in mm",
+    convention=Convention(
+        0.5,
+        has_k=True,
+        axes="camera x right, y up, z backward; world z up, m",
+        depth="mm, along the axis (of a fisheye or panorama along the ray)",
+    ),
 )

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv
 
 _FARTHEST_MM: Final = 65535  # of depth.png: so far, or farther
@@ -114,4 +114,5 @@ FORM = ViewForm(
     " yours) and `instance`; from the layer `position` where there is one, else from depth and K of"
     " a pin-hole",
     has_classes=True,
+    convention=Convention(None, has_k=False, axes="the home's world, y up, m"),
 )

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 
 # Layer -> where the published data has it.
 FILES: Final = {
@@ -85,4 +85,10 @@ FORM = ViewForm(
     "the published PBRS layout: `mlt_v2/<house>/<6 digits>_mlt.png`, `depth_v2`, `normal_v2`,"
     " `category_v2`, `boundary_v2`, `opengl_ver2`, `camera_v2/<house>/room_camera.txt`,"
     " `data_goodlist_v2.txt`",
+    convention=Convention(
+        None,
+        has_k=False,
+        axes="eye, towards, up in the home's world, y up, m; half angles",
+        depth="mm, along the axis",
+    ),
 )

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
-from pbrs_farm.export.form import ViewForm, name_left_out
+from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 from pbrs_farm.export.sequences import frames_by_house, pose_opencv, required_picture
 from pbrs_farm.images import png_from_array
 
@@ -80,4 +80,10 @@ FORM = ViewForm(
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
     " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`; views that are no frames are named"
     " in `left_out.txt`",
+    convention=Convention(
+        None,
+        has_k=False,
+        axes="camera x right, y down, z forward; the home's world, y up, m",
+        depth="5000 steps a metre, along the axis",
+    ),
 )

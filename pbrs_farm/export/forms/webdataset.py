@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.views.shard_tar import write_samples
 
 
@@ -34,4 +34,5 @@ FORM = ViewForm(
     "`shard-<6 digits>.tar`, 500 views each (`--shard-size`); key `<house>__<view>`, parts `json` and"
     " `<layer>.png` / `.exr`; equal views give equal bytes",
     has_classes=True,
+    convention=Convention(0.5, has_k=True, axes="as view.json", depth="as view.json"),
 )

@@ -10,7 +10,7 @@ from typing import Any, Final
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house_split import SPLITS
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import ViewForm, name_left_out
+from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 
 # What surrounds the whole picture is no object: it has no boxes.
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
@@ -95,4 +95,5 @@ FORM = ViewForm(
     " `left_out.txt`",
     has_classes=True,
     finish=write_data_yaml,
+    convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import ViewForm
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write_pictures_and_labels
 from pbrs_farm.export.masks import mask_polygons
 
@@ -39,4 +39,5 @@ FORM = ViewForm(
     " outline within a pixel of the mask's; a hole is cut by going to it, around it and back",
     has_classes=True,
     finish=write_data_yaml,
+    convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
 )
