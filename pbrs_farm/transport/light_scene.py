@@ -22,7 +22,7 @@ from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, add_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, blacken, join_results, result_from_sums
 from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
-from pbrs_farm.transport.scene_tables.portals import portals_of_house
+from pbrs_farm.transport.scene_tables.portals import panes_of_house, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
 
@@ -56,6 +56,7 @@ class LightScene:
         portals: F64,
         variant: str,
         outside: tuple[House, SceneTables] | None = None,
+        panes: SceneTables | None = None,
     ) -> None:
         self.tables = tables
         self.sky = sky
@@ -64,9 +65,12 @@ class LightScene:
         mitsuba(variant)
         self.device_scene: Any = None
         if not variant.startswith("scalar"):
-            from pbrs_farm.transport.kernels.device_scene import DeviceScene
+            from pbrs_farm.transport.kernels.device_scene import DeviceScene, Panes
 
             self.device_scene = DeviceScene(tables, one_scene=variant.startswith("cuda"))
+            # OptiX takes one scene in a kernel: there panes mirror nothing.
+            if panes is not None and variant.startswith("llvm"):
+                self.device_scene.panes = Panes(panes)
         self._portals = portals
         # OptiX takes one scene in a kernel: there windows show the sky alone.
         self._outside = outside if variant.startswith("llvm") else None
@@ -80,7 +84,7 @@ class LightScene:
         *,
         variant: str | None = None,
     ) -> LightScene:
-        """The scene of a repaired house, without its window panes, which would only cost rays.
+        """The scene of a repaired house; its window panes only mirror what rays from the camera show.
 
         textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top. Raises BadHouse when there
         is no surface and MachineFailed when Mitsuba does not work here.
@@ -97,7 +101,9 @@ class LightScene:
             }
             own = {name: texture for name, texture in textures.items() if name in shown}
             outside = beyond, tables_from_house(beyond, own, recipe)
-        return LightScene(tables, sky, portals_of_house(house), name, outside)
+        glass = None if recipe.materials.preset == "released" else panes_of_house(inside)
+        panes = None if glass is None else tables_from_house(glass, {}, recipe)
+        return LightScene(tables, sky, portals_of_house(house), name, outside, panes)
 
     @property
     def n_lamps(self) -> int:

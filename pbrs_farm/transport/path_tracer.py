@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -23,12 +23,15 @@ from pbrs_farm.transport.kernels.bsdf import luminance
 from pbrs_farm.transport.kernels.camera_rays import DeviceCamera, LensCamera, device_camera
 from pbrs_farm.transport.kernels.device_scene import DeviceScene
 from pbrs_farm.transport.kernels.emitters import Emitters
+from pbrs_farm.transport.kernels.guiding_targets import NO_FACE
 from pbrs_farm.transport.kernels.outdoor_choice import TechniqueCounts
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
     EmitterFilter,
+    MirroredRay,
     PathContext,
+    PathState,
     StepResult,
     camera_path,
     device_fields,
@@ -36,6 +39,8 @@ from pbrs_farm.transport.kernels.path_state import (
 )
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
+
+_NULLS_APART: Final = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,6 +118,65 @@ class _LampSums(NamedTuple):
     first: Any  # the lane's first place there
 
 
+@dataclass
+class _MirroredPath:
+    """What the first pane on a sample's way mirrors: followed when the path through it has ended."""
+
+    o: mi.Point3f
+    d: mi.Vector3f
+    beta: mi.Color3f
+    depth: mi.UInt32
+    n_nulls: mi.UInt32
+    rest: mi.Float  # share in the guides of this path
+    share: mi.Float  # of the path under way
+    waits: mi.Bool
+    met: mi.Bool  # a pane was met by this sample
+
+    def start(self, fresh: Any) -> None:
+        """Begin a sample."""
+        self.share = dr.select(fresh, mi.Float(1), self.share)
+        self.met = self.met & ~fresh
+
+    def keep(self, ray: MirroredRay, path: PathState) -> None:
+        """Keep the ray of the first pane that a sample meets; path: behind it."""
+        first = ray.is_there & ~self.met
+        self.o = dr.select(first, ray.o, self.o)
+        self.d = dr.select(first, ray.d, self.d)
+        self.beta = dr.select(first, ray.beta, self.beta)
+        self.depth = dr.select(first, path.depth, self.depth)
+        # Its vertices take other random dimensions than those behind the pane.
+        self.n_nulls = dr.select(first, path.n_nulls + _NULLS_APART, self.n_nulls)
+        self.rest = dr.select(first, ray.share, self.rest)
+        self.share = dr.select(first, 1 - ray.share, self.share)
+        self.waits, self.met = self.waits | first, self.met | first
+
+    def path(self, behind: PathState) -> PathState:
+        """The path of the ray that was kept; behind: the one that has ended."""
+        return PathState(
+            o=self.o,
+            d=self.d,
+            beta=self.beta,
+            depth=self.depth,
+            n_nulls=self.n_nulls,
+            reference=behind.reference,
+            bsdf_pdf=mi.Float(0),
+            guiding_odds=mi.Float(0),
+            target_face=mi.UInt32(NO_FACE),
+        )
+
+    def turn(self, turns: Any) -> None:
+        """Go on with the ray that was kept."""
+        self.share = dr.select(turns, self.rest, self.share)
+        self.waits = self.waits & ~turns
+
+
+def _no_mirrored_path(path: PathState) -> _MirroredPath:
+    return _MirroredPath(
+        mi.Point3f(path.o), mi.Vector3f(path.d), mi.Color3f(0), mi.UInt32(0), mi.UInt32(0),
+        mi.Float(0), mi.Float(1), mi.Bool(False), mi.Bool(False),
+    )  # fmt: skip
+
+
 class _Beside(NamedTuple):
     """Where a lane adds what is not its pixel's sum."""
 
@@ -134,11 +198,11 @@ class _LaneSums:
     normal: mi.Vector3f
     n_bad: mi.UInt32
 
-    def add_guides(self, result: StepResult, seen: Any, first_rough: Any) -> None:
-        """Add albedo and normal of the first rough surface, for the denoiser."""
-        self.albedo += dr.select(first_rough, result.albedo, 0)
-        self.albedo += dr.select(result.missed & ~seen, result.sky_albedo, 0)
-        self.normal += dr.select(first_rough, result.si.n, 0)
+    def add_guides(self, result: StepResult, seen: Any, first_rough: Any, share: Any) -> None:
+        """Add albedo and normal of the first rough surface, for the denoiser, times share."""
+        self.albedo += dr.select(first_rough, share * result.albedo, 0)
+        self.albedo += dr.select(result.missed & ~seen, share * result.sky_albedo, 0)
+        self.normal += dr.select(first_rough, share * result.si.n, 0)
 
     def add_sample(self, l_out: Any, l_in: Any, sample: Any, done: Any) -> None:
         """Add the radiance of a path where it is done; count those that are not finite."""
@@ -186,7 +250,9 @@ def trace(
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
-        PathContext(scene, emitters, depth_fields, emitter_filter, sunlit, may_guide),
+        PathContext(
+            scene, emitters, depth_fields, emitter_filter, sunlit, may_guide, splits_panes=True
+        ),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
@@ -246,6 +312,7 @@ def _trace(
     x0, y0 = mi.Float(pixel_width[0] % pixel_width[1]), mi.Float(pixel_width[0] // pixel_width[1])
     corner = mi.Point2f(x0, y0)
     path = camera_path(camera, corner, mi.Point2f(0))
+    pane = _no_mirrored_path(path)
 
     while active:
         # Start the next sample where the last path has ended.
@@ -254,6 +321,7 @@ def _trace(
         path = dr.select(fresh, camera_path(camera, corner, at, sampler), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
+        pane.start(fresh)
 
         # Go on by a vertex, and add what that brings.
         path, result, alive = advance(context, sampler, path, active)
@@ -263,11 +331,17 @@ def _trace(
         _count_techniques(beside.counts, context, result, active)
         _count_arrivals(beside, context, result, active)
         first_rough = result.is_rough & ~seen
-        sums.add_guides(result, seen, first_rough)
+        sums.add_guides(result, seen, first_rough, pane.share)
         seen = seen | first_rough
 
-        # Close the sample where the path ends.
+        # Where the path ends, follow what a pane has mirrored; close the sample where it has not.
         done = active & ~alive
+        if dr.hint(result.mirrored is not None, mode="scalar"):
+            pane.keep(result.mirrored, path)
+            turns = done & pane.waits
+            path = dr.select(turns, pane.path(path), path)
+            pane.turn(turns)
+            seen, done = seen & ~turns, done & ~turns
         sums.add_sample(l_out, l_in, s, done)
         s = s + dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)

@@ -6,7 +6,7 @@ sampled. Each step needs those before it, so their order is written here alone:
     build   1. lamps and sky, every lamp weighted alike
             2. the light that lampshades send out, measured with these
             3. what guided rays aim at, from 2.: with the scene's faces, then with the emitters
-            4. what lies before the windows
+            4. what lies before the windows, and the light that comes from there
     view    5. the portals near it, all emitters weighted alike
             6. the weights that a pilot of the view measures, and the cells of the sun's plane by its paths
             7. with lamps and `path`: the weights that a trial of the view settles, guided rays or not
@@ -118,5 +118,6 @@ class ViewEmitters:
         emitters.set_targets(targets)
         if self._outside is not None:
             beyond, tables = self._outside
-            emitters.outside = Outside(tables, beyond, self._sky)
+            outside = Outside(tables, beyond, self._sky)
+            emitters.set_outside(outside, outside.light_dome(self._scene, self._portals))
         return emitters

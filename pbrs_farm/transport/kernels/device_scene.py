@@ -35,6 +35,7 @@ from pbrs_farm.transport.scene_tables.scene_tables import (
     BACK_PDF,
     FACE_FLOATS,
     FRONT_PDF,
+    NO_LAMP,
     TARGET_EMITTER,
     SceneTables,
 )
@@ -78,6 +79,8 @@ class DeviceScene:
     scalar variants, which have no arrays. Building it builds one or two trees over all faces;
     keep it as long as the house is rendered.
     """
+
+    panes: Panes | None = None  # glass of the windows, for rays straight from the camera
 
     def __init__(self, tables: SceneTables, *, one_scene: bool = False) -> None:
         """one_scene: all rays go through one Mitsuba scene, for OptiX, which takes one in a kernel.
@@ -296,6 +299,56 @@ class DeviceScene:
         )
         is_cut = is_hole_at(self._texels, texture, uv, has_texture & (texture[3] > 0))
         return bsdf, active & (is_cut | (kind == NULL)), kd[3]
+
+
+class Panes:
+    """The glass of windows, which only rays meet that nothing has scattered.
+
+    Light goes through as if it were not there: it would cost each shadow ray a test.
+    """
+
+    def __init__(self, tables: SceneTables) -> None:
+        """tables: of the panes alone, as clear thin glass (`panes_of_house`)."""
+        self._scene = DeviceScene(tables)
+
+    def before(
+        self, si: SurfaceInteraction, o: Any, d: Any, looks: Any
+    ) -> tuple[SurfaceInteraction, Any]:
+        """(what a ray meets first of si and the panes, Bool: it is a pane), where looks is True.
+
+        si: what the ray of origin o (Point3f) and direction d (unit Vector3f) meets at home.
+        """
+        is_pane, p, n = self._nearer(si.valid, si.p, o, d, looks)
+        n = dr.select(is_pane, n, si.n)
+        clear = Bsdf(
+            kd=dr.select(is_pane, 0, si.bsdf.kd),
+            f0=dr.select(is_pane, 0, si.bsdf.f0),
+            tau=dr.select(is_pane, 1, si.bsdf.tau),
+            alpha=dr.select(is_pane, 0, si.bsdf.alpha),
+            kind=dr.select(is_pane, mi.UInt32(GLASS), si.bsdf.kind),
+        )
+        found = si._replace(
+            valid=si.valid | is_pane,
+            p=dr.select(is_pane, p, si.p),
+            ng=dr.select(is_pane, n, si.ng),
+            n=n,
+            emitter=dr.select(is_pane, mi.UInt32(NO_LAMP), si.emitter),
+            bsdf=clear,
+            is_cutout=si.is_cutout & ~is_pane,
+        )
+        return found, is_pane
+
+    @dr.syntax
+    def _nearer(self, valid: Any, at: Any, o: Any, d: Any, looks: Any) -> tuple[Any, Any, Any]:
+        """(Bool: a pane stands before the point at, where a ray meets it, its normal)."""
+        is_pane, p, n = mi.Bool(False), mi.Point3f(0), mi.Vector3f(0, 1, 0)
+        # Branch: packets of lanes whose rays were all scattered pass by.
+        if looks:
+            pane = self._scene.intersect(o, d, looks)
+            is_behind = valid & (dr.dot(at - o, d) <= dr.dot(pane.p - o, d))
+            is_pane = looks & pane.valid & ~is_behind
+            p, n = mi.Point3f(pane.p), mi.Vector3f(pane.ng)
+        return is_pane, p, n
 
 
 def bend_normal(n: Any, d: Any) -> Any:

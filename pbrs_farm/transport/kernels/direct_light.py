@@ -143,6 +143,14 @@ def _direct_light(
     d = dr.select(is_finite, to / distance, sample.d)
     reach = dr.select(is_finite, distance * (1 - 1e-4), dr.inf)
     clear = context.scene.transmittance(begin, d, reach, contributes)
+    if (
+        context.emitters.outside is not None
+        and isinstance(sample, DirectionSample)
+        and sample.emitter is None
+    ):
+        # The dome has the light of what stands before it: the sun alone is hidden.
+        to_sun = contributes & (sample.kind == SUN) & (dr.max(clear) > 0)
+        clear *= context.emitters.sun.past_outside(begin, d, to_sun)
     incident = dr.select(contributes, sample.radiance * clear * weight, 0)
     light = dr.select(contributes & is_consistent, value * incident, 0)
     if taken is not None:

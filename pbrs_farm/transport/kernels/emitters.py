@@ -53,6 +53,7 @@ SUN, DOME, FIRST_PORTAL = 0, 1, 2  # outdoor techniques; those from FIRST_PORTAL
 # of the view alone (walls hide lamps). Where it is known which rays arrive it is more, as far as the
 # nearby lamps have the weight of the view.
 NEARBY_SHARE, MAX_NEARBY_SHARE = 0.5, 0.9
+_SEEN_SHARE, _ROOM_SHARE, _LAMPS_LX = 0.25, 0.02, 100.0  # of pane_odds
 _PORTAL_PACKETS = 3  # corner, first edge, second edge
 
 
@@ -102,7 +103,8 @@ class Emitters:
         self.sun, self.sunlit = SunDisc(sky), SunlitPoints(grid, self.arrival)
         self.targets = TargetSampler(no_targets(len(tables.lamps)))
         self._set_lamps(tables, weights.lamps)
-        self._set_dome(sky)
+        self._set_dome(sky.dome, None)
+        self.pane_odds = dr.opaque(mi.Float, pane_odds(level))
         self._set_portals(portals)
         self._set_outdoor_weights(weights)
         self._set_shadow_thresholds(weights)
@@ -116,6 +118,17 @@ class Emitters:
         A group that never shines need not be traced: its picture is black.
         """
         return self._has_group[group]
+
+    def set_outside(self, outside: Outside, dome: F32) -> None:
+        """Set what lies before the windows, and the light of it.
+
+        dome: as `Outside.light_dome` gives it. Rays that a surface has scattered, and shadow rays, meet
+        it in place of the sky's, and the sun where nothing outside stands before it; others see what is
+        there.
+        """
+        self.outside = outside
+        self.sun.outside = outside
+        self._set_dome(dome, outside.sky.dome)
 
     def set_view(self, portals: F64, weights: EmitterWeights) -> None:
         """Set the portals and weights of another view; lamps and sky stay.
@@ -268,10 +281,14 @@ class Emitters:
         return dr.select(counts, self.sun.radiance(d), 0), weight * self.sun.pdf
 
     def eval_dome(
-        self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any
+        self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any, is_seen: Any = False
     ) -> tuple[Any, Any]:
-        """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted)."""
-        radiance, texel_pdf = self._dome_row(d, active)
+        """(radiance of the dome in direction d, pdf of sampling d from p, sun not counted).
+
+        is_seen: Bool, the ray shows the sky itself, not the light of all that lies outside.
+        """
+        first = 0 if is_seen is False else dr.select(is_seen, self._first_seen, 0)
+        radiance, texel_pdf = self._dome_row(d, active, first)
         free = counted < 0
         pdf = dr.select(free, chances[DOME], dr.select(counted == DOME, 1, 0)) * texel_pdf
         for k in range(MAX_PORTALS):
@@ -318,8 +335,8 @@ class Emitters:
         sin_phi, cos_phi = dr.sincos(phi)
         return mi.Vector3f(s * sin_phi, y, -s * cos_phi)
 
-    def _dome_row(self, d: Any, active: Any) -> tuple[Any, Any]:
-        """(radiance blended between texels, pdf of the dome's technique)."""
+    def _dome_row(self, d: Any, active: Any, first: Any) -> tuple[Any, Any]:
+        """(radiance blended between texels, pdf of the dome's technique); first: texel of the dome."""
         # Look the pdf up in the nearest texel.
         w, h = mi.Int32(self._dome_width), mi.Int32(self._dome_height)
         phi = dr.atan2(d.x, -d.z)
@@ -328,7 +345,7 @@ class Emitters:
         y = dr.safe_acos(d.y) * (1 / math.pi) * self._dome_height_f
         nearest_x = dr.clip(mi.Int32(x), 0, w - 1)
         nearest_y = dr.clip(mi.Int32(y), 0, h - 1)
-        at = mi.UInt32(nearest_y * w + nearest_x)
+        at = mi.UInt32(nearest_y * w + nearest_x) + first
         pdf = dr.gather(mi.Vector4f, self._dome, at, active)[3]
         # Blend the radiance of four texels; longitude repeats, latitude ends.
         fx, fy = dr.floor(x - 0.5), dr.floor(y - 0.5)
@@ -337,7 +354,8 @@ class Emitters:
         for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
             column, row = mi.Int32(fx) + dx, dr.clip(mi.Int32(fy) + dy, 0, h - 1)
             column = dr.select(column < 0, column + w, dr.select(column >= w, column - w, column))
-            texel = dr.gather(mi.Vector4f, self._dome, mi.UInt32(row * w + column), active)
+            at = mi.UInt32(row * w + column) + first
+            texel = dr.gather(mi.Vector4f, self._dome, at, active)
             weight = (tx if dx else 1 - tx) * (ty if dy else 1 - ty)
             total += weight * colour(texel)
         return total, pdf
@@ -382,18 +400,30 @@ class Emitters:
         outdoor, indoor = weights.shadow_thresholds
         self.shadow_thresholds = dr.opaque(mi.Float, outdoor), dr.opaque(mi.Float, indoor)
 
-    def _set_dome(self, sky: Sky) -> None:
-        height, width = sky.dome.shape[:2]
-        probability = dome_probabilities(sky.dome)
-        rows = np.empty((height, width, 4), np.float32)  # r g b pdf
-        rows[..., :3] = sky.dome
+    def _set_dome(self, dome: F32, seen: F32 | None) -> None:
+        height, width = dome.shape[:2]
+        probability = dome_probabilities(dome)
+        # Behind the dome that lights comes the one that is seen, where that is another.
+        rows = np.empty((1 if seen is None else 2, height, width, 4), np.float32)  # r g b pdf
+        rows[..., :3] = dome if seen is None else np.stack([dome, seen])
         rows[..., 3] = probability / solid_angles(height, width)[:, None]
         self._dome = device_array(mi.Float, rows.ravel())
+        self._first_seen = dr.opaque(mi.UInt32, 0 if seen is None else height * width)
         self._dome_alias = device_array(mi.Float, alias_rows(probability.ravel()).ravel())
         self._n_texels = dr.opaque(mi.UInt32, height * width)
         self._dome_width = dr.opaque(mi.UInt32, width)
         self._dome_height = dr.opaque(mi.UInt32, height)
         self._dome_height_f = dr.opaque(mi.Float, float(height))
+
+
+def pane_odds(level: float) -> float:
+    """How much brighter than a room in a pane what lies behind it is, about.
+
+    level: luminance over LM_PER_W of white ground under the open sky. A room has that of 100 lx of
+    lamps and a little of the sky's. Says how often rays are reflected, never what pictures converge to.
+    """
+    outside = _SEEN_SHARE * level
+    return outside / (_LAMPS_LX / LM_PER_W / math.pi * _SEEN_SHARE + _ROOM_SHARE * outside)
 
 
 def dome_probabilities(dome: F32) -> F64:

@@ -1,10 +1,11 @@
-"""What lies before the windows, as light sees it: matte surfaces under the sky, kernels.
+"""What lies before the windows, as light sees it: matte or glossy surfaces under the sky, kernels.
 
-A ray that leaves the home straight from the camera, by mirrors and glass, shows them; one that a rough
-surface has scattered, and every shadow ray, does not meet them, so that they change no light in a room.
-Their radiance is that of one bounce: the whole sky by the cosine (order 2 of spherical harmonics:
-Ramamoorthi and Hanrahan 2001), the sun where nothing shades it, and street lamps; windows of lit rooms
-shine by themselves.
+A ray that leaves the home straight from the camera, by mirrors and glass, meets them; for one that a rough
+surface has scattered, and for shadow rays, their light is in a dome that is made of what the windows see
+(`Outside.light_dome`), and they stand before the sun. Their radiance is that of one bounce: the whole sky
+by the cosine (order 2 of spherical harmonics: Ramamoorthi and Hanrahan 2001), the sun where nothing shades
+it, and street lamps; a coat mirrors the sky without its sun; windows of lit rooms shine by themselves. Air
+lightens what is far: everything stands within 60 m, so that haze grows with the square of the distance.
 Effects: holds a Mitsuba scene and numbers on the device.
 """
 
@@ -17,11 +18,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import LIT, House
 from pbrs_farm.transport.kernels.device_scene import DeviceScene, offset_ray_origin
-from pbrs_farm.transport.kernels.sampler import opaque3
+from pbrs_farm.transport.kernels.packets import colour
+from pbrs_farm.transport.kernels.sampler import device_array, opaque3
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP, SceneTables
 from pbrs_farm.transport.scene_tables.sky import Sky, directions, solid_angles
 
@@ -31,6 +33,20 @@ GLOW_CD_M2: Final = 45.0
 STREET_LX: Final = 2.5
 """Of street lamps on whatever lies outside, at any hour: by day it cannot be seen."""
 STREET_RGB: Final = (1.0, 0.72, 0.42)  # linear, its largest 1
+
+HAZE_M: Final = 75.0
+"""Distance at which 1 - 1/e of what is seen is air: hills at the horizon's ring stand for far ones."""
+
+_LOW_SHAPE: Final = (32, 64)  # texels of the sky that coats mirror and that haze has the colour of
+_HAZE_UP: Final = 0.12  # sine of the elevation at which haze has the sky's colour
+_OPEN_UP: Final = (
+    0.02,
+    0.45,
+)  # sines of the elevations between which a street gives way to the sky
+_STREET_SHARE: Final = 0.3  # of the sky's light that what stands there in its place has
+_LIGHT_SHAPE: Final = (48, 96)  # directions in which windows look
+_MAX_WINDOWS: Final = 24
+_LEAST_WEIGHT: Final = 1e-4  # of a direction in which no window sees anything but its own home
 
 # Convolution of a clamped cosine with each order of spherical harmonics.
 _COSINE: Final = np.array([np.pi, *[2 * np.pi / 3] * 3, *[np.pi / 4] * 5])
@@ -52,6 +68,7 @@ class Outside:
         glows = np.array([m.name.startswith(LIT) for m in house.materials])
         material = tables.face_tags & np.uint32(0xFFFF)
         lamp = np.where(glows[material], np.uint32(0), np.uint32(NO_LAMP))
+        self.sky = sky
         self._scene = DeviceScene(replace(tables, face_tags=material | (lamp << np.uint32(16))))
         self._coefficients = [opaque3(mi.Color3f, c) for c in sky_harmonics(sky) * _COSINE[:, None]]
         self._sun = opaque3(mi.Vector3f, sky.sun_direction)
@@ -60,6 +77,10 @@ class Outside:
         street = np.array(STREET_RGB) / (np.array(STREET_RGB) @ LUMINANCE) * STREET_LX / LM_PER_W
         self._street = opaque3(mi.Color3f, street)
         self._glow = dr.opaque(mi.Float, GLOW_CD_M2 / LM_PER_W)
+        low = np.zeros((*_LOW_SHAPE, 4), np.float32)
+        low[..., :3] = coarse_dome(sky.dome, *_LOW_SHAPE)
+        self._low = device_array(mi.Float, low.ravel())
+        self._mist = dr.opaque(mi.Float, 1 / HAZE_M)
 
     @dr.syntax
     def seen(self, home: DeviceScene, o: Any, d: Any, active: Any) -> Seen:
@@ -74,6 +95,60 @@ class Outside:
             valid, radiance, albedo = self._shown(home, o, d, active)
         return Seen(valid, radiance, albedo)
 
+    @dr.syntax
+    def lets_through(self, o: Any, d: Any, active: Any) -> Any:
+        """Color3f of light that comes from infinity to o (Point3f) past everything outside.
+
+        d: unit Vector3f to where it comes from. 1 for lanes that are not active.
+        """
+        clear = mi.Color3f(1)
+        if active:
+            clear = self._scene.transmittance(o, d, mi.Float(dr.inf), active)
+        return clear
+
+    def light_dome(self, home: DeviceScene, portals: F64) -> F32:
+        """(H, W, 3) float32 radiance that comes from each direction, the sun apart, to the windows.
+
+        A texel is the mean of what the windows see there, sky or something outside, each by the area
+        that it turns to it and as far as the home itself leaves it free: so the flux through all of
+        them together is that of what is seen through them. portals: (K, 4, 3) rectangles of windows,
+        metres; without any the sky's own dome. Runs a kernel at once.
+        """
+        dome = np.asarray(self.sky.dome, np.float32)
+        if not len(portals):
+            return dome
+        # Look from random places in the windows in directions spread over each texel.
+        area = np.linalg.norm(np.cross(portals[:, 1] - portals[:, 0], portals[:, 3] - portals[:, 0]), axis=-1)  # fmt: skip
+        largest = np.sort(np.argsort(-area, kind="stable")[:_MAX_WINDOWS])
+        area, corners = area[largest], portals[largest]
+        rng = np.random.default_rng(0)
+        n, (rows, columns) = len(corners), _LIGHT_SHAPE
+        u = rng.random((n, rows, columns, 4))
+        along, up = corners[:, None, None, 1] - corners[:, None, None, 0], corners[:, None, None, 3] - corners[:, None, None, 0]  # fmt: skip
+        o = corners[:, None, None, 0] + u[..., :1] * along + u[..., 1:2] * up
+        y = np.cos(np.pi * (np.arange(rows)[:, None] + u[..., 2]) / rows)
+        phi = 2 * np.pi * (np.arange(columns) + u[..., 3]) / columns
+        s = np.sqrt(1 - y * y)
+        d = np.stack([s * np.sin(phi), y, -s * np.cos(phi)], -1)
+        normal = np.cross(along, up)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        places, ways = (mi.Point3f(*_columns(o)), mi.Vector3f(*_columns(d)))
+        free = home.transmittance(places, ways, mi.Float(dr.inf), mi.Bool(True))
+        valid, radiance, _albedo = self._shown(home, places, ways, mi.Bool(True))
+        free = dr.max(free)
+        dr.eval(valid, radiance, free)
+        # Weigh them, and put what is seen before the sky.
+        turned = area[:, None, None] * np.abs((normal * d).sum(-1))
+        weight = turned * (free.numpy().reshape(turned.shape) + _LEAST_WEIGHT)
+        share = weight / weight.sum(0)
+        covered = (share * valid.numpy().reshape(turned.shape)).sum(0)
+        shown = np.stack([c.numpy().reshape(turned.shape) for c in radiance], -1)
+        of_things = (share[..., None] * shown).sum(0)
+        row = np.arange(dome.shape[0]) * rows // dome.shape[0]
+        column = np.arange(dome.shape[1]) * columns // dome.shape[1]
+        at = np.ix_(row, column)
+        return np.asarray(dome * (1 - covered[at])[..., None] + of_things[at], np.float32)
+
     def _shown(self, home: DeviceScene, o: Any, d: Any, active: Any) -> tuple[Any, Any, Any]:
         si = self._scene.intersect_past_holes(o, d, active)
         # The sun, unless the home or the outside stands before it.
@@ -87,11 +162,41 @@ class Outside:
             + self._street
             + dr.select(lit, self._sun_irradiance * cos * clear, 0)
         )
-        radiance = si.bsdf.kd * irradiance * (1 / np.pi)
+        coat = dr.select(si.bsdf.alpha > 0, _schlick(si.bsdf.f0, -dr.dot(si.n, d)), 0)
+        mirrored = d - 2 * dr.dot(si.n, d) * si.n
+        radiance = (1 - coat) * si.bsdf.kd * irradiance * (1 / np.pi)
+        radiance += coat * self._mirrored_sky(mirrored, si.valid)
         # Glass that a lit room stands behind is dark by day: its colour alone counts at night.
         hue = si.bsdf.kd / dr.maximum(dr.max(si.bsdf.kd), 1e-6)
         radiance += dr.select(si.emitter != NO_LAMP, hue * self._glow, 0)
+        # Air before it has the sky's colour over the horizon there.
+        clear_air = dr.exp(-dr.square(dr.dot(si.p - o, d) * self._mist))
+        level = dr.normalize(mi.Vector3f(d.x, 0, d.z) + mi.Vector3f(0, 0, 1e-6))
+        haze = self._low_sky(dr.normalize(level + mi.Vector3f(0, _HAZE_UP, 0)), si.valid)
+        radiance = dr.lerp(haze, radiance, clear_air)
         return si.valid, dr.select(si.valid, radiance, 0), si.bsdf.kd
+
+    def _mirrored_sky(self, d: Any, active: Any) -> Any:
+        """Color3f that a coat mirrors in direction d: the sky, low down what stands before it."""
+        low, high = _OPEN_UP
+        t = dr.clip((d.y - low) * (1 / (high - low)), 0, 1)
+        open_share = dr.lerp(_STREET_SHARE, 1.0, t * t * (3 - 2 * t))
+        return self._low_sky(d, active) * open_share
+
+    def _low_sky(self, d: Any, active: Any) -> Any:
+        """Color3f radiance of the sky in direction d, blurred, without its sun."""
+        rows, columns = _LOW_SHAPE
+        x = dr.atan2(d.x, -d.z) * (columns / (2 * np.pi)) + (columns - 0.5)
+        y = dr.safe_acos(d.y) * (rows / np.pi) - 0.5
+        fx, fy = dr.floor(x), dr.floor(y)
+        tx, ty = x - fx, y - fy
+        total = mi.Color3f(0)
+        for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+            column = mi.UInt32(mi.Int32(fx) + dx) % columns
+            row = mi.UInt32(dr.clip(mi.Int32(fy) + dy, 0, rows - 1))
+            texel = dr.gather(mi.Vector4f, self._low, row * columns + column, active)
+            total += (tx if dx else 1 - tx) * (ty if dy else 1 - ty) * colour(texel)
+        return total
 
     def _of_sky(self, n: Any) -> Any:
         """Color3f irradiance by the sky of a surface of normal n."""
@@ -99,6 +204,24 @@ class Outside:
         for value, coefficient in zip(_harmonics(n.x, n.y, n.z), self._coefficients, strict=True):
             total += value * coefficient
         return dr.maximum(total, 0)
+
+
+def coarse_dome(dome: F32, rows: int, columns: int) -> F64:
+    """(rows, columns, 3) mean radiance of a latitude-longitude image (H, W, 3), any size from 2 x 4."""
+    row = (np.arange(4 * rows) + 0.5) / (4 * rows) * dome.shape[0]
+    column = (np.arange(4 * columns) + 0.5) / (4 * columns) * dome.shape[1]
+    fine = np.asarray(dome, np.float64)[np.ix_(row.astype(int), column.astype(int))]
+    return np.asarray(fine.reshape(rows, 4, columns, 4, 3).mean((1, 3)))
+
+
+def _columns(rows: F64) -> list[Any]:
+    """Columns of (..., 3) on the device."""
+    return [device_array(mi.Float, c.astype(np.float32)) for c in rows.reshape(-1, 3).T]
+
+
+def _schlick(f0: Any, cos: Any) -> Any:
+    t = 1 - dr.clip(cos, 0, 1)
+    return f0 + (1 - f0) * (dr.square(dr.square(t)) * t)
 
 
 def sky_harmonics(sky: Sky) -> F64:

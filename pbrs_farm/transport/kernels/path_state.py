@@ -53,6 +53,7 @@ class PathContext(NamedTuple):
     emitter_filter: EmitterFilter
     sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
     may_guide: Any = None  # Bool: lanes whose rays are guided where the view's are; None = all
+    splits_panes: bool = False  # rays at panes go through, and the caller follows what they mirror
 
 
 @dataclass
@@ -82,6 +83,7 @@ class Vertex(NamedTuple):
     depth: Any  # vertices of the path, this one counted
     dim: Any  # its first random dimension
     near: NearbyLamps | None  # None: lamps do not count
+    is_pane: Any = None  # Bool: glass of a window; None: the scene has none
 
 
 class ScatteredRay(NamedTuple):
@@ -119,6 +121,16 @@ class DirectionPdfs:
     techniques: mi.Float  # by surface and cones together, with their shares
 
 
+class MirroredRay(NamedTuple):
+    """The ray that a pane sends back, where the path itself has gone through."""
+
+    is_there: Any  # Bool
+    o: Any
+    d: Any
+    beta: Any  # throughput
+    share: Any  # about, of the light that comes by the pane
+
+
 class StepResult(NamedTuple):
     """What one step of a path brings, throughput included."""
 
@@ -141,6 +153,7 @@ class StepResult(NamedTuple):
     indoor_sample: DirectLightSample
     sunlit_sample: DirectLightSample
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
+    mirrored: MirroredRay | None = None  # where panes are split
 
 
 def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:

@@ -22,7 +22,7 @@ from pbrs_farm.transport.kernels.bsdf import (
 )
 from pbrs_farm.transport.kernels.device_scene import SurfaceInteraction, offset_ray_origin
 from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
-from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL
+from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, Emitters
 from pbrs_farm.transport.kernels.guided_rays import (
     cone_technique_pdf,
     guided_mis_weight,
@@ -38,6 +38,7 @@ from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
     NO_EMITTERS,
     DirectionPdfs,
+    MirroredRay,
     PathContext,
     PathState,
     ScatteredRay,
@@ -51,6 +52,7 @@ from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 MAX_NULLS = 32
 _MAX_COUNT = 64  # vertices with random dimensions of their own
 _MAX_SURVIVAL = 0.95
+_MAX_PANE = 0.5  # of the rays at a pane, those that are reflected, where it reflects less itself
 
 # Random dimensions of a vertex, one or two numbers each; direct_light.py has the others.
 _LOBE, _SCATTER, _ROULETTE = 0, 1, 3
@@ -88,7 +90,8 @@ def advance(
     vertex = _next_vertex(context, path, active)
     si, bsdf = vertex.si, vertex.si.bsdf
     missed = active & ~si.valid
-    lobe = _choose_lobe(vertex, path, sampler.get_1d(vertex.dim + _LOBE))
+    u, splits = sampler.get_1d(vertex.dim + _LOBE), context.splits_panes
+    lobe = _choose_lobe(context.emitters, vertex, path, u, splits=splits)
 
     # Weigh what a guided ray has met; add the light of an emitter there.
     weight: Any = mi.Float(1)
@@ -124,12 +127,18 @@ def advance(
         sunlit_sample=direct.sunlit,
         is_view_independent=strategy.is_view_independent,
     )
+    if context.splits_panes and vertex.is_pane is not None:
+        mirrored = _mirrored_ray(context.emitters, vertex, path, active)
+        result = result._replace(mirrored=mirrored)
     return following, result, alive
 
 
 def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     """What the path's ray meets."""
-    si = context.scene.intersect(path.o, path.d, active)
+    si, is_pane = context.scene.intersect(path.o, path.d, active), None
+    if context.scene.panes is not None:
+        looks = active & (path.bsdf_pdf <= 0)
+        si, is_pane = context.scene.panes.before(si, path.o, path.d, looks)
     is_solid = si.valid & ~si.is_cutout
     is_glass, is_mirror = is_solid & (si.bsdf.kind == GLASS), is_solid & (si.bsdf.kind == MIRROR)
     depth = path.depth + dr.select(is_solid & ~is_glass, mi.UInt32(1), 0)
@@ -151,18 +160,41 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
         if context.may_guide is not None:
             near = near._replace(is_guided=near.is_guided & context.may_guide)
     is_rough = is_solid & ~is_glass & ~is_mirror
-    return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near)
+    return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near, is_pane)
 
 
-def _choose_lobe(vertex: Vertex, path: PathState, u: Any) -> _Lobe:
-    """Reflect more of the rays at glass near lamps; _throughput makes them weigh less."""
+def _choose_lobe(
+    emitters: Emitters, vertex: Vertex, path: PathState, u: Any, *, splits: bool
+) -> _Lobe:
+    """Reflect more of the rays at glass near lamps, and at panes before the dark or fewer before the day.
+
+    _throughput makes up for it.
+    """
     reflectance = thin_glass_reflectance(vertex.wi.z)
     probability = reflectance
     if vertex.near is not None:
         often = reflection_probability(reflectance, survival_boost(vertex.near))
         probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
+    if vertex.is_pane is not None:
+        mirrored = 0 if splits else _mirrored_share(emitters, reflectance)
+        probability = dr.select(vertex.is_pane, mirrored, probability)
     reflected = vertex.is_mirror | (vertex.is_glass & (u < probability))
     return _Lobe(u, reflectance, probability, reflected)
+
+
+def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
+    """How many of the rays at a pane are reflected: as many as bring light, about, half at most."""
+    wanted = reflectance / (reflectance + (1 - reflectance) * emitters.pane_odds)
+    return dr.minimum(wanted, dr.maximum(reflectance, _MAX_PANE))
+
+
+def _mirrored_ray(emitters: Emitters, vertex: Vertex, path: PathState, active: Any) -> MirroredRay:
+    """What a pane sends back of a path that goes through it."""
+    si, reflectance = vertex.si, thin_glass_reflectance(vertex.wi.z)
+    d = path.d - 2 * dr.dot(si.n, path.d) * si.n
+    share = _mirrored_share(emitters, reflectance)
+    is_there = active & vertex.is_pane
+    return MirroredRay(is_there, offset_ray_origin(si.p, si.ng), d, path.beta * reflectance, share)
 
 
 def _strategy(
@@ -204,13 +236,17 @@ def _emitted_light(
         here, asked = path.reference.p, emitter_filter.outdoor
         chances = emitters.outdoor_choice.chances(here, missed)
         sun, sun_pdf = emitters.eval_sun(chances, path.d, asked)
-        dome, dome_pdf = emitters.eval_dome(chances, here, path.d, asked, missed)
+        is_seen = False if emitters.outside is None else ~by_scatter
+        dome, dome_pdf = emitters.eval_dome(chances, here, path.d, asked, missed, is_seen)
         # Where a portal is asked for, count only what is drawn through it.
         is_asked = (asked > NO_EMITTERS) & (asked < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
+        if emitters.outside is not None:
+            meets_sun = missed & by_scatter & (dr.max(sun) > 0)
+            sun *= emitters.sun.past_outside(path.o, path.d, meets_sun)
         sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
         if emitters.outside is not None:
-            # What lies before the windows stands before the sky, for rays that nothing scattered.
+            # Rays that nothing scattered see what lies outside; for others its light is in the dome.
             beyond = emitters.outside.seen(context.scene, path.o, path.d, missed & ~by_scatter)
             sky = dr.select(beyond.valid, beyond.radiance, sky)
             sees_sky |= beyond.valid & counts & is_asked
@@ -316,7 +352,7 @@ def _throughput(step: _Step, scattered: ScatteredRay) -> Any:
     factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))
     factor = dr.select(vertex.is_mirror, bsdf.f0, factor)
     beta = step.path.beta * dr.select(vertex.is_glass & scattered.passed, bsdf.tau, factor)
-    if step.strategy.near is None:
+    if step.strategy.near is None and vertex.is_pane is None:
         return beta
     # Make up for having chosen reflection more often than it happens.
     r, p = lobe.reflectance, lobe.probability

@@ -6,7 +6,7 @@ Effects: holds numbers on the device.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import drjit as dr
 import mitsuba as mi
@@ -15,6 +15,9 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.transport.kernels.sampler import opaque3
 from pbrs_farm.transport.scene_tables.sky import Sky
+
+if TYPE_CHECKING:
+    from pbrs_farm.transport.kernels.outside import Outside
 
 REACH_M: Final = 200.0  # from the plane to where the sun's rays begin
 _EDGE_M: Final = 0.05  # of a cell, longer where there would be more than _MAX_CELLS
@@ -25,6 +28,7 @@ class SunDisc:
     """The sun of a sky on the device."""
 
     def __init__(self, sky: Sky) -> None:
+        self.outside: Outside | None = None  # what may stand before it, set where there is any
         cos_max = math.cos(sky.sun_half_angle_rad)
         # The disc's radiance gives its irradiance: integral of the cosine over the cone.
         projected = math.pi * math.sin(sky.sun_half_angle_rad) ** 2
@@ -39,6 +43,13 @@ class SunDisc:
     def irradiance(self) -> Any:
         """Color3f that a direction drawn to it brings to a surface that faces it."""
         return self._rgb / self.pdf
+
+    def past_outside(self, o: Any, d: Any, active: Any) -> Any:
+        """Color3f of its light that what lies outside lets through to o; 1 where there is none.
+
+        o: Point3f; d: unit Vector3f to the sun. Lanes that are not active mean nothing.
+        """
+        return mi.Color3f(1) if self.outside is None else self.outside.lets_through(o, d, active)
 
     def sample(self, uv: Any) -> Any:
         """A unit direction uniform in the disc."""

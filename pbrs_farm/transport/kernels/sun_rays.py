@@ -57,6 +57,7 @@ def trace_sun_rays(
     is_rough = si.valid & ~si.is_cutout & (si.bsdf.kind == SURFACE)
     may = is_rough & (dr.max(si.bsdf.tau) <= 0) & (cos_sun > 0) & (cos_n > 0)
     clear = scene.transmittance(offset_ray_origin(si.p, si.ng), d, mi.Float(dr.inf), may)
+    clear *= sun.past_outside(offset_ray_origin(si.p, si.ng), d, may & (dr.max(clear) > 0))
     irradiance = sun.irradiance * clear
     light = diffuse_reflection(si.bsdf, cos_n) * irradiance
     return SunRays(si, d, cos_sun, light, irradiance, may & (dr.max(irradiance) > 0))

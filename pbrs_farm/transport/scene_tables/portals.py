@@ -1,15 +1,16 @@
-"""Portals: the openings that daylight enters by, as rectangles to sample; pure numpy, no effects."""
+"""Portals: the openings that daylight enters by, as rectangles to sample, and their panes; no effects."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, MaterialKind
-from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.core.house import House, Material, MaterialKind, corners_of_surfaces
+from pbrs_farm.core.mesh import face_areas, faces_with_area
 
 MAX_PORTALS: Final = 6  # sampled for one view
 
@@ -28,6 +29,22 @@ def portals_of_house(house: House) -> F64:
         if (o.is_window or o.item_id in glazed) and _is_rectangle(np.asarray(o.quad))
     ]
     return np.array(quads).reshape(-1, 4, 3)
+
+
+def panes_of_house(house: House) -> House | None:
+    """The house's window panes alone, as clear thin glass; None where it has none."""
+    is_pane = [m.kind is MaterialKind.PANE for m in house.materials]
+    items = [
+        replace(i, surfaces=tuple(s for s in i.surfaces if is_pane[s.material]), lights=())
+        for i in house.items
+    ]
+    clear = Material("pane", kind=MaterialKind.GLASS, opacity=0.0)
+    materials = tuple(clear if p else m for m, p in zip(house.materials, is_pane, strict=True))
+    found = replace(house.with_items(i for i in items if i.surfaces), materials=materials)
+    has_area = any(
+        faces_with_area(corners_of_surfaces(i.surfaces), 1e-6).any() for i in found.items
+    )
+    return found if has_area else None
 
 
 def nearest_portals(portals: F64, eye: F64) -> F64:

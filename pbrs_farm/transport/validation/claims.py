@@ -268,12 +268,13 @@ def _sealed_room(variant: str) -> LightClaim:
 
 
 def _window_pane(variant: str) -> LightClaim:
-    glazed = rooms.window_room(0.7, lumen=800, pane=True)
-    (a,) = _rendered(variant, _window_room(), _sun(), _spp(16), 1)
-    (b,) = _rendered(variant, glazed, _sun(), _spp(16), 1)
+    away = rooms.camera((2.0, 1.5, 1.0), (2.0, 0.5, 3.9))
+    bare, glazed = (rooms.window_room(0.7, lumen=800, pane=p)[0] for p in (False, True))
+    (a,) = _rendered(variant, (bare, away), _sun(), _spp(16), 1)
+    (b,) = _rendered(variant, (glazed, away), _sun(), _spp(16), 1)
     off = float(np.abs(a.mode(Mode.MLT_IL_OL) - b.mode(Mode.MLT_IL_OL)).max())
     return LightClaim(
-        "a pane in the window changes no bit", f"largest difference {off:g}", "0", off == 0
+        "a pane that is not seen changes no bit", f"largest difference {off:g}", "0", off == 0
     )
 
 

@@ -1,0 +1,79 @@
+"""Panes mirror the room, for rays straight from the camera."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.transport.light_scene import LightScene
+from pbrs_farm.transport.scene_tables.sky import dark_sky, uniform_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
+
+pytestmark = pytest.mark.skipif(
+    not choose_variant().startswith("llvm"), reason="OptiX takes one scene in a kernel"
+)
+
+RECIPE: Recipe = recipe_from_name("fast")
+FIELDS: LightFields = RECIPE.light.model_copy(
+    update={"filter": "box", "pilot_spp": 0, "spp": 16, "max_depth": 4}
+)
+
+
+def fresnel(cos: float) -> float:
+    """Reflectance of both surfaces of glass of index 1.5, all inner reflections counted."""
+    sin_t = np.sqrt(1 - cos * cos) / 1.5
+    cos_t = np.sqrt(1 - sin_t**2)
+    s = ((cos - 1.5 * cos_t) / (cos + 1.5 * cos_t)) ** 2
+    p = ((1.5 * cos - cos_t) / (1.5 * cos + cos_t)) ** 2
+    r = (s + p) / 2
+    return float(2 * r / (1 + r))
+
+
+def pane_before_black(*, n_panes: int = 1) -> House:
+    """Panes at z = 0 and behind, and a black board behind them; before them is the sky."""
+
+    def sheet(z: float, material: int):  # type: ignore[no-untyped-def]
+        return rooms.quad([(-9, -9, z), (9, -9, z), (9, 9, z), (-9, 9, z)], material)
+
+    glass = Material("pane", kind=MaterialKind.PANE, opacity=0.3)
+    panes = [sheet(-0.01 * k, 1) for k in range(n_panes)]
+    return rooms.house([sheet(-1.0, 0), *panes], [rooms.matte("black", 0.0), glass])
+
+
+@pytest.mark.parametrize("cos", [1.0, 0.5, 0.2])
+def test_a_pane_before_a_black_wall_mirrors_the_sky_by_fresnels_law(cos: float) -> None:
+    sin = float(np.sqrt(1 - cos * cos))
+    camera = rooms.camera((2 * sin, 0.0, 2 * cos), (0, 0, 0), 4, 4, 0.01)
+    scene = LightScene.load(pane_before_black(), {}, RECIPE, uniform_sky((1.0, 2.0, 3.0)))
+    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
+    np.testing.assert_allclose(found, np.tile(fresnel(cos) * np.array([1.0, 2, 3]), (4, 4, 1)), rtol=0.02)  # fmt: skip
+
+
+def test_only_the_first_of_two_panes_mirrors() -> None:
+    camera = rooms.camera((0, 0, 2), (0, 0, 0), 4, 4, 0.01)
+    scene = LightScene.load(pane_before_black(n_panes=2), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
+    np.testing.assert_allclose(scene.render(camera, "0_0", FIELDS, 1).outdoor, fresnel(1.0), rtol=0.02)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["released", "fast"])
+def test_at_night_a_window_shows_the_room_but_in_released(name: str) -> None:
+    house, _camera = rooms.window_room(0.7, lumen=800, pane=True)
+    camera = rooms.camera((2.0, 1.5, 3.0), (2.0, 1.5, 0.0), 8, 8, 0.2)
+    recipe = recipe_from_name(name)
+    found = LightScene.load(house, {}, recipe, dark_sky()).render(camera, "0_0", FIELDS, 1)
+    assert bool(found.indoor.min() > 0) == (name == "fast")
+
+
+def test_metropolis_mirrors_as_path_does() -> None:
+    house, _camera = rooms.window_room(0.7, lumen=800, pane=True)
+    camera = rooms.camera((2.0, 1.5, 3.0), (2.0, 1.5, 0.0), 12, 12, 0.25)
+    scene = LightScene.load(house, {}, RECIPE, dark_sky())
+    by_path = scene.render(camera, "0_0", FIELDS.model_copy(update={"spp": 512}), 1).indoor
+    chains = FIELDS.model_copy(
+        update={"integrator": "metropolis", "direct_spp": 64, "mutations_per_pixel": 512}
+    )
+    by_chains = scene.render(camera, "0_0", chains, 1).indoor
+    assert by_chains.mean() == pytest.approx(by_path.mean(), rel=0.05)
