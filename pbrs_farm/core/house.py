@@ -50,7 +50,7 @@ class MaterialKind(StrEnum):
 
     OPAQUE = "opaque"
     GLASS = "glass"  # thin glass of an object: seen through, reflects
-    PANE = "pane"  # glass of a window or door: left out of the scene that carries light
+    PANE = "pane"  # glass of a window or door: light passes, and the camera sees it mirror
     MIRROR = "mirror"
     SHADE = "shade"  # translucent lamp shade, set by repair
     BULB = "bulb"  # emits
@@ -221,7 +221,7 @@ class ModelPose:
 OUTSIDE: Final = "outside"
 """Tag of an item that lies before the windows (dress/surroundings): seen, and no part of the home.
 
-Light is not scattered by it; labels and pictures have it behind glass.
+Light of rooms is made of what windows see of it; labels and pictures have it behind glass.
 """
 LIT: Final = "lit"
 """Begins the name of a material of such an item that shines by itself: windows at night."""

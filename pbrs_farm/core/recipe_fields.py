@@ -129,7 +129,7 @@ class RepairFields(FieldGroup):
 
 
 class SurroundingFields(FieldGroup):
-    """What lies before the windows (docs/dress.md); it is seen and lights or darkens nothing."""
+    """What lies before the windows (docs/dress.md); rooms have its light."""
 
     kind: Literal["none", "drawn", "street", "garden", "court", "blocks", "hills"] = Field(
         "none", description="on all sides; drawn: by the house's seed, storey and kind of home"

@@ -243,7 +243,7 @@ def _repair(work: Preparation) -> Preparation:
 
 
 def _surround(work: Preparation) -> Preparation:
-    """Streets, gardens and courts before the windows, seen by camera and mirrors alone."""
+    """Streets, gardens and courts before the windows."""
     from pbrs_farm.dress.surroundings import with_surroundings
 
     recipe = work.recipe

@@ -40,7 +40,9 @@ from pbrs_farm.transport.kernels.path_state import (
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
 
-_NULLS_APART: Final = 12
+_NULLS_APART: Final = (
+    12  # random dimensions, in vertices, of what a pane mirrors from what is behind it
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +139,10 @@ class _MirroredPath:
         self.share = dr.select(fresh, mi.Float(1), self.share)
         self.met = self.met & ~fresh
 
-    def keep(self, ray: MirroredRay, path: PathState) -> None:
+    def keep(self, ray: MirroredRay | None, path: PathState) -> None:
         """Keep the ray of the first pane that a sample meets; path: behind it."""
+        if ray is None:
+            return
         first = ray.is_there & ~self.met
         self.o = dr.select(first, ray.o, self.o)
         self.d = dr.select(first, ray.d, self.d)

@@ -1,8 +1,8 @@
 """The pass: what lies before a repaired home's windows, by its storey and a seed; no effects.
 
 Four sides lie about the bounding rectangle of the home's rooms, each a street, a garden, a court or a
-lawn with blocks; trees, roofs or hills close the horizon. Light inside the home does not know of
-them (transport/kernels/outside.py): they are seen, and they darken nothing.
+lawn with blocks; trees, roofs or hills close the horizon. Rooms have the light of what their
+windows see of them (transport/kernels/outside.py).
 """
 
 from __future__ import annotations
