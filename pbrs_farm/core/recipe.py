@@ -165,7 +165,7 @@ _PHOTO: Mapping[str, Any] = {
     "max_opening_fraction": 0.35,
     "min_score": 0.8,
     "min_room_score": 0.2,
-    "likeness": 3.0,
+    "likeness": 4.0,
     "hfov_rad": 1.0472,
     "hfov_spread": 0.1,
 }

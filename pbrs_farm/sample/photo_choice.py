@@ -1,6 +1,6 @@
 """Which candidates of a home become its views: good ones, no near-duplicates, together like photographs; no effects of its own.
 
-The views of a home maximise the sum of their scores, less what their framing costs, less likeness times
+The views of a home maximise the sum of their scores, less what foreground and framing cost, less likeness times
 their number times the distance of their mean class shares to those of photographs: first sector
 by sector, the best first, then by exchange. That distance is the L1 distance of the mean NYU13 pixel shares of
 the views to those published of NYUv2's labelled frames (Silberman et al. 2012), unlabelled pixels left out of both.
@@ -43,8 +43,8 @@ _TRIES: Final = 12
 _ROUNDS: Final = 3
 """How often every view may be exchanged for another of its sector."""
 
-MOST_WORSE: Final = 0.25
-"""By how much of score less than its sector's best a view may be taken for its likeness."""
+MOST_WORSE: Final = 0.35
+"""By how much less than its sector's best a view may be worth that is taken for its likeness."""
 
 _LIKELY_BY_SCORE: Final = 8
 """Candidates of a sector, best first, whose scores are worth knowing better whatever they add."""
@@ -70,8 +70,8 @@ class RoomCandidates:
     """A room's candidates with the rule that rejected each, and what the others show.
 
     verdict: (N,) uint8 of Verdict. score: (N,) float64, -inf where a rule rejected it. nyu13:
-    (N, 14) shares of the picture of each class, framing: (N,) framing_cost of photo_score.py; both
-    0 where it was not looked at.
+    (N, 14) shares of the picture of each class, framing, foreground: (N,) framing_cost and
+    foreground_cost of photo_score.py; all 0 where it was not looked at.
     """
 
     room: Room
@@ -80,6 +80,11 @@ class RoomCandidates:
     score: F64
     nyu13: F64
     framing: F64
+    foreground: F64
+
+    def worth(self, numbers: NDArray[np.intp]) -> F64:
+        """(M,) scores of candidates less what stands before their lens."""
+        return np.asarray(self.score[numbers] - self.foreground[numbers])
 
     def ranked(self, sector: int) -> NDArray[np.intp]:
         """Numbers of a sector's candidates that no rule rejected, best first.
@@ -173,8 +178,8 @@ class PhotoChoice:
         sector.candidates = sector.candidates[~is_low]
         # Likeness chooses among the better ones.
         if f.likeness > 0 and len(sector.candidates):
-            score = scored.score[sector.candidates]
-            sector.candidates = sector.candidates[score >= score[0] - MOST_WORSE]
+            worth = scored.worth(sector.candidates)
+            sector.candidates = sector.candidates[worth >= worth.max() - MOST_WORSE]
 
     def _fill(self, sector: _Sector) -> None:
         """Take a sector's views, the candidate that adds most first, leaving out near-duplicates."""
@@ -208,12 +213,12 @@ class PhotoChoice:
 
     def _gain(self, scored: RoomCandidates, numbers: NDArray[np.intp]) -> F64:
         """(M,) what candidates would add to the views that are taken."""
-        score = scored.score[numbers]
+        worth = scored.worth(numbers)
         if self.fields.likeness == 0:
-            return score
+            return worth
         distance = share_distance(self._shown + scored.nyu13[numbers])
         unlike = self.fields.likeness * (len(self._taken) + 1) * distance
-        return np.asarray(score - scored.framing[numbers] - unlike)
+        return np.asarray(worth - scored.framing[numbers] - unlike)
 
     def _take(self, sector: _Sector, number: int) -> None:
         sector.taken.append(number)

@@ -29,6 +29,7 @@ from pbrs_farm.sample.photo_choice import PhotoChoice, RoomCandidates
 from pbrs_farm.sample.photo_score import (
     ItemRoles,
     PhotoShares,
+    foreground_cost,
     framing_cost,
     item_roles,
     photo_score,
@@ -68,7 +69,8 @@ class PhotoSampler:
         )
         n = len(candidates)
         nothing = np.zeros((n, len(NYU13_NAMES)))
-        placed = RoomCandidates(room, candidates, verdict, np.zeros(n), nothing, np.zeros(n))
+        none = np.zeros(n)
+        placed = RoomCandidates(room, candidates, verdict, none, nothing, none, none)
         left = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
         return self._scored(placed, left, *self._first_sizes)
 
@@ -97,12 +99,13 @@ class PhotoSampler:
         # Give the others the score of what they show.
         n = len(candidates)
         verdict, score = placed.verdict.copy(), np.full(n, -np.inf)
-        nyu13, framing = np.zeros((n, seen.nyu13.shape[1])), np.zeros(n)
+        nyu13, framing, foreground = np.zeros((n, seen.nyu13.shape[1])), np.zeros(n), np.zeros(n)
         tilt_deg = np.degrees(np.arcsin(-candidates.towards[which, 1]))
         verdict[which] = rule
         score[which] = np.where(rule == Verdict.LOWER_SCORE, photo_score(seen), -np.inf)
         nyu13[which], framing[which] = seen.nyu13, framing_cost(seen, tilt_deg)
-        return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing)
+        foreground[which] = foreground_cost(seen)
+        return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing, foreground)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
         """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
@@ -132,7 +135,7 @@ class PhotoSampler:
                 room_id=scored.room.id,
                 sector=sector,
                 camera=camera,
-                score=round(float(scored.score[number]), 4),
+                score=round(float(scored.worth(np.array([number]))[0]), 4),
                 objects={int(i): int(row[i]) for i in columns if row[i]},
             )
             for k, (number, camera, row) in enumerate(zip(chosen, cameras, counts, strict=True))
@@ -188,7 +191,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
     refused = {rule.label: tally[rule] for rule in REJECTIONS if tally[rule]}
     ranked = scored.ranked(sector)
     winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)
-    others = scored.score[np.delete(ranked, winners[:1] if len(winners) else slice(0, 1))]
+    others = scored.worth(np.delete(ranked, winners[:1] if len(winners) else slice(0, 1)))
     most = ", ".join(
         f"{n} {rule.replace('_', ' ')}" for rule, n in sorted(refused.items(), key=lambda p: -p[1])
     )
@@ -200,7 +203,7 @@ def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) ->
         n_rescored=0,
         views=tuple(view.id for view in views),
         winner_score=views[0].score if views else None,
-        runner_up_score=round(float(others[0]), 4) if len(others) else None,
+        runner_up_score=round(float(others.max()), 4) if len(others) else None,
         reason="" if views else f"every candidate was rejected: {most}",
     )
 

@@ -8,7 +8,7 @@ weights were fitted by eye on the example homes against the class shares of NYUv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,13 +40,28 @@ MOST_OPENING, OPENING_COST = 0.10, 1.5
 MOST_OF_ONE, MOST_OF_A_WALL = 0.30, 0.50
 # The median depth that costs nothing, and what a metre out of it costs.
 NEAR_M, FAR_M, NEAR_COST, FAR_COST = 1.6, 4.5, 0.5, 0.1
-# Beside likeness: the upper quartile of NYUv2's tilts and what a degree beyond it costs; what is
-# foreground, the share of it that costs nothing, and the rest; what a metre below NEAR_M costs;
-# doors and windows, which the score lets go up to MOST_OPENING.
+# Beside likeness: the upper quartile of NYUv2's tilts and what a degree beyond it costs; what a
+# metre below NEAR_M costs; doors and windows, which the score lets go up to MOST_OPENING.
 MOST_TILT_DEG, TILT_COST = 12.0, 0.05
-FOREGROUND_M, MOST_FOREGROUND, FOREGROUND_COST = 0.8, 0.1, 1.0
 CLOSE_COST: Final = 2.0
 FREE_OPENING, FRAMED_OPENING_COST = 0.06, 1.5
+
+
+class Foreground(NamedTuple):
+    """What stands before the lens: nearer than a distance, beyond a free share of the picture."""
+
+    nearer_m: float
+    free: float
+    cost: float  # a unit of share beyond it
+
+
+FOREGROUND: Final = (
+    # A lampshade, a door's edge, the side of a wardrobe: people step past it.
+    Foreground(nearer_m=0.6, free=0.01, cost=3.0),
+    # A corner of a table or the back of a chair leads into a room; half of one hides it.
+    Foreground(nearer_m=0.9, free=0.05, cost=3.0),
+)
+"""Costs of what is near, all of which are paid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,12 +80,12 @@ class ItemRoles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhotoShares:
-    """What N pictures show, as shares of the picture; each array (N,).
+    """What N pictures show, as shares of the picture; each array (N,) but for the last two.
 
     largest: of the one largest piece of furniture. wall: of the largest wall. n_objects: pieces
     that cover the least share. n_classes: NYU13 classes seen. median_m: median planar depth.
-    foreground: of what is nearer than FOREGROUND_M. nyu13: (N, 14) of each class, column 0 of what
-    has none.
+    foreground: (N, K) of what is nearer than each row of FOREGROUND says. nyu13: (N, 14) of each class,
+    column 0 of what has none.
     """
 
     furniture: F64
@@ -121,7 +136,9 @@ def photo_shares(
         n_objects=(share[:, roles.furniture] >= least).sum(1),
         n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=_median_depth(depth_m),
-        foreground=((depth_m > 0) & (depth_m < FOREGROUND_M)).mean(1),
+        foreground=np.stack(
+            [((depth_m > 0) & (depth_m < f.nearer_m)).mean(1) for f in FOREGROUND], 1
+        ),
         nyu13=classes,
     )
 
@@ -159,7 +176,7 @@ def photo_score(seen: PhotoShares) -> F64:
 
 
 def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
-    """(N,) what steep views, close ones, doors and a large foreground cost where likeness counts.
+    """(N,) what steep views, close ones and doors cost where likeness counts.
 
     Such views show least of bare walls: without a cost likeness would prefer them. tilt_deg: (N,)
     downwards.
@@ -167,8 +184,17 @@ def framing_cost(seen: PhotoShares, tilt_deg: F64) -> F64:
     cost = TILT_COST * np.maximum(tilt_deg - MOST_TILT_DEG, 0)
     cost += CLOSE_COST * np.maximum(NEAR_M - seen.median_m, 0)
     cost += FRAMED_OPENING_COST * np.maximum(seen.opening - FREE_OPENING, 0)
-    cost += FOREGROUND_COST * np.maximum(seen.foreground - MOST_FOREGROUND, 0)
     return cost
+
+
+def foreground_cost(seen: PhotoShares) -> F64:
+    """(N,) what the things before the lens cost, of which FOREGROUND has the prices.
+
+    A view pays it against others of its sector; none is left out for it.
+    """
+    nearer = zip(FOREGROUND, seen.foreground.T, strict=True)
+    costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]
+    return np.asarray(np.sum(costs, axis=0))
 
 
 def _is_opening(item: Item) -> bool:

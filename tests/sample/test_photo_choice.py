@@ -34,11 +34,14 @@ WALLS, LIKE_ALL = shows(wall=1.0), shows(**PHOTOGRAPH)
 
 
 def room(
-    rows: Sequence[tuple[int, float, list[float]]], name: str = "0_0", framing: float = 0.0
+    rows: Sequence[tuple[int, float, list[float]]],
+    name: str = "0_0",
+    framing: float = 0.0,
+    foreground: float = 0.0,
 ) -> RoomCandidates:
     """A room of candidates (sector, score, shares), each 10 m from the next: no twins.
 
-    framing: what that of the first candidate costs.
+    framing, foreground: what those of the first candidate cost.
     """
     n = len(rows)
     eye = np.stack([10.0 * np.arange(n), np.full(n, 1.5), np.full(n, float(int(name[-1])))], 1)
@@ -56,6 +59,7 @@ def room(
         score=np.array([row[1] for row in rows]),
         nyu13=np.array([row[2] for row in rows]),
         framing=framing * np.eye(n)[0],
+        foreground=foreground * np.eye(n)[0],
     )
 
 
@@ -117,6 +121,21 @@ def test_a_badly_framed_view_is_not_taken_for_its_likeness() -> None:
     assert chosen(room(rows, framing=0.3), likeness=2.0)["0_0", 0] == [1]
     assert chosen(room(rows, framing=0.0), likeness=2.0)["0_0", 0] == [0]
     assert chosen(room(rows, framing=0.3), likeness=0.0)["0_0", 0] == [0]
+
+
+def test_a_view_past_a_lampshade_yields_to_a_free_one_of_its_sector() -> None:
+    rows = [(0, 1.3, LIKE_ALL), (0, 1.1, LIKE_ALL)]
+    for likeness in (0.0, 2.0):
+        assert chosen(room(rows), likeness=likeness)["0_0", 0] == [0]
+        assert chosen(room(rows, foreground=0.3), likeness=likeness)["0_0", 0] == [1]
+    # The free one may lie below what the better score allows.
+    rows[1] = (0, 1.3 - MOST_WORSE - 0.05, LIKE_ALL)
+    assert chosen(room(rows, foreground=1.0), likeness=2.0)["0_0", 0] == [1]
+
+
+def test_a_sector_keeps_its_view_whatever_stands_before_the_lens() -> None:
+    rows = [(0, FIELDS.min_score, LIKE_ALL)]
+    assert chosen(room(rows, foreground=3.0))["0_0", 0] == [0]
 
 
 def test_several_views_of_a_sector_are_chosen_together() -> None:

@@ -21,7 +21,9 @@ from pbrs_farm.sample.eye_probes import EnclosureLimits, enclosure_limits
 from pbrs_farm.sample.house_sampler import Sampling
 from pbrs_farm.sample.photo_sampler import PhotoSampler
 from pbrs_farm.sample.photo_score import (
+    FOREGROUND,
     PhotoShares,
+    foreground_cost,
     framing_cost,
     item_roles,
     photo_score,
@@ -57,10 +59,11 @@ def shares(**changes: float) -> PhotoShares:
     """A good view of one room, but for what is changed."""
     plain = {
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
-        "n_objects": 5, "n_classes": 6, "median_m": 2.5, "foreground": 0.05,
+        "n_objects": 5, "n_classes": 6, "median_m": 2.5,
     }  # fmt: skip
     columns = {k: np.array([v]) for k, v in (plain | changes).items()}
-    return PhotoShares(**columns, nyu13=np.zeros((1, 14)))
+    near = np.zeros((1, len(FOREGROUND)))
+    return PhotoShares(**columns, foreground=near, nyu13=np.zeros((1, 14)))
 
 
 @pytest.mark.parametrize(
@@ -74,15 +77,25 @@ def test_a_view_is_worth_less(worse: dict[str, float]) -> None:
     assert photo_score(shares(**worse))[0] < photo_score(shares())[0]
 
 
-def test_steep_close_and_covered_views_cost_where_likeness_counts() -> None:
+def test_steep_and_close_views_cost_where_likeness_counts() -> None:
     def cost(tilt_deg: float = 10.0, **changes: float) -> float:
         return float(framing_cost(shares(**changes), np.array([tilt_deg]))[0])
 
     assert cost() == 0
     assert cost(tilt_deg=16.0) == pytest.approx(0.2)
-    assert cost(foreground=0.4) == pytest.approx(0.3)
     assert cost(opening=0.16) == pytest.approx(0.15)
     assert cost(median_m=1.4) == pytest.approx(0.4)
+
+
+def test_what_stands_before_the_lens_costs_the_more_the_nearer_it_is() -> None:
+    house = room_house([box((0, 0, 0), (1, 1, 1)), *shell(3, 3)], 3, 3)
+    counts = np.ones((5, len(house.items) + 1), np.uint32)
+    # A hundred pixels each: ten of them far, at 1 m, at 0.7 m, at 0.5 m, and all but one at 0.5 m.
+    depth = np.full((5, 100), 3.0, np.float32)
+    depth[1, :10], depth[2, :10], depth[3, :10], depth[4, :99] = 1.0, 0.7, 0.5, 0.5
+    cost = foreground_cost(photo_shares(counts, depth, item_roles(house), 0.01))
+    assert cost[:2].tolist() == [0, 0]
+    assert (np.diff(cost[1:]) > 0.1).all()
 
 
 def test_doors_curtains_and_built_in_parts_are_no_furniture() -> None:
@@ -103,7 +116,7 @@ def test_shares_are_those_of_the_pixels() -> None:
     assert (seen.n_objects[0], seen.n_classes[0], seen.median_m[0]) == (1, 1, 2.0)
     assert seen.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
     assert seen.nyu13[0].sum() == pytest.approx(1)
-    assert photo_shares(counts, depth / 2, item_roles(house), 0.01).foreground[0] == 0.25
+    assert photo_shares(counts, depth / 2, item_roles(house), 0.01).foreground[0].max() == 0.25
 
 
 def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:
