@@ -22,14 +22,26 @@ def check_files(root: Path, house: Path, tally: Tally) -> None:
     """
     # Each listed file is there, with the bytes and the hash that are listed.
     rows = _manifest(house / "manifest.jsonl", house.name, tally)
+    credit = _credit(house)
     for key, row in rows.items():
         _check_row(root, key, row, tally)
+        if credit is not None:
+            same = row.get("attribution", "") == credit
+            tally.expect("credits", key, same, "its line of manifest.jsonl carries another credit")
     _check_markers(house, rows, tally)
     # Find files that nothing lists.
     listed = {root / key for key in rows}
     for file in sorted(p for p in (house / "views").rglob("*") if p.is_file()):
         place = str(file.relative_to(root))
         tally.expect("files", place, file in listed, "is not in manifest.jsonl")
+
+
+def _credit(house: Path) -> str | None:
+    """The line that what is made from a house must carry; None where house.json does not say."""
+    try:
+        return str(stored_object(house / "house.json")["source"]["attribution"])
+    except (BadFile, KeyError, TypeError):
+        return None
 
 
 def check_root_manifest(root: Path, houses: list[Path], tally: Tally) -> None:
@@ -93,13 +105,22 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
     for file in sorted(house.glob("done/*.json")):
         place = f"{house.name}/done/{file.name}"
         try:
-            stored = stored_object(file)["files"]
+            marker = stored_object(file)
+            stored = marker["files"]
             pairs = [(str(s["key"]), s["sha256"], s["n_bytes"]) for s in stored]
+            told = (marker["step"], marker["house_id"], marker.get("view_id"))
+            digest = marker["digest"]
         except (ValueError, KeyError, TypeError):
             tally.expect("markers", place, False, "is no marker")
             continue
+        # Its name says what it is of.
+        step, _, view = file.stem.partition(".")
+        same = told == (step, house.name, view or None)
+        tally.expect("markers", place, same, "is told to be of another step, house or view")
         # A marker and the manifest tell the same of each file.
         for key, sha256, n_bytes in pairs:
             row = rows.get(key, {})
             same = row.get("sha256") == sha256 and row.get("bytes") == n_bytes
             tally.expect("markers", place, same, f"{key} is not as in manifest.jsonl")
+            same = (row.get("step"), row.get("digest")) == (step, digest)
+            tally.expect("markers", place, same, f"{key} is of another step in manifest.jsonl")

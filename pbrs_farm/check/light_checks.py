@@ -132,9 +132,13 @@ def _check_picture(
         exposure = float(stated.get("exposure", exposure))
     else:
         off = abs(float(stated.get("exposure", exposure)) / exposure - 1)
-        off = max(off, float(np.abs(np.array(stated.get("gains", gains)) - gains).max()))
+        told = np.array(stated.get("gains", gains), np.float64)
+        off = max(off, float(np.abs(told - gains).max()))
         what = f"view.json tells other factors, by {off:.4f}"
-        tally.expect("light developed", place, off <= _FACTOR, what)
+        if tally.expect("light developed", place, off <= _FACTOR, what):
+            # Whether a pixel lies above a percentile hangs on its last bit: go on with what is told.
+            exposure = float(stated.get("exposure", exposure))
+            balanced = np.maximum(np.nan_to_num((total * told).astype(np.float64), posinf=0.0), 0)
     expected = _tone(balanced, exposure, tone, sensor)
     if sensor.is_on:
         _compare_tiles(place, stored, expected, tally)

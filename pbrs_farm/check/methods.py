@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+from pbrs_farm.check.fields import field_lines
 from pbrs_farm.check.pixel_checks import RAY_LAYERS
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS
+from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS, OWN_LAYERS
 
 RAYS = "recomputed by rays"
 FORMULA = "recomputed from other layers"
@@ -29,8 +30,9 @@ HOW: dict[str, str] = {
     **{LAYER[f"mlt_il_ol.{n}"].file: "developed from radiance.exr again" for n in range(1, MOST_VARIANTS + 1)},
     "opengl_dl.png": "its edges against those of the instances",
     "opengl_il.png": "its edges against those of the instances",
-    "view.json": "camera by rays; boxes, shares and counts recomputed",
+    "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
     "radiance.exr": "every value finite and not negative; no light is traced",
+    "projector.png": "size and type alone",
     "normal_shading.png": "unit length alone",
     "boundary_occlusion.png": "values that there are alone",
     "boundary_crease.png": "values that there are alone",
@@ -41,31 +43,50 @@ HOW: dict[str, str] = {
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
 }  # fmt: skip
 
-_LIGHTLY = ("radiance.exr", "normal_shading.png", "boundary_occlusion.png", "boundary_crease.png")
+_LIGHTLY = (
+    "radiance.exr",
+    "projector.png",
+    "normal_shading.png",
+    "boundary_occlusion.png",
+    "boundary_crease.png",
+)
 
-# What no file of a view tells.
+# What is looked at of the files of a house and of a root, beside their fields.
+HOW_OF_HOUSE: dict[str, str] = {
+    "house.glb": "its triangles are what rays meet; items, materials and pictures are those of house.json",
+    "house.json": "each field has its check", "cameras.json": "each field has its check",
+    "illuminance.json": "each field has its check; no light is traced",
+    "repair.json": "rooms and lamps as house.json", "dress.json": "credits as ATTRIBUTION.txt",
+    "pairs.parquet": "followed by rays from view to view", "manifest.jsonl": "each file's size and hash",
+    "recipe.json": "by the digest and the seeds of its views", "ATTRIBUTION.txt": "names what dress.json says must be",
+}  # fmt: skip
+
+# What no file of a root tells.
 _NEVER = (
     "levels of light: what radiance.exr holds, illuminance.json, noise",
-    "the choice of views: cameras.json and its scores",
-    "house.glb and house.json against their source; repair.json, dress.json",
+    "house.glb and house.json against their source, which is not stored",
 )
 
 
-def looked_at(views: list[StoredView]) -> tuple[str, ...]:
+def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
     """A line for each kind of file that was recomputed: its name, in how many views, how.
 
-    In the order of the list of methods, without kinds of files that no view has.
+    In the order of the list of methods, without kinds of files that no view has; then how many
+    kinds of fields of each JSON file have a check (fields: as of `fields.stored_fields`).
     """
     counts = _file_counts(views)
-    return tuple(
+    files = tuple(
         f"{file} ({counts[file]}): {how}"
         for file, how in HOW.items()
         if counts[file] and file not in _LIGHTLY
     )
+    return (*files, *field_lines(fields)[0])
 
 
-def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
-    """A line for each kind of file that a hash alone speaks for, or little more.
+def not_looked_at(
+    root: Path, houses: list[Path], views: list[StoredView], fields: Counter[tuple[str, str]]
+) -> tuple[str, ...]:
+    """A line for each kind of file that a hash alone speaks for, or little more, and for each field without a check.
 
     With each view whose light could not be developed again and why, and the lines that hold for
     every root.
@@ -79,8 +100,27 @@ def not_looked_at(views: list[StoredView]) -> tuple[str, ...]:
         elif file not in HOW:
             how = "hash, size and type alone" if file in layers else "hash alone"
             lines.append(f"{file} ({counts[file]}): {how}")
+    lines += unknown_files(root, houses)
+    lines += field_lines(fields)[1]
     lines += [f"light of {view.place}: {why}" for view in views if (why := _light_fault(view))]
     return (*lines, *_NEVER)
+
+
+def unknown_files(root: Path, houses: list[Path]) -> list[str]:
+    """A line for each file beside the views that no check opens."""
+    found = Counter(file.name for file in root.glob("*") if file.is_file())
+    for house in houses:
+        found.update(file.name for file in house.glob("*") if file.is_file())
+    return [
+        f"{name} ({n}): no check knows it"
+        for name, n in sorted(found.items())
+        if name not in HOW_OF_HOUSE
+    ]
+
+
+def unowned_layers() -> list[str]:
+    """Files of layers of the package that no check looks at, nor says how little it does."""
+    return [layer.file for layer in OWN_LAYERS if layer.file not in HOW]
 
 
 def _file_counts(views: list[StoredView]) -> Counter[str]:

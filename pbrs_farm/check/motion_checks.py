@@ -226,11 +226,15 @@ def half_step(values: Floats) -> Floats:
 def check_partners(views: list[StoredView], tally: Tally) -> None:
     """Each partner that is stored itself has the pose and K that the view's table says.
 
-    Partners that the folder does not have are passed over, as a view may be rendered alone.
+    Its name follows from the view's own. Partners that the folder does not have are passed over
+    then, as a view may be rendered alone.
     """
     by_name = {view.folder.name: view for view in views}
     for view in views:
         for relation, row in sorted(view.table.get("partners", {}).items()):
+            name = _name_of_partner(view, relation)
+            what = f"the {relation} view is told to be {row['view']}, not {name}"
+            tally.expect("partners", view.place, row["view"] == name, what)
             other = by_name.get(str(row["view"]))
             if other is None:
                 continue
@@ -241,3 +245,15 @@ def check_partners(views: list[StoredView], tally: Tally) -> None:
             )
             what = f"the {relation} view {other.folder.name} has another camera"
             tally.expect("partners", view.place, same, what)
+            same = row.get("time_s") == other.table.get("time_s")
+            what = f"the {relation} view {other.folder.name} is of another time"
+            tally.expect("partners", view.place, same, what)
+
+
+def _name_of_partner(view: StoredView, relation: str) -> str:
+    """The id of the other eye, or of the frame before or after, of the same eye."""
+    left = view.table.get("left", "")
+    if relation == "stereo":
+        return left or f"{view.folder.name}_right"
+    number = int(view.table["frame"]) + (1 if relation == "next" else -1)
+    return f"frame_{number:05d}" + ("_right" if left else "")

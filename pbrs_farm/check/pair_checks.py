@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import zlib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,33 @@ def check_pairs(house: Path, rays: Rays, tally: Tally) -> None:
             place = f"{house.name}: {row['view_a']}, {row['view_b']}"
             right = abs(row[key] - share) <= SHARE
             tally.expect("pairs", place, right, f"{key} is {row[key]:.3f}, here {share:.3f}")
+    for row in rows:
+        _check_row(house, row, views[row["view_a"]], views[row["view_b"]], tally)
+    # Each pair of views of a room has a row.
+    counts = Counter(view["room"] for view in views.values())
+    expected = sum(n * (n - 1) // 2 for n in counts.values())
+    what = f"has {len(rows)} rows, views of a room make {expected} pairs"
+    tally.expect("pairs", house.name, len(rows) == expected, what)
+
+
+def _check_row(
+    house: Path, row: dict[str, Any], a: dict[str, Any], b: dict[str, Any], tally: Tally
+) -> None:
+    """Both views are of the room that is told; what follows from their shares and cameras."""
+    place = f"{house.name}: {row['view_a']}, {row['view_b']}"
+    same = row["room"] == a["room"] == b["room"]
+    tally.expect("pairs", place, same, f"are not both of room {row['room']}")
+    one, other = _Camera(a), _Camera(b)
+    cosine = float(np.clip(one.rotation[:, 2] @ other.rotation[:, 2], -1, 1))
+    expected = {
+        "common": (row["a_in_b"] + row["b_in_a"]) / 2,
+        "baseline_m": float(np.linalg.norm(one.eye - other.eye)),
+        "angle_deg": float(np.degrees(np.arccos(cosine))),
+    }
+    for key, value in expected.items():
+        # Stored as 32-bit floats; an angle near 0 is the arc of a cosine near 1.
+        right = abs(row[key] - value) <= 1e-3 + 1e-5 * abs(value)
+        tally.expect("pairs", place, right, f"{key} is {row[key]:.4f}, here {value:.4f}")
 
 
 class _Camera:

@@ -82,17 +82,20 @@ def _fit(outline: NDArray[np.bool_], edges: Floats) -> float:
     return float(np.corrcoef(outline.reshape(-1).astype(float), edges.reshape(-1))[0, 1])
 
 
-def check_histogram(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
+def check_histogram(
+    view: StoredView, arrays: Mapping[str, NDArray[Any]], house: Mapping[str, Any], tally: Tally
+) -> None:
     """Count the view's histograms and quality numbers again, where it has them.
 
     Each number of the file is expected on its own, so that the certificate names which one differs.
+    house: house.json, which knows rooms by name and which textures were missing.
     """
     if not view.has("histogram.json"):
         return
     place = f"{view.place}/histogram.json"
     try:
         stored = stored_object(view.folder / "histogram.json")
-        differing = _differing(view, arrays, stored)
+        differing = _differing(view, arrays, stored) | _same_home(stored, house)
     except (BadFile, KeyError, TypeError, ValueError, IndexError) as error:
         tally.expect("histogram", place, False, f"cannot be read: {error}")
         return
@@ -105,6 +108,13 @@ def _differing(
 ) -> dict[str, bool]:
     """Number of histogram.json -> whether it is right."""
     settings, same = stored["settings"], {}
+    same["format"] = stored["format"] == "pbrs_farm histogram 1"
+    named = stored["house"], stored["view"], stored["room"]
+    same["place"] = named == tuple(view.table[k] for k in ("house", "view", "room"))
+    sizes = stored["depth"]["size"], {row["size"] for row in stored["colour"].values()}
+    same["sizes"] = sizes[0] == settings["depth_bins"] and sizes[1] <= {
+        settings["colour_bins"] ** 3
+    }
     if view.recipe is not None:
         same["settings"] = settings == view.recipe.histogram.model_dump(mode="json")
     modes = [m for m in MODES if m in arrays]
@@ -126,6 +136,18 @@ def _differing(
         same[f"brightness of {mode}"] = abs(written["brightness"] - median / 255) < 1e-4
         same[f"share blown of {mode}"] = abs(written["blown"] - blown) < 1e-4
     return same | _same_scene(view, arrays["depth"], stored["scene"], settings)
+
+
+def _same_home(stored: dict[str, Any], house: Mapping[str, Any]) -> dict[str, bool]:
+    """The room's name, and how many pictures the home lacked."""
+    if not house:
+        return {}
+    names = {room["id"]: room["name"] for room in house["rooms"]}
+    lacking = sum(n["kind"] in ("missing-texture", "unreadable-texture") for n in house["notes"])
+    return {
+        "room_type": stored["room_type"] == names.get(stored["room"], ""),
+        "missing_textures": stored["scene"]["missing_textures"] == lacking,
+    }
 
 
 def _same_colours(picture: NDArray[Any], stored: dict[str, Any], settings: dict[str, Any]) -> bool:

@@ -118,6 +118,14 @@ class Triangles:
         int, NDArray[np.float32]
     ]  # instance id -> (N, 3) vertices, also those of no triangle
 
+    # (F,) number of the triangle's primitive among those of its node, as surfaces with vertices are
+    surface: NDArray[np.int64]
+
+    def points_of_surfaces(self, instance: int, surfaces: list[int]) -> NDArray[np.float64]:
+        """(N, 3) corners of the triangles of some surfaces of an item."""
+        own = (self.instance == instance) & np.isin(self.surface, surfaces)
+        return np.asarray(self.vertices[self.faces[own].reshape(-1)], np.float64)
+
     @property
     def has_holes(self) -> NDArray[np.bool_]:
         """(F,) whether the material may be cut out."""
@@ -156,6 +164,11 @@ def triangles_from_glb(data: bytes) -> Triangles:
         raise BadGlb(f"cannot be read: {error}") from None
 
 
+def json_of_glb(data: bytes) -> dict[str, Any]:
+    """The JSON of a GLB that `triangles_from_glb` has read."""
+    return _chunks(data)[0]
+
+
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     magic, version, length = struct.unpack_from("<4sII", data)
     if magic != b"glTF" or version != 2 or length != len(data):
@@ -180,7 +193,7 @@ def _accessor(document: dict[str, Any], binary: bytes, index: int) -> NDArray[An
 def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     vertices = [np.zeros((0, 3), np.float32)]
     faces = [np.zeros((0, 3), np.int64)]
-    owners: list[tuple[int, int, int]] = []  # instance, material, number of faces
+    owners: list[tuple[int, int, int, int]] = []  # instance, material, surface, number of faces
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
     uvs = [np.zeros((0, 2), np.float32)]
@@ -192,7 +205,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         nyu40[instance] = int(node["extras"]["nyu40"])
         item[instance] = str(node["extras"].get("item", instance))
         mesh = document["meshes"][node["mesh"]] if "mesh" in node else {"primitives": []}
-        for primitive in mesh["primitives"]:
+        for number, primitive in enumerate(mesh["primitives"]):
             attributes = primitive["attributes"]
             points = _accessor(document, binary, attributes["POSITION"])
             loose.setdefault(instance, []).append(points)
@@ -204,21 +217,21 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
             corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
             faces.append(corners.astype(np.int64) + n_vertices)
-            owners.append((instance, int(primitive["material"]), len(corners)))
+            owners.append((instance, int(primitive["material"]), number, len(corners)))
             n_vertices += len(points)
             n_faces += len(corners)
             if max(n_vertices, n_faces) > _MAX_ELEMENTS:
                 raise ValueError(f"more than {_MAX_ELEMENTS} vertices or triangles")
 
     # Repeat each primitive's instance and material for its faces.
-    table = np.array(owners, np.int64).reshape(-1, 3)
-    material = np.repeat(table[:, 1], table[:, 2])
+    table = np.array(owners, np.int64).reshape(-1, 4)
+    material = np.repeat(table[:, 1], table[:, 3])
     kinds = [m.get("extras", {}).get("kind", "opaque") for m in document.get("materials", [])]
     clear = np.array([k in _SEE_THROUGH for k in kinds], bool)
     return Triangles(
         np.concatenate(vertices),
         np.concatenate(faces),
-        np.repeat(table[:, 0], table[:, 2]),
+        np.repeat(table[:, 0], table[:, 3]),
         material,
         nyu40,
         clear[material] if len(material) else np.zeros(0, bool),
@@ -226,6 +239,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         np.concatenate(uvs),
         _colours(document, binary),
         {instance: np.concatenate(points) for instance, points in loose.items()},
+        np.repeat(table[:, 2], table[:, 3]),
     )
 
 

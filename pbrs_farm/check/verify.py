@@ -6,6 +6,7 @@ house.glb, cameras from view.json, hits from Embree.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import zlib
 from collections.abc import Callable
@@ -17,8 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Certificate, Tally
+from pbrs_farm.check.choice_checks import check_choice
+from pbrs_farm.check.credit_checks import check_credits
 from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.fact_checks import check_facts
+from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
+from pbrs_farm.check.house_checks import check_house
 from pbrs_farm.check.light_checks import check_developed
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
@@ -27,8 +33,11 @@ from pbrs_farm.check.picture_checks import check_edges, check_histogram
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, PixelChecks, judge, of_another_colour
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.sensor_checks import check_derived
+from pbrs_farm.check.sky_checks import check_illuminance
+from pbrs_farm.check.solid_checks import check_models, check_solids
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
-from pbrs_farm.check.stored_mesh import BadGlb, Triangles, triangles_from_glb
+from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.stored_mesh import BadGlb, Triangles, json_of_glb, triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 from pbrs_farm.check.table_checks import HouseItems, check_rows
 from pbrs_farm.check.view_checks import check_consistency, check_pictures, check_planes, read_labels
@@ -37,6 +46,8 @@ from pbrs_farm.core.errors import BadInput
 
 SAMPLE = 2000  # pixels of each view that are recomputed by default
 MOST_COINCIDENT = 3  # of those, by chance: an edge where two things meet
+# What reading a document raises that does not have what it should.
+FAULTS = (KeyError, TypeError, ValueError, IndexError, AttributeError, np.linalg.LinAlgError)
 MAX_TIES = 0.0002  # share of pixels whose instance may be the other of two right answers
 
 
@@ -47,6 +58,7 @@ class Scenes:
     all: tuple[Triangles, Rays]
     opaque: tuple[Triangles, Rays]  # without glass and panes
     items: HouseItems
+    house: StoredHouse
 
 
 def verify(
@@ -73,13 +85,15 @@ def verify(
     checked = itertools.count(1)
     tell(0, n_views)
     check_root_manifest(folder, houses, tally)
+    check_credits(folder, [StoredHouse(house) for house in houses], tally)
     for house in houses:
         check_files(folder, house, tally)
         views += _check_house(house, n_pixels, tally, lambda: tell(next(checked), n_views))
     _judge_ties(tally)
+    fields = stored_fields(folder, houses)
     return tally.certificate(
         str(folder), len(houses), len(views), all_pixels=all_pixels,
-        looked_at=looked_at(views), not_looked_at=not_looked_at(views),
+        looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields),
     )  # fmt: skip
 
 
@@ -91,23 +105,25 @@ def _check_house(
     for file, fault in faults.items():
         place = f"{house.name}/{file.parent.name}/view.json"
         tally.expect("layers", place, False, fault)
+    stored = StoredHouse(house)
     try:
-        triangles = triangles_from_glb(stored_bytes(house / "house.glb"))
+        glb = stored_bytes(house / "house.glb")
+        triangles = triangles_from_glb(glb)
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.name, False, f"house.glb {error}")
         return []
     opaque = Rays(triangles, ~triangles.see_through)
-    scenes = Scenes((triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles))
+    scenes = Scenes(
+        (triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles), stored
+    )
+    _check_documents(stored, glb, scenes, tally)
     # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
     for view in views:
         try:
             arrays = _check_view(view, scenes, n_pixels, tally)
-        except (KeyError, TypeError, ValueError, IndexError, np.linalg.LinAlgError) as error:
-            what = (
-                f"{error} is missing" if isinstance(error, KeyError) else f"does not fit: {error}"
-            )
-            tally.expect("layers", f"{view.place}/view.json", False, what)
+        except FAULTS as error:
+            tally.expect("layers", f"{view.place}/view.json", False, _fault(error))
             arrays = None
         tell()
         if arrays is not None:
@@ -118,6 +134,28 @@ def _check_house(
     return views
 
 
+def _check_documents(house: StoredHouse, glb: bytes, scenes: Scenes, tally: Tally) -> None:
+    """Check the documents of a house against each other; what does not fit fails, and the rest goes on."""
+    triangles, rays = scenes.all
+    digest = hashlib.sha256(glb).hexdigest()
+    checks: tuple[tuple[str, Callable[[], None]], ...] = (
+        ("house.json", lambda: check_house(house, json_of_glb(glb), digest, tally)),
+        ("house.json", lambda: check_models(house, triangles, tally)),
+        ("house.json", lambda: check_solids(house, triangles, rays, tally)),
+        ("illuminance.json", lambda: check_illuminance(house, tally)),
+        ("cameras.json", lambda: check_choice(house, rays, triangles, tally)),
+    )
+    for file, check in checks:
+        try:
+            check()
+        except FAULTS as error:
+            tally.expect("layers", f"{house.id}/{file}", False, _fault(error))
+
+
+def _fault(error: Exception) -> str:
+    return f"{error} is missing" if isinstance(error, KeyError) else f"does not fit: {error}"
+
+
 def _check_view(
     view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally
 ) -> dict[str, NDArray[Any]] | None:
@@ -126,14 +164,15 @@ def _check_view(
     arrays = read_labels(view, tally)
     if arrays is None:
         return None
-    # From cheap to dear: whole pictures, layers against each other, rays.
-    check_pictures(view, arrays, tally)
+    # From cheap to dear: facts, whole pictures, layers against each other, rays.
+    check_facts(view, scenes.house, arrays, tally)
+    check_pictures(view, scenes.house, arrays, tally)
     check_consistency(view, arrays, tally)
     check_planes(view, arrays, tally)
     check_derived(view, arrays, tally)
     check_developed(view, arrays, tally)
     check_edges(view, arrays, tally)
-    check_histogram(view, arrays, tally)
+    check_histogram(view, arrays, scenes.house.house, tally)
     check_rows(view, arrays["instance"], scenes.items, n_pixels, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
     if MOTION_LAYERS & arrays.keys():

@@ -13,6 +13,8 @@ from scipy import ndimage
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.darkness_checks import check_darkness
+from pbrs_farm.check.lamp_checks import check_lamps
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
@@ -68,7 +70,9 @@ def _planes(view: StoredView, layer: Layer) -> NDArray[np.float32]:
     return planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
 
 
-def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+def check_pictures(
+    view: StoredView, house: StoredHouse, arrays: dict[str, NDArray[Any]], tally: Tally
+) -> None:
     """No OpenGL picture is one colour; radiance is finite and not negative.
 
     A light mode may be: without a window, outdoor light alone leaves a room black. That is noted.
@@ -84,10 +88,12 @@ def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tal
             if constant:
                 tally.note(f"{place} is one colour: {picture[0, 0].tolist()}")
     if view.has("radiance.exr"):
-        _check_radiance(view, arrays["valid"], tally)
+        _check_radiance(view, house, arrays["valid"], tally)
 
 
-def _check_radiance(view: StoredView, valid: NDArray[Any], tally: Tally) -> None:
+def _check_radiance(
+    view: StoredView, house: StoredHouse, valid: NDArray[Any], tally: Tally
+) -> None:
     """Every group of light is there, finite and not negative."""
     try:
         channels = view.exr("radiance.exr")
@@ -106,26 +112,8 @@ def _check_radiance(view: StoredView, valid: NDArray[Any], tally: Tally) -> None
         if bad or plane.shape != view.size:
             what = f"{bad} pixels negative or not finite"
             tally.fail("radiance", f"{view.place} {name}", what, max(bad, 1))
-    _check_lamps(view, channels, tally)
+    check_lamps(view, house, channels, tally)
     check_darkness(view, channels, valid, tally)
-
-
-def _check_lamps(view: StoredView, channels: dict[str, NDArray[Any]], tally: Tally) -> None:
-    """Where each lamp has a layer, indoor is their sum in the order of their numbers, to the bit."""
-    table = view.table.get("modes", {}).get("light", {}).get("lamps")
-    if table is None:
-        return
-    names = [row["layer"] for row in table if row["layer"]]
-    needed = {f"{name}.{c}" for name in ("indoor", *names) for c in "RGB"}
-    lacking = needed - channels.keys()
-    if not tally.expect("lamps", view.place, not lacking, f"lacks {lacking}"):
-        return
-    # Sum in float32, one lamp after the other, as the trace does.
-    for c in "RGB":
-        total = np.zeros(view.size, np.float32)
-        for name in names:
-            total += channels[f"{name}.{c}"]
-        _same(view, tally, "indoor = sum of lamps", channels[f"indoor.{c}"] == total)
 
 
 def check_consistency(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:

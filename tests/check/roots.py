@@ -11,7 +11,7 @@ from pbrs_farm.check import verify
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.layers import LAYER, OWN_LAYERS
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import Marker, StoredFile
@@ -27,6 +27,11 @@ def views_of(home: House) -> dict[str, Camera]:
     """The home's stored cameras, small."""
     intrinsics = Intrinsics.from_hfov(*SIZE)
     return {f"v{k}": Camera.look(intrinsics, c.eye, c.towards) for k, c in enumerate(home.cameras)}
+
+
+def all_layers() -> tuple[str, ...]:
+    """Every optional layer of the package itself."""
+    return tuple(x.name for x in OWN_LAYERS if x.optional and x.step == "truth")
 
 
 def encoded(name: str, array: np.ndarray) -> bytes:
@@ -86,10 +91,17 @@ def make_root(
 
 
 def sign(root: Path, house: Path) -> None:
-    """Make manifest and markers agree with the files as they are now."""
+    """Make manifest, markers and house.json agree with the files as they are now."""
     markers = []
+    description = house / "house.json"
+    if description.is_file() and (house / "house.glb").is_file():
+        held = json.loads(description.read_text())
+        digest = keys.sha256((house / "house.glb").read_bytes())
+        if held.get("glb_sha256") != digest:
+            description.write_text(json.dumps(held | {"glb_sha256": digest}))
     for marker in sorted((house / "done").glob("*.json")):
-        old = json.loads(marker.read_text())["files"]
+        stood = json.loads(marker.read_text())
+        old = stood["files"]
         names = [f if isinstance(f, str) else f["key"].split("/", 2)[2] for f in old]
         stored = []
         for name in names:
@@ -98,8 +110,9 @@ def sign(root: Path, house: Path) -> None:
             stored.append(StoredFile(key=key, n_bytes=len(data), sha256=keys.sha256(data)))
         step, _, view = marker.stem.partition(".")
         whole = Marker(
-            step=step, house_id=house.name, view_id=view or None, digest="0", files=tuple(stored)
-        )
+            step=step, house_id=house.name, view_id=view or None, digest=stood.get("digest", "0"),
+            files=tuple(stored), facts=stood.get("facts", {}),
+        )  # fmt: skip
         marker.write_text(whole.model_dump_json())
         markers.append(whole)
     lines = manifest_from_markers(markers, "")

@@ -1,0 +1,89 @@
+"""A house's folder as its stored files say: documents and what its markers tell. Effects: reads files.
+
+Knows nothing of the House that made them. A document that is missing or damaged is empty here: the
+checks of files say so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pbrs_farm.check.stored_files import BadFile, stored_object
+
+
+@dataclass(frozen=True)
+class StoredHouse:
+    """One houses/<house_id> folder."""
+
+    folder: Path
+
+    @property
+    def id(self) -> str:
+        """As the folder is called."""
+        return self.folder.name
+
+    @cached_property
+    def house(self) -> dict[str, Any]:
+        """house.json."""
+        return _document(self.folder / "house.json")
+
+    @cached_property
+    def cameras(self) -> dict[str, Any]:
+        """cameras.json."""
+        return _document(self.folder / "cameras.json")
+
+    @cached_property
+    def illuminance(self) -> dict[str, Any]:
+        """illuminance.json."""
+        return _document(self.folder / "illuminance.json")
+
+    @cached_property
+    def repair(self) -> dict[str, Any]:
+        """repair.json."""
+        return _document(self.folder / "repair.json")
+
+    @cached_property
+    def dress(self) -> dict[str, Any]:
+        """dress.json, of a house that was dressed."""
+        return _document(self.folder / "dress.json")
+
+    @cached_property
+    def recipe(self) -> dict[str, Any]:
+        """recipe.json of the root, as it stands: no field is added."""
+        return _document(self.folder.parents[1] / "recipe.json")
+
+    @cached_property
+    def items(self) -> dict[int, dict[str, Any]]:
+        """Instance id -> the item's row in house.json."""
+        return {int(row["instance"]): row for row in self.house.get("items", [])}
+
+    @cached_property
+    def rooms(self) -> dict[str, dict[str, Any]]:
+        """Id -> the room's row in house.json."""
+        return {str(row["id"]): row for row in self.house.get("rooms", [])}
+
+    @cached_property
+    def camera_rows(self) -> dict[str, dict[str, Any]]:
+        """View's id -> its row in cameras.json."""
+        return {str(row["id"]): row for row in self.cameras.get("views", [])}
+
+    @cached_property
+    def lux_rows(self) -> dict[str, dict[str, Any]]:
+        """Room's id -> its row in illuminance.json."""
+        return {str(row["room"]): row for row in self.illuminance.get("rooms", [])}
+
+    def told_by_marker(self, step: str, view: str = "") -> dict[str, Any]:
+        """The facts that the marker of a step holds; {} where it has none."""
+        name = f"{step}.{view}.json" if view else f"{step}.json"
+        facts = _document(self.folder / "done" / name).get("facts", {})
+        return facts if isinstance(facts, dict) else {}
+
+
+def _document(file: Path) -> dict[str, Any]:
+    try:
+        return stored_object(file)
+    except BadFile:
+        return {}

@@ -1,0 +1,516 @@
+"""Kinds of falsehood, each planted in a finished root: what is changed, and the check that must find it.
+
+Effects: a plant changes files of the root that it is given; `planted` mends all hashes afterwards.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from pbrs_farm.check import verify
+from pbrs_farm.formats.pairs_parquet import pairs_from_parquet, pairs_parquet
+from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
+from tests.check.roots import house_of, sign
+
+Plant = Callable[[Path], None]
+
+
+def view_of(root: Path) -> Path:
+    """Its first view."""
+    return min((house_of(root) / "views").iterdir())
+
+
+def table(change: Callable[[dict], object]) -> Plant:
+    def plant(view: Path) -> None:
+        held = json.loads((view / "view.json").read_text())
+        change(held)
+        (view / "view.json").write_text(json.dumps(held))
+
+    return plant
+
+
+def row(change: Callable[[dict], object]) -> Plant:
+    """Of the instance that covers most."""
+    return table(lambda t: change(max(t["instances"], key=lambda r: r["pixels"])))
+
+
+def picture(file: str, change: Callable[[np.ndarray], np.ndarray]) -> Plant:
+    def plant(view: Path) -> None:
+        array = array_from_png((view / file).read_bytes())
+        new = np.ascontiguousarray(change(array.astype(float)))
+        most = np.iinfo(array.dtype).max
+        (view / file).write_bytes(png_from_array(np.rint(new).clip(0, most).astype(array.dtype)))
+
+    return plant
+
+
+def patch(by: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(array: np.ndarray) -> np.ndarray:
+        out = array.copy()
+        out[50:70, 60:90] = np.where(out[50:70, 60:90] > by, out[50:70, 60:90] - by, by)
+        return out
+
+    return change
+
+
+def scaled(by: float) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda array: array * by
+
+
+def mirrored(array: np.ndarray) -> np.ndarray:
+    return array[:, ::-1]
+
+
+def exr(file: str, change: Callable[[np.ndarray], np.ndarray]) -> Plant:
+    def plant(view: Path) -> None:
+        planes = layers_from_exr((view / file).read_bytes())
+        changed = {n: np.ascontiguousarray(change(p), np.float32) for n, p in planes.items()}
+        (view / file).write_bytes(exr_from_layers(changed))
+
+    return plant
+
+
+def histogram(change: Callable[[dict], object]) -> Plant:
+    def plant(view: Path) -> None:
+        held = json.loads((view / "histogram.json").read_text())
+        change(held)
+        (view / "histogram.json").write_text(json.dumps(held))
+
+    return plant
+
+
+def move_count(counts: dict) -> None:
+    held = list(counts["counts"])
+    held[0], held[-1] = held[0] + 40, held[-1] - 40
+    counts["counts"] = held
+
+
+def turn_box(r: dict) -> None:
+    # Another frame, grown until it holds the old box.
+    c, s = np.cos(0.3), np.sin(0.3)
+    r["box3d"]["axes"] = (
+        np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ r["box3d"]["axes"]
+    ).tolist()
+
+
+def move_box(r: dict) -> None:
+    r["box3d"]["centre"][0] += 0.05
+
+
+def other_share(r: dict) -> None:
+    f = r["visible_fraction"]
+    r["visible_fraction"] = f * 0.7
+
+
+def pose(change: Callable[[np.ndarray], None]) -> Plant:
+    def both(t: dict) -> None:
+        for name in ("world_from_camera_opengl", "world_from_camera_opencv"):
+            matrix = np.array(t[name])
+            change(matrix)
+            t[name] = matrix.tolist()
+
+    return table(both)
+
+
+def step_aside(matrix: np.ndarray) -> None:
+    matrix[0, 3] += 0.02
+
+
+def brighter_with_its_facts(view: Path) -> None:
+    picture("mlt_ol.png", scaled(1.1))(view)
+    table(lambda t: t["modes"]["develop"]["mlt_ol"].update(exposure=9.0))(view)
+
+
+def swapped_ids(view: Path) -> None:
+    file = view / "instance.png"
+    ids = array_from_png(file.read_bytes()).copy()
+    a, b = np.argsort(np.bincount(ids.reshape(-1)))[::-1][:2]
+    ids[:60][ids[:60] == a] = b
+    file.write_bytes(png_from_array(ids))
+
+
+def document(name: str, change: Callable[[dict], object]) -> Plant:
+    """Changes a JSON file of the view's house; of the root, for its recipe."""
+
+    def plant(view: Path) -> None:
+        file = view.parents[3 if name == "recipe.json" else 1] / name
+        held = json.loads(file.read_text())
+        change(held)
+        file.write_text(json.dumps(held))
+
+    return plant
+
+
+def glb(change: Callable[[dict], object]) -> Plant:
+    """Changes the JSON of house.glb."""
+
+    def plant(view: Path) -> None:
+        file = view.parents[1] / "house.glb"
+        data = file.read_bytes()
+        (n,) = struct.unpack_from("<I", data, 12)
+        held = json.loads(data[20 : 20 + n])
+        change(held)
+        text = json.dumps(held).encode()
+        text += b" " * (-len(text) % 4)
+        rest = data[20 + n :]
+        head = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON")
+        file.write_bytes(head + text + rest)
+
+    return plant
+
+
+def text_file(name: str, change: Callable[[str], str]) -> Plant:
+    def plant(view: Path) -> None:
+        file = view.parents[1] / name
+        file.write_text(change(file.read_text()))
+
+    return plant
+
+
+def both(*plants: Plant) -> Plant:
+    def plant(view: Path) -> None:
+        for one in plants:
+            one(view)
+
+    return plant
+
+
+def placed(change: Callable[[dict], object]) -> Plant:
+    """Of the first instance that is a placed model."""
+    return table(lambda t: change(next(r for r in t["instances"] if "model" in r)))
+
+
+def moved(name: str, by: float) -> Callable[[dict], object]:
+    return lambda held: held[name][0].__setitem__(3, held[name][0][3] + by)
+
+
+def swapped(a: str, b: str) -> Plant:
+    """Two files of a view exchanged."""
+
+    def plant(view: Path) -> None:
+        first, second = (view / a).read_bytes(), (view / b).read_bytes()
+        (view / a).write_bytes(second)
+        (view / b).write_bytes(first)
+
+    return plant
+
+
+def of_neighbour(*files: str) -> Plant:
+    """The files of another view of the home."""
+
+    def plant(view: Path) -> None:
+        other = next(v for v in sorted(view.parent.iterdir()) if v != view)
+        for file in files:
+            shutil.copy(other / file, view / file)
+
+    return plant
+
+
+def scene_without_outside(held: dict) -> None:
+    scene = held["scenes"][0]
+    scene["nodes"] = [
+        n for n in scene["nodes"] if not held["nodes"][n]["extras"]["item"].startswith("outside")
+    ][: len(scene["nodes"]) - 1]
+
+
+def without_credit(held: dict) -> None:
+    held["asset"].pop("copyright", None)
+
+
+def pairs(change: Callable[[list[dict]], object]) -> Plant:
+    """Changes the rows of pairs.parquet."""
+
+    def plant(view: Path) -> None:
+        file = view.parents[1] / "pairs.parquet"
+        rows = pairs_from_parquet(file.read_bytes(), str(file))
+        change(rows)
+        file.write_bytes(pairs_parquet(rows))
+
+    return plant
+
+
+def lamps(change: Callable[[dict, dict], object]) -> Plant:
+    """Of the two lamps that bring most."""
+
+    def both_rows(t: dict) -> None:
+        rows = sorted(t["modes"]["light"]["lamps"], key=lambda r: -r["share"])
+        change(rows[0], rows[1])
+
+    return table(both_rows)
+
+
+def swap_keys(a: dict, b: dict, key: str) -> None:
+    a[key], b[key] = b[key], a[key]
+
+
+def pose_and_what_follows(r: dict) -> None:
+    moved_by = np.eye(4)
+    moved_by[0, 3] = 0.5
+    world = np.array(r["world_from_model"])
+    camera = np.array(r["camera_from_model_opencv"]) @ np.linalg.inv(world)
+    r["world_from_model"] = (moved_by @ world).tolist()
+    r["camera_from_model_opencv"] = (camera @ moved_by @ world).tolist()
+
+
+def eyes_exchanged(view: Path) -> None:
+    """All that is stored of the left eye under the name of the right one, and the other way round."""
+    right = view.parent / f"{view.name}_right"
+    spare = view.parent / "spare"
+    view.rename(spare)
+    right.rename(view)
+    spare.rename(right)
+
+    def exchange(held: dict) -> None:
+        rows = {r["id"]: r for r in held["views"]}
+        swap_keys(rows[view.name], rows[right.name], "world_from_camera_opengl")
+
+    document("cameras.json", exchange)(view)
+
+
+def pictures_of_eyes(view: Path) -> None:
+    """Light, and what is developed of it, of one eye in the other's place."""
+    right = view.parent / f"{view.name}_right"
+    for file in ("radiance.exr", "mlt_ol.png", "mlt_il_ol.png"):
+        first, second = (view / file).read_bytes(), (right / file).read_bytes()
+        (view / file).write_bytes(second)
+        (right / file).write_bytes(first)
+    names = ("mlt_ol", "mlt_il_ol")
+    held = [json.loads((v / "view.json").read_text()) for v in (view, right)]
+    for name in names:
+        swap_keys(held[0]["modes"]["develop"], held[1]["modes"]["develop"], name)
+    for folder, one in zip((view, right), held, strict=True):
+        (folder / "view.json").write_text(json.dumps(one))
+
+
+_FINISHED: dict[str, tuple[Plant, str]] = {
+    "box3d moved by 5 cm": (row(move_box), "box3d"),
+    "box3d grown": (row(lambda r: r["box3d"]["half"].__setitem__(1, r["box3d"]["half"][1] + 0.03)), "box3d"),
+    "box3d turned": (row(turn_box), "box3d"),
+    "visible_fraction changed": (row(other_share), "visible_fraction"),
+    "truncated changed": (row(lambda r: r.update(truncated=not r["truncated"])), "truncated"),
+    "pixels changed": (row(lambda r: r.update(pixels=r["pixels"] + 1)), "table"),
+    "fraction changed": (row(lambda r: r.update(fraction=r["fraction"] * 1.01)), "table"),
+    "box2d changed": (row(lambda r: r["box2d"].__setitem__(0, r["box2d"][0] + 1)), "table"),
+    "class changed": (row(lambda r: r.update(nyu40=35, **{"class": "lamp"})), "semantic = table"),
+    "an instance left out": (table(lambda t: t["instances"].pop()), "table"),
+    "camera moved by 2 cm": (pose(step_aside), "ray: depth"),
+    "focal length changed": (table(lambda t: t["K"][0].__setitem__(0, t["K"][0][0] * 1.02)), "ray: depth"),
+    "depth scaled": (picture("depth.png", scaled(1.01)), "ray: depth"),
+    "depth patched": (picture("depth.png", patch(30)), "ray: depth"),
+    "normals mirrored": (picture("normal.png", lambda a: np.dstack([65535 - a[..., 0], a[..., 1:]])), "ray: normal"),
+    "instances swapped": (swapped_ids, "ray: instance"),
+    "semantic patched": (picture("semantic.png", patch(1)), "ray: semantic"),
+    "boundary moved": (picture("boundary.png", lambda a: np.roll(a, 1, 1)), "boundary"),
+    "valid patched": (picture("valid.png", lambda a: a * (np.arange(a.shape[1]) > 10)), "ray: valid"),
+    "depth_z scaled": (exr("depth_z.exr", scaled(1.002)), "ray: depth_z"),
+    "position moved": (exr("position.exr", lambda a: a + 0.01), "ray: position"),
+    "normal_world turned": (picture("normal_world.png", lambda a: a[..., [2, 1, 0]]), "ray: normal_world"),
+    "material renumbered": (picture("material.png", lambda a: a + 1), "ray: material"),
+    "nyu13 patched": (picture("nyu13.png", patch(1)), "nyu13"),
+    "glass patched": (picture("glass.png", patch(255)), "ray: glass"),
+    "behind glass moved": (picture("behind_glass/depth.png", scaled(1.02)), "ray: behind glass depth"),
+    "source's class patched": (picture("class_source.png", patch(1)), "class_source"),
+    "semantic boundary moved": (picture("boundary_semantic.png", lambda a: np.roll(a, 1, 0)), "boundary_semantic"),
+    "albedo patched": (picture("albedo.png", patch(40)), "ray: albedo"),
+    "albedo scaled": (picture("albedo.png", scaled(0.95)), "ray: albedo"),
+    "hha of another height": (picture("hha.png", lambda a: a + np.array([0, 4, 0])), "hha"),
+    "Kinect's depth scaled": (picture("depth_sensor.png", scaled(1.03)), "depth_sensor: values"),
+    "Kinect's depth without its noise": (
+        lambda view: shutil.copy(view / "depth.png", view / "depth_sensor.png"), "depth_sensor: values",
+    ),
+    "time of flight scaled": (picture("depth_sensor_tof.png", scaled(1.05)), "depth_sensor_tof: values"),
+    "stereo's depth scaled": (picture("depth_sensor_stereo.png", scaled(1.02)), "depth_sensor_stereo: values"),
+    "light mirrored": (picture("mlt_il_ol.png", mirrored), "light developed"),
+    "light brightened": (picture("mlt_il_ol.png", scaled(1.05)), "light developed"),
+    "light patched": (picture("mlt_ol.png", patch(20)), "light developed"),
+    "light brightened, and its facts": (brighter_with_its_facts, "light developed"),
+    "radiance of one colour scaled": (
+        exr("radiance.exr", lambda a: a * (1 + np.arange(a.shape[1]) / 320)), "light developed",
+    ),
+    "OpenGL mirrored": (picture("opengl_dl.png", mirrored), "opengl edges"),
+    "OpenGL of lamps upside down": (picture("opengl_il.png", lambda a: a[::-1]), "opengl edges"),
+    "OpenGL moved by 3 px": (picture("opengl_dl.png", lambda a: np.roll(a, 3, 1)), "opengl edges"),
+    "histogram of colours changed": (histogram(lambda h: move_count(h["colour"]["mlt_il_ol"])), "histogram"),
+    "histogram of depth changed": (histogram(lambda h: move_count(h["depth"])), "histogram"),
+    "brightness changed": (histogram(lambda h: h["picture"]["mlt_ol"].update(brightness=0.5)), "histogram"),
+    "number of objects changed": (histogram(lambda h: h["scene"].update(n_objects=99)), "histogram"),
+}  # fmt: skip
+
+
+_CAMERAS: dict[str, tuple[Plant, str]] = {
+    "another tone told": (
+        table(lambda t: t["modes"]["develop"]["variants"][0]["tone"].update(contrast=1.0)), "light developed",
+    ),
+    "another camera told": (
+        table(lambda t: t["modes"]["develop"]["variants"][0].update(camera="none")), "light developed",
+    ),
+    "a camera told where none was drawn": (
+        table(lambda t: t["modes"]["develop"].update(tone={"contrast": 1.2})), "light developed",
+    ),
+    "a variant mirrored": (picture("mlt_il_ol.2.png", mirrored), "light developed"),
+    "a variant too many": (
+        lambda view: shutil.copy(view / "mlt_il_ol.1.png", view / "mlt_il_ol.4.png"), "light developed",
+    ),
+}  # fmt: skip
+
+
+_FINISHED |= {
+    # Facts of view.json that other files repeat, or that follow from others.
+    "another house told": (table(lambda t: t.update(house="elsewhere")), "facts"),
+    "another view told": (table(lambda t: t.update(view="0_1_1")), "facts"),
+    "another room told": (table(lambda t: t.update(room="0_1")), "camera file"),
+    "another sector told": (table(lambda t: t.update(sector=t["sector"] + 1)), "camera file"),
+    "another origin told": (table(lambda t: t.update(origin="stored")), "camera file"),
+    "another score told": (table(lambda t: t.update(score=t["score"] + 0.1)), "camera file"),
+    "another recipe told": (table(lambda t: t.update(recipe=t["recipe"][::-1])), "recipe"),
+    "a row's name": (row(lambda r: r.update(name="sofa")), "names"),
+    "a row's kind": (row(lambda r: r.update(kind="object")), "names"),
+    "a row's item": (row(lambda r: r.update(item="piece_99")), "names"),
+    "a row's room": (row(lambda r: r.update(room="0_9")), "names"),
+    "a row's class13": (row(lambda r: r.update(class13="bed")), "names"),
+    "a row's nyu13": (row(lambda r: r.update(nyu13=1)), "names"),
+    "a row's source class": (row(lambda r: r.update(source_class="builtin#tv")), "names"),
+    "a row given a pose": (row(lambda r: r.update(model="m", world_from_model=np.eye(4).tolist(), camera_from_model_opencv=np.eye(4).tolist())), "model poses"),
+    "two materials exchanged": (table(lambda t: t["materials"].update({"1": t["materials"]["2"], "2": t["materials"]["1"]})), "tables"),
+    "a material's kind": (table(lambda t: t["materials"]["1"].update(kind="mirror")), "tables"),
+    "a source class renamed": (table(lambda t: t["source_classes"].update({"1": "zebra"})), "tables"),
+    "a corner of the room moved": (table(lambda t: t["layout"][0]["world"].__setitem__(0, 0.2)), "layout"),
+    "a corner's pixel moved": (table(lambda t: next(r for r in t["layout"] if r["pixel"])["pixel"].__setitem__(0, 3.0)), "layout"),
+    "a hidden corner told to be seen": (table(lambda t: next(r for r in t["layout"] if not r["visible"]).update(visible=True)), "layout"),
+    "a layout without its ceiling": (table(lambda t: t.update(layout=t["layout"][: len(t["layout"]) // 2])), "layout"),
+    "warnings hushed up": (table(lambda t: t.update(warnings=["all is well"])), "light facts"),
+    # Facts of light.
+    "seed of light": (table(lambda t: t["modes"]["light"].update(seed=1)), "light facts"),
+    "floor_lux": (table(lambda t: t["modes"]["light"]["floor_lux"].update(indoor=300.0)), "light facts"),
+    "the sun of another hour": (table(lambda t: t["modes"]["light"]["sky"].update(sun_direction=[0.0, 0.6, 0.8])), "light facts"),
+    "the sun of another hour, everywhere": (
+        both(
+            table(lambda t: t["modes"]["light"]["sky"].update(sun_direction=[0.0, 0.6, 0.8], sun_elevation_deg=36.87)),
+            document("illuminance.json", lambda h: h["sky"].update(sun_direction=[0.0, 0.6, 0.8], sun_elevation_deg=36.87)),
+        ), "sky",
+    ),
+    "sky's lux": (table(lambda t: t["modes"]["light"]["sky"].update(sky_lx=5000.0)), "light facts"),
+    "the sun's lux, everywhere": (
+        both(
+            table(lambda t: t["modes"]["light"]["sky"].update(sun_lx=90000.0)),
+            document("illuminance.json", lambda h: h["sky"].update(sun_lx=90000.0)),
+        ), "sky",
+    ),
+    "samples a pixel": (table(lambda t: t["modes"]["light"].update(spp=512)), "light facts"),
+    "integrator": (table(lambda t: t["modes"]["light"].update(integrator="pssmlt-camera")), "light facts"),
+    "told to be denoised": (table(lambda t: t["modes"]["develop"].update(denoised=True)), "light facts"),
+    "weights of lamps": (table(lambda t: t["modes"]["light"]["lamp_weights"].update(piece_5=0.9)), "light facts"),
+    "noise": (table(lambda t: t["modes"]["light"]["noise"].update(sum=0.01)), "histogram"),
+    # Files of the house.
+    "lux of a room": (document("illuminance.json", lambda h: h["rooms"][0].update(indoor_lx=500.0)), "light facts"),
+    "a room's warning hidden": (document("illuminance.json", lambda h: h["rooms"][0].update(warnings=["dark"])), "illuminance"),
+    "a room lit by another light": (document("illuminance.json", lambda h: h["rooms"][0].update(lit_by=["sky"])), "illuminance"),
+    "camera of cameras.json moved": (document("cameras.json", lambda h: h["views"][5]["world_from_camera_opengl"][0].__setitem__(3, 1.0)), "camera file"),
+    "camera of a view that is not rendered moved": (document("cameras.json", lambda h: h["views"][0]["world_from_camera_opengl"][0].__setitem__(3, 1.0)), "choice"),
+    "focal length of a view that is not rendered": (document("cameras.json", lambda h: h["views"][0]["intrinsics"].update(fx=200.0)), "choice"),
+    "objects of a view that is not rendered": (document("cameras.json", lambda h: h["views"][0]["objects"].update({"21": 9})), "choice"),
+    "a view left out of cameras.json": (document("cameras.json", lambda h: h["views"].pop(0)), "choice"),
+    "candidates of a sector": (document("cameras.json", lambda h: h["report"]["rooms"][0]["sectors"][0].update(n_candidates=999)), "choice"),
+    "the score that won": (document("cameras.json", lambda h: h["report"]["rooms"][0]["sectors"][0].update(winner_score=9.0)), "choice"),
+    "an item renamed": (document("house.json", lambda h: h["items"][20].update(name="zebra")), "house items"),
+    "an item of another class": (document("house.json", lambda h: h["items"][20].update({"nyu40": 5, "class": "chair"})), "house items"),
+    "an item's box moved": (document("house.json", lambda h: next(i for i in h["items"] if i["box"])["box"]["centre"].__setitem__(0, 0.0)), "house items"),
+    "two items exchanged": (document("house.json", lambda h: h["items"].insert(0, h["items"].pop(1))), "house items"),
+    "a room's polygon stretched": (document("house.json", lambda h: h["rooms"][0]["polygon"][1].__setitem__(0, 5.5)), "rooms"),
+    "a room renamed": (document("house.json", lambda h: h["rooms"][0].update(name="Kitchen")), "rooms"),
+    "a floor lowered": (document("house.json", lambda h: h["rooms"][0].update(floor_y=-0.3)), "rooms"),
+    "a material's colour": (document("house.json", lambda h: h["materials"][5].update(diffuse=[0.1, 0.2, 0.9])), "materials"),
+    "a material's roughness": (document("house.json", lambda h: h["materials"][5].update(roughness=0.11)), "materials"),
+    "a material's texture": (document("house.json", lambda h: h["materials"][5].update(texture_id=h["textures"][1]["key"])), "materials"),
+    "a material renamed": (document("house.json", lambda h: h["materials"][5].update(name="gold")), "materials"),
+    "an opening turned": (document("house.json", lambda h: h["openings"][0].update(normal=[0.0, 0.0, 1.0])), "openings"),
+    "a window told to be a door": (document("house.json", lambda h: next(o for o in h["openings"] if o["is_window"]).update(is_window=False)), "openings"),
+    "a light moved": (document("house.json", lambda h: next(i for i in h["items"] if i["lights"])["lights"][0]["position"].__setitem__(1, 0.2)), "lights"),
+    "a light's escape": (document("house.json", lambda h: next(i for i in h["items"] if i["id"] == "piece_5")["lights"][0].update(escape=0.9)), "lights"),
+    "a licence changed": (document("house.json", lambda h: h["source"].update(licence="CC0")), "credits"),
+    "a credit emptied": (glb(without_credit), "credits"),
+    "the street's nodes out of the scene": (glb(scene_without_outside), "house items"),
+    "a node moved": (glb(lambda h: h["nodes"][10].update(translation=[0.5, 0.0, 0.0])), "house items"),
+    "a node of another item": (glb(lambda h: h["nodes"][10]["extras"].update(item="wall_0")), "house items"),
+    "a surface of another material": (glb(lambda h: h["meshes"][10]["primitives"][0].update(material=3)), "house items"),
+    "a material of house.glb painted": (glb(lambda h: h["materials"][4]["pbrMetallicRoughness"].update(baseColorFactor=[0.9, 0.1, 0.1, 1.0])), "materials"),
+    "area of a room in repair.json": (document("repair.json", lambda h: h["rooms"][0].update(floor_area_m2=12.0)), "rooms"),
+    "a room told to be open": (document("repair.json", lambda h: h["rooms"][0].update(enclosure="open")), "rooms"),
+    "a field of the recipe": (document("recipe.json", lambda h: h["repair"].update(wall_thickness_m=0.2)), "recipe"),
+    "the recipe's tone": (document("recipe.json", lambda h: h["tone"].update(key=0.25)), "light developed"),
+    "seed of the recipe": (document("recipe.json", lambda h: h.update(seed=3)), "recipe"),
+    "spp of the recipe": (document("recipe.json", lambda h: h["light"].update(spp=64)), "light facts"),
+    "a histogram of another room": (histogram(lambda h: h.update(room_type="Kitchen")), "histogram"),
+    "a pair's common share": (pairs(lambda rows: rows[3].update(common=0.9)), "pairs"),
+    "a pair's base line": (pairs(lambda rows: rows[3].update(baseline_m=4.0)), "pairs"),
+    "a pair's angle": (pairs(lambda rows: rows[3].update(angle_deg=99.0)), "pairs"),
+    "shares of a pair": (pairs(lambda rows: [r.update(a_in_b=0.9, common=(0.9 + r["b_in_a"]) / 2) for r in rows]), "pairs"),
+    "a pair left out": (pairs(lambda rows: rows.pop()), "pairs"),
+    "missing textures": (histogram(lambda h: h["scene"].update(missing_textures=3)), "histogram"),
+    "a histogram of another view": (histogram(lambda h: h.update(view="0_1_1")), "histogram"),
+}  # fmt: skip
+
+_FILM: dict[str, tuple[Plant, str]] = {
+    "time of a frame": (table(lambda t: t.update(time_s=t["time_s"] + 0.02)), "camera file"),
+    "times of all frames": (document("cameras.json", lambda h: [v.update(time_s=2 * v["time_s"]) for v in h["views"]]), "sequence"),
+    "number of a frame": (table(lambda t: t.update(frame=t["frame"] + 1)), "camera file"),
+    "another next frame told": (table(lambda t: t["partners"]["next"].update(view="frame_00009")), "partners"),
+    "time of the next frame": (table(lambda t: t["partners"]["next"].update(time_s=0.5)), "partners"),
+    "pose of the next frame": (table(lambda t: t["partners"]["next"]["world_from_camera_opencv"][0].__setitem__(3, 0.0)), "partners"),
+    "rolling shutter's time": (document("recipe.json", lambda h: h["blur"].update(rolling_s=0.001)), "recipe"),
+    "flow scaled": (exr("flow_forward.exr", scaled(1.05)), "motion: flow_forward"),
+    "flow turned": (exr("flow_forward.exr", scaled(-1)), "motion: flow_forward"),
+    "occlusion cleared": (picture("occlusion_forward.png", scaled(0)), "motion: occlusion_forward"),
+    "KITTI's flow moved": (picture("flow_forward_kitti.png", lambda a: a + np.array([64, 0, 0])), "motion: flow_forward_kitti"),
+    "labels of the next frame": (of_neighbour("depth.png", "normal.png", "instance.png", "semantic.png", "boundary.png", "valid.png"), "ray: depth"),
+}  # fmt: skip
+
+_PAIR: dict[str, tuple[Plant, str]] = {
+    "disparity scaled": (picture("disparity.png", scaled(1.05)), "motion: disparity"),
+    "the other eye told": (table(lambda t: t["partners"]["stereo"].update(view="0_1_0")), "partners"),
+    "K of the other eye": (table(lambda t: t["partners"]["stereo"]["K"][0].__setitem__(0, 99.0)), "partners"),
+    "the base line": (document("recipe.json", lambda h: h["cameras"].update(stereo_m=0.12)), "sequence"),
+    "the eyes of a pair exchanged": (eyes_exchanged, "sequence"),
+}  # fmt: skip
+
+_LAMPS: dict[str, tuple[Plant, str]] = {
+    "shares of two lamps exchanged": (lamps(lambda a, b: swap_keys(a, b, "share")), "lamps"),
+    "layers of two lamps exchanged": (lamps(lambda a, b: swap_keys(a, b, "layer")), "lamps"),
+    "a lamp's flux": (lamps(lambda a, b: a.update(lm=100.0)), "lamps"),
+    "a lamp's name": (lamps(lambda a, b: a.update(name="sun")), "lamps"),
+    "a lamp's item": (lamps(lambda a, b: swap_keys(a, b, "item")), "lamps"),
+    "a lamp's number": (lamps(lambda a, b: swap_keys(a, b, "number")), "lamps"),
+    "a lamp's instance": (lamps(lambda a, b: swap_keys(a, b, "instance")), "lamps"),
+    "a lamp's room": (lamps(lambda a, b: a.update(room="0_9")), "lamps"),
+    "a lamp left out": (table(lambda t: t["modes"]["light"]["lamps"].pop()), "lamps"),
+}  # fmt: skip
+
+_EDITED: dict[str, tuple[Plant, str]] = {
+    "camera_from_model_opencv moved": (placed(moved("camera_from_model_opencv", 1.0)), "model poses"),
+    "world_from_model moved": (placed(moved("world_from_model", 1.0)), "model poses"),
+    "both poses of a model moved": (placed(pose_and_what_follows), "model poses"),
+    "both poses and house.json's moved": (
+        both(placed(pose_and_what_follows), document("house.json", lambda h: moved("world_from_model", 0.5)(next(i for i in h["items"] if i["pose"])["pose"]))), "model poses",
+    ),
+    "another model told": (placed(lambda r: r.update(model="teapot")), "model poses"),
+    "a model's pose left out": (placed(lambda r: [r.pop(k) for k in ("model", "world_from_model", "camera_from_model_opencv")]), "model poses"),
+    "nocs mirrored": (picture("nocs.png", lambda a: np.where(a.any(-1, keepdims=True), 65535 - a, 0)), "ray: nocs"),
+}  # fmt: skip
+
+FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
+    "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED,
+}  # fmt: skip
+
+
+def planted(root: Path, sort: str, kind: str) -> set[str]:
+    """The checks that fail once a falsehood is planted in a root of that sort, with its hashes mended."""
+    plant, _check = FALSEHOODS[sort][kind]
+    plant(view_of(root))
+    sign(root, house_of(root))
+    return {name for name, count in verify(root).counts.items() if count.failed}
