@@ -234,6 +234,15 @@ def k_of_whole_centres(k: list[list[float]]) -> list[list[float]]:
     return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
 
 
+def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
+    """(H, W) uint16 mm, 0 where there is nothing and where depth.png says 65.535 m or more.
+
+    For forms whose readers take every value above 0 for a measured one.
+    """
+    depth = view.array("depth")
+    return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))
+
+
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
     """A view's camera as an export repeats it: K, its lens where it is no pin-hole, its pose."""
     names = ("K", "lens", "depth", "world_from_camera_opencv")

@@ -29,13 +29,33 @@ def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 def write_pictures_and_labels(
     views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
 ) -> int:
+    """images/ and labels/ with the lines of each picture; the number of files."""
+
+    def label(view: ChosenView) -> tuple[str, bytes]:
+        return ".txt", "".join(lines_of(view)).encode()
+
+    return write_pictures_beside(views, out, "labels", label)
+
+
+def write_pictures_beside(
+    views: list[ChosenView],
+    out: Path,
+    folder: str,
+    label_of: Callable[[ChosenView], tuple[str, bytes]],
+) -> int:
+    """images/<house>__<view>.png and <folder>/<house>__<view><suffix>; the number of files.
+
+    label_of: the suffix and the bytes of a view's label. Views without a picture are left out, and
+    named in left_out.txt.
+    """
     shown = [view for view in views if view.picture is not None]
-    for folder in ("images", "labels"):
-        (out / folder).mkdir()
+    for name in ("images", folder):
+        (out / name).mkdir()
     for view in shown:
         name = f"{view.house.id}__{view.id}"
+        suffix, data = label_of(view)
         (out / "images" / f"{name}.png").write_bytes(view.data(view.picture or ""))
-        (out / "labels" / f"{name}.txt").write_text("".join(lines_of(view)))
+        (out / folder / f"{name}{suffix}").write_bytes(data)
     without = [view for view in views if view.picture is None]
     return 2 * len(shown) + name_left_out(out, without, "has no picture")
 
@@ -64,7 +84,20 @@ def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
 
 
 def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
-    """data.yaml of an export with these splits, or none; the number of files, 1.
+    """data.yaml of an export with these splits, or none, and the names of its classes; the number of files, 1."""
+    return write_yaml(out, splits, names_lines(choice))
+
+
+def names_lines(choice: Choice) -> list[str]:
+    """The classes by number, as data.yaml has them."""
+    names = choice.class_names.values()
+    # A user's name may be anything: JSON's text is YAML's, too.
+    said = names if choice.classes is None else map(json.dumps, names)
+    return ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
+
+
+def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> int:
+    """data.yaml: the folders of these splits, or of none, and lines of other fields; the number of files, 1.
 
     Folders count from data.yaml's own. Ultralytics wants train and val: one that has no home is
     the other's, and a comment says so.
@@ -77,10 +110,7 @@ def write_data_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
             folders[name] = folders[other]
             remarks.append(f"# no home is in {name}: it is {other}")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
-    names = choice.class_names.values()
-    # A user's name may be anything: JSON's text is YAML's, too.
-    said = names if choice.classes is None else map(json.dumps, names)
-    lines += ["names:", *(f"  {k}: {name}" for k, name in enumerate(said))]
+    lines += fields
     (out / "data.yaml").write_text("\n".join(lines) + "\n")
     return 1
 

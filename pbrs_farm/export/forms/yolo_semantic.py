@@ -1,0 +1,54 @@
+"""YOLO's semantic segmentation: pictures, a mask of class numbers for each, data.yaml.
+
+Effects: reads views, writes files.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.forms.yolo import names_lines, write_pictures_beside, write_yaml
+from pbrs_farm.images import png_from_array
+
+_IGNORED: Final = 255  # of a mask: no loss, no metric
+
+
+def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> int:
+    """images/<house>__<view>.png and masks/<house>__<view>.png; the number of files.
+
+    A mask is uint8: the class's number in data.yaml (NYU40 id - 1; of a user's table its place among
+    the ids), 255 where nothing is or it has no class. BadInput for more than 255 classes.
+    """
+    if len(choice.class_names) > _IGNORED:
+        what = f"{len(choice.class_names)} classes: a mask holds {_IGNORED}"
+        raise BadInput("--to yolo-semantic", "", what, hint="fewer classes in --classes")
+    number = np.full(max(choice.class_names) + 1, _IGNORED, np.uint8)
+    number[list(choice.class_names)] = np.arange(len(choice.class_names))
+
+    def mask(view: ChosenView) -> tuple[str, bytes]:
+        return ".png", png_from_array(number[view.array("semantic")])
+
+    return write_pictures_beside(views, out, "masks", mask)
+
+
+def write_semantic_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> int:
+    """data.yaml of an export with these splits, or none; the number of files, 1."""
+    return write_yaml(out, splits, ["masks_dir: masks", *names_lines(choice)])
+
+
+FORM = ViewForm(
+    "yolo-semantic",
+    write_yolo_semantic,
+    "`images/<house>__<view>.png`, `masks/<house>__<view>.png` (uint8 class number: NYU40 id - 1; 255 ="
+    " nothing, or without a class), `data.yaml` as `yolo`'s with `masks_dir`, for"
+    " `yolo semantic train data=data.yaml`",
+    has_classes=True,
+    finish=write_semantic_yaml,
+    convention=Convention(None, has_k=False, axes=""),
+)
