@@ -51,6 +51,7 @@ OWN_TARGET: Final = {
     "motion": "motion.motion",
     "python": "python_api",
     "truth": "truth",
+    "sets": "sets",
     "inputs": "inputs",
     "docs": "docs_figures",
     "release": "release",

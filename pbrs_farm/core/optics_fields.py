@@ -70,6 +70,10 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "k1": 0.0034823894, "k2": 0.00071503485, "k3": -0.0020532361, "k4": 0.00020293674,
         "max_angle_deg": 97.5,
     },
+    # Hypersim's: 60 degrees across, square pixels (Roberts et al. 2021).
+    "hypersim": {
+        "model": "pinhole", "width_px": 1024, "height_px": 768, "fx": 886.8100134752651,
+    },
     # Half of all directions in a circle that touches the picture's edges, equidistant.
     "fisheye180": {
         "model": "fisheye", "width_px": 512, "height_px": 512, "hfov_deg": 180.0,
@@ -82,7 +86,7 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 class LensFields(FieldGroup):
     """The lens of every view: what bends straight lines (docs/lenses.md)."""
 
-    preset: Literal["none", "kinect", "tum_vi", "fisheye180"] = Field(
+    preset: Literal["none", "kinect", "tum_vi", "hypersim", "fisheye180"] = Field(
         "none", description="of a known camera; other fields override it"
     )
     model: LensModel = Field("pinhole", description="how directions fall on the picture")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
 from pbrs_farm.core.layers import LAYER, LAYERS, Layer
 from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.core.lighting import Mode
@@ -241,6 +242,18 @@ def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
     """
     depth = view.array("depth")
     return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))
+
+
+def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float32]:
+    """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) where there is none.
+
+    layer: "normal" or "normal_shading".
+    """
+    published = view.array(layer) * (2 / 65535) - 1
+    local = published @ PUBLISHED_FROM_OPENGL.astype(np.float64)  # columns are OpenGL's axes
+    length = np.linalg.norm(local, axis=-1, keepdims=True)
+    unit = local / np.where(length > 0, length, 1)
+    return np.where((view.array("valid") > 0)[..., None], unit, 0).astype(np.float32)
 
 
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:

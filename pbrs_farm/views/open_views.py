@@ -1,9 +1,10 @@
-"""Opens an output root or shards, wherever they lie. Effects: reads the store."""
+"""Opens an output root, shards or a folder of Hypersim, wherever they lie. Effects: reads the store."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store import Store, store_from_url
@@ -13,7 +14,7 @@ from pbrs_farm.views.views import Views
 
 @checked_call
 def open_views(place: str | Path | Store) -> Views:
-    """The views of an output root, or of shards that `pbrs-farm pack` wrote.
+    """The views of an output root, of shards that `pbrs-farm pack` wrote, or of a Hypersim folder.
 
     place: a folder, file:///folder, s3://bucket/prefix, or a Store. Nothing but names is read
     before a view is asked for. Raises BadInput where there is no view, StoreFailed where the store
@@ -31,6 +32,11 @@ def open_views(place: str | Path | Store) -> Views:
         from pbrs_farm.views.shard_set import views_of_shards
 
         return views_of_shards(store)
+    if isinstance(store, FolderStore) and not (store.root / keys.FOLDERS[0]).is_dir():
+        from pbrs_farm.views.hypersim_folder import is_hypersim, views_of_hypersim
+
+        if is_hypersim(store.root):
+            return views_of_hypersim(store.root)
     from pbrs_farm.views.stored_root import views_of_root
 
     return views_of_root(store)

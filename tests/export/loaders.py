@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
+import pandas as pd
 import yaml
 from PIL import Image
 
@@ -100,3 +102,95 @@ def horizonnet(folder: Path) -> Iterator[Example]:
         assert (corners[0::2, 0] == corners[1::2, 0]).all()
         assert (corners[0::2, 1] < corners[1::2, 1]).all()
         yield Example(file.stem, rgb, corners)
+
+
+@dataclass
+class HypersimFrame:
+    """A frame of Hypersim with its camera; world and positions in asset units, z up."""
+
+    scene: Path
+    camera: str
+    frame: int
+    split: str
+    row: pd.Series  # of the camera parameters
+
+    def hdf5(self, folder: str, name: str) -> np.ndarray:
+        """The data set of a frame's file."""
+        file = f"images/scene_{self.camera}_{folder}/frame.{self.frame:04d}.{name}.hdf5"
+        with h5py.File(self.scene / file, "r") as opened:
+            assert list(opened) == ["dataset"]
+            return opened["dataset"][:]
+
+    def has(self, folder: str, name: str) -> bool:
+        """Whether it has a file."""
+        file = f"images/scene_{self.camera}_{folder}/frame.{self.frame:04d}.{name}"
+        return (self.scene / file).is_file()
+
+    def preview(self, name: str) -> np.ndarray:
+        """A lossy picture."""
+        file = f"images/scene_{self.camera}_final_preview/frame.{self.frame:04d}.{name}.jpg"
+        return picture(self.scene / file)
+
+    def detail(self, name: str) -> np.ndarray:
+        """A data set of the scene."""
+        with h5py.File(self.scene / "_detail" / f"{name}.hdf5", "r") as opened:
+            return opened["dataset"][:]
+
+    @property
+    def metres(self) -> float:
+        """Of an asset unit."""
+        table = pd.read_csv(self.scene / "_detail/metadata_scene.csv", index_col="parameter_name")
+        return float(table.loc["meters_per_asset_unit"].iloc[0])
+
+    @property
+    def pose(self) -> np.ndarray:
+        """(4, 4) world_from_camera, camera x right, y up, z backward."""
+        found = np.eye(4)
+        found[:3, :3] = self.detail(f"{self.camera}/camera_keyframe_orientations")[self.frame]
+        found[:3, 3] = self.detail(f"{self.camera}/camera_keyframe_positions")[self.frame]
+        return found
+
+    def matrix(self, name: str, n: int) -> np.ndarray:
+        """A matrix of the camera parameters."""
+        return np.array([[self.row[f"{name}_{r}{c}"] for c in range(n)] for r in range(n)])
+
+    @property
+    def rays(self) -> np.ndarray:
+        """(H, W, 3) through the pixels' centres, camera axes: v counts upwards."""
+        h, w = (int(self.row[f"settings_output_img_{x}"]) for x in ("height", "width"))
+        u = (np.arange(w) + 0.5) / w * 2 - 1
+        v = 1 - (np.arange(h) + 0.5) / h * 2
+        uv = np.stack([*np.meshgrid(u, v), np.ones((h, w))], axis=-1)
+        return uv @ self.matrix("M_cam_from_uv", 3).T
+
+    @property
+    def planar_depth(self) -> np.ndarray:
+        """(H, W) metres along the axis, NaN where nothing is."""
+        rays = self.rays
+        return (
+            -rays[..., 2]
+            / np.linalg.norm(rays, axis=-1)
+            * self.hdf5("geometry_hdf5", "depth_meters")
+        )
+
+    def pixels_of(self, points: np.ndarray) -> np.ndarray:
+        """(N, 2) pixel coordinates of world points, from the corner of the picture: by M_proj."""
+        h, w = (int(self.row[f"settings_output_img_{x}"]) for x in ("height", "width"))
+        local = np.linalg.inv(self.pose) @ np.concatenate([points, np.ones((len(points), 1))], 1).T
+        clip = self.matrix("M_proj", 4) @ local
+        ndc = clip[:2] / clip[3]
+        return np.stack([(ndc[0] + 1) / 2 * w, (1 - ndc[1]) / 2 * h], axis=1)
+
+
+def hypersim(root: Path) -> Iterator[HypersimFrame]:
+    """The frames of the public release, as the split table lists them."""
+    rows = pd.read_csv(root / "metadata_images_split_scene_v1.csv")
+    cameras = pd.read_csv(root / "metadata_camera_parameters.csv", index_col="scene_name")
+    for row in rows[rows.included_in_public_release].itertuples():
+        scene = root / row.scene_name
+        names = pd.read_csv(scene / "_detail/metadata_cameras.csv").camera_name
+        assert row.camera_name in set(names)
+        split = row.split_partition_name
+        yield HypersimFrame(
+            scene, row.camera_name, row.frame_id, split, cameras.loc[row.scene_name]
+        )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.sets import READ_BACK
 from pbrs_farm.cli import build_parser, main
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export import forms
@@ -43,6 +44,10 @@ def test_the_docs_say_how_each_form_of_views_counts_pixels() -> None:
     assert table in DOCS.read_text()
     views = [name for name in form_names() if form_of(name).of == "views"]
     assert [line.split("`")[1] for line in table.splitlines()[2:]] == views
+
+
+def test_the_bench_of_sets_reads_every_form_of_views_back() -> None:
+    assert list(READ_BACK) == [name for name in form_names() if form_of(name).of == "views"]
 
 
 def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: Path) -> None:

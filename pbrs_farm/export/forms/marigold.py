@@ -13,11 +13,15 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import PUBLISHED_FROM_OPENGL
-from pbrs_farm.export.chosen_view import Choice, ChosenView, depth_within_png, require_lens
+from pbrs_farm.export.chosen_view import (
+    Choice,
+    ChosenView,
+    depth_within_png,
+    opengl_normals,
+    require_lens,
+)
 from pbrs_farm.export.form import Convention, ViewForm, name_left_out
 from pbrs_farm.images import png_from_array
 
@@ -54,15 +58,6 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     without = [view for view in views if view.picture is None]
     n_files = len(shown) + sum(len(own) for own in lines.values()) + len(written)
     return n_files + name_left_out(out, without, "has no picture")
-
-
-def opengl_normals(view: ChosenView) -> NDArray[np.float32]:
-    """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) where there is none."""
-    published = view.array("normal") * (2 / 65535) - 1
-    local = published @ PUBLISHED_FROM_OPENGL.astype(np.float64)  # columns are OpenGL's axes
-    length = np.linalg.norm(local, axis=-1, keepdims=True)
-    unit = local / np.where(length > 0, length, 1)
-    return np.where((view.array("valid") > 0)[..., None], unit, 0).astype(np.float32)
 
 
 def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:

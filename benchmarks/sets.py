@@ -1,0 +1,83 @@
+"""How many forms of export are read back equal: `make bench NAME=sets` -> out/bench/sets.json.
+
+The loaders are those of tests/export, written from each form's documentation: they share nothing with
+the writers. A form is equal where labels differ in no pixel, depth within the form's step, and K and
+poses are the view's own.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+from xml.etree import ElementTree
+
+from benchmarks.figures import write_report
+
+UNITS: Final = {
+    "sets.forms": "forms of views read back equal by code that shares nothing with the writers",
+    "sets.forms_written": "forms of views",
+    "sets.forms_wrong": "names of the others",
+}
+READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
+    "bop": ("bop", ()),
+    "captions": ("captions", ()),
+    "coco": ("export", ("coco", "panoptic")),
+    "colmap": ("sequences", ("colmaps",)),
+    "hdf5": ("export", ("hdf5",)),
+    "hypersim": ("hypersim", ()),
+    "kitti": ("sequences", ("kittis",)),
+    "layoutnet": ("training_forms", ("horizonnet",)),
+    "marigold": ("training_forms", ("marigold",)),
+    "nerfstudio": ("sequences", ("nerfstudios",)),
+    "ply": ("point_clouds", ()),
+    "released": ("export", ("released",)),
+    "tum": ("sequences", ("tum",)),
+    "webdataset": ("export", ("webdataset",)),
+    "yolo": ("export", ("yolo_boxes", "data_yaml")),
+    "yolo-depth": ("training_forms", ("yolo_reads", "yolos_depth")),
+    "yolo-seg": ("export", ("polygons",)),
+    "yolo-semantic": ("training_forms", ("yolos_masks",)),
+}
+"""Form of views -> what reads it back: tests/export/test_<name>.py, and words of its tests, () for all."""
+
+
+def main() -> None:
+    """Read every form back and write the report."""
+    passed = _passed()
+    wrong = [form for form in READ_BACK if not _is_equal(form, passed)]
+    figures: dict[str, Any] = {
+        "sets.forms": len(READ_BACK) - len(wrong),
+        "sets.forms_written": len(READ_BACK),
+        "sets.forms_wrong": wrong,
+    }
+    write_report("sets", figures, UNITS)
+
+
+def _passed() -> dict[tuple[str, str], bool]:
+    """(file's name, test's name) -> whether it passed."""
+    files = [f"tests/export/test_{name}.py" for name in {file for file, _ in READ_BACK.values()}]
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "junit.xml"
+        command = [sys.executable, "-m", "pytest", "-q", *sorted(files), f"--junit-xml={report}"]
+        subprocess.run(command, capture_output=True, check=False)
+        rows = list(ElementTree.parse(report).iter("testcase")) if report.is_file() else []
+    return {
+        (row.get("classname", "").rpartition(".test_")[2], row.get("name", "")): not len(row)
+        for row in rows
+    }
+
+
+def _is_equal(form: str, passed: dict[tuple[str, str], bool]) -> bool:
+    """Whether all of a form's tests passed, and there is one."""
+    file, words = READ_BACK[form]
+    own = [
+        is_right
+        for (name, test), is_right in passed.items()
+        if name == file and (not words or any(word in test for word in words))
+    ]
+    is_right = bool(own) and all(own)
+    print(f"   {'right' if is_right else 'wrong'} {form}: {len(own)} tests", flush=True)
+    return is_right

@@ -1,0 +1,382 @@
+"""The layout of the Hypersim data set (Roberts et al. 2021), which many programs load depth and light from.
+
+    ai_VVV_NNN/images/scene_cam_XX_{final_hdf5,final_preview,geometry_hdf5}/frame.IIII.<what>
+    ai_VVV_NNN/_detail/{metadata_scene.csv,metadata_cameras.csv,cam_XX,mesh}
+    metadata_images_split_scene_v1.csv  metadata_camera_parameters.csv  index.csv  README.md
+
+Effects: reads views, writes files. formats/hypersim.py says what its cameras and files are.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.layers import LAYER
+from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
+from pbrs_farm.export.chosen_view import (
+    Choice,
+    ChosenView,
+    intrinsics_of,
+    opengl_normals,
+    require_lens,
+)
+from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.sequences import pose_opencv
+from pbrs_farm.formats import hypersim
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
+from pbrs_farm.images import jpeg_from_array
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
+from pbrs_farm.run.relight import linear_aovs
+from pbrs_farm.transport.develop.mode_pictures import denoise_aovs
+
+_MOST_SCENES: Final = 999  # of a volume
+_MOST_LIGHT: Final = 65504.0  # of a half float
+_INT16: Final = 32767
+_INDEX: Final = "index.csv"  # ours: which view each frame is
+_CREDITS: Final = "ATTRIBUTION.txt"
+_SPLIT_FIELDS: Final = (
+    "scene_name", "camera_name", "frame_id", "included_in_public_release", "exclude_reason",
+    "split_partition_name",
+)  # fmt: skip
+_INTRINSIC: Final = ("albedo", "shading", "residual")
+"""Layers whose files make reflectance, illumination and residual; a view without one has none of the last two."""
+
+
+def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> int:
+    """The layout above; the number of files.
+
+    A scene is a home as one pin-hole sees it, a camera a walk's eye or the views that are no frames.
+    A unit is a metre, the world has z up. `depth_meters` is the distance along the ray, NaN where
+    there is nothing. BadInput for another lens than a pin-hole and a size that is not the views' own.
+    """
+    if choice.size is not None:
+        raise BadInput("--size", "", "hypersim holds light, which is not resized")
+    n_files = 0
+    tables: dict[str, list[dict[str, Any]]] = {
+        name: [] for name in (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
+    }
+    for number, own in enumerate(_scenes(views)):
+        scene = _scene_name(number)
+        n_files += _write_scene(out / scene, own, tables, scene)
+    for name, rows in tables.items():
+        _write_table(out / name, rows)
+    credits = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
+    (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
+    return n_files + len(tables) + 1
+
+
+def _scene_name(number: int) -> str:
+    """`ai_VVV_NNN` of a scene by its number, from 0."""
+    volume, own = divmod(number, _MOST_SCENES)
+    return f"ai_{volume + 1:03d}_{own + 1:03d}"
+
+
+def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
+    """The views by home and pin-hole: a scene has one projection."""
+    found: dict[tuple[Any, ...], list[ChosenView]] = {}
+    for view in views:
+        require_lens(view, "hypersim")
+        i = intrinsics_of(view.facts)
+        key = (view.house.id, i.width_px, i.height_px, i.fx, i.fy, i.cx, i.cy)
+        found.setdefault(key, []).append(view)
+    return list(found.values())
+
+
+def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
+    """The views by camera: those that are no frames, left eyes of a walk, right eyes."""
+    found: dict[tuple[bool, bool], list[ChosenView]] = {}
+    for view in views:
+        key = ("frame" in view.facts, bool(view.facts.get("left")))
+        found.setdefault(key, []).append(view)
+    for (is_frame, _right), own in found.items():
+        if is_frame:
+            own.sort(key=lambda view: int(view.facts["frame"]))
+    return [found[key] for key in sorted(found)]
+
+
+def _write_scene(
+    folder: Path, views: list[ChosenView], tables: Mapping[str, list[dict[str, Any]]], scene: str
+) -> int:
+    detail, n_files = folder / "_detail", 0
+    cameras = {f"cam_{k:02d}": own for k, own in enumerate(_trajectories(views))}
+    for camera, own in cameras.items():
+        for frame, view in enumerate(own):
+            files = _frame(view)
+            for (part, name), array in files.items():
+                file = folder / hypersim.frame_file(camera, frame, part, name)
+                if isinstance(array, bytes):
+                    file.parent.mkdir(parents=True, exist_ok=True)
+                    file.write_bytes(array)
+                else:
+                    hypersim.write_dataset(file, array)
+            n_files += len(files)
+            at: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}
+            tables[_INDEX].append(at | {"house": view.house.id, "view": view.id})
+            split = {"included_in_public_release": True, "exclude_reason": ""}
+            tables[hypersim.SPLIT_CSV].append(at | split | {"split_partition_name": "train"})
+        for name, array in _trajectory(own).items():
+            hypersim.write_dataset(detail / camera / f"{name}.hdf5", array)
+            n_files += 1
+    for name, array in _boxes(views).items():
+        hypersim.write_dataset(detail / "mesh" / f"{name}.hdf5", array)
+        n_files += 1
+    _write_table(detail / "metadata_cameras.csv", [{"camera_name": name} for name in cameras])
+    row = {"parameter_name": "meters_per_asset_unit", "parameter_value": 1.0}
+    _write_table(detail / "metadata_scene.csv", [row])
+    tables[hypersim.CAMERAS_CSV].append(_parameters(scene, views[0]))
+    return n_files + 2
+
+
+def _trajectory(views: Sequence[ChosenView]) -> dict[str, NDArray[Any]]:
+    poses = np.array([view.facts["world_from_camera_opengl"] for view in views], np.float64)
+    turn = hypersim.Z_UP_FROM_Y_UP
+    return {
+        "camera_keyframe_positions": poses[:, :3, 3] @ turn.T,
+        "camera_keyframe_orientations": turn @ poses[:, :3, :3],
+        "camera_keyframe_frame_indices": np.arange(len(views)),
+    }
+
+
+def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
+    """Boxes of what is seen, a row an instance id, NaN where there is none; z is the axis that is most upright."""
+    rows = {r["id"]: r["box3d"] for v in views for r in v.facts["instances"] if r.get("box3d")}
+    n = max(rows, default=-1) + 1
+    centre, size, turn = (
+        np.full((n, 3), np.nan),
+        np.full((n, 3), np.nan),
+        np.full((n, 3, 3), np.nan),
+    )
+    for number, box in rows.items():
+        axes = hypersim.Z_UP_FROM_Y_UP @ np.array(box["axes"], np.float64).T
+        up = int(np.abs(axes[2]).argmax())
+        order = [(up + 1) % 3, (up + 2) % 3, up]
+        own = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
+        own[:, 1] *= np.sign(np.linalg.det(own)) or 1.0
+        centre[number] = hypersim.Z_UP_FROM_Y_UP @ np.array(box["centre"], np.float64)
+        size[number], turn[number] = 2 * np.array(box["half"], np.float64)[order], own
+    name = "metadata_semantic_instance_bounding_box_object_aligned_2d"
+    return {f"{name}_positions": centre, f"{name}_extents": size, f"{name}_orientations": turn}
+
+
+def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:
+    i = intrinsics_of(view.facts)
+    row: dict[str, Any] = {
+        "scene_name": scene, "settings_output_img_height": i.height_px,
+        "settings_output_img_width": i.width_px, "settings_units_info_meters_scale": 1.0,
+        "use_camera_physical": False,
+        "settings_camera_fov": float(2 * np.arctan(i.width_px / 2 / i.fx)),
+    }  # fmt: skip
+    for name, matrix in (
+        ("M_cam_from_uv", hypersim.cam_from_uv(i)),
+        ("M_proj", hypersim.projection(i)),
+    ):
+        row |= {f"{name}_{r}{c}": float(value) for (r, c), value in np.ndenumerate(matrix)}
+    return row
+
+
+def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
+    """(folder, name) -> what a frame's file holds: an array of HDF5, or a JPEG."""
+    light, geometry = _light(view), _geometry(view)
+    files: dict[tuple[str, str], NDArray[Any] | bytes] = {}
+    for name, array in light.items():
+        files["final_hdf5", f"{name}.hdf5"] = array
+    for name, array in geometry.items():
+        files["geometry_hdf5", f"{name}.hdf5"] = array
+    if view.picture is not None:
+        files["final_preview", "tonemap.jpg"] = jpeg_from_array(view.array(view.picture), 95)
+    if "color" in light:
+        shown = hypersim.preview(
+            light["color"].astype(np.float32), geometry["render_entity_id"] >= 0
+        )
+        files["final_preview", "color.jpg"] = jpeg_from_array(shown, 95)
+    return files
+
+
+def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
+    depth, instance = view.array("depth"), view.array("instance")
+    z = np.where(depth < np.iinfo(np.uint16).max, depth, 0) / 1000
+    if _has(view, "depth_z"):
+        z = view.array("depth_z").astype(np.float64)
+    i, seen = intrinsics_of(view.facts), z > 0
+    along = np.where(seen, z * hypersim.ray_lengths(i), np.nan)
+    whole = np.int16 if int(instance.max(initial=0)) <= _INT16 else np.int32
+    semantic = view.array("semantic") if view.choice.classes is None else None
+    pose, turn = pose_opencv(view), hypersim.Z_UP_FROM_Y_UP
+    local = opengl_normals(view)
+    found: dict[str, NDArray[Any]] = {
+        "depth_meters": along.astype(np.float32),
+        "position": _positions(z, i, pose, turn),
+        "normal_cam": local,
+        "normal_world": _in_world(local, pose, turn),
+        "semantic_instance": np.where(instance > 0, instance, -1).astype(whole),
+        "render_entity_id": np.where(instance > 0, instance.astype(np.int32), np.int32(-1)),
+    }
+    if semantic is not None:
+        found["semantic"] = np.where(semantic > 0, semantic.astype(np.int16), np.int16(-1))
+    if _has(view, "normal_shading"):
+        bent = opengl_normals(view, "normal_shading")
+        found |= {"normal_bump_cam": bent, "normal_bump_world": _in_world(bent, pose, turn)}
+    return found
+
+
+def _positions(z: F64, i: Any, pose: F64, turn: F64) -> F32:
+    x, y = np.meshgrid(np.arange(i.width_px) + 0.5, np.arange(i.height_px) + 0.5)
+    rays = i.directions(np.stack([x.ravel(), y.ravel()], axis=1)).reshape(*z.shape, 3)
+    world = ((rays * z[..., None]) @ pose[:3, :3].T + pose[:3, 3]) @ turn.T
+    return np.where((z > 0)[..., None], world, 0).astype(np.float32)
+
+
+def _in_world(local: F32, pose: F64, turn: F64) -> F32:
+    opengl = pose[:3, :3] * [1, -1, -1]
+    return np.asarray(local @ (turn @ opengl).T, np.float32)
+
+
+def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
+    """color, and of intrinsic layers what there is; color == reflectance x illumination + residual where all are."""
+    found: dict[str, NDArray[np.float16]] = {}
+    if _has(view, "albedo"):
+        found["diffuse_reflectance"] = _half(linear_from_srgb(view.array("albedo") / 255))
+    if all(_has(view, name) for name in _INTRINSIC):
+        found["diffuse_illumination"] = _half(view.array("shading"))
+        found["residual"] = _half(view.array("residual"))
+        light, shading, rest = (
+            found[name].astype(np.float32)
+            for name in ("diffuse_reflectance", "diffuse_illumination", "residual")
+        )
+        return found | {"color": _half(light * shading + rest)}
+    colour = _colour(view)
+    return found if colour is None else found | {"color": _half(colour)}
+
+
+def _colour(view: ChosenView) -> F32 | None:
+    """(H, W, 3) linear radiance of the light that the picture shows, as denoised as the picture; None without any."""
+    file = view.entry.file(RADIANCE_EXR)
+    if file is None:
+        return None
+    aovs = linear_aovs(radiance_from_exr(read_regular(file, MAX_SCENE_BYTES), str(file)))
+    develop = view.facts.get("modes", {}).get("develop", {})
+    if develop.get("denoised", False):
+        aovs = denoise_aovs(aovs)
+    groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
+    wanted = groups or (Group.OUTDOOR, Group.INDOOR)
+    total = np.zeros_like(aovs.outdoor)
+    for group in wanted:
+        total = total + (aovs.outdoor if group is Group.OUTDOOR else aovs.indoor)
+    return np.asarray(total, np.float32)
+
+
+def _half(array: NDArray[Any]) -> NDArray[np.float16]:
+    return np.asarray(np.clip(array, -_MOST_LIGHT, _MOST_LIGHT), np.float16)
+
+
+def _has(view: ChosenView, layer: str) -> bool:
+    """Whether the view has a layer and it is not left out of the export."""
+    return layer in LAYER and view.has(layer)
+
+
+def _write_table(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("w", encoding="utf-8", newline="") as opened:
+        writer = csv.DictWriter(opened, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _table(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
+    """One root of all splits, as the data set has it, and the card. The number of files added."""
+    names = (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
+    tables: dict[str, list[dict[str, Any]]] = {name: [] for name in names}
+    credits: dict[str, None] = {}
+    n_scenes = 0
+    for split in splits:
+        part = out / split
+        names_of = {
+            scene.name: _scene_name(n_scenes + k)
+            for k, scene in enumerate(sorted(part.glob("ai_*")))
+        }
+        n_scenes += len(names_of)
+        for name in names:
+            for row in _table(part / name):
+                row["scene_name"] = names_of[row["scene_name"]]
+                if "split_partition_name" in row:
+                    row["split_partition_name"] = split
+                tables[name].append(row)
+        credits |= dict.fromkeys((part / _CREDITS).read_text("utf-8").splitlines())
+        for scene, name in names_of.items():
+            (part / scene).rename(out / name)
+        for file in (*names, _CREDITS):
+            (part / file).unlink()
+        part.rmdir()
+    for name, rows in tables.items():
+        if rows:
+            _write_table(out / name, rows)
+    if splits:
+        (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
+    (out / "README.md").write_text(_card(out), "utf-8")
+    return 1 - 4 * max(len(splits) - 1, 0)
+
+
+def _card(out: Path) -> str:
+    rows, frames = _table(out / hypersim.CAMERAS_CSV), len(_table(out / _INDEX))
+    usual = hypersim.cam_from_uv(hypersim.usual_intrinsics(hypersim.WIDTH_PX, hypersim.HEIGHT_PX))
+    others = [row["scene_name"] for row in rows if not _is_usual(row, usual)]
+    camera = "holds for every scene" if not others else f"does NOT hold for {', '.join(others[:9])}"
+    camera += "" if len(others) <= 9 else f" and {len(others) - 9} more"
+    has_light = any(out.glob("ai_*/images/*_final_hdf5/*.color.hdf5"))
+    has_parts = any(out.glob("ai_*/images/*_final_hdf5/*.diffuse_illumination.hdf5"))
+    light = "`color` = `diffuse_reflectance` x `diffuse_illumination` + `residual`, in half floats"
+    if not has_parts:
+        light = (
+            "`color` is radiance; there is no `diffuse_illumination` and no `residual`"
+            if has_light else "there is no `color`: the views have no light of their own"
+        )  # fmt: skip
+    return f"""# Views of pbrs_farm in the layout of Hypersim
+
+{frames} frames of {len(rows)} scenes. `index.csv` says which view each is, `{_CREDITS}` whom to name.
+
+- The camera that readers assume (1024 x 768, 886.81 px) {camera}; `{hypersim.CAMERAS_CSV}` has the right one of each.
+- `depth_meters` is the distance along the ray, NaN where nothing is; `position` and normals are 0 there, `semantic`, `semantic_instance` and `render_entity_id` -1.
+- One unit is a metre (`meters_per_asset_unit` 1); the world has z up.
+- Light: {light}.
+- `tonemap.jpg` is the developed picture, `color.jpg` Hypersim's own tone of `color`.
+- Left out of the original's files: `tex_coord`, `metadata_nodes.csv` and the meshes.
+"""
+
+
+def _is_usual(row: Mapping[str, str], usual: F64) -> bool:
+    size = int(row["settings_output_img_width"]), int(row["settings_output_img_height"])
+    own = np.array([[float(row[f"M_cam_from_uv_{r}{c}"]) for c in range(3)] for r in range(3)])
+    return size == (hypersim.WIDTH_PX, hypersim.HEIGHT_PX) and bool(
+        np.allclose(own, usual, atol=1e-5)
+    )
+
+
+FORM = ViewForm(
+    "hypersim",
+    write_hypersim,
+    "the layout of Hypersim (extra `selection`): `ai_VVV_NNN/images/scene_cam_XX_{final_hdf5,final_preview,geometry_hdf5}`,"
+    " `_detail` with cameras and boxes, `metadata_images_split_scene_v1.csv`, `metadata_camera_parameters.csv`;"
+    " `index.csv` and `README.md` of ours; with `--split` one root whose table has the splits",
+    finish=join_splits,
+    convention=Convention(
+        0.5,
+        has_k=True,
+        axes="camera x right, y up, z backward; world z up, m",
+        depth="m, along the ray",
+    ),
+)

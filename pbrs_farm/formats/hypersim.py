@@ -1,0 +1,127 @@
+"""The layout of the Hypersim data set (Roberts et al. 2021): names of its files, cameras, HDF5, tone.
+
+Effects: read_dataset and write_dataset read and write a file. The writer of the layout is
+export/forms/hypersim.py, the reader views/hypersim_folder.py.
+
+Its world has z up, its camera's axes are x right, y up, z backward. (u, v) go over the picture from
+-1 to 1, v upwards: M_cam_from_uv (u, v, 1) is a ray in camera axes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.installation import install_command
+
+SPLIT_CSV: Final = "metadata_images_split_scene_v1.csv"
+CAMERAS_CSV: Final = "metadata_camera_parameters.csv"
+WIDTH_PX: Final = 1024
+HEIGHT_PX: Final = 768
+FOCAL_PX: Final = 886.8100134752651
+"""What readers take where they do not read CAMERAS_CSV: 60 degrees across 1024 pixels."""
+
+Z_UP_FROM_Y_UP: Final[F64] = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
+"""Its world from ours."""
+
+_NEAR, _FAR = 1.0, 1000.0  # of M_proj
+_GAMMA: Final = 1 / 2.2  # of its preview
+_PERCENTILE: Final = 90  # of brightness, which its preview shows as ...
+_SHOWN: Final = 0.8
+
+
+def frame_file(camera: str, frame: int, folder: str, name: str) -> str:
+    """A frame's file below its scene: `images/scene_cam_00_geometry_hdf5/frame.0000.semantic.hdf5`.
+
+    folder: "final_hdf5", "final_preview" or "geometry_hdf5"; name: with its suffix.
+    """
+    return f"images/scene_{camera}_{folder}/frame.{frame:04d}.{name}"
+
+
+def cam_from_uv(i: Intrinsics) -> F64:
+    """(3, 3) from (u, v, 1) to a ray of depth 1 in camera axes, of a pin-hole."""
+    w, h = i.width_px / 2, i.height_px / 2
+    return np.array(
+        [[w / i.fx, 0, (w - i.cx) / i.fx], [0, h / i.fy, -(h - i.cy) / i.fy], [0, 0, -1]],
+        np.float64,
+    )
+
+
+def projection(i: Intrinsics) -> F64:
+    """(4, 4) OpenGL's projection of a pin-hole, columns of camera axes."""
+    deep = _FAR - _NEAR
+    return np.array([
+        [2 * i.fx / i.width_px, 0, 1 - 2 * i.cx / i.width_px, 0],
+        [0, 2 * i.fy / i.height_px, 2 * i.cy / i.height_px - 1, 0],
+        [0, 0, -(_FAR + _NEAR) / deep, -2 * _FAR * _NEAR / deep],
+        [0, 0, -1, 0],
+    ], np.float64)  # fmt: skip
+
+
+def intrinsics_of_uv(matrix: F64, width_px: int, height_px: int) -> Intrinsics | None:
+    """The pin-hole of M_cam_from_uv (3, 3) and a size; None of a tilted or sheared projection."""
+    m = matrix / -matrix[2, 2]
+    off = [m[0, 1], m[1, 0], m[2, 0], m[2, 1]]
+    if not np.isfinite(m).all() or np.abs(off).max() > 1e-6 or min(m[0, 0], m[1, 1]) <= 0:
+        return None
+    w, h = width_px / 2, height_px / 2
+    fx, fy = float(w / m[0, 0]), float(h / m[1, 1])
+    return Intrinsics(width_px, height_px, fx, fy, float(w - m[0, 2] * fx), float(h + m[1, 2] * fy))
+
+
+def usual_intrinsics(width_px: int, height_px: int) -> Intrinsics:
+    """The camera that readers assume: 60 degrees across, square pixels, the middle."""
+    return Intrinsics.from_hfov(width_px, height_px, np.pi / 3)
+
+
+def ray_lengths(i: Intrinsics) -> F64:
+    """(H, W) the length of each pixel's ray of depth 1: depth along the ray over planar depth."""
+    x = (np.arange(i.width_px) + 0.5 - i.cx) / i.fx
+    y = (np.arange(i.height_px) + 0.5 - i.cy) / i.fy
+    return np.asarray(np.sqrt(1 + x[None, :] ** 2 + y[:, None] ** 2))
+
+
+def preview(colour: F32, has_surface: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8: linear colour as Hypersim's own tone mapping shows it.
+
+    Scaled so that of the pixels with a surface a tenth is brighter than 0.8, then to the power of
+    1 / 2.2 (so does the tone mapping of its repository).
+    """
+    brightness = (colour @ np.array([0.3, 0.59, 0.11], np.float32))[has_surface]
+    scale, now = 1.0, float(np.percentile(brightness, _PERCENTILE)) if brightness.size else 0.0
+    if brightness.size:
+        scale = _SHOWN ** (1 / _GAMMA) / now if now >= 1e-4 else 0.0
+    shown = np.clip(np.maximum(scale * colour.astype(np.float64), 0) ** _GAMMA, 0, 1)
+    return np.rint(255 * shown).astype(np.uint8)
+
+
+def write_dataset(file: Path, array: NDArray[Any]) -> None:
+    """An HDF5 file of one compressed data set, `dataset`. Raises MachineFailed without h5py."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with _h5py().File(file, "w") as opened:
+        opened.create_dataset("dataset", data=array, compression="gzip")
+
+
+def read_dataset(file: Path) -> NDArray[Any]:
+    """The array of an HDF5 file's `dataset`; BadInput where it is none, MachineFailed without h5py."""
+    h5py = _h5py()
+    try:
+        with h5py.File(file, "r") as opened:
+            return np.asarray(opened["dataset"][...])
+    except (OSError, KeyError, ValueError, TypeError) as error:
+        raise BadInput(file, "dataset", f"is no data set of HDF5: {error}"[:200]) from None
+
+
+def _h5py() -> Any:
+    try:
+        import h5py
+    except ImportError:
+        hint = install_command("selection")
+        raise MachineFailed("Hypersim's files need h5py", hint=hint) from None
+    return h5py
