@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ from pbrs_farm.core.mesh import (
 
 SPACING_M = 0.03
 _MOST_POINTS = 200_000  # of one item: larger ones are spread more thinly
+_LEAST_M = 1e-9  # a row that is flatter along an axis lies across it
 _SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 
 
@@ -29,10 +32,11 @@ def item_triangles(item: Item) -> F64:
     return finite_triangles(np.concatenate([np.zeros((0, 3, 3)), *parts]))
 
 
-def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
+def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None = None) -> F64:
     """(N, 3) points on triangles (F, 3, 3), at most one in each cube of half the spacing.
 
-    No place of a triangle is farther than about 0.7 spacing_m from a point.
+    No place of a triangle is farther than about 0.7 spacing_m from a point. box: (2, 3) lowest and
+    highest corner; only points in it are given, the same as without it and much sooner.
     """
     if not len(corners):
         return np.zeros((0, 3))
@@ -42,19 +46,67 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M) -> F64:
     low, high = triangle_bounds(corners)
     size = high - low
     is_small = np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]) < spacing_m / 2
-    middles = corners[is_small].sum(1) / 3
-    points = np.concatenate([middles, _laid_over(corners[~is_small], spacing_m)])
+    middles, grids = corners[is_small].sum(1) / 3, _grids(corners[~is_small], spacing_m)
+    # A cube that the box cuts counts whole: which point stands for it does not change.
+    near = None if box is None else (box[0] - spacing_m, box[1] + spacing_m)
+    points = np.concatenate([middles, grids.points(near)])
     # Fine meshes have many points in one place.
-    columns = np.ascontiguousarray(points.T)
-    least = columns.min(1)
+    columns, least = np.ascontiguousarray(points.T), low.min(0)
     cube = np.floor((columns - least[:, None]) / (spacing_m / 2)).astype(np.int64)
-    cells = cube.max(1) + 1
+    cube = np.maximum(cube, 0)  # rounding
+    cells = cube.max(1, initial=0) + 1
     keys = (cube[0] * cells[1] + cube[1]) * cells[2] + cube[2]
-    return np.asarray(points[_first_of_each(keys, int(cells.prod()))])
+    points = points[_first_of_each(keys, int(cells.prod()))]
+    return points if box is None else points[((points > box[0]) & (points < box[1])).all(1)]
 
 
-def _laid_over(corners: F64, spacing_m: float) -> F64:
-    """(N, 3) the middles of cells of about spacing_m of a grid over each of the triangles."""
+class _Grids(NamedTuple):
+    """A grid over each of some triangles: steps along its longest edge, rows towards the apex."""
+
+    base: tuple[F64, F64]  # (T, 3) ends of the longest edge
+    apex: F64  # (T, 3)
+    n_u: NDArray[np.int64]  # (T,) cells of a row
+    n_v: NDArray[np.int64]  # (T,) rows
+
+    def points(self, box: tuple[F64, F64] | None) -> F64:
+        """(N, 3) the middles of the cells, in order; all those in the box (low, high) and few others."""
+        if box is None:
+            counts = self.n_u * self.n_v
+            k, which = _numbers(counts)
+            row = k // self.n_u[which]
+            return self._middles(which, k - row * self.n_u[which], row)
+        row, which = _numbers(self.n_v)
+        v = ((row + 0.5) / self.n_v[which])[:, None]
+        start, end = (p[which] * (1 - v) + self.apex[which] * v for p in self.base)
+        # Each row is a segment: keep the cells between the planes of the box.
+        least, most = np.zeros(len(row)), np.ones(len(row))
+        for axis in range(3):
+            along = end[:, axis] - start[:, axis]
+            is_across = np.abs(along) < _LEAST_M
+            slope = np.where(is_across, 1.0, along)
+            t = np.stack([(side[axis] - start[:, axis]) / slope for side in box])
+            beside = (start[:, axis] < box[0][axis]) | (start[:, axis] > box[1][axis])
+            least = np.maximum(least, np.where(is_across, np.where(beside, 2.0, 0.0), t.min(0)))
+            most = np.minimum(most, np.where(is_across, 1.0, t.max(0)))
+        n_u = self.n_u[which]
+        first = np.maximum(np.floor(least * n_u - 0.5), 0).astype(np.int64)
+        last = np.minimum(np.ceil(most * n_u - 0.5), n_u - 1).astype(np.int64)
+        k, of_row = _numbers(np.where(most < least, 0, np.maximum(last - first + 1, 0)))
+        return self._middles(which[of_row], k + first[of_row], row[of_row])
+
+    def _middles(
+        self, which: NDArray[np.int64], column: NDArray[np.int64], row: NDArray[np.int64]
+    ) -> F64:
+        u, v = (column + 0.5) / self.n_u[which], (row + 0.5) / self.n_v[which]
+        points = np.empty((len(which), 3))
+        for axis in range(3):
+            p, q, r = (end[:, axis][which] for end in (*self.base, self.apex))
+            points[:, axis] = (p * (1 - u) + q * u) * (1 - v) + r * v
+        return points
+
+
+def _grids(corners: F64, spacing_m: float) -> _Grids:
+    """The grids of cells of about spacing_m over triangles (T, 3, 3)."""
     # Turn each triangle so that its longest edge is the base, the apex opposite.
     sides = lengths(corners[:, [1, 2, 0]] - corners)
     first = sides.argmax(1)
@@ -62,20 +114,15 @@ def _laid_over(corners: F64, spacing_m: float) -> F64:
     a, b, c = (corners[rows, (first + k) % 3] for k in range(3))
     base = sides[rows, first]
     height = lengths(area_vectors(corners)) / np.maximum(base, 1e-12)
-    # Lay a grid over it: steps along the base, rows towards the apex; take the cells' middles.
     n_u = np.maximum(np.ceil(base / spacing_m), 1).astype(np.int64)
     n_v = np.maximum(np.ceil(height / spacing_m), 1).astype(np.int64)
-    counts = n_u * n_v
-    k = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    across = np.repeat(n_u, counts)
-    row = k // across
-    u = (k - row * across + 0.5) / across
-    v = (row + 0.5) / np.repeat(n_v, counts)
-    points = np.empty((len(k), 3))
-    for axis in range(3):
-        p, q, r = (np.repeat(corner[:, axis], counts) for corner in (a, b, c))
-        points[:, axis] = (p * (1 - u) + q * u) * (1 - v) + r * v
-    return points
+    return _Grids((a, b), c, n_u, n_v)
+
+
+def _numbers(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """0 to count - 1 for each count, one after another, and the number of the count."""
+    which = np.repeat(np.arange(len(counts)), counts)
+    return np.arange(len(which)) - (np.cumsum(counts) - counts)[which], which
 
 
 def _first_of_each(keys: NDArray[np.int64], n: int) -> NDArray[np.int64]:

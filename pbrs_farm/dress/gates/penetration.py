@@ -113,7 +113,7 @@ def _points_in(a: Shell, b: Shell) -> F64:
     corners = a.corners
     low, high = triangle_bounds(corners)
     meets = boxes_meeting(low, high, b.low, b.high)
-    points = np.concatenate([a.vertices, surface_points(corners[meets], _SPACING_M)])
-    inside = ((points > b.low + MOST_M / 2) & (points < b.high - MOST_M / 2)).all(1)
-    points = points[inside]
+    box = np.stack([b.low + MOST_M / 2, b.high - MOST_M / 2])
+    inside = ((a.vertices > box[0]) & (a.vertices < box[1])).all(1)
+    points = np.concatenate([a.vertices[inside], surface_points(corners[meets], _SPACING_M, box)])
     return points[:: max(1, len(points) // _MOST_POINTS)]
