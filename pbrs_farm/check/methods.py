@@ -25,6 +25,7 @@ HOW: dict[str, str] = {
     "boundary.png": FORMULA, "boundary_semantic.png": FORMULA, "nyu13.png": FORMULA,
     "class_source.png": FORMULA, "hha.png": FORMULA, "histogram.json": FORMULA,
     "depth_sensor.png": _NOISE, "depth_sensor_tof.png": _NOISE, "depth_sensor_stereo.png": _NOISE,
+    "depth_sensor_d455.png": _NOISE, "depth_sensor_azure.png": _NOISE, "depth_sensor_l515.png": _NOISE,
     "mlt_ol.png": "developed from radiance.exr again",
     "mlt_il_ol.png": "developed from radiance.exr again",
     **{LAYER[f"mlt_il_ol.{n}"].file: "developed from radiance.exr again" for n in range(1, MOST_VARIANTS + 1)},

@@ -24,13 +24,20 @@ _SATURATED_MM = 65535
 _MATCHING = {
     "depth_sensor": (580.0 * 0.075, 8, 1 / 6, (0.5, 8.0)),
     "depth_sensor_stereo": (447.0 * 0.05, 32, 0.08, (0.0, 10.0)),
+    "depth_sensor_d455": (455.0 * 0.095, 32, 0.08, (0.0, 20.0)),
 }
-_TOF_REACH_M = (0.5, 4.5)
+# Reach in m of those that time light; their noise is in _tof_sigma_m.
+_TOF_REACH_M = {
+    "depth_sensor_tof": (0.5, 4.5),
+    "depth_sensor_azure": (0.5, 3.86),
+    "depth_sensor_l515": (0.25, 9.0),
+}
 _SIGMAS = 6.5  # of noise, for a pixel
 _FLAT_SIGMAS = 0.8  # of noise: what the neighbours of a flat pixel may differ by
 _SLANT_SIGMAS = 8.0  # the same of a time-of-flight sensor
 _BIAS_SIGMAS = 0.35  # of noise: what the mean over flat pixels may be
-_GRAIN_PX2 = {"depth_sensor": 81.0, "depth_sensor_stereo": 28.0}  # pixels that share their noise
+# Pixels that share their noise.
+_GRAIN_PX2 = {"depth_sensor": 81.0, "depth_sensor_stereo": 28.0, "depth_sensor_d455": 28.0}
 _LEAST_ALIKE = 0.3  # correlation of neighbours' noise, where a sensor matches blocks
 _SPREAD = (0.6, 1.5)  # noise of flat pixels over what it should be
 _LEAST_MEASURED = 0.25  # of flat pixels within reach
@@ -51,8 +58,9 @@ def check_derived(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: T
     for name in _MATCHING:
         if name in arrays:
             _check_matching(view, name, arrays[name], depth, tally)
-    if "depth_sensor_tof" in arrays:
-        _check_tof(view, arrays, tally)
+    for name in _TOF_REACH_M:
+        if name in arrays:
+            _check_tof(view, name, arrays, tally)
 
 
 def _points_and_normals(
@@ -120,26 +128,38 @@ def _check_matching(
     _check_statistics(view, name, (found - true) / noise, measured, is_flat, tally)
 
 
-def _check_tof(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """A time-of-flight sensor: noise by distance and slant (Fankhauser et al. 2015)."""
-    stored, depth = arrays["depth_sensor_tof"], arrays["depth"]
+def _check_tof(
+    view: StoredView, name: str, arrays: Mapping[str, NDArray[Any]], tally: Tally
+) -> None:
+    """A sensor that times light: noise by distance and slant."""
+    stored, depth, reach_m = arrays[name], arrays["depth"], _TOF_REACH_M[name]
     _points, normals, rays = _points_and_normals(view, arrays)
     cosine = np.abs(np.einsum("...i,...i->...", normals, rays)) / np.linalg.norm(rays, axis=-1)
     angle = np.minimum(np.arccos(np.clip(cosine, 0, 1)), np.radians(85))
     true = np.where(depth > 0, depth / 1000, np.nan)
     low, high = _extremes(true)
-    slant = angle**2 / (np.pi / 2 - angle) ** 2
-    sigma = np.maximum(1.5 - 0.5 * high + 0.3 * high**2 + 0.1 * high**1.5 * slant, 0.5) / 1000
+    sigma = _tof_sigma_m(name, high, angle)
     found, measured = stored / 1000, stored > 0
-    reach = (found >= _TOF_REACH_M[0] - 0.001) & (found <= _TOF_REACH_M[1] + 0.001)
+    reach = (found >= reach_m[0] - 0.001) & (found <= reach_m[1] + 0.001)
     slack = _SIGMAS * sigma + 0.001
     with np.errstate(invalid="ignore"):
         near = (found >= low - slack) & (found <= high + slack)
         # It measures the pixel itself, so that a slant moves nothing.
         is_flat = (high - low < _SLANT_SIGMAS * sigma) & (depth > 0)
-        is_flat &= (true > _TOF_REACH_M[0] * 1.1) & (true < _TOF_REACH_M[1] * 0.9)
-    _tally_pixels(view, "depth_sensor_tof: values", ~measured | (reach & near), tally)
-    _check_statistics(view, "depth_sensor_tof", (found - true) / sigma, measured, is_flat, tally)
+        is_flat &= (true > reach_m[0] * 1.1) & (true < reach_m[1] * 0.9)
+    _tally_pixels(view, f"{name}: values", ~measured | (reach & near), tally)
+    _check_statistics(view, name, (found - true) / sigma, measured, is_flat, tally)
+
+
+def _tof_sigma_m(name: str, z: Floats, angle: Floats) -> Floats:
+    """Standard deviation at depth z (m) and slant: of a Kinect 2 (Fankhauser et al. 2015), no more than at
+    2.5 m of an Azure Kinect (Kurillo et al. 2022), by its data sheet of an L515.
+    """
+    if name == "depth_sensor_l515":
+        return np.maximum(2.5 + 13 / 8 * (z - 1), 0.5) / 1000
+    far = np.minimum(z, 2.5) if name == "depth_sensor_azure" else z
+    slant = angle**2 / (np.pi / 2 - angle) ** 2
+    return np.maximum(1.5 - 0.5 * far + 0.3 * far**2 + 0.1 * far**1.5 * slant, 0.5) / 1000
 
 
 def _extremes(values: Floats) -> tuple[Floats, Floats]:

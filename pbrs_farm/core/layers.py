@@ -257,6 +257,9 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     ),
     _along_axis("depth_sensor_tof", "Y", "uint16", "planar z in mm as a Kinect 2 (time of flight)", shown_as="depth"),
     _along_axis("depth_sensor_stereo", "Y", "uint16", "planar z in mm as a stereo camera has it", shown_as="depth"),
+    _along_axis("depth_sensor_d455", "Y", "uint16", "planar z in mm as an Intel D455 (stereo)", shown_as="depth"),
+    _along_axis("depth_sensor_azure", "Y", "uint16", "planar z in mm as an Azure Kinect (time of flight)", shown_as="depth"),
+    _along_axis("depth_sensor_l515", "Y", "uint16", "planar z in mm as an Intel L515 (lidar camera)", shown_as="depth"),
     # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
     *_flow("forward", "next"),
     *_flow("backward", "previous"),

@@ -74,6 +74,9 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
     "hypersim": {
         "model": "pinhole", "width_px": 1024, "height_px": 768, "fx": 886.8100134752651,
     },
+    # Left infrared cameras of Intel's D435 and D455: 87 and 86 degrees across (data sheet, D400 family).
+    "d435": {"model": "pinhole", "width_px": 848, "height_px": 480, "fx": 447.0},
+    "d455": {"model": "pinhole", "width_px": 848, "height_px": 480, "fx": 455.0},
     # Half of all directions in a circle that touches the picture's edges, equidistant.
     "fisheye180": {
         "model": "fisheye", "width_px": 512, "height_px": 512, "hfov_deg": 180.0,
@@ -86,7 +89,7 @@ LENS_PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
 class LensFields(FieldGroup):
     """The lens of every view: what bends straight lines (docs/lenses.md)."""
 
-    preset: Literal["none", "kinect", "tum_vi", "hypersim", "fisheye180"] = Field(
+    preset: Literal["none", "kinect", "tum_vi", "hypersim", "d435", "d455", "fisheye180"] = Field(
         "none", description="of a known camera; other fields override it"
     )
     model: LensModel = Field("pinhole", description="how directions fall on the picture")

@@ -36,9 +36,9 @@ from pbrs_farm.truth.standard_layers import (
     normal_label,
     semantic_label,
 )
-from pbrs_farm.truth.stereo_sensor import stereo_depth
+from pbrs_farm.truth.stereo_sensor import D455, stereo_depth
 from pbrs_farm.truth.surface_layers import albedo_label, hha_label, nocs_label, shading_normals
-from pbrs_farm.truth.tof_sensor import tof_depth
+from pbrs_farm.truth.tof_sensor import AZURE, L515, tof_depth
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 
@@ -171,6 +171,9 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_tof": lambda s: tof_depth(s.hit, s.camera, seed=s.seed),
     "depth_sensor_stereo": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed),
+    "depth_sensor_d455": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed, sensor=D455),
+    "depth_sensor_azure": lambda s: tof_depth(s.hit, s.camera, seed=s.seed, sensor=AZURE),
+    "depth_sensor_l515": lambda s: tof_depth(s.hit, s.camera, seed=s.seed, sensor=L515),
     # Where the hits lie in other views.
     "flow_forward": lambda s: flow_label(s.to_partners["next"]),
     "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),

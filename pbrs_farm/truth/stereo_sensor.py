@@ -1,11 +1,13 @@
-"""The depth_sensor_stereo layer: depth as a stereo camera with block matching has it; no effects.
+"""The layers depth_sensor_stereo and depth_sensor_d455: depth as stereo cameras with block matching have it.
 
-The numbers are those of an active stereo camera like Intel's D435 (848 pixels over 87 degrees,
-5 cm): disparity has noise, is quantised, near edges belong to the nearer side, and what the
-left camera alone sees has none (data sheet of the D400 family; Keselman et al. 2017).
+No effects. Disparity has noise, is quantised, near edges belong to the nearer side, and what the left
+camera alone sees has none (data sheet of Intel's D400 family; Keselman et al. 2017).
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +16,32 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F64, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
 
-WIDTH_PX = 848  # of its picture
-STEREO_FOCAL_PX = 447.0  # that width over 87 degrees
-STEREO_BASELINE_M = 0.05
 STEREO_DISPARITY_NOISE_PX = 0.08  # standard deviation of sub-pixel matching on a textured wall
 STEREO_STEPS_PER_PX = 32  # quantisation of disparity
 MAX_DISPARITY_PX = 126.0  # of the search: what is nearer has no depth
-STEREO_FARTHEST_M = 10.0
-WINDOW = 5  # px of WIDTH_PX, of a matched block
+WINDOW = 5  # px of the sensor's own picture, of a matched block
 NOISE_GRAIN_PX = 1.5  # neighbouring blocks overlap: their noise is alike
 
 
-def stereo_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16]:
+@dataclass(frozen=True, slots=True)
+class StereoSensor:
+    """An active stereo camera by its data sheet."""
+
+    width_px: int  # of its picture
+    focal_px: float  # of that picture
+    baseline_m: float
+    farthest_m: float
+
+
+D435: Final = StereoSensor(848, 447.0, 0.05, 10.0)
+"""848 pixels over 87 degrees."""
+D455: Final = StereoSensor(848, 455.0, 0.095, 20.0)
+"""848 pixels over 86 degrees, twice the baseline: half the D435's noise at a distance."""
+
+
+def stereo_depth(
+    hit: HitRecord, camera: Camera, *, seed: int, sensor: StereoSensor = D435
+) -> NDArray[np.uint16]:
     """(H, W) uint16 depth_z in mm as the sensor measures it, 0 = no measurement.
 
     Equal seeds give equal noise. Not modelled: walls without texture (the projector gives them
@@ -33,31 +49,26 @@ def stereo_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uin
     """
     # A block takes the nearest of what lies in it: objects grow by half a block.
     rng = np.random.default_rng(seed)
-    size = max(round(WINDOW * hit.face.shape[1] / WIDTH_PX) | 1, 3)
+    size = max(round(WINDOW * hit.face.shape[1] / sensor.width_px) | 1, 3)
     z = np.where(hit.valid, hit.depth_z.astype(np.float64), np.inf)
     fattened = ndimage.minimum_filter(z, size=size, mode="nearest")
-    hidden = _hidden_from_right(fattened, camera)
+    hidden = _hidden_from_right(fattened, camera, sensor.baseline_m)
     # Add noise of the blocks' grain to the disparity, quantise it, and turn it back into depth.
     grain = ndimage.gaussian_filter(rng.normal(0.0, 1.0, z.shape), NOISE_GRAIN_PX, mode="wrap")
     grain /= max(float(grain.std()), 1e-9)
+    scale = sensor.focal_px * sensor.baseline_m
     with np.errstate(divide="ignore"):
-        disparity = (
-            STEREO_FOCAL_PX * STEREO_BASELINE_M / fattened + STEREO_DISPARITY_NOISE_PX * grain
-        )
-        measured = (
-            STEREO_FOCAL_PX
-            * STEREO_BASELINE_M
-            / (np.rint(disparity * STEREO_STEPS_PER_PX) / STEREO_STEPS_PER_PX)
-        )
+        disparity = scale / fattened + STEREO_DISPARITY_NOISE_PX * grain
+        measured = scale / (np.rint(disparity * STEREO_STEPS_PER_PX) / STEREO_STEPS_PER_PX)
     good = np.isfinite(fattened) & ~hidden & (disparity <= MAX_DISPARITY_PX)
-    good &= (measured > 0) & (measured <= STEREO_FARTHEST_M)
+    good &= (measured > 0) & (measured <= sensor.farthest_m)
     return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
 
 
-def _hidden_from_right(z: F64, camera: Camera) -> Mask:
+def _hidden_from_right(z: F64, camera: Camera, baseline_m: float) -> Mask:
     """(H, W) bool: the right camera does not see the point: beyond its picture, or behind another."""
     with np.errstate(divide="ignore"):
-        shift = np.where(np.isfinite(z), camera.intrinsics.fx * STEREO_BASELINE_M / z, 0.0)
+        shift = np.where(np.isfinite(z), camera.intrinsics.fx * baseline_m / z, 0.0)
     there = np.arange(z.shape[1]) - shift
     # A point on a row is hidden where something on its right has moved past it.
     leftmost = np.minimum.accumulate(there[:, ::-1], axis=1)[:, ::-1]

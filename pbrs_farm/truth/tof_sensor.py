@@ -1,6 +1,10 @@
-"""The depth_sensor_tof layer: depth as a time-of-flight camera (Kinect 2) has it; no effects."""
+"""The layers depth_sensor_tof, _azure and _l515: depth as cameras have it that time light; no effects."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +13,48 @@ from scipy import ndimage
 from pbrs_farm.core.arrays import F64, HitRecord
 from pbrs_farm.core.camera import Camera
 
-TOF_NEAREST_M, TOF_FARTHEST_M = 0.5, 4.5  # range in which the sensor answers
-MIX_PX = 0.5  # standard deviation of what a pixel gathers light over
 TOF_MAX_ANGLE_RAD = np.radians(85)  # from the normal; beyond it nothing returns
+_AZURE_STEADY_M: Final = 2.5  # from which an Azure Kinect is less noisy than a Kinect 2
+_EDGE_SHARE: Final = 0.03  # of the depth, that neighbours of a pixel without depth lie apart
 
 
-def tof_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16]:
+def kinect2_noise_mm(z: F64, angle_rad: F64) -> F64:
+    """Standard deviation in mm at depth z (m) and angle from the normal (Fankhauser et al. 2015)."""
+    grazing = angle_rad**2 / (np.pi / 2 - angle_rad) ** 2
+    return np.asarray(np.maximum(1.5 - 0.5 * z + 0.3 * z**2 + 0.1 * z**1.5 * grazing, 0.5))
+
+
+def azure_noise_mm(z: F64, angle_rad: F64) -> F64:
+    """The same of an Azure Kinect: a Kinect 2's to 2.5 m, and no more beyond (Kurillo et al. 2022)."""
+    return kinect2_noise_mm(np.minimum(z, _AZURE_STEADY_M), angle_rad)
+
+
+def l515_noise_mm(z: F64, _angle_rad: F64) -> F64:
+    """The same of an L515: 2.5 mm at 1 m, 15.5 mm at 9 m, a line between (its data sheet)."""
+    return np.asarray(np.maximum(2.5 + (15.5 - 2.5) / (9 - 1) * (z - 1), 0.5))
+
+
+@dataclass(frozen=True, slots=True)
+class TofSensor:
+    """A camera that times light. noise_mm: of depth (m) and angle from the normal (rad)."""
+
+    nearest_m: float  # between which it answers
+    farthest_m: float
+    noise_mm: Callable[[F64, F64], F64]
+    mix_px: float  # standard deviation of what a pixel gathers light over
+    drops_edges: bool = False  # no depth where both sides of an edge reach a pixel; else their mean
+
+
+KINECT2: Final = TofSensor(0.5, 4.5, kinect2_noise_mm, 0.5)
+AZURE: Final = TofSensor(0.5, 3.86, azure_noise_mm, 0.5, drops_edges=True)
+"""An Azure Kinect, narrow field of view, unbinned."""
+L515: Final = TofSensor(0.25, 9.0, l515_noise_mm, 0.3)
+"""A lidar camera: a laser's spot is narrow."""
+
+
+def tof_depth(
+    hit: HitRecord, camera: Camera, *, seed: int, sensor: TofSensor = KINECT2
+) -> NDArray[np.uint16]:
     """(H, W) uint16 depth_z in mm as the sensor measures it, 0 = no measurement.
 
     Equal seeds give equal noise. Not modelled: several paths of light (corners round off), dark and
@@ -25,20 +65,29 @@ def tof_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16
     z = hit.depth_z.astype(np.float64)
     angle = incidence_rad(hit, camera)
     weight = np.where(hit.valid & (angle < TOF_MAX_ANGLE_RAD), np.cos(angle), 0.0)
-    light = ndimage.gaussian_filter(weight, MIX_PX, mode="nearest")
-    mixed = ndimage.gaussian_filter(weight * z, MIX_PX, mode="nearest")
+    light = ndimage.gaussian_filter(weight, sensor.mix_px, mode="nearest")
+    mixed = ndimage.gaussian_filter(weight * z, sensor.mix_px, mode="nearest")
     measured = np.divide(mixed, light, out=np.zeros_like(z), where=light > 1e-3)
     # Add axial noise by the pixel's own distance and angle.
-    noise_m = axial_noise_mm(measured, np.minimum(angle, TOF_MAX_ANGLE_RAD)) / 1000
+    noise_m = sensor.noise_mm(measured, np.minimum(angle, TOF_MAX_ANGLE_RAD)) / 1000
     measured += rng.normal(0.0, 1.0, z.shape) * noise_m
-    good = (weight > 0) & (measured >= TOF_NEAREST_M) & (measured <= TOF_FARTHEST_M)
+    is_edge = _edges(z, hit.valid) if sensor.drops_edges else False
+    good = (
+        ~np.asarray(is_edge)
+        & (weight > 0)
+        & (measured >= sensor.nearest_m)
+        & (measured <= sensor.farthest_m)
+    )
     return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
 
 
-def axial_noise_mm(z: F64, angle_rad: F64) -> F64:
-    """Standard deviation in mm at depth z (m) and angle from the normal."""
-    grazing = angle_rad**2 / (np.pi / 2 - angle_rad) ** 2
-    return np.asarray(np.maximum(1.5 - 0.5 * z + 0.3 * z**2 + 0.1 * z**1.5 * grazing, 0.5))
+def _edges(z: F64, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) where a pixel's neighbours lie apart, or one sees nothing."""
+    high = ndimage.maximum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
+    low = ndimage.minimum_filter(np.where(valid, z, np.inf), 3, mode="nearest")
+    with np.errstate(invalid="ignore"):
+        apart = high - low
+    return np.asarray(~(apart <= _EDGE_SHARE * low))
 
 
 def incidence_rad(hit: HitRecord, camera: Camera) -> F64:

@@ -11,8 +11,8 @@ from pbrs_farm.core.house import House, Material, MaterialKind, ModelPose, geome
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
-from pbrs_farm.truth.stereo_sensor import stereo_depth
-from pbrs_farm.truth.tof_sensor import tof_depth
+from pbrs_farm.truth.stereo_sensor import D435, D455, stereo_depth
+from pbrs_farm.truth.tof_sensor import AZURE, KINECT2, L515, tof_depth
 from tests.truth.hits import camera, hit, house, square
 
 
@@ -324,6 +324,35 @@ def test_a_stereo_cameras_noise_grows_with_the_square_of_distance_and_edges_have
     assert found[:, 210:].all()
     same = [stereo_depth(hit(np.ones((6, 8)), 2.0), camera(), seed=s) for s in (3, 3)]
     assert (same[0] == same[1]).all()
+
+
+def wall_errors(layer, z: float, **fields) -> np.ndarray:
+    """Of a wall z metres before the camera, away from the picture's edges: mm."""
+    found = layer(hit(np.ones((60, 320)), z), camera(320, 60), seed=2, **fields)[5:-5, 60:-5]
+    assert found.all()
+    return found - 1000.0 * z
+
+
+def test_each_sensor_has_the_noise_that_its_sheet_says() -> None:
+    # Twice the baseline, so half the error of depth: it goes with focal length times baseline.
+    d435, d455 = (wall_errors(stereo_depth, 3.0, sensor=s).std() for s in (D435, D455))
+    assert d455 / d435 == pytest.approx(447 * 0.05 / (455 * 0.095), rel=0.1)
+    # A lidar camera: 2.5 mm at 1 m, 9 mm at 5 m, on the line to 15.5 mm at 9 m.
+    for z, sigma in ((1.0, 2.5), (5.0, 9.0)):
+        assert wall_errors(tof_depth, z, sensor=L515).std() == pytest.approx(sigma, rel=0.1)
+    # An Azure Kinect is no worse at 3.5 m than a Kinect 2 at 2.5 m, and reaches less far.
+    azure, kinect2 = (wall_errors(tof_depth, 3.5, sensor=s).std() for s in (AZURE, KINECT2))
+    assert azure == pytest.approx(wall_errors(tof_depth, 2.5).std(), rel=0.1)
+    assert azure < 0.75 * kinect2
+    assert not tof_depth(hit(np.ones((6, 8)), 4.0), camera(), seed=1, sensor=AZURE).any()
+
+
+def test_an_azure_kinect_leaves_edges_out() -> None:
+    depth_z = np.where(np.arange(80) < 40, 1.0, 3.0)[None, :].repeat(60, 0)
+    found = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1, sensor=AZURE)
+    assert not found[:, 39:41].any()
+    assert found[:, :38].all()
+    assert found[:, 42:].all()
 
 
 def test_nocs_is_the_point_in_the_models_box_and_nothing_elsewhere() -> None:
