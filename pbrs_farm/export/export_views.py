@@ -7,17 +7,25 @@ the modules of `forms/`; docs/formats.md describes them.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import LEFT_OUT, ViewForm, form_of, forms_with_classes, new_folder
+from pbrs_farm.export.form import (
+    LEFT_OUT,
+    REMARKS,
+    ViewForm,
+    form_of,
+    forms_with_classes,
+    new_folder,
+)
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, read_regular
@@ -96,14 +104,34 @@ def export_frames(
         modes=None if modes is None else as_words(modes), size=size,
         classes=None if classes is None else class_map(classes),
     )  # fmt: skip
+    with _stored(frames) as (folder, wanted):
+        export(folder, out, name, choice=choice, shares=shares, views=wanted)
+
+
+def questions_of(frames: Views) -> list[dict[str, Any]]:
+    """Rows of questions about frames, as questions.jsonl has them: what `Views.questions` gives.
+
+    Walks are asked about as wholes. Raises BadInput for frames of shards.
+    """
+    from pbrs_farm.export.questions.asking import Asker
+    from pbrs_farm.export.questions.clips import clips_of
+
+    with _stored(frames) as (folder, wanted):
+        found = [v for v in views_of(folder) if (v.house.id, v.id) in wanted]
+        asked = Asker().asked(clips_of([ChosenView(v, Choice()) for v in found]))
+    return [q.row(k) | {"instances": list(q.about)} for k, q in enumerate(asked)]
+
+
+@contextmanager
+def _stored(frames: Views) -> Iterator[tuple[Path, frozenset[tuple[str, str]]]]:
+    """A folder that holds the frames, theirs or one for now, and the names of house and view."""
     wanted = frozenset((ref.house, ref.view) for ref in frames.refs)
     with TemporaryDirectory(prefix="pbrs-export-") as scratch:
-        if (Path(frames.source.url) / keys.FOLDERS[0]).is_dir():
-            folder = Path(frames.source.url)
-        else:
+        folder = Path(frames.source.url)
+        if not (folder / keys.FOLDERS[0]).is_dir():
             frames.save(scratch)
             folder = Path(scratch)
-        export(folder, out, name, choice=choice, shares=shares, views=wanted)
+        yield folder, wanted
 
 
 def _by_split(views: list[ViewEntry], shares: SplitShares | None) -> dict[str, list[ViewEntry]]:
@@ -130,12 +158,16 @@ def _kept(folder: Path, run: str) -> set[tuple[str, str]]:
 
 
 def remarks_of(out: Path) -> list[str]:
-    """What a user should know of an export: its data.yaml's comments, which views are left out.
+    """What a user should know of an export: its data.yaml's comments, its remarks, which views are left out.
 
-    Read from the files of the export, so also of one made earlier. [] where nothing was left out.
+    Read from the files of the export, so also of one made earlier. [] where there is nothing to say.
     """
     files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
     lines = [line for file in files if file.is_file() for line in file.read_text().splitlines()]
-    return [
+    said = [
         line.removeprefix("# ") for line in lines if line.startswith("# ") or ": has no " in line
+    ]
+    remarks = [out / REMARKS, *(out / split / REMARKS for split in SPLITS)]
+    return said + [
+        line for file in remarks if file.is_file() for line in file.read_text().splitlines()
     ]

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pbrs_farm.export.home_pieces import ExportedHome
 
 LEFT_OUT: Final = "left_out.txt"
+REMARKS: Final = "remarks.txt"
+"""A file of an export whose lines its user is told."""
 _GROUP: Final = "exports"  # of plugins
 
 WriteViews: TypeAlias = "Callable[[list[ChosenView], Path, Choice], int]"

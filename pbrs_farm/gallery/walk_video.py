@@ -1,12 +1,11 @@
-"""A sequence of frames as mp4 films: the picture, and its labels beside it; the only user of PyAV.
+"""A sequence of frames as mp4 films: the picture, and its labels beside it; coded by formats/film_mp4.py.
 
 Effects: reads picture files, keeps a film in memory while it is coded.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Final
 
@@ -16,15 +15,13 @@ from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.export.chosen_view import PICTURES
+from pbrs_farm.formats.film_mp4 import film, film_pace
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.gallery import label_colours as colours
-from pbrs_farm.installation import need
 from pbrs_farm.regular_files import read_regular
 
-_QUALITY: Final = "20"  # H.264's constant rate factor: visually clean
 _LABELS: Final = ("depth", "normal", "semantic", "instance", "flow_forward")
-_DEFAULT_FPS: Final = 30.0
 
 
 def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
@@ -45,7 +42,6 @@ def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
 
     Raises BadInput where a frame has no picture, MachineFailed without PyAV.
     """
-    need("av")
     fps = _fps(frames)
     picture = _mode(frames[0])
     depth_m = _depth_range(frames)
@@ -55,37 +51,11 @@ def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
     }
 
 
-def film(pictures: Iterator[Srgb8Image], fps: Fraction) -> bytes:
-    """An mp4 file (H.264, 4:2:0) of pictures (H, W, 3) of one size; an odd row or column is cut off.
-
-    pictures are uint8 sRGB, encoded one by one as they come, so a long film needs little memory;
-    the first decides the size. One thread encodes, so the same pictures give the same bytes with
-    the same libraries. Needs PyAV.
-    """
-    import av
-
-    buffer = io.BytesIO()
-    with av.open(buffer, "w", format="mp4") as container:
-        stream: Any = None
-        for rgb in pictures:
-            height, width = (n // 2 * 2 for n in rgb.shape[:2])
-            if stream is None:
-                stream = container.add_stream("libx264", rate=fps)
-                stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-                # One thread: the same frames give the same file.
-                stream.options = {"crf": _QUALITY, "threads": "1"}
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(rgb[:height, :width]), "rgb24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode() if stream is not None else [])
-    return buffer.getvalue()
-
-
 def _fps(frames: Sequence[ViewEntry]) -> Fraction:
-    """Frames a second by the times of the first and last; a film has one pace."""
-    times = [float(f.facts["time_s"]) for f in (frames[0], frames[-1])]
-    span = int(frames[-1].facts["frame"]) - int(frames[0].facts["frame"])
-    pace = span / (times[1] - times[0]) if times[1] > times[0] else _DEFAULT_FPS
-    return Fraction(pace).limit_denominator(1001)
+    first, last = (
+        (int(f.facts["frame"]), float(f.facts["time_s"])) for f in (frames[0], frames[-1])
+    )
+    return film_pace(first, last)
 
 
 def _mode(frame: ViewEntry) -> str:

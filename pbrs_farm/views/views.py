@@ -354,6 +354,14 @@ class Frame:
         """
         return Views(self.source, (self.ref,), {}).export(out, to, **choice)
 
+    def questions(self) -> list[dict[str, Any]]:
+        """Questions about space with their answers, as Views.questions.
+
+        >>> {"question", "ground_truth", "options"} <= set(frame.questions()[0])
+        True
+        """
+        return Views(self.source, (self.ref,), {}).questions()
+
     def __repr__(self) -> str:
         width, height = self.size
         return f"<Frame {self.id} {width}x{height}: {', '.join(self.layers)}>"
@@ -442,6 +450,20 @@ class Views(Sequence[Frame]):
             shares=shares,
         )  # fmt: skip
         return Path(out)
+
+    def questions(self) -> list[dict[str, Any]]:
+        """Questions about space: a dict with question_type, question, ground_truth, options, instances.
+
+        The kinds and columns are those of VSI-Bench (docs/formats.md, form `questions`). Frames of a walk
+        are asked about as one film, every other frame by itself; of one that shows too little there
+        are none. Raises BadInput for frames of shards.
+
+            >>> [row["question_type"] for row in views.questions()][:1]
+            ['object_abs_distance']
+        """
+        from pbrs_farm.export.export_views import questions_of
+
+        return questions_of(self)
 
     def __repr__(self) -> str:
         return f"<{len(self)} frames of {len(self.homes)} homes in {self.source.url}>"

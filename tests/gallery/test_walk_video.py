@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.film_mp4 import film
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
-from pbrs_farm.gallery.walk_video import film, films_of, sequences_of
+from pbrs_farm.gallery.walk_video import films_of, sequences_of
 from pbrs_farm.images import png_from_array
 
 

@@ -31,12 +31,12 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
     annotations: list[dict[str, Any]] = []
     for number, view in enumerate(views, start=1):
         images.append(_image(view, number, out))
-        for annotation in _annotations(view):
+        for annotation in annotations_of(view):
             annotations.append({"id": len(annotations) + 1, "image_id": number, **annotation})
     document: dict[str, Any] = {
         "info": {"description": "pbrs_farm", "version": "1.0"},
         "licenses": _licences(views),
-        "categories": _categories(choice),
+        "categories": categories_of(choice),
         "images": images,
         "annotations": annotations,
     }
@@ -45,7 +45,8 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
     return 1 + n_pictures + _write_panoptic(views, images, document["categories"], out)
 
 
-def _categories(choice: Choice) -> list[dict[str, Any]]:
+def categories_of(choice: Choice) -> list[dict[str, Any]]:
+    """COCO's categories: NYU40's classes, or the user's."""
     return [
         {"id": k, "name": n, "supercategory": "structure" if choice.is_structure(k) else "object"}
         for k, n in choice.class_names.items()
@@ -75,7 +76,8 @@ def _image(view: ChosenView, number: int, out: Path) -> dict[str, Any]:
     return image
 
 
-def _annotations(view: ChosenView) -> Iterator[dict[str, Any]]:
+def annotations_of(view: ChosenView) -> Iterator[dict[str, Any]]:
+    """COCO's annotations of a view, without id and image_id: one for each instance with a class."""
     instance = view.array("instance")
     for row in view.facts["instances"]:
         if not view.class_of(row):

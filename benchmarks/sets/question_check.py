@@ -1,0 +1,222 @@
+"""Recomputes the answers of an export of questions from the stored files; imports nothing of pbrs_farm.
+
+`python -m benchmarks.sets.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
+ROOT: the output folder that was exported. Distances come from points on house.glb's meshes, read with
+trimesh; everything else from view.json, house.json and the words of the question.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+
+_SPACING_M: Final = 0.008  # of points on a mesh
+_ROUNDING_M: Final = 0.05  # of an answer in metres with one decimal
+_SLACK_M: Final = 0.006  # of a distance between points of that spacing
+_NOTICED: Final = 1e-4  # share of a picture's pixels
+_CONE_DEG: Final = 10.0  # of a direction, at least so far from the border to another
+
+
+class _Scene:
+    """The files of one question: its frames' view.json, its house."""
+
+    def __init__(self, root: Path, name: str) -> None:
+        house, _, view = name.partition("__")
+        self.folder = root / "houses" / house
+        names = [view] if view else sorted(p.name for p in (self.folder / "views").iterdir())
+        tables = [json.loads((self.folder / "views" / n / "view.json").read_text()) for n in names]
+        if not view:
+            tables = sorted(
+                (t for t in tables if "frame" in t and "left" not in t), key=lambda t: t["frame"]
+            )
+        self.views = tables
+        self.house = json.loads((self.folder / "house.json").read_text())
+        self.rows: dict[int, dict[str, Any]] = {}
+        for table in tables:
+            for row in table["instances"]:
+                best = self.rows.setdefault(row["id"], row)
+                if row["fraction"] > best["fraction"]:
+                    self.rows[row["id"]] = row
+
+    @cached_property
+    def meshes(self) -> trimesh.Scene:
+        return trimesh.load(self.folder / "house.glb", force="scene")
+
+    @lru_cache(maxsize=256)  # noqa: B019  a scene lives as long as its questions
+    def points(self, instance: int) -> Array:
+        """Points on the surface of a thing, none farther than _SPACING_M from the next."""
+        node = self.rows[instance]["item"]
+        parts = []
+        for name in self.meshes.graph.nodes_geometry:
+            transform, geometry = self.meshes.graph[name]
+            chain = self.meshes.graph.transforms.parents
+            if name == node or chain.get(name) == node:
+                mesh = self.meshes.geometry[geometry].copy().apply_transform(transform)
+                points, _faces = trimesh.remesh.subdivide_to_size(
+                    mesh.vertices, mesh.faces, 2 * _SPACING_M, max_iter=20
+                )
+                parts.append(points)
+        return np.concatenate(parts)
+
+    def middle(self, instance: int) -> Array:
+        """(x, z) of the middle of its box."""
+        return np.array(self.rows[instance]["box3d"]["centre"])[[0, 2]]
+
+    def namesakes(self, instance: int) -> list[int]:
+        """Instances that may be noticed and that a question would call by the same word."""
+        row = self.rows[instance]
+        outside = {i["id"] for i in self.house["items"] if "outside" in i.get("tags", ())}
+        return [
+            k for k, other in self.rows.items()
+            if _word(other) == _word(row) and other["fraction"] >= _NOTICED and other["item"] not in outside
+        ]  # fmt: skip
+
+
+def _word(row: dict[str, Any]) -> str:
+    name = str(row["class"])
+    return re.sub(r"[\d ]+$", "", str(row["name"])).lower() if name.startswith("other") else name
+
+
+def wrong_answers(root: Path, export: Path) -> list[str]:
+    """A line for each question of EXPORT/questions.jsonl whose answer the files of ROOT deny."""
+    scenes: dict[str, _Scene] = {}
+    wrong = []
+    for line in (export / "questions.jsonl").read_text("utf-8").splitlines():
+        row = json.loads(line)
+        name = row["scene_name"]
+        if name not in scenes:
+            scenes.clear()
+            scenes[name] = _Scene(root, name)
+        fault = _fault(scenes[name], row)
+        if fault:
+            wrong.append(f"{row['id']} {row['question_type']}: {fault}: {row['question']}")
+    return wrong
+
+
+def _fault(scene: _Scene, row: dict[str, Any]) -> str:
+    kind, about = row["question_type"], row["instances"]
+    truth = row["ground_truth"]
+    if row["options"]:
+        truth = next(o for o in row["options"] if o.startswith(f"{truth}. "))[3:]
+    if kind != "object_counting" and any(len(scene.namesakes(k)) != 1 for k in about):
+        return "a word fits more than one thing"
+    if kind == "object_counting":
+        found = scene.namesakes(about[0])
+        return "" if len(found) == int(truth) == len(about) else f"there are {len(found)}"
+    if kind == "object_abs_distance":
+        gap = _gap_m(scene, *about)
+        return "" if abs(gap - float(truth)) <= _ROUNDING_M + _SLACK_M else f"it is {gap:.3f} m"
+    if kind == "object_size_estimation":
+        longest = 200 * max(scene.rows[about[0]]["box3d"]["half"])
+        return "" if abs(longest - float(truth)) <= 0.501 else f"it is {longest:.1f} cm"
+    if kind == "room_size_estimation":
+        area = _area_entered_m2(scene)
+        return "" if abs(area - float(truth)) <= 0.0501 else f"it is {area:.2f} m2"
+    if kind == "object_rel_distance":
+        gaps = {_gap_m(scene, about[0], k): k for k in about[1:]}
+        nearest = gaps[min(gaps)]
+        return "" if _fits(scene.rows[nearest], truth) else f"instance {nearest} is nearer"
+    if kind.startswith("object_rel_direction"):
+        angle = _angle_deg(*(scene.middle(k) for k in about))
+        return "" if _is_there(kind, angle, truth) else f"it is at {angle:.0f} degrees"
+    if kind == "obj_appearance_order":
+        order = sorted(about, key=lambda k: _first_frame(scene, k))
+        words = truth.split(", ")
+        fits = all(_fits(scene.rows[k], word) for k, word in zip(order, words, strict=True))
+        return "" if fits else f"the order is {order}"
+    if kind == "route_planning":
+        return _fault_of_route(scene, about, truth.split(", "))
+    return "no such kind"
+
+
+def _fits(row: dict[str, Any], word: str) -> bool:
+    """The word is the class's, or holds it ("row of books"), or is the thing's own or its kind's."""
+    known = {"night stand": "nightstand", "floor mat": "rug", "shelves": "shelves"}
+    own = known.get(row["class"], row["class"])
+    return own in word or word in own or word == _word(row) or word == row["kind"]
+
+
+def _gap_m(scene: _Scene, a: int, b: int) -> float:
+    return float(cKDTree(scene.points(b)).query(scene.points(a))[0].min())
+
+
+def _angle_deg(stand: Array, face: Array, to: Array) -> float:
+    """Clockwise seen from above (y up): right is positive. Plan angles of x and z, subtracted."""
+    ahead, there = face - stand, to - stand
+    turn = np.arctan2(there[1], there[0]) - np.arctan2(ahead[1], ahead[0])
+    return float(np.degrees((turn + np.pi) % (2 * np.pi) - np.pi))
+
+
+def _is_there(kind: str, angle: float, word: str) -> bool:
+    left_right = angle > 0 if "right" in word else angle < 0
+    if kind.endswith("easy"):
+        return left_right and _CONE_DEG <= abs(angle) <= 180 - _CONE_DEG
+    if kind.endswith("medium"):
+        return abs(angle) > 135 if word == "back" else left_right and abs(angle) < 135
+    return left_right and (abs(angle) < 90 if word.startswith("front") else abs(angle) > 90)
+
+
+def _first_frame(scene: _Scene, instance: int) -> int:
+    for k, table in enumerate(scene.views):
+        for row in table["instances"]:
+            if row["id"] == instance and row["fraction"] >= _NOTICED:
+                return k
+    return len(scene.views)
+
+
+def _area_entered_m2(scene: _Scene) -> float:
+    eyes = [np.array(t["world_from_camera_opencv"])[:3, 3] for t in scene.views]
+    total = 0.0
+    for room in scene.house["rooms"]:
+        ring = np.array(room["polygon"])
+        if any(
+            room["floor_y"] <= e[1] <= room["ceiling_y"] and _is_inside(ring, e[[0, 2]])
+            for e in eyes
+        ):
+            x, z = ring.T
+            total += abs(float(np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))) / 2
+    return total
+
+
+def _is_inside(ring: Array, place: Array) -> bool:
+    """By crossings of a ray along x."""
+    a, b = ring, np.roll(ring, -1, axis=0)
+    crosses = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = a[:, 0] + (place[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((crosses & (at > place[0])).sum() % 2)
+
+
+def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
+    places = [scene.middle(k) for k in stops]
+    for k, turn in enumerate(turns):
+        before, at, after = places[k : k + 3]
+        angle = _angle_deg(at, at + (at - before), after)
+        right = {"turn right": 55 < angle < 125, "turn left": -125 < angle < -55}.get(
+            turn, abs(angle) > 145
+        )
+        if not right:
+            return f"the turn at stop {k + 2} is {angle:.0f} degrees"
+    return ""
+
+
+def main(words: list[str]) -> int:
+    """Print what is wrong; 1 if something is."""
+    wrong = wrong_answers(Path(words[0]), Path(words[1]))
+    print("\n".join(wrong) or "all answers are right")
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

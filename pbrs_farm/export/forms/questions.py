@@ -1,0 +1,181 @@
+"""Questions about space with their answers, of pictures and walks, and referring expressions.
+
+    questions.parquet questions.jsonl conversations.jsonl refs.json instances.json blind_scores.csv
+    pbrs_farm/<scene_name>.png|mp4
+
+Effects: reads views and their houses, writes files.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.form import REMARKS, ViewForm, name_left_out
+from pbrs_farm.export.forms.coco import annotations_of, categories_of
+from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
+from pbrs_farm.export.questions.clips import Clip, clips_of
+from pbrs_farm.export.questions.references import Reference, references_of
+from pbrs_farm.export.sequences import required_picture
+from pbrs_farm.formats.film_mp4 import film, film_pace
+from pbrs_farm.formats.layer_file import layer_from_bytes
+
+_SCHEMA: Final = pa.schema([
+    ("id", pa.int64()), ("dataset", pa.string()), ("scene_name", pa.string()),
+    ("question_type", pa.string()), ("question", pa.string()), ("ground_truth", pa.string()),
+    ("options", pa.list_(pa.string())),
+])  # fmt: skip
+
+
+def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> int:
+    """Write questions, answers and references of views, and the pictures and films they are about.
+
+    A walk is one film and its questions are about all of it; every other view is a picture. Views
+    without a picture, and models without a home, are left out. Returns the number of files; BadInput
+    where a house is damaged, MachineFailed for walks without PyAV.
+    """
+    shown = [view for view in views if view.picture is not None]
+    asker, questions, media = Asker(), [], {}
+    pictures: list[tuple[Clip, list[Reference]]] = []
+    (out / DATASET).mkdir()
+    for clip in clips_of(shown):
+        media[clip.name] = _write_medium(clip, out)
+        questions += asker.asked([clip])
+        if not clip.is_walk:
+            pictures.append((clip, references_of(clip)))
+    _write_rows(questions, media, out)
+    _write_references(pictures, media, choice, out)
+    remarks = _write_blind_scores(questions, out)
+    (out / REMARKS).write_text("".join(f"{line}\n" for line in remarks), "utf-8")
+    hidden = [view for view in views if view.picture is None]
+    return 7 + len(media) + name_left_out(out, hidden, "has no picture")
+
+
+def _write_medium(clip: Clip, out: Path) -> str:
+    """The clip's picture or film, at the place where readers of VSI-Bench look: <dataset>/<scene_name>."""
+    mode = required_picture(clip.views[0], "questions")
+    if not clip.is_walk:
+        name = f"{DATASET}/{clip.name}.png"
+        (out / name).write_bytes(clip.views[0].data(mode))
+        return name
+    name = f"{DATASET}/{clip.name}.mp4"
+    ends = [
+        (int(v.facts["frame"]), float(v.facts["time_s"])) for v in (clip.views[0], clip.views[-1])
+    ]
+    frames = (
+        np.asarray(layer_from_bytes(mode, view.data(mode), view.id)[..., :3], np.uint8)
+        for view in clip.views
+    )
+    (out / name).write_bytes(film(frames, film_pace(*ends)))
+    return name
+
+
+def _write_rows(questions: Sequence[Question], media: dict[str, str], out: Path) -> None:
+    rows = [question.row(k) for k, question in enumerate(questions)]
+    pq.write_table(pa.Table.from_pylist(rows, _SCHEMA), out / "questions.parquet")
+    _write_lines(
+        (
+            row | {"media": media[q.clip], "instances": list(q.about)}
+            for row, q in zip(rows, questions, strict=True)
+        ),
+        out / "questions.jsonl",
+    )
+    _write_lines(
+        (_conversation(k, q, media[q.clip]) for k, q in enumerate(questions)),
+        out / "conversations.jsonl",
+    )
+
+
+def _conversation(number: int, question: Question, medium: str) -> dict[str, Any]:
+    """A record as LLaVA and SIMS-V train on: what a person says, what the model should say."""
+    text, answer = question.text, question.ground_truth
+    if question.options:
+        text = "\n".join([text, *question.options])
+        answer = f"{question.ground_truth}. {question.answer}"
+    what = "video" if medium.endswith(".mp4") else "image"
+    return {
+        "id": f"{DATASET}__{number}", "type": "mc" if question.options else "oe",
+        "data_source": DATASET, what: medium,
+        "conversations": [
+            {"from": "human", "value": f"<{what}>\n{text}", "task": question.kind},
+            {"from": "gpt", "value": answer},
+        ],
+    }  # fmt: skip
+
+
+def _write_references(
+    pictures: Sequence[tuple[Clip, list[Reference]]],
+    media: dict[str, str],
+    choice: Choice,
+    out: Path,
+) -> None:
+    """refs.json and instances.json, as RefCOCO's refs and COCO's instances."""
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
+    refs: list[dict[str, Any]] = []
+    n_sentences = 0
+    for number, (clip, references) in enumerate(pictures, start=1):
+        facts = clip.views[0].facts
+        size = {"width": facts["width_px"], "height": facts["height_px"]}
+        images.append({"id": number, "file_name": media[clip.name], **size})
+        by_instance: dict[int, list[str]] = {}
+        for reference in references:
+            by_instance.setdefault(reference.instance, []).append(reference.phrase)
+        for row in annotations_of(clip.views[0]):
+            row = {"id": len(annotations) + 1, "image_id": number, **row}
+            annotations.append(row)
+            phrases = by_instance.get(row["instance_id"], [])
+            if not phrases:
+                continue
+            sentences = [
+                {
+                    "sent_id": n_sentences + k,
+                    "sent": phrase,
+                    "raw": phrase,
+                    "tokens": phrase.split(),
+                }
+                for k, phrase in enumerate(phrases)
+            ]
+            n_sentences += len(phrases)
+            refs.append({
+                "ref_id": len(refs), "ann_id": row["id"], "image_id": number,
+                "category_id": row["category_id"], "file_name": media[clip.name],
+                "sent_ids": [s["sent_id"] for s in sentences], "sentences": sentences,
+            })  # fmt: skip
+    document = {"images": images, "annotations": annotations, "categories": categories_of(choice)}
+    (out / "instances.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
+    (out / "refs.json").write_text(json.dumps(refs, ensure_ascii=False) + "\n", "utf-8")
+
+
+def _write_blind_scores(questions: Sequence[Question], out: Path) -> list[str]:
+    scores = blind_scores(questions)
+    with (out / "blind_scores.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["question_type", "questions", "blind_score"])
+        writer.writerows([kind, n, f"{score:.3f}"] for kind, (n, score) in scores.items())
+    return [
+        f"{kind}: {n} questions, {score:.2f} for the best answer given blindly"
+        for kind, (n, score) in scores.items()
+    ]
+
+
+def _write_lines(rows: Iterable[dict[str, Any]], file: Path) -> None:
+    file.write_text("".join(f"{json.dumps(row, ensure_ascii=False)}\n" for row in rows), "utf-8")
+
+
+FORM = ViewForm(
+    "questions",
+    write_questions,
+    "`questions.parquet` and `questions.jsonl` (columns and kinds of VSI-Bench), `conversations.jsonl`"
+    " (a record a question, as LLaVA and SIMS-V train on), `refs.json` and `instances.json` (phrases"
+    " that fit one thing, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
+    has_classes=True,
+)

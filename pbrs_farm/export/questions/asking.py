@@ -1,0 +1,140 @@
+"""Questions of clips, balanced so that a guesser who sees nothing gains little, and that guesser's score; no effects."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.export.questions.clips import Clip
+from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind
+
+DATASET: Final = "pbrs_farm"
+_OF_A_PICTURE: Final = 2  # questions of a kind
+_OF_A_WALK: Final = 8
+_LETTERS: Final = "ABCD"
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A question with its answer, as a row of VSI-Bench, and the instances that it is about."""
+
+    clip: str
+    kind: str
+    text: str
+    ground_truth: str  # a number, or the letter of an option
+    options: tuple[str, ...]  # "A. left", ...; () where the answer is a number
+    about: tuple[int, ...]
+
+    @property
+    def answer(self) -> str:
+        """The answer in words: the option without its letter, or the number."""
+        if not self.options:
+            return self.ground_truth
+        return self.options[_LETTERS.index(self.ground_truth)].partition(". ")[2]
+
+    def row(self, number: int) -> dict[str, Any]:
+        """The columns of VSI-Bench."""
+        return {
+            "id": number, "dataset": DATASET, "scene_name": self.clip, "question_type": self.kind,
+            "question": self.text, "ground_truth": self.ground_truth,
+            "options": list(self.options) or None,
+        }  # fmt: skip
+
+
+class Asker:
+    """Asks clip after clip, and keeps count of the answers so that none becomes the usual one.
+
+    >>> from pbrs_farm.export.questions.asking import Asker
+    >>> Asker().asked([])
+    []
+    """
+
+    def __init__(self) -> None:
+        self._answers: dict[str, Counter[str]] = defaultdict(Counter)
+        self._letters: dict[str, Counter[str]] = defaultdict(Counter)
+
+    def asked(self, clips: Iterable[Clip]) -> list[Question]:
+        """The questions of clips, in their order; the same clips give the same questions."""
+        return [question for clip in clips for question in self._of_clip(clip)]
+
+    def _of_clip(self, clip: Clip) -> list[Question]:
+        found = []
+        for kind in KINDS:
+            if kind.of_walks_only and not clip.is_walk:
+                continue
+            rng = random.Random(keys.seed(clip.name, kind.name))
+            drafts = list(kind.drafts(clip, rng))
+            for _ in range(min(len(drafts), _OF_A_WALK if clip.is_walk else _OF_A_PICTURE)):
+                draft = self._rarest(kind, drafts)
+                drafts = [d for d in drafts if set(d.about) != set(draft.about)]
+                found.append(self._worded(clip, kind, draft, rng))
+                if not drafts:
+                    break
+        return found
+
+    def _rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft:
+        """The first draft whose answer has been given least often; then it is counted."""
+        count = self._answers[kind.name]
+        draft = min(drafts, key=lambda d: count[d.answer])
+        count[draft.answer] += 1
+        return draft
+
+    def _worded(
+        self, clip: Clip, kind: QuestionKind, draft: Draft, rng: random.Random
+    ) -> Question:  # fmt: skip
+        here = "in the video" if clip.is_walk else "in the image"
+        style = rng.choice(kind.styles)
+        truth, options = draft.answer, list(draft.options)
+        if options:
+            # Put the answer at the letter that was right least often, the others in a drawn order.
+            wrong = [o for o in options if o != draft.answer]
+            rng.shuffle(wrong)
+            count = self._letters[kind.name]
+            truth = min(_LETTERS[: len(options)], key=lambda letter: count[letter])
+            count[truth] += 1
+            wrong.insert(_LETTERS.index(truth), draft.answer)
+            options = wrong
+        text = style.format(**draft.words, here=here, choices=", ".join(options))
+        lettered = tuple(f"{_LETTERS[k]}. {o}" for k, o in enumerate(options))
+        return Question(clip.name, kind.name, text, truth, lettered, draft.about)
+
+
+def mean_relative_accuracy(guess: float, truth: float) -> float:
+    """The share of thresholds t in .5, .55 ... .95 with |guess - truth| / truth < 1 - t (VSI-Bench).
+
+    >>> mean_relative_accuracy(1.0, 1.0), mean_relative_accuracy(3.0, 1.0)
+    (1.0, 0.0)
+    """
+    off = abs(guess - truth) / truth
+    return float(np.mean([off < 1 - t for t in np.arange(0.5, 0.951, 0.05)]))
+
+
+def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float]]:
+    """Kind -> how many questions, and the score of the best answer that is the same for all of them.
+
+    Of choices, the larger of the most frequent letter's share and the most frequent answer's share; of
+    numbers, the best constant's mean relative accuracy.
+    """
+    by_kind: dict[str, list[Question]] = defaultdict(list)
+    for question in questions:
+        by_kind[question.kind].append(question)
+    scores = {}
+    for kind in (k.name for k in KINDS if k.name in by_kind):
+        own = by_kind[kind]
+        if own[0].options:
+            counts = Counter(q.ground_truth for q in own), Counter(q.answer for q in own)
+            best = max(count.most_common(1)[0][1] for count in counts) / len(own)
+        else:
+            truths = [float(q.ground_truth) for q in own]
+            best = max(
+                float(np.mean([mean_relative_accuracy(guess, t) for t in truths]))
+                for guess in sorted(set(truths))
+            )
+        scores[kind] = len(own), best
+    return scores

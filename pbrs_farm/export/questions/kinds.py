@@ -1,0 +1,312 @@
+"""The kinds of questions about space: what each asks, how it is worded, and its answers; no effects.
+
+The kinds and their names are those of VSI-Bench (Yang et al. 2025, "Thinking in Space"). A kind's
+`drafts` gives what can be asked of a clip without doubt: things with one name, seen well, with answers
+that are no matter of a hand's breadth.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, permutations
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.export.nouns import plural
+from pbrs_farm.export.questions.clips import WHOLE, Clip, Thing
+
+_MOST_TRIED: Final = 60  # combinations of things that are looked at, of a clip and kind
+_MOST_WAYS: Final = 600  # that are looked at, since few are free
+_LEAST_GAP_M: Final = 0.3  # of a distance that is asked for
+_CLEARLY: Final = 1.25  # the second nearest is so much farther than the nearest ...
+_CLEARLY_M: Final = 0.25  # ... and by so many metres
+_STEP_APART_M: Final = 0.7  # between the middles of things that a direction is asked of
+_MARGIN_DEG: Final = 15.0  # that a direction keeps from the border to the next one
+_LATER_FRAMES: Final = 5  # a thing that comes later is not even noticed so many frames before
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A question that may be asked: the words of its template, its answer, and what it is about."""
+
+    words: dict[str, str]
+    answer: str  # a number, or one of options
+    options: tuple[str, ...]  # () where the answer is a number
+    about: tuple[int, ...]  # instances, in the order of the words
+
+
+@dataclass(frozen=True, slots=True)
+class QuestionKind:
+    """name: of VSI-Bench. styles: templates with the fields of Draft.words and {here}."""
+
+    name: str
+    drafts: Callable[[Clip, random.Random], Iterator[Draft]]
+    styles: tuple[str, ...]
+    of_walks_only: bool = False
+
+
+def _tried(
+    rng: random.Random, things: Sequence[Thing], n: int, most: int = _MOST_TRIED
+) -> Iterator[tuple[Thing, ...]]:
+    """Ordered choices of n things, each at most once, in a drawn order."""
+    seen: set[tuple[int, ...]] = set()
+    if len(things) < n:
+        return
+    if n <= 2:
+        every = list(permutations(range(len(things)), n))
+        rng.shuffle(every)
+        for chosen in every[:most]:
+            yield tuple(things[k] for k in chosen)
+        return
+    for _ in range(most):
+        chosen = tuple(rng.sample(range(len(things)), n))
+        if chosen not in seen:
+            seen.add(chosen)
+            yield tuple(things[k] for k in chosen)
+
+
+def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
+    """How many there are of a noun, from two on."""
+    for noun, own in clip.by_noun.items():
+        if len(own) > 1:
+            yield Draft({"many": plural(noun)}, str(len(own)), (), tuple(t.instance for t in own))
+
+
+def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
+    """Metres between the nearest places of two things."""
+    for a, b in _tried(rng, clip.single, 2):
+        gap = clip.gap_m(a, b)
+        if gap >= _LEAST_GAP_M:
+            words = {"a": a.noun, "b": b.noun}
+            yield Draft(words, f"{gap:.1f}", (), (a.instance, b.instance))
+
+
+def _sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
+    """Centimetres of the longest side of a thing that is seen nearly whole."""
+    for thing in clip.single:
+        if thing.most_visible >= WHOLE and thing.longest_m >= 0.1:
+            yield Draft({"a": thing.noun}, f"{100 * thing.longest_m:.0f}", (), (thing.instance,))
+
+
+def _room_sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
+    """Square metres of floor of the rooms that the camera enters."""
+    area = sum(float(shapely.Polygon(room.polygon).area) for room in clip.rooms_entered)
+    if area > 0:
+        yield Draft({}, f"{area:.1f}", (), ())
+
+
+def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
+    """Which of four things is nearest to a fifth."""
+    for target, *others in _tried(rng, clip.single, 5):
+        gaps = sorted((clip.gap_m(target, other), other.noun) for other in others)
+        nearest, second = gaps[0][0], gaps[1][0]
+        if second >= max(_CLEARLY * nearest, nearest + _CLEARLY_M):
+            yield Draft(
+                {"a": target.noun}, gaps[0][1], tuple(other.noun for other in others),
+                (target.instance, *(other.instance for other in others)),
+            )  # fmt: skip
+
+
+def bearing_deg(stand: F64, face: F64, to: F64) -> float:
+    """Degrees, in plan, from the way that one faces to a place: 0 ahead, 90 right, -90 left.
+
+    stand, face, to: (2,) x and z in metres; world y is up and right-handed.
+    """
+    ahead, there = face - stand, to - stand
+    right = np.array([-ahead[1], ahead[0]])
+    return float(np.degrees(np.arctan2(there @ right, there @ ahead)))
+
+
+def _side(bearing: float) -> str:
+    return "right" if bearing > 0 else "left"
+
+
+def _left_or_right(bearing: float) -> str:
+    """ "" where it is too near to straight ahead or straight back."""
+    return _side(bearing) if _MARGIN_DEG <= abs(bearing) <= 180 - _MARGIN_DEG else ""
+
+
+def _left_right_or_back(bearing: float) -> str:
+    if abs(bearing) >= 135 + _MARGIN_DEG:
+        return "back"
+    return _side(bearing) if _MARGIN_DEG <= abs(bearing) <= 135 - _MARGIN_DEG else ""
+
+
+def _quadrant(bearing: float) -> str:
+    if abs(abs(bearing) - 90) < _MARGIN_DEG or not _left_or_right(bearing):
+        return ""
+    return f"{'front' if abs(bearing) < 90 else 'back'}-{_side(bearing)}"
+
+
+def _directions(
+    answer_of: Callable[[float], str], options: tuple[str, ...]
+) -> Callable[[Clip, random.Random], Iterator[Draft]]:
+    """Where a third thing is for one who stands by a first and faces a second."""
+
+    def drafts(clip: Clip, rng: random.Random) -> Iterator[Draft]:
+        for a, b, c in _tried(rng, clip.single, 3):
+            apart = [
+                float(np.linalg.norm(x.middle - y.middle)) for x, y in ((a, b), (a, c), (b, c))
+            ]
+            is_crowded = a.plan.intersects(b.plan) or a.plan.intersects(c.plan)
+            if min(apart) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
+                continue
+            answer = answer_of(bearing_deg(a.middle, b.middle, c.middle))
+            if answer:
+                words = {"a": a.noun, "b": b.noun, "c": c.noun}
+                yield Draft(words, answer, options, (a.instance, b.instance, c.instance))
+
+    return drafts
+
+
+def _turn(before: Thing, at: Thing, after: Thing) -> str:
+    """The turn at a thing on the way from one to the next; "" where no word fits."""
+    way = at.middle - before.middle
+    bearing = bearing_deg(at.middle, at.middle + way, after.middle)
+    if abs(bearing) >= 180 - 2 * _MARGIN_DEG:
+        return "turn back"
+    fits = abs(abs(bearing) - 90) <= 2 * _MARGIN_DEG
+    return f"turn {_side(bearing)}" if fits else ""
+
+
+def _routes(clip: Clip, rng: random.Random) -> Iterator[Draft]:
+    """The turns of a way over one or two things to a last one."""
+    turns = ("turn left", "turn right", "turn back")
+    places = [thing for thing in clip.single if clip.stands_on_floor(thing)]
+    for n in (3, 4):
+        for stops in _tried(rng, places, n, _MOST_WAYS):
+            taken = [_turn(*stops[k : k + 3]) for k in range(n - 2)]
+            if not all(taken) or not all(
+                clip.is_way_free(stops[k], stops[k + 1]) for k in range(n - 1)
+            ):  # fmt: skip
+                continue
+            answer = ", ".join(taken)
+            options = list(turns) if n == 3 else _four_of(rng, answer, turns)
+            steps = [f"1. Go forward until the {stops[1].noun}."]
+            for k, stop in enumerate(stops[2:]):
+                steps.append(f"{2 * k + 2}. [please fill in]")
+                steps.append(f"{2 * k + 3}. Go forward until the {stop.noun}.")
+            words = {
+                "a": stops[0].noun, "b": stops[1].noun, "c": stops[-1].noun, "steps": " ".join(steps),
+            }  # fmt: skip
+            yield Draft(words, answer, tuple(options), tuple(t.instance for t in stops))
+
+
+def _four_of(rng: random.Random, answer: str, turns: tuple[str, ...]) -> list[str]:
+    """The answer and three other pairs of turns."""
+    wrong = [f"{a}, {b}" for a in turns for b in turns if f"{a}, {b}" != answer]
+    return [answer, *rng.sample(wrong, 3)]
+
+
+def _orders(clip: Clip, rng: random.Random) -> Iterator[Draft]:
+    """In which order four things come into view first."""
+    for chosen in _tried(rng, clip.single, 4):
+        by_time = sorted(chosen, key=lambda t: t.first_seen or 0)
+        if any(
+            later.first_glimpsed < (earlier.first_seen or 0) + _LATER_FRAMES
+            for earlier, later in pairwise(by_time)
+        ):
+            continue
+        right = ", ".join(t.noun for t in by_time)
+        wrong = [
+            ", ".join(t.noun for t in order) for order in permutations(by_time)
+            if list(order) != by_time
+        ]  # fmt: skip
+        options = (right, *rng.sample(wrong, 3))
+        words = {"things": ", ".join(t.noun for t in chosen)}
+        yield Draft(words, right, options, tuple(t.instance for t in chosen))
+
+
+KINDS: Final = (
+    QuestionKind(
+        "object_counting", _counts,
+        (
+            "How many {many} are there {here}?",
+            "Count the {many} {here}. Answer with a number.",
+            "What is the number of {many} {here}?",
+        ),
+    ),
+    QuestionKind(
+        "object_abs_distance", _distances,
+        (
+            "How far apart are the {a} and the {b}, between their nearest points? Answer in metres, to one"
+            " decimal.",
+            "What is the distance in metres (to one decimal) from the {a} to the {b}, measured where they"
+            " are closest?",
+            "Measure from the closest point of each: how many metres lie between the {a} and the {b}?"
+            " Give one decimal.",
+        ),
+    ),
+    QuestionKind(
+        "object_size_estimation", _sizes,
+        (
+            "How long is the longest side of the {a} (length, width or height), in centimetres?",
+            "What does the {a} measure along its longest dimension? Answer in centimetres.",
+            "Take the largest of length, width and height of the {a}: how many centimetres is it?",
+        ),
+    ),
+    QuestionKind(
+        "room_size_estimation", _room_sizes,
+        (
+            "What floor area do the rooms that the camera enters have together, in square metres?",
+            "How many square metres of floor are in the rooms that the camera walks through, all taken"
+            " together?",
+        ),
+        of_walks_only=True,
+    ),
+    QuestionKind(
+        "object_rel_distance", _nearest,
+        (
+            "Measured from the closest point of each, which of these is nearest to the {a}: {choices}?",
+            "Which of these things stands closest to the {a}: {choices}?",
+            "Of {choices}, which has the smallest gap to the {a}?",
+        ),
+    ),
+    QuestionKind(
+        "object_rel_direction_easy", _directions(_left_or_right, ("left", "right")),
+        (
+            "I stand by the {a} and face the {b}. Is the {c} to my left or to my right?",
+            "Standing next to the {a} and looking at the {b}, on which side is the {c}: left or right?",
+        ),
+    ),
+    QuestionKind(
+        "object_rel_direction_medium", _directions(_left_right_or_back, ("left", "right", "back")),
+        (
+            "I stand by the {a} and face the {b}. Is the {c} to my left, to my right, or behind me? Behind"
+            " me means that I would have to turn by at least 135 degrees to face it.",
+            "Next to the {a}, looking at the {b}: is the {c} left, right or back? Back is a turn of 135"
+            " degrees or more.",
+        ),
+    ),
+    QuestionKind(
+        "object_rel_direction_hard",
+        _directions(_quadrant, ("front-left", "front-right", "back-left", "back-right")),
+        (
+            "I stand by the {a} and face the {b}. Is the {c} to my front-left, front-right, back-left or"
+            " back-right? These are the quadrants of a plan with me at the middle, facing along its axis.",
+            "Next to the {a}, looking at the {b}: in which quadrant is the {c}, with me at the origin and"
+            " the {b} straight ahead?",
+        ),
+    ),
+    QuestionKind(
+        "route_planning", _routes,
+        (
+            "You are a robot that starts at the {a} and faces the {b}. You want to reach the {c}. Fill in"
+            " each gap with 'turn back', 'turn left' or 'turn right': {steps} You have arrived.",
+        ),
+    ),
+    QuestionKind(
+        "obj_appearance_order", _orders,
+        (
+            "In which order do these things first appear in the video: {things}?",
+            "Put these in the order in which they are first seen in the video: {things}.",
+        ),
+        of_walks_only=True,
+    ),
+)  # fmt: skip
+"""All kinds. A kind is added by a row: nothing else lists them."""

@@ -1,0 +1,206 @@
+"""Referring expressions: phrases that fit exactly one thing of a picture.
+
+Effects: reads the view's albedo and depth, where it has them.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
+
+_APART: Final = (
+    0.05  # of the picture's width: things beside each other have their middles so far apart
+)
+_NEARER_M: Final = 0.3
+_ON_M: Final = 0.05  # between a thing's bottom and the top of what it stands on
+_OF_COLOUR: Final = 0.7  # share of a thing's pixels from which it has that colour
+_OF_ANOTHER: Final = 0.3  # another thing of its name has less of that colour
+_ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth")
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A phrase and the one instance it fits."""
+
+    phrase: str
+    instance: int
+
+
+class _Picture:
+    """What phrases are made of: the things of a picture, where they stand in it, colours, depths."""
+
+    def __init__(self, clip: Clip) -> None:
+        self.clip = clip
+        self.view = clip.views[0]
+        self.rows = {int(r["id"]): r for r in self.view.facts["instances"]}
+
+    @cached_property
+    def instance(self) -> NDArray[Any]:
+        return self.view.array("instance")
+
+    @cached_property
+    def depth_m(self) -> F64 | None:
+        """(H, W) metres along the axis, NaN where there is none; None without the layer."""
+        if self.view.entry.file("depth.png") is None:
+            return None
+        depth = self.view.array("depth").astype(np.float64) / 1000
+        return np.where(depth > 0, depth, np.nan)
+
+    @cached_property
+    def colour_words(self) -> NDArray[Any] | None:
+        """(H, W) index into _COLOURS of each pixel's albedo; None without the layer."""
+        if self.view.entry.file("albedo.png") is None:
+            return None
+        return _colour_words(self.view.array("albedo")[..., :3])
+
+    def column(self, thing: Thing) -> float:
+        """The middle of its box in the picture, as a share of the width."""
+        box = self.rows[thing.instance]["box2d"]
+        return float(box[0] + box[2]) / 2 / float(self.view.facts["width_px"])
+
+    def distance_m(self, thing: Thing) -> float:
+        """The median depth of its pixels; NaN where it has none."""
+        if self.depth_m is None:
+            return float("nan")
+        own = self.depth_m[self.instance == thing.instance]
+        own = own[np.isfinite(own)]
+        return float(np.median(own)) if len(own) else float("nan")
+
+    def colour_shares(self, thing: Thing) -> Counter[str]:
+        """Colour -> share of its pixels."""
+        if self.colour_words is None:
+            return Counter()
+        own = self.colour_words[self.instance == thing.instance]
+        counts = np.bincount(own, minlength=len(_COLOURS)) / max(len(own), 1)
+        return Counter({name: float(counts[k]) for k, name in enumerate(_COLOURS)})
+
+
+_COLOURS: Final = (
+    "black", "grey", "white", "red", "brown", "orange", "yellow", "beige", "green", "blue", "purple", "pink",
+)  # fmt: skip
+
+
+def _colour_words(rgb: NDArray[Any]) -> NDArray[Any]:
+    """(H, W) index into _COLOURS of the sRGB albedo (H, W, 3) of 8 bits."""
+    # Name each of 16 x 16 x 16 colours once.
+    cell = (rgb // 16).astype(np.int64)
+    index = (cell[..., 0] * 16 + cell[..., 1]) * 16 + cell[..., 2]
+    used, places = np.unique(index, return_inverse=True)
+    names = [_COLOURS.index(_colour_word(k // 256, k // 16 % 16, k % 16)) for k in used]
+    return np.asarray(names, np.int64)[places].reshape(index.shape)
+
+
+def _colour_word(*cell: int) -> str:
+    hue, light, saturation = colorsys.rgb_to_hls(*((k + 0.5) / 16 for k in cell))
+    chroma = saturation * (1 - abs(2 * light - 1))
+    if chroma < 0.12:
+        return "black" if light < 0.2 else "white" if light > 0.8 else "grey"
+    if light < 0.1:
+        return "black"
+    degrees = 360 * hue
+    if degrees < 15 or degrees >= 345:
+        return "pink" if light > 0.7 else "red"
+    if degrees < 45:
+        # Dark orange is brown, pale orange beige.
+        return "brown" if light < 0.45 else "beige" if chroma < 0.4 else "orange"
+    if degrees < 70:
+        return "beige" if chroma < 0.4 else "yellow"
+    if degrees < 170:
+        return "green"
+    return "blue" if degrees < 260 else "purple" if degrees < 310 else "pink"
+
+
+def references_of(clip: Clip) -> list[Reference]:
+    """Phrases for the things of a picture that are seen well, each true of one thing alone.
+
+    By class alone where there is one of it, by colour, by side and order, by what it stands on, and by
+    nearness to the camera. Things of the same name that are hardly seen take part: a phrase is given
+    only where none of them fits it.
+    """
+    picture = _Picture(clip)
+    groups: dict[str, list[Thing]] = {}
+    for thing in clip.things:
+        groups.setdefault(thing.noun, []).append(thing)
+    singles = {t.instance for t in clip.single}
+    found: list[Reference] = []
+    for noun, own in sorted(groups.items()):
+        if not is_countable(noun):
+            continue
+        for phrase, thing in _phrases(picture, noun, own, singles):
+            if thing.first_seen is not None:
+                found.append(Reference(phrase, thing.instance))
+    return found
+
+
+def _phrases(
+    picture: _Picture, noun: str, own: Sequence[Thing], singles: set[int]
+) -> Iterator[tuple[str, Thing]]:
+    if len(own) == 1:
+        yield f"the {noun}", own[0]
+    else:
+        yield from _by_side(picture, noun, own)
+        yield from _by_distance(picture, noun, own)
+    yield from _by_colour(picture, noun, own)
+    yield from _by_support(picture, noun, own, singles)
+
+
+def _by_side(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
+    row = sorted(own, key=picture.column)
+    columns = [picture.column(t) for t in row]
+    if min(np.diff(columns)) < _APART or len(row) > len(_ORDINALS):
+        return
+    yield f"the {noun} on the left" if len(row) == 2 else f"the leftmost {noun}", row[0]
+    yield f"the {noun} on the right" if len(row) == 2 else f"the rightmost {noun}", row[-1]
+    for k, thing in enumerate(row[1:-1], 1):
+        yield f"the {_ORDINALS[k]} {noun} from the left", thing
+
+
+def _by_distance(
+    picture: _Picture, noun: str, own: Sequence[Thing]
+) -> Iterator[tuple[str, Thing]]:  # fmt: skip
+    away = [picture.distance_m(t) for t in own]
+    if not np.isfinite(away).all():
+        return
+    order = np.argsort(away, kind="stable")
+    if away[order[1]] - away[order[0]] >= _NEARER_M:
+        yield f"the {noun} nearest to the camera", own[order[0]]
+    if away[order[-1]] - away[order[-2]] >= _NEARER_M:
+        yield f"the {noun} farthest from the camera", own[order[-1]]
+
+
+def _by_colour(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[tuple[str, Thing]]:
+    shares = [picture.colour_shares(t) for t in own]
+    for k, thing in enumerate(own):
+        for colour in _COLOURS:
+            others = [s[colour] for j, s in enumerate(shares) if j != k]
+            if shares[k][colour] >= _OF_COLOUR and max(others, default=0.0) < _OF_ANOTHER:
+                yield f"the {colour} {noun}", thing
+
+
+def _by_support(
+    picture: _Picture, noun: str, own: Sequence[Thing], singles: set[int]
+) -> Iterator[tuple[str, Thing]]:
+    for other in picture.clip.things:
+        if other.instance not in singles or other.noun == noun:
+            continue
+        on = [t for t in own if _stands_on(t, other)]
+        # All that may stand on it are known: one, and the others do not.
+        if len(on) == 1 and len(own) > 1:
+            yield f"the {noun} on the {other.noun}", on[0]
+
+
+def _stands_on(a: Thing, b: Thing) -> bool:
+    """The first's bottom is at the height of the second's top, or within it, its middle above it."""
+    low, top = float(a.item.bounds[0, 1]), float(b.item.bounds[1, 1])
+    return abs(low - top) <= _ON_M and bool(b.plan.contains(shapely.Point(*a.middle)))
