@@ -1,12 +1,14 @@
-"""How many forms of export are read back equal: `make bench NAME=sets` -> out/bench/sets.json.
+"""Forms of export read back, and answers to questions recomputed: `make bench NAME=sets` -> out/bench/sets.json.
 
 The loaders are those of tests/export, written from each form's documentation: they share nothing with
 the writers. A form is equal where labels differ in no pixel, depth within the form's step, and K and
-poses are the view's own.
+poses are the view's own. Questions are of pictures and walks through dressed homes that nobody tunes on;
+benchmarks/question_check.py answers them again from the stored files.
 """
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
 import tempfile
@@ -15,12 +17,24 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
+from benchmarks.question_check import wrong_answers
 
 UNITS: Final = {
     "sets.forms": "forms of views read back equal by code that shares nothing with the writers",
     "sets.forms_written": "forms of views",
     "sets.forms_wrong": "names of the others",
+    "sets.questions": "questions of pictures and walks",
+    "sets.questions_wrong": "of them whose answer a checker that shares no code denies",
+    "sets.blind_best": "largest share that one letter or answer gets right of choices of four",
+    "sets.blind": "score of the best blind answer, by type",
 }
+_PICTURES: Final = "made:70101..70114"
+_WALKS: Final = "made:70115..70117"
+_CHOICES_OF_FOUR: Final = (
+    "object_rel_distance",
+    "object_rel_direction_hard",
+    "obj_appearance_order",
+)
 READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "bop": ("bop", ()),
     "captions": ("captions", ()),
@@ -33,6 +47,7 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "marigold": ("training_forms", ("marigold",)),
     "nerfstudio": ("sequences", ("nerfstudios",)),
     "ply": ("point_clouds", ()),
+    "questions": ("questions", ("real_view",)),
     "released": ("export", ("released",)),
     "tum": ("sequences", ("tum",)),
     "webdataset": ("export", ("webdataset",)),
@@ -52,8 +67,44 @@ def main() -> None:
         "sets.forms": len(READ_BACK) - len(wrong),
         "sets.forms_written": len(READ_BACK),
         "sets.forms_wrong": wrong,
+        **_questions(),
     }
     write_report("sets", figures, UNITS)
+
+
+def _questions() -> dict[str, Any]:
+    """Figures of the questions about pictures and walks."""
+    scores: dict[str, float] = {}
+    n = n_wrong = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for name, homes, how in (
+            ("pictures", _PICTURES, ["--views", "5"]),
+            ("walks", _WALKS, ["--cameras", "walk", "--frames", "150", "--fps", "10"]),
+        ):
+            root, out = Path(folder, name), Path(folder, f"{name}_questions")
+            _pbrs_farm(
+                "run", homes, "--dress", "1", "--recipe", "preview", "--size", "320x240",
+                "--modes", "opengl_dl", *how, "--out", str(root),
+            )  # fmt: skip
+            _pbrs_farm("export", str(root), "--to", "questions", "--out", str(out))
+            wrong = wrong_answers(root, out)
+            print(*wrong, sep="\n", flush=True)
+            n_wrong += len(wrong)
+            with (out / "blind_scores.csv").open() as file:
+                for row in csv.DictReader(file):
+                    n += int(row["questions"])
+                    scores[f"{name} {row['question_type']}"] = float(row["blind_score"])
+    best = [score for name, score in scores.items() if name.split()[1] in _CHOICES_OF_FOUR]
+    return {
+        "sets.questions": n, "sets.questions_wrong": n_wrong, "sets.blind_best": max(best),
+        "sets.blind": scores,
+    }  # fmt: skip
+
+
+def _pbrs_farm(*words: str) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "pbrs_farm.cli", *words], check=True, stdout=subprocess.DEVNULL
+    )
 
 
 def _passed() -> dict[tuple[str, str], bool]:

@@ -459,7 +459,7 @@ class Views(Sequence[Frame]):
         are none. Raises BadInput for frames of shards.
 
             >>> [row["question_type"] for row in views.questions()][:1]
-            ['object_abs_distance']
+            ['object_counting']
         """
         from pbrs_farm.export.export_views import questions_of
 

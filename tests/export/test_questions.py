@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import pbrs_farm as pf
-from benchmarks.sets.question_check import wrong_answers
+from benchmarks.question_check import wrong_answers
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_views import export, remarks_of

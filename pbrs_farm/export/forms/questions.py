@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import REMARKS, ViewForm, name_left_out
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
 from pbrs_farm.export.forms.coco import annotations_of, categories_of
 from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
 from pbrs_farm.export.questions.clips import Clip, clips_of
@@ -178,4 +178,5 @@ FORM = ViewForm(
     " (a record a question, as LLaVA and SIMS-V train on), `refs.json` and `instances.json` (phrases"
     " that fit one thing, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
     has_classes=True,
+    convention=Convention(0.5, has_k=False, axes=""),
 )

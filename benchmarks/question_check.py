@@ -1,6 +1,6 @@
 """Recomputes the answers of an export of questions from the stored files; imports nothing of pbrs_farm.
 
-`python -m benchmarks.sets.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
+`python -m benchmarks.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
 ROOT: the output folder that was exported. Distances come from points on house.glb's meshes, read with
 trimesh; everything else from view.json, house.json and the words of the question.
 """
