@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 
@@ -99,6 +100,7 @@ class Catalogue:
     digest: str  # of everything that shapes come from
     pictures: tuple[Picture, ...] = ()
     notes: tuple[Note, ...] = ()
+    painted_folder: Path | None = None  # where painted materials are kept for other homes
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 
     def of(self, *groups: str) -> tuple[Piece, ...]:

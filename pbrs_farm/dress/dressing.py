@@ -25,6 +25,7 @@ from pbrs_farm.dress.gates import group_of, keep_gates, pass_that_added, piece_i
 from pbrs_farm.dress.lamps import add_lamps
 from pbrs_farm.dress.mess import move_chairs, tilt_pictures
 from pbrs_farm.dress.mutable_house import CHANGED_TAG, MutableHouse
+from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import dress_surfaces
@@ -89,7 +90,8 @@ def dressed_house(
     on_progress: Callable[[float], None] = lambda _share: None,
 ) -> Dressed:  # fmt: skip
     """As dress, with what refit_after_repair needs. on_progress: called with the share of the passes that are done."""
-    with closing(MutableHouse(house, seed, fields.mess)) as mutable:
+    bank = PaintedBank(catalogue.painted_folder)
+    with closing(MutableHouse(house, seed, fields.mess, bank)) as mutable:
         return Dressed(
             *_dressed(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
         )

@@ -38,7 +38,7 @@ from pbrs_farm.dress.part_kinds import (
     metal_of,
 )
 from pbrs_farm.dress.style import COLOURS, METALS, WOODS, Rgb, Style, Wood
-from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
+from pbrs_farm.dress.textures.families import SEEDS, Pattern, pattern_material, photographed
 
 PASS: Final = "parts"
 _LEAST_BOARD_M2: Final = 0.05  # smaller parts of no known kind stay as they are: knobs, feet
@@ -181,7 +181,7 @@ def _finish_wood(
 
 def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
     """The one veneer that a home's furniture of that wood shows."""
-    seed = int(house.rng(PASS, "grain", wood.name).integers(2**31))
+    seed = int(house.rng(PASS, "grain", wood.name).integers(SEEDS))
     return Pattern("grain", seed, wood=wood)
 
 
@@ -204,7 +204,7 @@ def _finish_soft(
     if family == "leather":
         hides = COLOURS["hides"]
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
-    seed = int(house.rng(PASS, family).integers(2**31))
+    seed = int(house.rng(PASS, family).integers(SEEDS))
     pattern = photographed(house, catalogue, Pattern(family, seed))
     return _tinted(house, pattern, wanted, is_grained=False)
 

@@ -16,6 +16,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.painted_materials import PaintedMaterials
 
 ADDED_TAG = "dressed:"  # tag of an added item, followed by its piece's id
@@ -37,12 +38,15 @@ class MutableHouse:
     Not for edits of users: those are values (core/edits.py).
     """
 
-    def __init__(self, house: House, seed: int, mess: float = 0.0) -> None:
+    def __init__(
+        self, house: House, seed: int, mess: float = 0.0, bank: PaintedBank | None = None
+    ) -> None:
         self.source = house
         self.seed = seed
         self.mess = mess  # 0..1: how little people have tidied up
         self.items: list[Item] = list(house.items)
         self.materials = PaintedMaterials(house.materials, house.textures)
+        self.bank = bank or PaintedBank(None)  # what surfaces are painted with
         self.notes: list[Note] = []
         self.done: Counter[str] = Counter()  # what was added or changed, by pass and group
         self.refused: Counter[str] = Counter()  # tries that were given up, by `<pass>: <reason>`

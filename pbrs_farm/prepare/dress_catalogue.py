@@ -85,7 +85,8 @@ def _stamp(path: Path) -> int:
 def _catalogue(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
     from pbrs_farm.dress.things.families import with_families
 
-    return with_families(_of_libraries(given, has_package))
+    catalogue = with_families(_of_libraries(given, has_package))
+    return replace(catalogue, painted_folder=cache_folder() / "painted")
 
 
 def _of_libraries(given: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:

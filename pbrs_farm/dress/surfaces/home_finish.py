@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrs_farm.dress.finish_scheme import aged
 from pbrs_farm.dress.style import COLOURS, WOODS, WOODS_FOR, Rgb, Style, mix, rgb
-from pbrs_farm.dress.textures.families import Pattern
+from pbrs_farm.dress.textures.families import SEEDS, Pattern
 from pbrs_farm.dress.textures.wallpaper import inks
 from pbrs_farm.home.room_use import RoomKind
 
@@ -205,7 +205,7 @@ def _dry_floor(rng: np.random.Generator, style: Style, kind: RoomKind) -> Floor:
 def _wood_floor(rng: np.random.Generator, style: Style, name: str) -> Floor:
     # Floors are seldom of the furniture's own wood.
     wood = style.wood if rng.random() < 0.45 else WOODS[_pick(rng, WOODS_FOR.floors)]
-    pattern = Pattern(name, _seed(rng), wood=wood, darkness=round(style.darkness, 3))
+    pattern = Pattern(name, _seed(rng), wood=wood, darkness=round(5 * style.darkness) / 5)
     return Floor(pattern, np.pi / 4 if name == "herringbone" else 0.0)
 
 
@@ -246,6 +246,6 @@ def _pick(rng: np.random.Generator, choices: Sequence[_T]) -> _T:
     return choices[int(rng.integers(len(choices)))]
 
 
-def _seed(rng: np.random.Generator, most: int = 2**31) -> int:
-    # Few seeds where pictures hardly differ: equal ones are made once.
+def _seed(rng: np.random.Generator, most: int = SEEDS) -> int:
+    # Fewer seeds where pictures hardly differ: equal ones are made once.
     return int(rng.integers(most))

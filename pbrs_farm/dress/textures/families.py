@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.painted_materials import Painted
@@ -49,6 +50,9 @@ from pbrs_farm.dress.textures.planks import (
     rows_of_planks,
 )
 from pbrs_farm.dress.textures.wallpaper import WIDTH_M, wallpaper_maps
+
+SEEDS: Final = 8
+"""Of how many seeds a home draws one: patterns of other homes come again, and are painted once."""
 
 _TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves from a metre away
 _STEP_PX: Final = 128
@@ -98,6 +102,13 @@ def pixels_of(size_m: tuple[float, float]) -> Shape2:
     return height, width
 
 
+# Families of one tint are painted in few lightnesses and tinted by their material's diffuse colour.
+_TINTED: Final = (
+    "paint", "plaster", "smooth plaster", "concrete", "carpet", "loop carpet", "weave", "twill",
+    "leather", "painted brick",
+)  # fmt: skip
+_LIGHTNESSES: Final = (0.4, 0.6, 0.75, 0.87, 0.97)
+
 _Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
 
 
@@ -132,16 +143,36 @@ def pattern_material(house: MutableHouse, pattern: Pattern) -> PatternMaterial:
         number, size, mean = photograph_material(house, pattern.photograph, pattern.family)
         made = PatternMaterial(number, size, lambda: mean)
     else:
-        number, painting = house.materials.paint(partial(_paint_pattern, pattern))
+        number, painting = house.materials.paint(partial(_paint_pattern, house, pattern))
         made = PatternMaterial(number, size_of(pattern), lambda: painting.painted().mean_rgb)
     house.kept[key] = made
     return made
 
 
-def _paint_pattern(pattern: Pattern) -> Painted:
+def _paint_pattern(house: MutableHouse, pattern: Pattern) -> Painted:
+    """The pattern as a material: taken out of the house's bank, or painted."""
+    if pattern.family in _TINTED and len(pattern.tints) == 1:
+        return _tinted(house, pattern)
+    return house.bank.painted(repr(pattern), partial(_painted, pattern))
+
+
+def _painted(pattern: Pattern) -> Painted:
     maps = maps_of(pattern)
     material, textures = material_from_maps(maps, f"{pattern.family}-{pattern.seed:08x}")
     return Painted(material, textures, maps.mean_rgb)
+
+
+def _tinted(house: MutableHouse, pattern: Pattern) -> Painted:
+    """The pattern painted in a grey that is lighter than its tint, times the tint's part of it."""
+    tint = pattern.tints[0]
+    grey = next((c for c in _LIGHTNESSES if c >= max(tint)), _LIGHTNESSES[-1])
+    plain = replace(pattern, tints=((grey, grey, grey),))
+    made = house.bank.painted(repr(plain), partial(_painted, plain))
+    part = np.minimum(linear_from_srgb(np.array(tint)) / linear_from_srgb(np.array(grey)), 1.0)
+    r, g, b = (round(float(c), 4) for c in srgb_from_linear(part))
+    means = [float(m) for m in np.array(made.mean_rgb) * linear_from_srgb(np.array((r, g, b)))]
+    diffuse = replace(made.material, diffuse=(r, g, b))
+    return Painted(diffuse, made.textures, (means[0], means[1], means[2]))
 
 
 def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:

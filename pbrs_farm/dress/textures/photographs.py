@@ -54,7 +54,7 @@ def photograph_for(house: MutableHouse, catalogue: Catalogue, family: str, seed:
     fitting = [
         p for p in catalogue.pictures if p.group == shown.group and min(p.size) >= shown.least_m
     ]
-    rng = np.random.default_rng([seed, len(fitting)])
+    rng = house.rng("photograph", family, seed, len(fitting))
     if rng.random() * (len(fitting) + _DRAWN) >= len(fitting):
         return ""
     picture = fitting[int(rng.integers(len(fitting)))]

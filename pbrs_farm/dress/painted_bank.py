@@ -1,0 +1,128 @@
+"""Painted materials kept on disk, for all homes and processes: painting one takes a hundred times as long.
+
+Effects: reads and writes its folder. What is kept is what would be painted, so no home depends on it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from threading import Lock
+from typing import Final, NamedTuple
+
+from pydantic import TypeAdapter, ValidationError
+
+from pbrs_farm.assets.debian import write_whole
+from pbrs_farm.core import keys
+from pbrs_farm.core.house import Material, Texture
+from pbrs_farm.dress.painted_materials import Painted, Painting
+
+MOST_BYTES: Final = 2_000_000_000  # of a bank: what was painted first goes first
+_MAKERS: Final = ("numpy", "OpenImageIO")  # the packages whose versions may change a pixel
+_LOOK_EVERY: Final = 32  # one of so many that are added looks how large the bank is
+
+
+@dataclass(frozen=True, slots=True)
+class _Described:
+    # What of a painted material is no picture.
+    material: Material
+    mean_rgb: tuple[float, float, float]
+    textures: tuple[tuple[str, str, str, int], ...]  # id, name, media type, bytes
+
+
+_DESCRIBED: Final = TypeAdapter(_Described)
+
+
+class _File(NamedTuple):
+    modified: float
+    n_bytes: int
+    path: Path
+
+
+class PaintedBank:
+    """Painted materials by what they are painted from.
+
+    folder: where they are kept, which several processes may share; None: in memory alone.
+    """
+
+    def __init__(self, folder: Path | None, most_bytes: int = MOST_BYTES) -> None:
+        self._folder = folder
+        self._most_bytes = most_bytes
+        self._lock = Lock()
+        self._known: dict[str, Painting] = {}
+
+    def painted(self, key: str, paint: Callable[[], Painted]) -> Painted:
+        """What is kept under a key, else what `paint` gives, which is then kept.
+
+        key: all that the pixels follow from beside the code. A file that is damaged is painted anew; a
+        folder that cannot be written costs time alone.
+        """
+        # Two threads that ask for one wait for each other, and for nothing else.
+        with self._lock:
+            painting = self._known.setdefault(key, Painting(lambda: self._kept(key, paint)))
+        return painting.painted()
+
+    def _kept(self, key: str, paint: Callable[[], Painted]) -> Painted:
+        if self._folder is None:
+            return paint()
+        path = self._folder / f"{keys.digest(key, _makers())}.painted"
+        with suppress(OSError, ValueError):
+            return _unpacked(path.read_bytes())
+        painted = paint()
+        with suppress(OSError):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_whole(path, _packed(painted))
+            if int(path.name[:8], 16) % _LOOK_EVERY == 0:
+                self._leave_out_oldest(self._folder)
+        return painted
+
+    def _leave_out_oldest(self, folder: Path) -> None:
+        files = []
+        for path in folder.glob("*.painted"):
+            with suppress(FileNotFoundError):  # another process took it out
+                files.append(_File((s := path.stat()).st_mtime, s.st_size, path))
+        spare = sum(f.n_bytes for f in files) - self._most_bytes
+        for file in sorted(files):
+            if spare <= 0:
+                return
+            file.path.unlink(missing_ok=True)
+            spare -= file.n_bytes
+
+
+@cache
+def _makers() -> str:
+    """The digest of the code that paints, and of the packages it paints with."""
+    folder = Path(__file__).parent
+    code = hashlib.sha256()
+    for path in (*sorted((folder / "textures").glob("*.py")), folder / "style.py"):
+        code.update(path.read_bytes())
+    return keys.digest(code.hexdigest(), *(version(name) for name in _MAKERS))
+
+
+def _packed(painted: Painted) -> bytes:
+    rows = tuple((t.id, t.name, t.media_type, len(t.data)) for t in painted.textures)
+    described = _DESCRIBED.dump_json(_Described(painted.material, painted.mean_rgb, rows))
+    content = b"\n".join([described, b"".join(t.data for t in painted.textures)])
+    return b"\n".join([hashlib.sha256(content).hexdigest().encode(), content])
+
+
+def _unpacked(data: bytes) -> Painted:
+    """ValueError for what is no whole file of _packed."""
+    digest, _, content = data.partition(b"\n")
+    if hashlib.sha256(content).hexdigest().encode() != digest:
+        raise ValueError("damaged")
+    text, _, pixels = content.partition(b"\n")
+    try:
+        described = _DESCRIBED.validate_json(text)
+    except ValidationError as error:  # an earlier version's
+        raise ValueError(str(error)) from error
+    textures, start = [], 0
+    for id_, name, media_type, n in described.textures:
+        textures.append(Texture(id_, name, media_type, pixels[start : start + n]))
+        start += n
+    return Painted(described.material, tuple(textures), described.mean_rgb)
