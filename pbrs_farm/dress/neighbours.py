@@ -67,20 +67,23 @@ class Neighbours:
         """
         low, high = item.bounds
         own = _cubes(self.triangles(item))
+        around = np.stack([low - CUBE_M, high + CUBE_M])
         count = 0
         for k in self.near(low, high):
             if k not in without:
                 corners = self.triangles(self.items[k])
                 least, most = triangle_bounds(corners)
                 meets = ((most >= low) & (least <= high)).all(1)
-                count += len(np.intersect1d(own, _cubes(corners[meets]), assume_unique=True))
+                count += len(
+                    np.intersect1d(own, _cubes(corners[meets], around), assume_unique=True)
+                )
         return count
 
 
-def _cubes(corners: F64) -> Cubes:
+def _cubes(corners: F64, box: F64 | None = None) -> Cubes:
     if not len(corners):
         return np.zeros(0, np.int64)
-    points = surface_points(corners, CUBE_M)
+    points = surface_points(corners, CUBE_M, box)
     cube = np.floor(points / CUBE_M).astype(np.int64) + (1 << (_BITS - 1))
     return np.unique((cube[:, 0] << 2 * _BITS) | (cube[:, 1] << _BITS) | cube[:, 2])
 

@@ -36,7 +36,7 @@ def furniture_audit(house: House) -> FurnitureAudit:
     boxes = np.array([i.bounds for i in pieces]).reshape(-1, 2, 3)
     pairs = list(islice(_pairs_of_boxes(boxes, -_SAME_M), _MAX_PAIRS + 1))
     return FurnitureAudit(
-        overlaps=tuple(_find_overlaps(pieces, pairs[:_MAX_PAIRS])),
+        overlaps=tuple(_find_overlaps(pieces, boxes, pairs[:_MAX_PAIRS])),
         floating=tuple(_floating(house, pieces, boxes)),
         duplicates=tuple(islice(_duplicates(pieces, boxes), _MAX_PAIRS)),
         n_unaudited=len(everything) - len(pieces),
@@ -57,9 +57,15 @@ def _pairs_of_boxes(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
             yield i, i + 1 + int(j)
 
 
-def _find_overlaps(pieces: Sequence[Item], pairs: Sequence[tuple[int, int]]) -> Iterator[Overlap]:
+def _find_overlaps(
+    pieces: Sequence[Item], boxes: F64, pairs: Sequence[tuple[int, int]]
+) -> Iterator[Overlap]:
     solids: dict[int, Manifold | None] = {}
     for i, j in pairs:
+        # They share no more than their boxes do: a cup on a table is told by these.
+        shared = np.minimum(boxes[i, 1], boxes[j, 1]) - np.maximum(boxes[i, 0], boxes[j, 0])
+        if np.prod(shared) <= _MIN_VOLUME_M3:
+            continue
         # Build the solid of a piece when its box first meets another.
         for k in (i, j):
             if k not in solids:
