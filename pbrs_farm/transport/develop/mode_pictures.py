@@ -78,13 +78,14 @@ def develop(
             total = sum((groups[name] for name in names), np.zeros_like(aovs.outdoor))
             total = add_glare(total, fields.glare)
             gains = white_balance(total, aovs.albedo, fields)
-            exposure = exposure_of(total * gains, fields)
+            balanced = total * gains
+            exposure = exposure_of(balanced, fields)
             if shot is not None:
                 taken = shot.exposure(mode.value, exposure)
                 rgb = take_by_sensor(total, gains, taken, shot.fields, fields, seed=shot.seed)
                 images[mode.value] = ToneMappedImage(rgb, gains, taken.factor, taken)
                 continue
-            rgb = tone(total * gains, fields, exposure=exposure)
+            rgb = tone(balanced, fields, exposure=exposure)
             images[mode.value] = ToneMappedImage(rgb, gains, exposure)
     return images
 

@@ -44,11 +44,20 @@ def tone(
     exposure: a factor (see `exposure_of`); the image's own when None. A black image stays black.
     Non-finite and negative values count as 0.
     """
-    rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
+    rgb = _finite_light(radiance)
     if fields.preset == "released":
         return _eight_bits(srgb_from_linear(_reinhard(rgb, fields.key, exposure)))
     factor = exposure_of(radiance, fields) if exposure is None else exposure
     return encode_tone(add_veil(rgb * factor, fields), fields, fields.white)
+
+
+def _finite_light(radiance: RadianceImage) -> F64:
+    """Radiance as float64; what is negative or not finite counts as 0."""
+    rgb = np.asarray(radiance, np.float64)
+    # Nothing is to be done to nearly every picture: two sums tell.
+    if rgb.min(initial=0.0) >= 0 and np.isfinite(rgb.sum()):
+        return rgb
+    return np.maximum(np.nan_to_num(rgb, posinf=0.0), 0.0)
 
 
 def encode_tone(light: F64, fields: ToneFields, white: float) -> Srgb8Image:
@@ -65,7 +74,10 @@ def encode_tone(light: F64, fields: ToneFields, white: float) -> Srgb8Image:
         bright, dark = luma**fields.contrast, (1 - luma).clip(0) ** fields.contrast
         curved = bright / (bright + dark)
         ratio = np.divide(curved, luma, out=np.zeros_like(luma), where=luma > 0)
-        rgb, luma = curved + (rgb - luma) * np.minimum(ratio, 1), curved
+        rgb -= luma
+        rgb *= np.minimum(ratio, 1)
+        rgb += curved
+        luma = curved
     if fields.sharpening > 0:
         blurred = ndimage.gaussian_filter(luma[..., 0], _SHARPENED_PX, mode="nearest")
         rgb = rgb + fields.sharpening * (luma - blurred[..., None])
@@ -73,7 +85,9 @@ def encode_tone(light: F64, fields: ToneFields, white: float) -> Srgb8Image:
 
 
 def _eight_bits(rgb: F64) -> Srgb8Image:
-    return np.round(np.clip(rgb, 0, 1) * 255).astype(np.uint8)
+    steps = np.clip(rgb, 0, 1)
+    steps *= 255
+    return np.round(steps, out=steps).astype(np.uint8)
 
 
 def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
@@ -82,7 +96,7 @@ def exposure_of(radiance: RadianceImage, fields: ToneFields) -> float:
     `photo` meters the room and not its windows and lamps: luminance counts as 1/32 to 4 times the
     median. The factor is higher by the fields' stops.
     """
-    rgb = np.maximum(np.nan_to_num(np.asarray(radiance, np.float64), posinf=0.0), 0.0)
+    rgb = _finite_light(radiance)
     if fields.preset == "released":
         luminance = rgb @ _MITSUBA_LUMINANCE
         return fields.key / float(np.exp(np.mean(np.log(luminance + _LOG_FLOOR))))

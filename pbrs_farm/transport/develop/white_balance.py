@@ -46,17 +46,30 @@ def white_balance(radiance: RadianceImage, albedo: RadianceImage, fields: ToneFi
 
 def _illuminant(radiance: RadianceImage, albedo: RadianceImage) -> F32 | None:
     """(3,) the light's colour; None when fewer than 16 pixels tell it."""
-    usable = all_channels(albedo > 0.02) & all_channels(radiance > 0)
+    # Go by channel, each in one piece: a third of the time of (N, 3) rows.
+    seen, surface = _channels(radiance), _channels(albedo)
+    usable = (_least(surface) > 0.02) & (_least(seen) > 0)
     if usable.sum() < 16:
         return None
+    if not usable.all():
+        seen, surface = [c[usable] for c in seen], [c[usable] for c in surface]
     # Take the better lit half without the very brightest.
-    reflecting = albedo[usable]
-    light = radiance[usable] / reflecting
-    level = light @ LUMINANCE
+    light = [c / s for c, s in zip(seen, surface, strict=True)]
+    level = sum(c * w for c, w in zip(light, LUMINANCE.astype(np.float32), strict=True))
     low, high = np.percentile(level, _LIT_PERCENTILES)
-    is_lit = (level >= low) & (level <= high)
-    found = np.exp(_medians(np.log(light[is_lit])))
-    return _clamp_to_lamps_and_skies(found) if _one_colour_fills(reflecting[is_lit]) else found
+    lit = np.flatnonzero((level >= low) & (level <= high))
+    found = np.exp(np.array([np.median(np.log(c[lit])) for c in light], np.float32))
+    is_filled = _one_colour_fills(np.stack([c[lit] for c in surface], -1))
+    return _clamp_to_lamps_and_skies(found) if is_filled else found
+
+
+def _channels(image: RadianceImage) -> list[F32]:
+    """The three channels of (H, W, 3), (H * W,) each."""
+    return [np.ascontiguousarray(image[..., c], np.float32).ravel() for c in range(3)]
+
+
+def _least(channels: list[F32]) -> F32:
+    return np.minimum(np.minimum(channels[0], channels[1]), channels[2])
 
 
 def _one_colour_fills(albedo: F32) -> bool:
