@@ -44,6 +44,7 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "hypersim": ("hypersim", ()),
     "kitti": ("sequences", ("kittis",)),
     "layoutnet": ("training_forms", ("horizonnet",)),
+    "lidar": ("lidar_form", ()),
     "marigold": ("training_forms", ("marigold",)),
     "nerfstudio": ("sequences", ("nerfstudios",)),
     "ply": ("point_clouds", ()),

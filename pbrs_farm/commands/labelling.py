@@ -31,6 +31,8 @@ def add_verbs(verb: Verb) -> None:
     add("--classes", type=Path, metavar="FILE.csv", help=text)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=500, metavar="N", help="views a tar (webdataset)")
+    text = "whose scans the form lidar has (default vlp16; docs/formats.md has them all)"
+    add("--lidar", default="vlp16", metavar="SCANNER", help=text)
 
     p = verb("pack", _pack_views, "finished views as shards to train from, or as Parquet")
     add = p.add_argument
@@ -74,6 +76,7 @@ def _export(args: argparse.Namespace) -> int:
         size=size_of(args.size),
         views_per_shard=args.shard_size,
         classes=class_map(args.classes) if args.classes else None,
+        lidar=args.lidar,
     )
     shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")

@@ -44,7 +44,8 @@ class Choice:
     """What is exported. Raises BadInput for a name that is no layer or mode.
 
     layers: names of core/layers.py without the modes; None for all there are, radiance apart.
-    modes: None for all. size: (width, height), None as rendered. classes: None for NYU40.
+    modes: None for all. size: (width, height), None as rendered. classes: None for NYU40. lidar: which
+    scanner of truth/lidar.py the form lidar has.
     """
 
     layers: tuple[str, ...] | None = None
@@ -52,6 +53,7 @@ class Choice:
     size: tuple[int, int] | None = None
     views_per_shard: int = 500  # of WebDataset
     classes: ClassMap | None = None
+    lidar: str = "vlp16"
 
     def __post_init__(self) -> None:
         labels = [layer.name for layer in LAYERS if layer.name not in _MODES]

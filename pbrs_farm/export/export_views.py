@@ -92,7 +92,7 @@ def export(
 def export_frames(
     frames: Views, out: Path, name: str, *, layers: str | Sequence[str] | None = None,
     modes: str | Sequence[str] | None = None, size: tuple[int, int] | None = None,
-    classes: str | Path | None = None, shares: SplitShares | None = None,
+    classes: str | Path | None = None, shares: SplitShares | None = None, lidar: str = "vlp16",
 ) -> None:  # fmt: skip
     """Write frames to out in the form of that name: what `Views.export` does.
 
@@ -102,7 +102,7 @@ def export_frames(
     choice = Choice(
         layers=None if layers is None else as_words(layers),
         modes=None if modes is None else as_words(modes), size=size,
-        classes=None if classes is None else class_map(classes),
+        classes=None if classes is None else class_map(classes), lidar=lidar,
     )  # fmt: skip
     with _stored(frames) as (folder, wanted):
         export(folder, out, name, choice=choice, shares=shares, views=wanted)

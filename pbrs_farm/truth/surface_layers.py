@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64, I32, HitRecord, UnitVectors
+from pbrs_farm.core.arrays import F32, F64, I32, HitRecord, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Geometry, House, Item, corners_of_surfaces
@@ -36,21 +36,33 @@ def albedo_label(
     textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top (v = 1), repeated; looked up between the
     four nearest texels, not filtered over the pixel. A missing texture counts as white.
     """
-    # Shade material by material: each texture is looked up once, for all its pixels.
     linear = np.zeros((*hit.face.shape, 3), np.float32)
     if len(geometry.faces):
-        material = np.where(hit.valid, geometry.face_material[hit.face], -1)
-        for number in np.unique(material[material >= 0]):
-            shaded = house.materials[int(number)]
-            mask = material == number
-            colour = linear_from_srgb(np.array(shaded.diffuse)).astype(np.float32)
-            pixels = textures.get(shaded.texture_id) if shaded.texture_id else None
-            linear[mask] = colour
-            if pixels is not None:
-                linear[mask] *= bilinear(pixels[..., :3], hit.points.uv[mask], _LINEAR_OF_BYTE)
+        seen = hit.valid
+        uv = hit.points.uv[seen]
+        linear[seen] = albedo_of_points(hit.face[seen], uv, house, geometry, textures)
     # Encode by table: 8-bit sRGB.
     steps = np.rint(np.clip(linear, 0, most) * _STEPS).astype(np.int32)
     return np.asarray(_BYTE_OF_LINEAR[steps])
+
+
+def albedo_of_points(
+    face: I32, uv: F32, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
+) -> F32:
+    """(N, 3) float32 diffuse colour times texture, linear, of points of faces (N,) at uv (N, 2).
+
+    textures: as of albedo_label.
+    """
+    linear = np.zeros((len(face), 3), np.float32)
+    # Shade material by material: each texture is looked up once, for all its points.
+    material = geometry.face_material[face]
+    for number in np.unique(material):
+        shaded, own = house.materials[int(number)], material == number
+        linear[own] = linear_from_srgb(np.array(shaded.diffuse)).astype(np.float32)
+        pixels = textures.get(shaded.texture_id) if shaded.texture_id else None
+        if pixels is not None:
+            linear[own] *= bilinear(pixels[..., :3], uv[own], _LINEAR_OF_BYTE)
+    return linear
 
 
 def shading_normals(

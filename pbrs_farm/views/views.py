@@ -432,12 +432,13 @@ class Views(Sequence[Frame]):
         size: Size | None = None,
         classes: str | Path | None = None,
         shares: SplitShares | None = None,
+        lidar: str = "vlp16",
     ) -> Path:
         """Write them in a form that other tools read into the new folder out, and give that.
 
         to: coco, yolo, kitti, bop and the other forms of views of docs/formats.md. layers and modes: one
         or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of your own
-        classes; shares: a folder a split. Raises BadInput for a form there is not, views it cannot hold,
+        classes; shares: a folder a split; lidar: the scanner of the form lidar. Raises BadInput for a form there is not, views it cannot hold,
         an out that holds something, and frames of shards.
 
             >>> sorted(path.name for path in views.export("coco", to="coco").iterdir())[:1]
@@ -447,7 +448,7 @@ class Views(Sequence[Frame]):
 
         export_frames(
             self, Path(out), to, layers=layers, modes=modes, size=size, classes=classes,
-            shares=shares,
+            shares=shares, lidar=lidar,
         )  # fmt: skip
         return Path(out)
 

@@ -194,3 +194,41 @@ def hypersim(root: Path) -> Iterator[HypersimFrame]:
         yield HypersimFrame(
             scene, row.camera_name, row.frame_id, split, cameras.loc[row.scene_name]
         )
+
+
+def ply_cloud(file: Path) -> pd.DataFrame:
+    """The vertices of a binary PLY, as its specification says."""
+    kinds = {"float": "<f4", "uchar": "u1", "ushort": "<u2"}
+    head, _, body = file.read_bytes().partition(b"end_header\n")
+    words = [line.split() for line in head.decode().splitlines()]
+    assert words[:2] == [["ply"], ["format", "binary_little_endian", "1.0"]]
+    (n,) = [int(w[2]) for w in words if w[0] == "element"]
+    dtype = np.dtype([(w[2], kinds[w[1]]) for w in words if w[0] == "property"])
+    assert len(body) == n * dtype.itemsize
+    return pd.DataFrame(np.frombuffer(body, dtype))
+
+
+def pcd_cloud(file: Path) -> tuple[pd.DataFrame, np.ndarray]:
+    """The points of a binary PCD 0.7, and (4, 4) its viewpoint: as PCL's page of the format says."""
+    head, _, body = file.read_bytes().partition(b"DATA binary\n")
+    rows = [line.split() for line in head.decode().splitlines() if not line.startswith("#")]
+    fields = {row[0]: row[1:] for row in rows}
+    assert fields["VERSION"] == ["0.7"]
+    letters = {"F": "f", "U": "u", "I": "i"}
+    assert set(fields["COUNT"]) == {"1"}
+    dtype = np.dtype([
+        (name, f"<{letters[kind]}{size}")
+        for name, kind, size in zip(fields["FIELDS"], fields["TYPE"], fields["SIZE"], strict=True)
+    ])  # fmt: skip
+    n = int(fields["WIDTH"][0]) * int(fields["HEIGHT"][0])
+    assert n == int(fields["POINTS"][0])
+    assert len(body) == n * dtype.itemsize
+    tx, ty, tz, w, x, y, z = map(float, fields["VIEWPOINT"])
+    pose = np.eye(4)
+    pose[:3, :3] = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    pose[:3, 3] = tx, ty, tz
+    return pd.DataFrame(np.frombuffer(body, dtype)), pose

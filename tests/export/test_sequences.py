@@ -147,6 +147,18 @@ def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
     assert left[:2, 2] == pytest.approx([31.5, 23.5])
 
 
+def test_a_walk_has_a_laser_scan_a_frame(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "x", "lidar", choice=Choice(lidar="rplidar_a1"))
+    house = only(tmp_path / "x")
+    poses = poses_from_tum((house / "poses.txt").read_text(), "poses.txt")
+    assert [p.time_s for p in poses] == pytest.approx([0.0, 0.2, 0.4])
+    # The left eye's: a scanner has no pair.
+    assert sorted(p.name for p in house.glob("*.pcd")) == [f"frame_{k:05d}.pcd" for k in range(3)]
+    eye = np.array(facts_of(root, "frame_00001")["world_from_camera_opengl"])[:3, 3]
+    words = (house / "poses.txt").read_text().splitlines()[1].split()
+    np.testing.assert_allclose([float(v) for v in words[1:4]], eye, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("form", "reason"), [("tum", "no view is a frame"), ("kitti", "no view has flow or disparity")]
 )
