@@ -17,7 +17,6 @@ from scipy import ndimage
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.recipe import Recipe, SensorFields, ToneFields
 
@@ -33,20 +32,21 @@ _SENSOR_STEPS, _SENSOR_TILES = 14, 0.9  # mean of a tile, share of tiles
 _FACTOR = 0.002  # of exposure and gains that view.json tells
 
 
-def check_developed(view: StoredView, arrays: Mapping[str, NDArray[Any]], tally: Tally) -> None:
-    """Develop radiance.exr again, and compare with the stored pictures of the light modes.
+def check_developed(
+    view: StoredView,
+    channels: Mapping[str, NDArray[np.float32]],
+    arrays: Mapping[str, NDArray[Any]],
+    tally: Tally,
+) -> None:
+    """Develop radiance.exr (its channels) again, and compare with the stored pictures of the light modes.
 
     Does nothing where the view has no picture of a light mode, no radiance.exr or no recipe:
     `methods.not_looked_at` says so. arrays has the layers by name.
     """
     modes = [m for m in _GROUPS if m in arrays]
-    if not modes or view.recipe is None or not view.has("radiance.exr"):
+    if not modes or view.recipe is None:
         return
-    try:
-        light = _stored_light(view, tally)
-    except BadInput as error:
-        tally.expect("light developed", view.place, False, str(error))
-        return
+    light = _stored_light(view, channels, tally)
     if light is None:
         return
     stated = view.table.get("modes", {}).get("develop", {})
@@ -177,9 +177,10 @@ def _tiles(picture: NDArray[Any]) -> Floats:
     return np.asarray(parts.mean(axis=(1, 3)))
 
 
-def _stored_light(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | None:
+def _stored_light(
+    view: StoredView, channels: Mapping[str, NDArray[np.float32]], tally: Tally
+) -> dict[str, NDArray[np.float32]] | None:
     """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had."""
-    channels = view.exr("radiance.exr")
     names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
     names["normal"] = [f"normal.{c}" for c in "XYZ"]
     if not all(n in channels for row in names.values() for n in row):

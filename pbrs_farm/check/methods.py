@@ -32,7 +32,7 @@ HOW: dict[str, str] = {
     "opengl_dl.png": "its edges against those of the instances",
     "opengl_il.png": "its edges against those of the instances",
     "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
-    "radiance.exr": "every value finite and not negative; no light is traced",
+    "radiance.exr": "its guides against surfaces, its steps against their albedo, sun and bulbs by shadow rays",
     "projector.png": "size and type alone",
     "normal_shading.png": "unit length alone",
     "boundary_occlusion.png": "values that there are alone",
@@ -44,13 +44,7 @@ HOW: dict[str, str] = {
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
 }  # fmt: skip
 
-_LIGHTLY = (
-    "radiance.exr",
-    "projector.png",
-    "normal_shading.png",
-    "boundary_occlusion.png",
-    "boundary_crease.png",
-)
+_LIGHTLY = ("projector.png", "normal_shading.png", "boundary_occlusion.png", "boundary_crease.png")
 
 # What is looked at of the files of a house and of a root, beside their fields.
 HOW_OF_HOUSE: dict[str, str] = {
@@ -64,7 +58,7 @@ HOW_OF_HOUSE: dict[str, str] = {
 
 # What no file of a root tells.
 _NEVER = (
-    "levels of light: what radiance.exr holds, illuminance.json, noise",
+    "levels of light, but for bulbs that are seen and what sun and bulbs bring at least: no light is traced",
     "house.glb and house.json against their source, which is not stored",
 )
 

@@ -184,11 +184,11 @@ def _position_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
 
 
 def _albedo_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
-    expected = _albedo(at.view, at.face, at.point, at.triangles)
+    expected = albedo_of_faces(at.view, at.face, at.point, at.triangles)
     return np.asarray(np.abs(stored - expected).max(axis=1) <= ALBEDO_STEPS + 0.5)
 
 
-def _albedo(view: StoredView, face: Faces, point: Floats, triangles: Triangles) -> Floats:
+def albedo_of_faces(view: StoredView, face: Faces, point: Floats, triangles: Triangles) -> Floats:
     """(N, 3) sRGB 0..255 of the materials at points (N, 3) on faces; 0 where face is -1."""
     found = np.zeros((len(face), 3))
     hit = np.nonzero(face >= 0)[0]

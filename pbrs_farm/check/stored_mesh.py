@@ -126,6 +126,13 @@ class Triangles:
         own = (self.instance == instance) & np.isin(self.surface, surfaces)
         return np.asarray(self.vertices[self.faces[own].reshape(-1)], np.float64)
 
+    kinds: tuple[str, ...]  # of each material
+
+    def kinds_of(self, face: NDArray[np.int64]) -> NDArray[Any]:
+        """(N,) the kind of each face's material; "" where face is -1."""
+        names = np.array([*self.kinds, ""])
+        return names[np.where(face >= 0, self.material[face], len(self.kinds))]
+
     @property
     def has_holes(self) -> NDArray[np.bool_]:
         """(F,) whether the material may be cut out."""
@@ -240,6 +247,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         _colours(document, binary),
         {instance: np.concatenate(points) for instance, points in loose.items()},
         np.repeat(table[:, 2], table[:, 3]),
+        tuple(str(k) for k in kinds),
     )
 
 

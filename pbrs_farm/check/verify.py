@@ -26,12 +26,14 @@ from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.house_checks import check_house
 from pbrs_farm.check.light_checks import check_developed
+from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
 from pbrs_farm.check.pair_checks import check_pairs
 from pbrs_farm.check.picture_checks import check_edges, check_histogram
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, PixelChecks, judge, of_another_colour
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
+from pbrs_farm.check.radiance_checks import check_fit, check_guides
 from pbrs_farm.check.sensor_checks import check_derived
 from pbrs_farm.check.sky_checks import check_illuminance
 from pbrs_farm.check.solid_checks import check_models, check_solids
@@ -40,7 +42,14 @@ from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, json_of_glb, triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 from pbrs_farm.check.table_checks import HouseItems, check_rows
-from pbrs_farm.check.view_checks import check_consistency, check_pictures, check_planes, read_labels
+from pbrs_farm.check.view_checks import (
+    check_consistency,
+    check_pictures,
+    check_planes,
+    check_radiance,
+    read_labels,
+    read_radiance,
+)
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
@@ -59,6 +68,7 @@ class Scenes:
     opaque: tuple[Triangles, Rays]  # without glass and panes
     items: HouseItems
     house: StoredHouse
+    lit: LitScene
 
 
 def verify(
@@ -114,8 +124,9 @@ def _check_house(
         return []
     opaque = Rays(triangles, ~triangles.see_through)
     scenes = Scenes(
-        (triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles), stored
-    )
+        (triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles), stored,
+        LitScene(stored, triangles),
+    )  # fmt: skip
     _check_documents(stored, glb, scenes, tally)
     # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
@@ -166,11 +177,17 @@ def _check_view(
         return None
     # From cheap to dear: facts, whole pictures, layers against each other, rays.
     check_facts(view, scenes.house, arrays, tally)
-    check_pictures(view, scenes.house, arrays, tally)
+    check_pictures(view, arrays, tally)
     check_consistency(view, arrays, tally)
     check_planes(view, arrays, tally)
     check_derived(view, arrays, tally)
-    check_developed(view, arrays, tally)
+    channels = read_radiance(view, tally)
+    if channels is not None:
+        check_radiance(view, scenes.house, channels, arrays["valid"], tally)
+        check_developed(view, channels, arrays, tally)
+        check_guides(view, channels, _chosen(view, SAMPLE), arrays, scenes.all, tally)
+        check_fit(view, channels, tally)
+        check_lit(view, channels, arrays, scenes.lit, scenes.all[1], tally)
     check_edges(view, arrays, tally)
     check_histogram(view, arrays, scenes.house.house, tally)
     check_rows(view, arrays["instance"], scenes.items, n_pixels, tally)

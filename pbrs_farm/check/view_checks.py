@@ -70,10 +70,19 @@ def _planes(view: StoredView, layer: Layer) -> NDArray[np.float32]:
     return planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
 
 
-def check_pictures(
-    view: StoredView, house: StoredHouse, arrays: dict[str, NDArray[Any]], tally: Tally
-) -> None:
-    """No OpenGL picture is one colour; radiance is finite and not negative.
+def read_radiance(view: StoredView, tally: Tally) -> dict[str, NDArray[np.float32]] | None:
+    """The channels of radiance.exr; None where the view has none, or it cannot be read."""
+    if not view.has("radiance.exr"):
+        return None
+    try:
+        return view.exr("radiance.exr")
+    except BadInput as error:
+        tally.expect("radiance", view.place, False, str(error))
+        return None
+
+
+def check_pictures(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Tally) -> None:
+    """No OpenGL picture is one colour.
 
     A light mode may be: without a window, outdoor light alone leaves a room black. That is noted.
     """
@@ -87,19 +96,19 @@ def check_pictures(
             tally.expect("pictures", place, not constant or may_be, "is one colour")
             if constant:
                 tally.note(f"{place} is one colour: {picture[0, 0].tolist()}")
-    if view.has("radiance.exr"):
-        _check_radiance(view, house, arrays["valid"], tally)
 
 
-def _check_radiance(
-    view: StoredView, house: StoredHouse, valid: NDArray[Any], tally: Tally
+def check_radiance(
+    view: StoredView,
+    house: StoredHouse,
+    channels: dict[str, NDArray[np.float32]],
+    valid: NDArray[Any],
+    tally: Tally,
 ) -> None:
-    """Every group of light is there, finite and not negative."""
-    try:
-        channels = view.exr("radiance.exr")
-    except BadInput as error:
-        tally.expect("radiance", view.place, False, str(error))
-        return
+    """Every group of light is there, finite and not negative; lamps are those of the house.
+
+    channels: of radiance.exr; valid: (H, W), 0 where nothing is hit.
+    """
     names = {f"{g}.{c}" for g in ("outdoor", "indoor", "albedo") for c in "RGB"}
     lacking = names - channels.keys()
     tally.expect("radiance", view.place, not lacking, f"lacks {lacking}")

@@ -8,15 +8,21 @@ from __future__ import annotations
 import json
 import shutil
 import struct
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from pbrs_farm.check import verify
+from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.formats.pairs_parquet import pairs_from_parquet, pairs_parquet
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
+from pbrs_farm.run.relight import linear_aovs
+from pbrs_farm.transport.develop.mode_pictures import develop
 from tests.check.roots import house_of, sign
+from tests.check.sorts_of_roots import rendered
 
 Plant = Callable[[Path], None]
 
@@ -288,6 +294,103 @@ def pictures_of_eyes(view: Path) -> None:
         (folder / "view.json").write_text(json.dumps(one))
 
 
+def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
+    """Changes the planes of radiance.exr, and develops the pictures of it again, with their facts."""
+
+    def plant(view: Path) -> None:
+        planes = dict(layers_from_exr((view / "radiance.exr").read_bytes()))
+        change(planes)
+        planes = {n: np.ascontiguousarray(p, np.float32) for n, p in planes.items()}
+        (view / "radiance.exr").write_bytes(exr_from_layers(planes))
+        develop_again(view)
+
+    return plant
+
+
+def develop_again(view: Path) -> None:
+    """The pictures of radiance.exr as it stands, in view.json and the step's marker, too."""
+    root = view.parents[3]
+    recipe = recipe_from_json((root / "recipe.json").read_bytes(), "recipe.json")
+    stored = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
+    tone = recipe.camera_of(view.parents[1].name, view.name).tone
+    images = develop(linear_aovs(stored), tone, denoise=recipe.light.denoise)
+    told = {}
+    for mode, image in images.items():
+        (view / f"{mode}.png").write_bytes(png_from_array(image.rgb_srgb8))
+        told[str(mode)] = image.facts()
+    table(lambda t: t["modes"]["develop"].update(told))(view)
+    document(f"done/develop.{view.name}.json", lambda m: m["facts"].update(told))(view)
+
+
+def light_planes(planes: dict[str, np.ndarray], *names: str) -> list[str]:
+    """Channels of light, of the groups that are named or of all and their lamps."""
+    chosen = names or ("outdoor", "indoor", "lamp")
+    return [n for n in planes if n.startswith(chosen)]
+
+
+def each(change: Callable[[np.ndarray], np.ndarray], *names: str) -> Plant:
+    """Light of some groups changed, and developed again."""
+    return light(lambda p: p.update({n: change(p[n]) for n in light_planes(p, *names)}))
+
+
+def of_other_view(*, with_guides: bool) -> Plant:
+    """The light of another view of the home, with its guides or under the view's own."""
+
+    def plant(view: Path) -> None:
+        other = max(v for v in view.parent.iterdir() if v != view)
+        theirs = layers_from_exr((other / "radiance.exr").read_bytes())
+        names = list(theirs) if with_guides else light_planes(dict(theirs))
+        light(lambda p: p.update({n: theirs[n] for n in names}))(view)
+
+    return plant
+
+
+def exchange_groups(planes: dict[str, np.ndarray]) -> None:
+    for c in "RGB":
+        swap_keys_of(planes, f"outdoor.{c}", f"indoor.{c}")
+
+
+def swap_keys_of(held: dict, a: str, b: str) -> None:
+    held[a], held[b] = held[b], held[a]
+
+
+def exchange_lamps(view: Path) -> None:
+    """The layers of the two lamps that bring most, with the shares that are told of them."""
+    rows = json.loads((view / "view.json").read_text())["modes"]["light"]["lamps"]
+    first, second = sorted(rows, key=lambda r: -r["share"])[:2]
+
+    def change(planes: dict[str, np.ndarray]) -> None:
+        for c in "RGB":
+            swap_keys_of(planes, f"{first['layer']}.{c}", f"{second['layer']}.{c}")
+            # Their sum is in the order of their numbers, to the bit.
+            layers = [r["layer"] for r in rows if r["layer"]]
+            total = np.zeros_like(planes[f"indoor.{c}"])
+            for name in layers:
+                total += planes[f"{name}.{c}"]
+            planes[f"indoor.{c}"] = total
+
+    light(change)(view)
+    shares = {first["number"]: second["share"], second["number"]: first["share"]}
+
+    def tell(facts: dict) -> None:
+        for r in facts["lamps"]:
+            r["share"] = shares.get(r["number"], r["share"])
+
+    table(lambda t: tell(t["modes"]["light"]))(view)
+    document(f"done/light.{view.name}.json", lambda m: tell(m["facts"]))(view)
+
+
+def of_another_hour(view: Path) -> None:
+    """The light of the same view with the sun behind the house."""
+    with tempfile.TemporaryDirectory() as name:
+        root = Path(name) / "root"
+        words = {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "165", "light.spp": "16"}
+        rendered("builtin", words, layers=())(root)
+        (file,) = root.glob(f"houses/*/views/{view.name}/radiance.exr")
+        shutil.copy(file, view / "radiance.exr")
+    develop_again(view)
+
+
 _FINISHED: dict[str, tuple[Plant, str]] = {
     "box3d moved by 5 cm": (row(move_box), "box3d"),
     "box3d grown": (row(lambda r: r["box3d"]["half"].__setitem__(1, r["box3d"]["half"][1] + 0.03)), "box3d"),
@@ -503,8 +606,40 @@ _EDITED: dict[str, tuple[Plant, str]] = {
     "nocs mirrored": (picture("nocs.png", lambda a: np.where(a.any(-1, keepdims=True), 65535 - a, 0)), "ray: nocs"),
 }  # fmt: skip
 
+_FINISHED |= {
+    # Light that is not what the labels show, developed again.
+    "radiance of another view": (of_other_view(with_guides=True), "light guides"),
+    "light of another view": (of_other_view(with_guides=False), "light edges"),
+    "light mirrored, developed": (each(mirrored), "light edges"),
+    "light upside down, developed": (each(lambda a: a[::-1]), "light edges"),
+    "light turned, developed": (each(lambda a: a[::-1, ::-1]), "light edges"),
+    "light moved by 4 px, developed": (each(lambda a: np.roll(a, 4, 1)), "light edges"),
+    "outdoor light mirrored, developed": (each(mirrored, "outdoor"), "light edges"),
+    "indoor light mirrored, developed": (each(mirrored, "indoor"), "light edges"),
+    "lamps of ten times the light": (each(scaled(10), "indoor"), "levels"),
+    "lamps of a tenth of the light": (each(scaled(0.1), "indoor"), "lamplight"),
+    "daylight of ten times the light": (each(scaled(10), "outdoor"), "levels"),
+    "light of one colour all over": (each(lambda a: np.full_like(a, a.mean())), "light edges"),
+    "outdoor and indoor light exchanged": (light(exchange_groups), "colours of light"),
+    "guides mirrored": (light(lambda p: p.update({n: a[:, ::-1] for n, a in p.items() if n[0] in "an"})), "light guides"),
+    "normal guides of another frame": (light(lambda p: swap_keys_of(p, "normal.X", "normal.Z")), "light guides"),
+    "albedo guide flattened": (light(lambda p: p.update({n: np.full_like(a, 0.5) for n, a in p.items() if n.startswith("albedo")})), "light guides"),
+}  # fmt: skip
+
+_LAMPS |= {"layers of two lamps exchanged, and their shares": (exchange_lamps, "lamplight")}
+
+_PAIR |= {"pictures of the eyes exchanged": (pictures_of_eyes, "light guides")}
+
+_SUN: dict[str, tuple[Plant, str]] = {
+    "light of another hour": (of_another_hour, "sun"),
+    "the sun told elsewhere": (
+        table(lambda t: t["modes"]["light"]["sky"].update(sun_direction=[0.224144, 0.5, 0.836516])), "sun",
+    ),
+}  # fmt: skip
+
 FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
     "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED,
+    "sun": _SUN,
 }  # fmt: skip
 
 

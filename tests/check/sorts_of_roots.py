@@ -73,6 +73,7 @@ ROOTS: dict[str, Make] = {
     "pair": rendered("builtin", {"cameras.stereo_m": "0.065"}, n_views=2),
     "lamps": rendered("builtin", {"light.groups": "lamps", "light.spp": "16"}, layers=()),
     "cameras": rendered("builtin", {"light.denoise": "true", "light.spp": "16", "tone.variants": "3"}, layers=()),
+    "sun": rendered("builtin", {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "345", "light.spp": "16"}, layers=()),
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
     "edited": _edited,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),

@@ -1,0 +1,190 @@
+"""Whether radiance.exr shows what the labels show: its guides against surfaces, its light against their albedo.
+
+Effects: none. Light is albedo times what arrives, so that steps of its logarithm follow those of albedo's,
+in this place of the picture and in no other, whatever the noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.pixel_checks import albedo_of_faces
+from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.check.stored_view import StoredView
+
+Channels = Mapping[str, NDArray[np.float32]]
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
+_GUIDE_DEG = 25.0  # a normal map may bend a guide, and a pixel is not flat
+_GUIDE_ALBEDO = 0.1  # of 1, in linear light: a texture's mean over the pixel against its middle
+_GUIDE_SHARE = 0.8  # of pixels amid one surface; blur and depth of field cost the rest
+_GUIDE_PX = 0  # by which the guides' edges may lie beside the labels'
+_FEW_GUIDES = 50  # pixels amid surfaces that tell nothing
+_FAINT = 0.05  # of albedo, and of the mean light: darker steps count less
+_MOST_STEP = 1.0  # of a logarithm: one firefly is not a picture
+_EDGE = 0.1  # step of albedo's logarithm that counts as an edge
+_FEW_EDGES = 300  # pixels with one that tell nothing
+_BLUR_PX = 0.7  # of both before they are compared: noise goes, edges stay within a pixel
+_NOISY = 0.09  # error of the slope above which noise hides all
+_LEAST_SLOPE = 0.15  # of steps of light over those of albedo, whose logarithms rise alike
+_LEAST_SIGMAS = 5.0  # of the slope where the picture stands
+_TIE_SIGMAS = 2.0  # by which another place may fit better by chance
+_GROUP_SIGMAS = 5.0  # the same of a light group alone, which may reach few of the edges
+
+
+def check_guides(
+    view: StoredView,
+    channels: Channels,
+    pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
+    arrays: Mapping[str, NDArray[Any]],
+    scene: tuple[Triangles, Rays],
+    tally: Tally,
+) -> None:
+    """The guides that radiance.exr holds, mean albedo and normal, are those of the surfaces seen there.
+
+    pixels: rows and columns to look at; only those amid one surface count, of no glass and no mirror.
+    """
+    names = [*(f"albedo.{c}" for c in "RGB"), *(f"normal.{c}" for c in "XYZ")]
+    if not all(name in channels and channels[name].shape == view.size for name in names):
+        return
+    _check_place(view, channels, arrays["normal"], tally)
+    triangles, rays = scene
+    rows, columns = pixels
+    origin, directions = view.rays(rows, columns)
+    face = rays.first(origin, directions)
+    kinds = triangles.kinds_of(face)
+    flat = _is_amid(arrays["instance"], arrays["normal"])[rows, columns]
+    keep = (face >= 0) & flat & ~np.isin(kinds, ("glass", "pane", "mirror", "bulb"))
+    # What lies outside is seen through a pane, or not at all.
+    if keep.sum() < _FEW_GUIDES:
+        return
+    rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
+    point = origin + directions * rays.distance(face, origin, directions)[:, None]
+    srgb = albedo_of_faces(view, face, point, triangles) / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    stored = np.stack([channels[n][rows, columns] for n in names], axis=1).astype(np.float64)
+    close = np.abs(stored[:, :3] - linear).max(axis=1) <= _GUIDE_ALBEDO
+    normal = rays.normal(face, directions)
+    length = np.maximum(np.linalg.norm(stored[:, 3:], axis=1), 1e-9)
+    cosine = np.einsum("ni,ni->n", normal, stored[:, 3:]) / length
+    turned = cosine >= np.cos(np.radians(_GUIDE_DEG))
+    for name, right in (("albedo", close), ("normal", turned)):
+        share = float(right.mean())
+        what = f"its {name} is that of the surface at {share:.0%} of {len(right)} pixels"
+        tally.expect("light guides", f"{view.place}/radiance.exr", share >= _GUIDE_SHARE, what)
+
+
+def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tally: Tally) -> None:
+    """The mean normal turns where the label's does, and a few pixels beside it less so."""
+    decoded = normal * (2 / 65535) - 1
+    # Published axes are x right, y forward, z up; the pose's are x right, y down, z forward.
+    facing = np.stack([decoded[..., 0], -decoded[..., 2], decoded[..., 1]], axis=-1)
+    world = facing @ view.world_from_camera[:3, :3].T
+    total = np.zeros(view.size)
+    n_edges = 0
+    for k, c in enumerate("XYZ"):
+        found, _energy = _correlation(channels[f"normal.{c}"], world[..., k])
+        total += found
+        n_edges += int((np.hypot(*_steps(world[..., k])) > _EDGE).sum())
+    if n_edges < _FEW_EDGES:
+        return
+    best = np.unravel_index(int(total.argmax()), total.shape)
+    moved = tuple(
+        int(k) if k <= n // 2 else int(k) - n for k, n in zip(best, total.shape, strict=True)
+    )
+    what = f"its normal fits the label's best {moved[1]} px to the right and {moved[0]} px below"
+    same = max(abs(m) for m in moved) <= _GUIDE_PX
+    tally.expect("light guides", f"{view.place}/radiance.exr", same, what)
+
+
+def _is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
+    """(H, W) whether a pixel and its neighbours show one instance with one normal."""
+    flat = ndimage.minimum_filter(instance, 3) == ndimage.maximum_filter(instance, 3)
+    for axis in range(3):
+        plane = normal[..., axis].astype(np.int64)
+        flat &= ndimage.maximum_filter(plane, 3) - ndimage.minimum_filter(plane, 3) < 600
+    return np.asarray(flat, bool)
+
+
+def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
+    """The light of radiance.exr fits its albedo as it stands, and mirrored, turned or moved no better.
+
+    All light together must fit; a light group alone may reach few edges, and must not fit another
+    place much better. Pictures with few edges, or more noise than light, are a note.
+    """
+    needed = [f"{name}.{c}" for name in ("outdoor", "indoor", "albedo") for c in "RGB"]
+    if not all(n in channels and channels[n].shape == view.size for n in needed):
+        return
+    level = {
+        name: ndimage.gaussian_filter(
+            sum(channels[f"{name}.{c}"] * w for c, w in zip("RGB", LUMINANCE, strict=True)),
+            _BLUR_PX,
+        )
+        for name in ("outdoor", "indoor", "albedo")
+    }
+    surface = np.log(level.pop("albedo") + _FAINT)
+    across, down = _steps(surface)
+    if int((np.hypot(across, down) > _EDGE).sum()) < _FEW_EDGES:
+        tally.note(f"{view.place}/radiance.exr has too few edges to compare")
+        return
+    level["all light"] = level["outdoor"] + level["indoor"]
+    place = f"{view.place}/radiance.exr"
+    for name, light in level.items():
+        if not (light > 0).any():
+            continue
+        logs = np.log(light + _FAINT * float(light[light > 0].mean()))
+        own, error, elsewhere = _slopes(logs, surface)
+        if error > _NOISY:
+            if name == "all light":
+                tally.note(f"{place} has more noise than edges: {name} is not compared")
+            continue
+        others = {"moved": elsewhere}
+        for what, turned in (
+            ("mirrored", logs[:, ::-1]),
+            ("upside down", logs[::-1]),
+            ("turned", logs[::-1, ::-1]),
+        ):
+            others[what] = _slopes(turned, surface)[0]
+        slack = (_TIE_SIGMAS if name == "all light" else _GROUP_SIGMAS) * error
+        for what, other in others.items():
+            text = f"{name} fits the albedo better {what} ({other:.2f}) than as it is ({own:.2f})"
+            tally.expect("light edges", place, other <= own + slack, text)
+        if name == "all light":
+            text = f"{name} does not follow the albedo: {own:.2f} +- {error:.2f}"
+            least = max(_LEAST_SIGMAS * error, _LEAST_SLOPE)
+            tally.expect("light edges", place, own >= least, text)
+
+
+def _steps(picture: NDArray[Any]) -> tuple[Floats, Floats]:
+    across = np.diff(picture, axis=1, append=picture[:, -1:])
+    down = np.diff(picture, axis=0, append=picture[-1:])
+    return tuple(np.clip(s.astype(np.float64), -_MOST_STEP, _MOST_STEP) for s in (across, down))  # type: ignore[return-value]
+
+
+def _slopes(light: NDArray[Any], surface: NDArray[Any]) -> tuple[float, float, float]:
+    """Steps of light over those of the surface: the slope here, its error, and the largest elsewhere.
+
+    The error is the spread over all other places, which a Fourier transform compares at once.
+    """
+    found, energy = _correlation(light, surface)
+    found /= max(energy, 1e-12)
+    own = float(found[0, 0])
+    found[0, 0] = -np.inf
+    rest = found[np.isfinite(found)]
+    return own, float(rest.std()), float(rest.max())
+
+
+def _correlation(light: NDArray[Any], surface: NDArray[Any]) -> tuple[Floats, float]:
+    """(H, W) products of steps of light with those of the surface moved by so much; squares of the latter."""
+    found, energy = np.zeros(light.shape), 0.0
+    for a, b in zip(_steps(light), _steps(surface), strict=True):
+        found += np.fft.irfft2(np.fft.rfft2(a) * np.conj(np.fft.rfft2(b)), light.shape)
+        energy += float((b**2).sum())
+    return found, energy
