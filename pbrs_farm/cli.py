@@ -104,7 +104,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _start_early(words)
         return _run_parsed(words, verb, module)
     except KeyboardInterrupt:
-        warn("interrupted; the same command goes on where it stopped")
+        warn("interrupted; run the same command again to resume")
         return 130  # 128 + SIGINT, as shells have it
     finally:
         if verb == "demo":

@@ -37,7 +37,7 @@ class BoardOptions:
     host: str = "127.0.0.1"
     port: int = DEFAULT_PORT
     token: Secret = field(default_factory=Secret)  # who shows it may change things
-    is_readonly: bool = False  # nothing can be changed, by nobody
+    is_readonly: bool = False  # read-only: no one can change anything
     allowed_hosts: tuple[str, ...] = ()  # names a browser may call the board by
     price_per_slot_hour: float = 0.0  # of the farm; 0 = no cost is shown
     currency: str = "EUR"

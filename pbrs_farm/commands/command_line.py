@@ -13,11 +13,11 @@ from pbrs_farm.core.shown_text import did_you_mean
 
 # What a user wants -> the verbs for it, in the order of the help.
 GROUPS: Final = {
-    "begin": ("demo", "doctor", "homes", "inputs", "skies", "completion"),
-    "make pictures and labels": ("run", "scatter", "objects", "step", "recipes", "layers"),
+    "start here": ("demo", "doctor", "homes", "run", "board", "export"),
+    "make pictures and labels": ("scatter", "objects", "step", "recipes", "layers", "inputs", "skies"),
     "look into one home": ("dress", "catalogue", "repair", "cameras"),
-    "look at what was made": ("board", "sheet", "label-sheet", "classes", "verify", "relight"),
-    "choose and hand on": ("reference", "select", "export", "pack"),
+    "look at what was made": ("sheet", "label-sheet", "classes", "verify", "relight"),
+    "choose and pack": ("reference", "select", "pack", "pull"),
     "train and judge": ("train", "evaluate", "predict", "ablation"),
     "run on many machines": (
         "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",

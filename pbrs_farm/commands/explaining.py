@@ -48,7 +48,7 @@ def add_verbs(verb: Verb) -> None:
         SeededRecipeOptions,
     )
 
-    text = "make a home look lived in: before and after, the bundle, a report in plain words"
+    text = "make a home look lived in; write before and after, the bundle and a report"
     p = verb("dress", _dress, text)
     add_home(p)
     add = p.add_argument
@@ -61,7 +61,7 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, LibraryOptions)
     add_options(p, RecipeOptions)
 
-    text = "what furniture of your own is used for, and what of it is refused and why"
+    text = "report how your own furniture is used, and why pieces are refused"
     p = verb("catalogue", _catalogue, text)
     text = "as --catalogue takes it: 3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, .sh3f"
     p.add_argument("libraries", nargs="+", type=Path, metavar="LIBRARY", help=text)
@@ -69,14 +69,14 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--refused", type=Path, metavar="FILE.csv", help=text)
     p.add_argument("--json", action="store_true", help="for machines")
 
-    text = "read and repair a home: bundle, report in plain words, a cut through the walls"
+    text = "read and repair a home; write the bundle, a report and a cut through the walls"
     p = verb("repair", _repair, text)
     add_home(p)
     text = "folder for house.glb, house.json, repair.json, cut_<level>.svg"
     p.add_argument("--out", type=Path, required=True, help=text)
     add_options(p, SeededRecipeOptions)
 
-    p = verb("cameras", _cameras, "choose views and say why every other candidate was rejected")
+    p = verb("cameras", _cameras, "choose views, and say why each other candidate was rejected")
     add_home(p)
     add = p.add_argument
     text = "floor plan with candidates, rejections and winners: FILE.png and FILE.svg"

@@ -17,7 +17,7 @@ def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
     from pbrs_farm.run.request import ModelsOption
 
-    text = "finished views in the form another tool reads; or the homes, for simulators"
+    text = "export finished views to other tools' formats, or homes to simulators"
     p = verb("export", _export, text)
     add = p.add_argument
     add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
@@ -34,7 +34,7 @@ def add_verbs(verb: Verb) -> None:
     text = "whose scans the form lidar has (default vlp16; docs/formats.md has them all)"
     add("--lidar", default="vlp16", metavar="SCANNER", help=text)
 
-    p = verb("pack", _pack_views, "finished views as shards to train from, or as Parquet")
+    p = verb("pack", _pack_views, "pack finished views into shards to train from, or into Parquet")
     add = p.add_argument
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
@@ -49,12 +49,18 @@ def add_verbs(verb: Verb) -> None:
     add("--colour", default="png", metavar="FORM", help=text)
     add("--seed", type=int, default=0, help="of the order of views (default 0)")
 
-    p = verb("classes", _count_classes, "how often each class is seen, and by which rule")
+    p = verb(
+        "classes", _count_classes, "count how often each class is seen, and say which rule chose it"
+    )
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
     add_options(p, ModelsOption)
     p.add_argument("--json", action="store_true", help="as JSON")
 
-    p = verb("label-sheet", _label_sheet, "a view's labels over its picture, an edge magnified")
+    p = verb(
+        "label-sheet",
+        _label_sheet,
+        "draw a view's labels over its picture, with one edge magnified",
+    )
     p.add_argument("view", type=Path, help=VIEW)
     p.add_argument("--out", type=Path, help="PNG (default VIEW_labels.png here)")
 

@@ -24,19 +24,21 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add doctor, inputs, skies, recipes, layers and completion."""
-    p = verb("doctor", _doctor, "what this machine can do, and what to do about what is missing")
+    p = verb(
+        "doctor", _doctor, "check this machine: what works, what is missing, how to install it"
+    )
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
-    text = "the formats of houses that are read: what each brings, where one gets it, its licence"
+    text = "list the house formats: what each brings, where to get it, its licence"
     p = verb("inputs", _inputs, text)
     p.add_argument("--json", action="store_true", help="for machines")
     p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
-    p = verb("recipes", _recipes, "every field of a recipe and its value")
+    p = verb("recipes", _recipes, "print every field of a recipe with its value")
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES, help="default fast")
     p.add_argument("--toml", action="store_true", help="as a file for --recipe FILE.toml")
-    p = verb("layers", _layers, "the table of the files of a view")
-    text = 'what makes the shell complete words: eval "$(pbrs-farm completion bash)"'
+    p = verb("layers", _layers, "print the table of a view's files")
+    text = 'print a shell completion script: eval "$(pbrs-farm completion bash)"'
     p = verb("completion", _completion, text)
     p.add_argument("shell", choices=SHELLS, help="the shell that reads it")
 

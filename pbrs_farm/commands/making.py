@@ -50,7 +50,7 @@ def add_verbs(verb: Verb) -> None:
     p.set_defaults(views=6)
     p.epilog = "six views unless --views asks for others"
 
-    p = verb("run", _run, "houses -> repaired houses -> cameras -> pictures and labels")
+    p = verb("run", _run, "render homes: repair them, choose cameras, write pictures and labels")
     add = p.add_argument
     add("homes", nargs="*", metavar="HOME", help=HOME)
     add("--home", action="append", default=[], metavar="PATH", help="the same, repeatable")
@@ -67,7 +67,7 @@ def add_verbs(verb: Verb) -> None:
         "example: pbrs-farm run Studio --dress 1 --recipe preview --views 4 --layers albedo depth_z"
     )
 
-    text = "single models without context: 20 views each (paper section 4.1)"
+    text = "render single models without context, 20 views each (paper section 4.1)"
     p = verb("objects", _objects, text)
     add = p.add_argument
     text = "folders of OBJ or GLB (ShapeNet's layout too), .sh3f libraries"
@@ -79,7 +79,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", required=True, help="output folder or store URL")
     add_options(p, ObjectsRequest)
 
-    p = verb("step", _step, "one step in this process: reproduces a failure")
+    p = verb("step", _step, "run one step in this process, to reproduce a failure")
     add = p.add_argument
     add("step", help="as a failure names it, e.g. light")
     add("home", help=HOME)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
-    p = verb("reference", _reference, "photographs -> a small reference file of histograms")
+    p = verb("reference", _reference, "make a small reference file of histograms from photographs")
     add = p.add_argument
     add("action", choices=("build",), help="the one thing to do")
     add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add board."""
-    p = verb("board", _board, "a page in the browser: look at views, relight them, watch a farm")
+    p = verb(
+        "board", _board, "open a page in the browser: look at views, relight them, watch a farm"
+    )
     add = p.add_argument
     add("root", nargs="?", default="", help="output folder or store URL (default $PBRS_STORE)")
     add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
@@ -32,7 +34,7 @@ def add_verbs(verb: Verb) -> None:
         "file that holds the token of changes, and of reading from elsewhere (default: a new one)"
     )
     add("--token-file", type=Path, metavar="FILE", help=text)
-    add("--readonly", action="store_true", help="nothing can be changed, by nobody")
+    add("--readonly", action="store_true", help="read-only: no one can change anything")
     text = "keeps the index and thumbnails (default ~/.cache/pbrs_farm/board)"
     add("--cache", type=Path, metavar="FOLDER", help=text)
     text = "price of a slot for an hour, for the cost of jobs"

@@ -48,23 +48,23 @@ def add_verbs(verb: Verb) -> None:
         add_farm(p)
         return p
 
-    p = farm_verb("status", _status, "how far a job is: stages, rate, time left, workers")
+    p = farm_verb("status", _status, "show a job's progress: stages, rate, time left, workers")
     _add_job(p)
     text = "again every two seconds, to the end (--json: a line each)"
     p.add_argument("--watch", action="store_true", help=text)
-    farm_verb("jobs", _jobs, "every job of the farm: state, views an hour, time left, slot-hours")
-    p = farm_verb("why", _why, "what a task, a house or a view waits for")
+    farm_verb("jobs", _jobs, "list the farm's jobs: state, views an hour, time left, slot-hours")
+    p = farm_verb("why", _why, "explain what a task, a house or a view is waiting for")
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
-    p = farm_verb("logs", _logs, "the log of a failed or long task")
+    p = farm_verb("logs", _logs, "print the log of a failed or long-running task")
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     p.add_argument("--attempt", type=int, metavar="N", help="which one (default the last)")
     _add_job(p, flag=True)
-    _add_job(farm_verb("failures", _failures, "what failed for good, alike together"))
-    p = farm_verb("retry", _retry, "fresh attempts for failed tasks (all, unless named)")
+    _add_job(farm_verb("failures", _failures, "list permanent failures, similar ones together"))
+    p = farm_verb("retry", _retry, "retry failed tasks: those named, or all")
     p.add_argument("tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default all)")
     _add_job(p, flag=True)
-    p = farm_verb("rerun", _rerun, "a task once more, in this process: reproduces a failure")
+    p = farm_verb("rerun", _rerun, "run a task again in this process, to reproduce a failure")
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
     # Verbs that change a job's state take the job alone.
@@ -72,43 +72,43 @@ def add_verbs(verb: Verb) -> None:
         p = farm_verb(name, _steer, text)
         p.set_defaults(what=name)
         _add_job(p)
-    p = farm_verb("priority", _priority, "how urgent a job is, while it runs: 0 goes first, 9 last")
+    p = farm_verb("priority", _priority, "change a running job's priority: 0 is first, 9 is last")
     text = f"0 to {LEAST_URGENT}"
     p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER", help=text)
     _add_job(p)
     p = farm_verb(
-        "limit", _limit, "another ceiling of a job: tasks in flight, slot-hours; 0 = none"
+        "limit", _limit, "limit a job's tasks in flight or its slot-hours; 0 removes the limit"
     )
     text = "tasks of the job in flight at once; 0 = any"
     p.add_argument("--max-slots", type=int, metavar="N", help=text)
     text = "slot-hours after which it pauses itself; 0 = none"
     p.add_argument("--budget", type=float, metavar="HOURS", help=text)
     _add_job(p)
-    p = farm_verb("gc", _gc, "what the store holds and nobody needs: told, and removed with --yes")
+    p = farm_verb("gc", _gc, "list what the store no longer needs; remove it with --yes")
     p.add_argument(
         "--keep", default="30d", metavar="TIME", help="younger things stay (default 30d)"
     )
     p.add_argument("--yes", action="store_true", help="remove it")
-    p = farm_verb("drain", _drain, "a worker finishes what it runs and leaves")
+    p = farm_verb("drain", _drain, "let a worker finish its tasks and stop")
     p.add_argument("worker", help="its name, as `workers` lists it")
     p.add_argument("--undo", action="store_true", help="let it stay")
-    farm_verb("workers", _workers, "the farm's workers")
+    farm_verb("workers", _workers, "list the farm's workers")
     _add_users(farm_verb)
     p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
     p.set_defaults(what="recover")
     p.add_argument("job", help="job id")
-    text = "go on with a job of another version: what this one would make alike stays"
+    text = "continue a job of another version; keep what this version would make alike"
     p = farm_verb("adopt", _recover, text)
     p.set_defaults(what="adopt")
     p.add_argument("job", help="job id")
     # The two services of the farm.
-    verb("coordinator", _coordinator, "lead the farm, or stand by")
-    p = verb("worker", _worker, "work for the farm until asked to leave")
+    verb("coordinator", _coordinator, "run the coordinator, or stand by for it")
+    p = verb("worker", _worker, "run farm tasks until told to stop")
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
 
 
 def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]) -> None:
-    p = farm_verb("users", _users, "who may ask for work, and how much; users add NAME makes one")
+    p = farm_verb("users", _users, "list, add and limit users; `users add NAME` makes one")
     verbs = ("list", "add", "limit", "remove")
     p.add_argument("what", nargs="?", default="list", choices=verbs, help="default list")
     p.add_argument("name", nargs="?", default="", metavar="NAME", help="the user's")
@@ -121,16 +121,16 @@ def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]
     yes_no = ("yes", "no")
     p.add_argument("--admin", choices=yes_no, help="may steer every job, workers and users")
     p.add_argument("--may-preempt", choices=yes_no, help="may submit urgent jobs (--preempt)")
-    p = farm_verb("audit", _audit, "who changed what of the farm, the newest first")
+    p = farm_verb("audit", _audit, "list who changed what on the farm, newest first")
     p.add_argument("--last", type=int, default=20, metavar="N", help="lines (default 20)")
 
 
 # Verbs that change a job's state -> what they do.
 _STEERING = {
-    "pause": "start nothing more; what runs, ends",
-    "resume": "go on with a paused job",
-    "cancel": "stop a job; what is stored stays",
-    "reduce": "merge what is there, of a finished or running job",
+    "pause": "pause a job: running tasks finish, no new ones start",
+    "resume": "resume a paused job",
+    "cancel": "cancel a job; stored results stay",
+    "reduce": "merge the results of a finished or running job",
 }
 
 

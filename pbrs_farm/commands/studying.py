@@ -34,7 +34,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 
 def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict and ablation."""
-    p = verb("train", _train, "train a network on finished views; twice goes on where it stopped")
+    p = verb("train", _train, "train a network on finished views; run it again to resume")
     p.add_argument("task", choices=TASKS, help="what the network learns to see")
     roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
@@ -72,7 +72,11 @@ def add_verbs(verb: Verb) -> None:
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
-    p = verb("predict", _predict, "what a run sees in photographs: files, and a page with a wipe")
+    p = verb(
+        "predict",
+        _predict,
+        "run a trained network on photographs; write files and a comparison page",
+    )
     photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
     p.usage = (
         "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--json]\n"
@@ -84,7 +88,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
     p.add_argument("--json", action="store_true", help="a JSON line a photograph")
 
-    text = "the paper's comparison: one network, several lights or sets of homes, several seeds"
+    text = "compare lights or sets of homes by training one network on each, with several seeds"
     p = verb("ablation", _ablation, text)
     rows = "[NAME=]ROOT[+ROOT][@MODE]: a row a mode, or one where a mode is named"
     p.add_argument("root", metavar="ROOT", nargs="+", help=rows)

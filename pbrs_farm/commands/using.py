@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add sheet, verify, relight and pull."""
-    text = "contact sheet (sheet.png) and gallery (index.html) of an output folder"
+    text = "lay out an output folder: contact sheet (sheet.png) and gallery (index.html)"
     p = verb("sheet", _sheet, text)
     p.add_argument("folder", type=Path, help="the folder of --out")
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
@@ -41,7 +41,7 @@ def add_verbs(verb: Verb) -> None:
     add("--sample", type=int, metavar="N", help="pixels a view")
     add("--json", action="store_true", help="certificate or claims as JSON")
 
-    text = "other strengths of lamps and daylight from a stored view, no rendering"
+    text = "change lamps and daylight of a stored view without rendering"
     p = verb("relight", _relight, text)
     add = p.add_argument
     add("view", help=f"{VIEW}, or a store's URL of one")
@@ -56,7 +56,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, help="PNG to write (default VIEW_relit.png here)")
     add("--no-denoise", action="store_true", help="develop the raw radiance")
 
-    p = verb("pull", _pull, "copy a store's views into a folder of files; what is there stays")
+    p = verb("pull", _pull, "copy a store's views into a folder; files already there stay")
     p.add_argument("root", metavar="ROOT", help="s3://bucket/prefix, or a folder")
     p.add_argument("--out", type=Path, required=True, help="the folder")
 

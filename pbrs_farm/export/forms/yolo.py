@@ -108,7 +108,7 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> int:
         if name not in folders:
             other = other if other in folders else next(iter(folders))
             folders[name] = folders[other]
-            remarks.append(f"# no home is in {name}: it is {other}")
+            remarks.append(f"# the split left {name} empty, so {other} stands in for it")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
     lines += fields
     (out / "data.yaml").write_text("\n".join(lines) + "\n")
