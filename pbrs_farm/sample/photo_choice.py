@@ -112,15 +112,17 @@ class PhotoChoice:
     """The choice among all candidates of one home.
 
     lens: of zoom 1, of the size of depth pictures. depth_of: small depth pictures; None: no view is
-    compared with another, so that near-duplicates stay.
+    compared with another, so that near-duplicates stay. looked_at: cameras and depth pictures that are
+    at hand, by room and number.
     """
 
     fields: CameraFields
     lens: Intrinsics
     depth_of: DepthOf | None
+    looked_at: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
     _shown: F64 = field(default_factory=lambda: np.zeros(len(NYU13_NAMES)))  # sum over views
     _taken: set[_Name] = field(default_factory=set)
-    _looked_at: dict[_Name, tuple[Camera, F32]] = field(default_factory=dict)
+    _are_alike: dict[frozenset[_Name], bool] = field(default_factory=dict)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
         """(room id, sector) -> numbers of the chosen candidates; writes their verdicts.
@@ -234,9 +236,15 @@ class PhotoChoice:
         if self.depth_of is None:
             return False
         name = scored.room.id, number
-        if name not in self._looked_at:
+        if name not in self.looked_at:
             camera = scored.candidates.cameras(np.array([number]), self.lens)[0]
-            self._looked_at[name] = camera, self.depth_of([camera])[0]
-        # Every view that is taken was looked at before.
-        others = (self._looked_at[other] for other in self._taken)
-        return any(overlap(*self._looked_at[name], *other) > MOST_OVERLAP for other in others)
+            self.looked_at[name] = camera, self.depth_of([camera])[0]
+        return any(self._is_alike(name, other) for other in self._taken)
+
+    def _is_alike(self, name: _Name, other: _Name) -> bool:
+        # Every view that is taken was looked at before; rounds ask for the same pairs again.
+        pair = frozenset((name, other))
+        if pair not in self._are_alike:
+            shared = overlap(*self.looked_at[name], *self.looked_at[other])
+            self._are_alike[pair] = shared > MOST_OVERLAP
+        return self._are_alike[pair]

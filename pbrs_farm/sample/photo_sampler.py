@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import Geometry, House, Room
@@ -39,7 +40,7 @@ from pbrs_farm.sample.view_overlap import DEPTH_SIZE, DepthOf
 
 Size = tuple[int, int]  # width and height of a picture, px
 
-TINY: Final = 0.3  # of the edges of a small picture: a tenth of its pixels
+TINY: Final = 0.225  # of the edges of a small picture: a twentieth of its pixels
 _LEAST_TINY_PX: Final = 24  # edge of a picture that tells furniture from walls
 _TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
 
@@ -54,6 +55,10 @@ class PhotoSampler:
     counter: ItemCounter
     depth_of: DepthOf
     geometry: Geometry
+    _looked_at: dict[tuple[str, int], tuple[Camera, F32]] = field(default_factory=dict)
+    _at_full_size: dict[tuple[str, int], tuple[Camera, NDArray[np.uint32]]] = field(
+        default_factory=dict
+    )
 
     def room_candidates(self, room: Room) -> RoomCandidates:
         """Every candidate of a room, rejected by a rule or scored from a tiny picture.
@@ -90,7 +95,14 @@ class PhotoSampler:
     ) -> RoomCandidates:
         """The candidates numbered by which (M,) with scores from pictures of a size; no other has one."""
         f, candidates = self.fields, placed.candidates
-        seen = self._shares(candidates.cameras(which, self._intrinsics(*size)), depth_size)
+        cameras = candidates.cameras(which, self._intrinsics(*size))
+        small = [camera.with_size(*depth_size) for camera in cameras]
+        depth = self.depth_of(small)
+        seen = self._shares(cameras, depth)
+        # By these near-duplicates are told.
+        if depth_size == DEPTH_SIZE:
+            names = [(placed.room.id, int(k)) for k in which]
+            self._looked_at |= dict(zip(names, zip(small, depth, strict=True), strict=True))
         # Rules about the picture come before any comparison of scores.
         rule = np.full(len(which), Verdict.LOWER_SCORE, np.uint8)
         one = (seen.largest > f.max_item_fraction) | (seen.wall > f.max_wall_fraction)
@@ -112,33 +124,38 @@ class PhotoSampler:
 
         rooms: all of the house at once. A sector without a choice may be missing.
         """
-        choice = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), self.depth_of)
-        return choice.choose(rooms)
+        lens = self._intrinsics(*DEPTH_SIZE)
+        choice = PhotoChoice(self.fields, lens, self.depth_of, dict(self._looked_at))
+        chosen = choice.choose(rooms)
+        # Count the pixels of furniture again at the size that scores are stored for, all views at once.
+        f = self.fields
+        full = self._intrinsics(f.score_width_px, f.score_height_px)
+        by_room = {scored.room.id: scored for scored in rooms}
+        names = [(room, int(k)) for (room, _sector), some in chosen.items() for k in some]
+        cameras = [by_room[r].candidates.cameras(np.array([k], np.intp), full)[0] for r, k in names]
+        parts = count_items(self.counter, cameras, self._n_items)
+        counts = [row for _which, rows in parts for row in rows]
+        self._at_full_size = dict(zip(names, zip(cameras, counts, strict=True), strict=True))
+        return chosen
 
     def views(self, scored: RoomCandidates, sector: int, chosen: list[int]) -> list[View]:
         """The chosen candidates of a sector as views, at the scoring size.
 
-        chosen: numbers from `choose`. The pixels of furniture (`objects`) are counted anew at the
+        chosen: numbers from `choose`, which counted the pixels of furniture (`objects`) anew at the
         scoring size.
         """
-        # Count the pixels of furniture again at the size that scores are stored for.
-        f = self.fields
-        full = self._intrinsics(f.score_width_px, f.score_height_px)
-        cameras = scored.candidates.cameras(np.array(chosen, np.intp), full)
-        columns = np.flatnonzero(self._roles.furniture)
-        counts = [
-            r for _part, rows in count_items(self.counter, cameras, self._n_items) for r in rows
-        ]
+        columns, per_sector = np.flatnonzero(self._roles.furniture), self.fields.per_sector
+        seen = [self._at_full_size[scored.room.id, number] for number in chosen]
         return [
             View(
-                id=keys.view_id(scored.room.id, sector, k if f.per_sector > 1 else None),
+                id=keys.view_id(scored.room.id, sector, k if per_sector > 1 else None),
                 room_id=scored.room.id,
                 sector=sector,
                 camera=camera,
                 score=round(float(scored.worth(np.array([number]))[0]), 4),
                 objects={int(i): int(row[i]) for i in columns if row[i]},
             )
-            for k, (number, camera, row) in enumerate(zip(chosen, cameras, counts, strict=True))
+            for k, (number, (camera, row)) in enumerate(zip(chosen, seen, strict=True))
         ]
 
     @cached_property
@@ -166,12 +183,11 @@ class PhotoSampler:
             return self._sizes
         return (width, height), _TINY_DEPTH_SIZE
 
-    def _shares(self, cameras: list[Camera], depth_size: Size) -> PhotoShares:
-        """What pictures of these cameras show."""
+    def _shares(self, cameras: list[Camera], depth: F32) -> PhotoShares:
+        """What pictures of these cameras show. depth: (N, H, W) small pictures of them."""
         rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
-        depth = self.depth_of([camera.with_size(*depth_size) for camera in cameras])
-        flat = depth.reshape(len(cameras), depth_size[0] * depth_size[1])
+        flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
         return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
