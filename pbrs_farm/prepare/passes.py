@@ -266,7 +266,7 @@ PASSES: Final = (
     Pass("dress", 4, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass(
-        "surroundings", 1, ("surroundings",), _surround,
+        "surroundings", 2, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",
     ),
     Pass("edits", 3, (), _edit, lambda source, _recipe: bool(source.edits)),

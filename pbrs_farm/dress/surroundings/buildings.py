@@ -1,103 +1,25 @@
-"""Facades with windows, houses with gables, parked cars, lamp posts, fences; no effects."""
+"""Buildings with windows, balconies and roofs, parked cars, lamp posts, fences; no effects."""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.dress.surroundings.facades import COLUMNS, N_ROOMS, ROWS, Facade
 from pbrs_farm.dress.surroundings.scenery import Rgb, Scenery, SceneryMaterial, lit, mottled, paved
-from pbrs_farm.dress.textures.noise import noise
 
 STOREY_M: Final = 3.0
-_PX: Final = 512  # size of a facade's picture, which shows two bays by two storeys
 
-_WALLS: Final[tuple[Rgb, ...]] = (
-    (0.72, 0.66, 0.55), (0.62, 0.50, 0.36), (0.78, 0.76, 0.72), (0.50, 0.36, 0.28), (0.66, 0.58, 0.36),
-    (0.45, 0.47, 0.46), (0.60, 0.42, 0.34), (0.70, 0.70, 0.62), (0.38, 0.17, 0.12), (0.34, 0.20, 0.15),
-)  # fmt: skip
-_BRICKS: Final = 8  # walls from here on are of bricks
-_FRAMES: Final[tuple[Rgb, ...]] = ((0.75, 0.75, 0.72), (0.16, 0.12, 0.09), (0.08, 0.09, 0.10))
-_ROOFS: Final[tuple[Rgb, ...]] = ((0.30, 0.10, 0.055), (0.11, 0.10, 0.10), (0.20, 0.10, 0.07))
+_REVEAL_M: Final = 0.17  # that windows lie behind their front
+_EAVES_M: Final = 0.45
+_PLINTH_M: Final = 0.5
+_DOOR_M: Final = (1.15, 2.45)
 _PAINTS: Final[tuple[Rgb, ...]] = (
     (0.55, 0.56, 0.58), (0.03, 0.03, 0.035), (0.20, 0.21, 0.22), (0.30, 0.03, 0.03), (0.05, 0.09, 0.20), (0.70, 0.70, 0.68),
 )  # fmt: skip
-# Dark glass, of the hue that a lamp behind it gives it.
-_GLOWS: Final[tuple[Rgb, ...]] = ((0.45, 0.37, 0.25), (0.45, 0.40, 0.31), (0.42, 0.32, 0.20))
-
-
-class Facade(NamedTuple):
-    """How a building's front is divided and painted."""
-
-    look: SceneryMaterial
-    bay_m: float
-    window: tuple[float, float, float, float]  # x0, y0, x1, y1 as shares of bay and storey
-
-
-def facade(rng: np.random.Generator, number: int) -> Facade:
-    """A facade of two bays by two storeys, each window a little different."""
-    k = int(rng.integers(0, len(_WALLS)))
-    wall, frame = _WALLS[k], _FRAMES[int(rng.integers(0, len(_FRAMES)))]
-    bay_m = float(rng.uniform(2.5, 3.4))
-    wide, high = rng.uniform(0.36, 0.52), rng.uniform(0.46, 0.6)
-    low = rng.uniform(0.24, 0.3)
-    window = (0.5 - wide / 2, low, 0.5 + wide / 2, low + high)
-    picture = _facade_pixels(rng, wall, is_brick=k >= _BRICKS)
-    half = _PX // 2
-    surround = rng.random() < 0.5
-    for row in range(2):
-        for column in range(2):
-            own = picture[row * half : (row + 1) * half, column * half : (column + 1) * half]
-            _draw_window(rng, own, window, wall, frame, has_surround=surround)
-    look = SceneryMaterial(f"facade {number}", picture=picture, size_m=(2 * bay_m, 2 * STOREY_M))
-    return Facade(look, bay_m, window)
-
-
-def _facade_pixels(rng: np.random.Generator, rgb: Rgb, *, is_brick: bool) -> F32:
-    tone = 1 + 0.05 * noise(rng, (_PX, _PX), slope=1.6) + 0.03 * noise(rng, (_PX, _PX), slope=0.3)
-    if is_brick:
-        rows = np.arange(_PX) * 80 // _PX  # 7.5 cm each
-        shift = (rows % 2)[:, None] * 10
-        columns = (np.arange(_PX)[None] + shift) // 20
-        bricks = rng.uniform(0.75, 1.2, (80, 64))
-        tone = tone * bricks[rows[:, None], columns % 64]
-        first = np.diff(rows, prepend=-1) > 0
-        tone[first] *= 1.25
-    return np.asarray(np.clip(tone[..., None] * np.array(rgb), 0, 0.9), np.float32)
-
-
-def _draw_window(
-    rng: np.random.Generator, bay: F32, window: tuple[float, float, float, float], wall: Rgb,
-    frame: Rgb, *, has_surround: bool,
-) -> None:  # fmt: skip
-    """Paint a window into a bay's picture, row 0 at its top."""
-    n = len(bay)
-    x0, x1 = round(window[0] * n), round(window[2] * n)
-    y0, y1 = round((1 - window[3]) * n), round((1 - window[1]) * n)
-    if has_surround:
-        bay[y0 - 12 : y1 + 6, x0 - 12 : x1 + 12] = np.minimum(1.25 * np.array(wall), 0.85)
-    # The reveal is dark above, the frame stands in it, glass shows some sky and curtains.
-    bay[y0:y1, x0:x1] = 0.35 * np.array(wall)
-    bay[y0 + 7 : y1, x0 + 3 : x1 - 3] = frame
-    glass = bay[y0 + 13 : y1 - 6, x0 + 9 : x1 - 9]
-    fall = np.linspace(1.0, 0.45, len(glass))[:, None, None]
-    glass[:] = fall * np.array([0.10, 0.125, 0.15]) * rng.uniform(0.6, 1.5)
-    curtain = rng.random()
-    if curtain < 0.6:
-        part = int(rng.uniform(0.12, 0.32) * glass.shape[1])
-        cloth = np.array([0.45, 0.43, 0.40]) * rng.uniform(0.4, 0.9)
-        folds = 1 + 0.18 * np.sin(np.arange(part) * 0.9)[None, :, None]
-        glass[:, :part] = cloth * folds
-        glass[:, glass.shape[1] - part :] = cloth * folds
-    elif curtain < 0.78:
-        glass[: int(rng.uniform(0.2, 0.8) * len(glass))] = np.array([0.5, 0.48, 0.44]) * rng.uniform(0.5, 0.9)  # fmt: skip
-    middle = (x0 + x1) // 2
-    bay[y0 + 7 : y1, middle - 3 : middle + 3] = frame
-    if rng.random() < 0.6:
-        cross = y0 + 13 + (y1 - y0) // 3
-        bay[cross - 3 : cross + 3, x0 + 9 : x1 - 9] = frame
-    bay[y1 : y1 + 6, x0 - 5 : x1 + 5] = 0.6 * np.array(wall)
+_IRON: Final = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
 
 
 class Front(NamedTuple):
@@ -134,113 +56,239 @@ def _front_box(
     scenery.add(thing, look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]])  # fmt: skip
 
 
+class _Holes(NamedTuple):
+    """The windows of a front, metres on it, (N,) each."""
+
+    left: F64
+    low: F64
+    right: F64
+    high: F64
+    has_balcony: Any  # (N,) bool
+
+
 def block(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, n_bays: int,
-    n_storeys: int, *, depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False,
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
+    n_bays: int, n_storeys: int, *, depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False,
 ) -> None:  # fmt: skip
-    """A building of several storeys: a front with windows, sides, a roof and what sticks out."""
-    width, plinth = n_bays * own.bay_m, 0.5
-    top = plinth + n_storeys * STOREY_M
-    stone = SceneryMaterial("stone", picture=None, rgb=(0.46, 0.45, 0.43))
-    u0, v0 = rng.integers(0, 2, 2) / 2
-    uvs = np.array([[0, 0], [n_bays / 2, 0], [n_bays / 2, n_storeys / 2], [0, n_storeys / 2]])
-    scenery.add(thing, own.look, _rectangles(front, np.array([0.0]), np.array([plinth]), np.array([width]), np.array([top]), 0.0), (uvs + np.array([u0, v0]))[None])  # fmt: skip
-    _front_box(scenery, thing, stone, front, 0, width, -0.5, plinth, -0.1, 0.06)
-    # Sides, without windows, in the facade's own colour.
-    tint = own.look.picture
-    assert tint is not None
-    r, g, b = (float(c) for c in np.sqrt(np.median(tint.reshape(-1, 3), 0)))
-    plain = SceneryMaterial(f"{own.look.name} plain", rgb=(r, g, b))
-    for s in (0.0, width):
-        side = np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth_m), (top, -depth_m), (top, 0))])  # fmt: skip
-        scenery.add(thing, plain, side[None])
-    _roof(scenery, thing, rng, front, width, top, depth_m)
-    # Sills and a cornice throw shadows that a painted front lacks.
-    _front_box(scenery, thing, stone, front, -0.15, width + 0.15, top - 0.05, top + 0.3, -0.1, 0.35)
-    left, low, right, _high = windows = _windows(own, n_bays, n_storeys, plinth)
-    over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low), front.at(right + 0.08, low, 0.14), front.at(left - 0.08, low, 0.14)], -2)  # fmt: skip
-    lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.14)
-    scenery.add(thing, stone, np.concatenate([over, lip]))
-    _lit_windows(scenery, thing, rng, front, windows, is_lit)
-    if has_balconies:
-        iron = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
-        for k in np.flatnonzero((low > plinth + STOREY_M) & (rng.random(len(left)) < 0.4)):
-            floor = float(low[k] - own.window[1] * STOREY_M)
-            _front_box(scenery, thing, stone, front, left[k] - 0.3, right[k] + 0.3, floor - 0.12, floor, 0, 1.1)  # fmt: skip
-            n = 9
-            rods = np.linspace(left[k] - 0.3, right[k] + 0.3, n)
-            scenery.add(thing, iron, _rectangles(front, rods - 0.02, np.full(n, floor), rods + 0.02, np.full(n, floor + 1.0), 1.08))  # fmt: skip
-            scenery.add(thing, iron, _rectangles(front, rods[:1], np.array([floor + 0.96]), rods[-1:], np.array([floor + 1.02]), 1.09))  # fmt: skip
+    """A building of several storeys: a front with windows, sides, a roof and what sticks out.
 
-
-def _lit_windows(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
-    windows: tuple[F64, F64, F64, F64], share: float,
-) -> None:  # fmt: skip
-    """Light behind a share of the windows: two panes of a warm glow each."""
-    left, low, right, high = windows
-    on = np.flatnonzero(rng.random(len(left)) < share)
-    glow = rng.integers(0, len(_GLOWS), len(on))
-    for g in range(len(_GLOWS)):
-        k = on[glow == g]
-        middle = (left[k] + right[k]) / 2
-        for a, b in ((left[k] + 0.09, middle - 0.03), (middle + 0.03, right[k] - 0.09)):
-            quads = _rectangles(front, a, low[k] + 0.1, b, high[k] - 0.14, 0.015)
-            scenery.add(thing, lit(_GLOWS[g], g), quads)
-
-
-def _roof(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, width: float, top: float, depth: float
-) -> None:  # fmt: skip
-    rgb = _ROOFS[int(rng.integers(0, len(_ROOFS)))]
-    look = SceneryMaterial(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
-    ridge = top + rng.uniform(1.2, 3.2)
-    a, b = front.at(-0.2, top, 0.3), front.at(width + 0.2, top, 0.3)
-    c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
-    e, f = front.at(width + 0.2, top, -depth), front.at(-0.2, top, -depth)
-    scenery.add(thing, look, np.stack([np.stack([a, b, c, d]), np.stack([d, c, e, f])]))
-    for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
-        _front_box(scenery, thing, look, front, s, s + 0.6, ridge - 1.2, ridge + 0.9, -depth / 2 - 0.3, -depth / 2 + 0.4)  # fmt: skip
+    rooms: the look of `lit_rooms`, for windows of lit rooms.
+    """
+    width = n_bays * own.bay_m
+    top = _PLINTH_M + n_storeys * STOREY_M
+    _body(scenery, thing, front, own, width, top, depth_m)
+    share = own.style.balconies if has_balconies else 0.0
+    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, share)
+    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
+    cornice = own.style.cornice_m
+    _front_box(
+        scenery, thing, own.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
+    )
+    _front_box(scenery, thing, own.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1, 0.45 * cornice)  # fmt: skip
+    if own.style.surround_m:
+        y = _PLINTH_M + STOREY_M
+        _front_box(scenery, thing, own.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
+    _front_box(scenery, thing, _IRON, front, 0.12, 0.22, 0, top, 0.02, 0.12)
+    if own.style.is_flat:
+        _flat_roof(scenery, thing, front, own, width, top, depth_m)
+    else:
+        _roof(scenery, thing, rng, front, own, width, top, depth_m)
+    for k in np.flatnonzero(holes.has_balcony):
+        _balcony(scenery, thing, front, own, holes.left[k] - 0.35, holes.right[k] + 0.35, holes.low[k] - 0.1)  # fmt: skip
 
 
 def house(
-    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, *, is_lit: float = 0.3
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, rooms: SceneryMaterial,
+    *, is_lit: float = 0.3,
 ) -> None:  # fmt: skip
     """A house of one or two storeys with a gable."""
     n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
     width, depth = n_bays * own.bay_m, float(rng.uniform(7, 10))
-    top = 0.4 + n_storeys * STOREY_M
+    top = _PLINTH_M + n_storeys * STOREY_M
     ridge = top + rng.uniform(0.32, 0.48) * width if rng.random() < 0.5 else 0.0
-    uvs = np.array([[0, 0], [n_bays / 2, 0], [n_bays / 2, n_storeys / 2], [0, n_storeys / 2]])
-    scenery.add(thing, own.look, _rectangles(front, np.array([0.0]), np.array([0.4]), np.array([width]), np.array([top]), 0.0), uvs[None])  # fmt: skip
-    assert own.look.picture is not None
-    r, g, b = (float(c) for c in np.sqrt(np.median(own.look.picture.reshape(-1, 3), 0)))
-    plain = SceneryMaterial(f"{own.look.name} plain", rgb=(r, g, b))
-    _front_box(scenery, thing, plain, front, 0, width, -0.5, 0.4, -0.2, 0.02)
+    _body(scenery, thing, front, own, width, top, depth)
+    holes = _front(scenery, thing, rng, front, own, n_bays, n_storeys, 0.0)
+    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
+    _front_box(scenery, thing, _IRON, front, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
+    if not ridge:
+        _roof(scenery, thing, rng, front, own, width, top, depth)
+        return
+    # The gable looks at the home, under slopes that reach over it.
+    middle = width / 2
+    gable = np.stack([front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)])  # fmt: skip
+    uvs = np.array([[0, top], [width, top], [middle, ridge], [middle, ridge]])
+    scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+    for s in (-_EAVES_M, width + _EAVES_M):
+        eave = top - (ridge - top) * _EAVES_M / middle
+        a, b = front.at(s, eave, _EAVES_M), front.at(middle, ridge + 0.05, _EAVES_M)
+        c, d = front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)
+        _slope(scenery, thing, own, d, a, b, c)
+        low = np.stack([a, b, b - [0, 0.2, 0], a - [0, 0.2, 0]])
+        scenery.add(thing, own.trim, low[None])
+
+
+def _body(
+    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+) -> None:
+    """Sides without windows, and a plinth."""
+    stone = SceneryMaterial("stone", rgb=(0.46, 0.45, 0.43))
+    _front_box(scenery, thing, stone, front, 0, width, -0.5, _PLINTH_M, -0.1, 0.05)
     for s in (0.0, width):
-        scenery.add(thing, plain, np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))])[None])  # fmt: skip
-    if ridge:
-        # The gable looks at the home.
-        middle = width / 2
-        gable = np.stack([front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)])  # fmt: skip
-        scenery.add(thing, plain, gable[None])
-        rgb = _ROOFS[int(rng.integers(0, len(_ROOFS)))]
-        look = SceneryMaterial(f"roof {rgb[0]:.2f}", rgb=tuple(float(c**0.5) for c in rgb))  # type: ignore[arg-type]
-        for s in (-0.4, width + 0.4):
-            eave = top - 0.2
-            slope = np.stack([front.at(s, eave, 0.35), front.at(middle, ridge + 0.05, 0.35), front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)])  # fmt: skip
-            scenery.add(thing, look, slope[None])
-    else:
-        _roof(scenery, thing, rng, front, width, top, depth)
-    _lit_windows(scenery, thing, rng, front, _windows(own, n_bays, n_storeys, 0.4), is_lit)
+        side = np.stack([front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))])  # fmt: skip
+        uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / own.wall.size_m
+        scenery.add(thing, own.wall, side[None], uvs[None])
 
 
-def _windows(own: Facade, n_bays: int, n_storeys: int, plinth: float) -> tuple[F64, F64, F64, F64]:
-    """Left, lower, right and upper edge of every window of a front, metres on it."""
+def _front(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, n_bays: int,
+    n_storeys: int, balconies: float,
+) -> _Holes:  # fmt: skip
+    """The wall of a front, with windows that lie in it, and a door; the windows are returned."""
     x0, y0, x1, y1 = own.window
-    bays, storeys = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
-    left, low = (bays + x0) * own.bay_m, plinth + (storeys + y0) * STOREY_M
-    return left, low, left + (x1 - x0) * own.bay_m, low + (y1 - y0) * STOREY_M
+    bay, storey = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
+    n = len(bay)
+    left, right = bay * own.bay_m + x0, bay * own.bay_m + x1
+    floor = _PLINTH_M + storey * STOREY_M
+    has_balcony = (storey > 0) & (rng.random(n) < balconies)
+    # Windows of a balcony are doors, so they begin at its floor.
+    low, high = floor + np.where(has_balcony, 0.1, y0), floor + y1
+    is_door = (storey == 0) & (bay == int(rng.integers(0, n_bays)))
+    middle = (left + right) / 2
+    left, right = np.where(is_door, middle - _DOOR_M[0] / 2, left), np.where(is_door, middle + _DOOR_M[0] / 2, right)  # fmt: skip
+    low, high = np.where(is_door, 0.06, low), np.where(is_door, 0.06 + _DOOR_M[1], high)
+    # The wall about each window of a bay, from the storey's floor to its ceiling.
+    a, b = bay * own.bay_m, (bay + 1) * own.bay_m
+    bottom, top = np.where(storey == 0, _PLINTH_M, floor), floor + STOREY_M
+    at_sill = np.maximum(low, bottom)
+    for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top), (left, bottom, right, at_sill), (left, high, right, top)):  # fmt: skip
+        _add_wall(scenery, thing, own.wall, front, s0, t0, s1, t1)
+    # Reveals, and what stands in them.
+    inner = own.trim if own.style.surround_m else own.wall
+    for p, q, r, t in ((left, low, left, high), (right, high, right, low), (left, high, right, high), (right, low, left, low)):  # fmt: skip
+        reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M), front.at(p, q, -_REVEAL_M)], -2)  # fmt: skip
+        scenery.add(thing, inner, reveal)
+    is_glass = ~is_door
+    cells = rng.integers(0, COLUMNS * ROWS, n)
+    corner = np.stack([cells % COLUMNS / COLUMNS, cells // COLUMNS / ROWS], -1)
+    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    uvs = corner[:, None] + unit * [1 / COLUMNS, 1 / ROWS]
+    panes = _rectangles(front, left, low, right, high, -_REVEAL_M)
+    scenery.add(thing, own.windows, panes[is_glass], uvs[is_glass])
+    if is_door.any():
+        scenery.add(thing, own.door, panes[is_door], unit[None].astype(np.float64))
+    _about_windows(scenery, thing, front, own, left[is_glass], low[is_glass], right[is_glass], high[is_glass])  # fmt: skip
+    found = left, low, right, high, has_balcony
+    return _Holes(*(v[is_glass] for v in found))
+
+
+def _add_wall(
+    scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64, s1: F64, y1: F64
+) -> None:  # fmt: skip
+    """Rectangles of a front, its picture in metres on it."""
+    corners = [np.stack(np.broadcast_arrays(s, y), -1) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]  # fmt: skip
+    scenery.add(thing, look, _rectangles(front, s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m)  # fmt: skip
+
+
+def _about_windows(
+    scenery: Scenery,
+    thing: str,
+    front: Front,
+    own: Facade,
+    left: F64,
+    low: F64,
+    right: F64,
+    high: F64,
+) -> None:
+    """Sills, bands about windows or lintels over them, and shutters."""
+    over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low), front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)  # fmt: skip
+    lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.1)
+    scenery.add(thing, own.trim, np.concatenate([over, lip]))
+    band = own.style.surround_m
+    if band:
+        for s0, t0, s1, t1 in ((left - band, low, left, high + band), (right, low, right + band, high + band), (left, high, right, high + band)):  # fmt: skip
+            scenery.add(thing, own.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
+    elif own.style.wall == "brick":
+        scenery.add(thing, own.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015))  # fmt: skip
+    if own.shutter is not None:
+        half = (right - left) / 2
+        for s0, s1 in ((left - band - half, left - band), (right + band, right + band + half)):
+            scenery.add(thing, own.shutter, _rectangles(front, s0, low, s1, high, 0.05))
+
+
+def _balcony(
+    scenery: Scenery, thing: str, front: Front, own: Facade, s0: float, s1: float, floor: float
+) -> None:
+    """A slab with a railing of bars, of a modern building with a parapet."""
+    out = 1.15
+    _front_box(scenery, thing, own.trim, front, s0, s1, floor - 0.16, floor, 0, out)
+    if own.style.is_flat:
+        _front_box(scenery, thing, own.wall, front, s0, s1, floor, floor + 0.95, out - 0.08, out)
+        return
+    rods = np.arange(s0, s1, 0.12)
+    n = len(rods)
+    scenery.add(thing, _IRON, _rectangles(front, rods - 0.009, np.full(n, floor), rods + 0.009, np.full(n, floor + 1.0), out - 0.03))  # fmt: skip
+    _front_box(
+        scenery, thing, _IRON, front, s0, s1, floor + 0.97, floor + 1.02, out - 0.05, out - 0.01
+    )
+    for s in (s0, s1):
+        depth = np.linspace(0.1, out - 0.03, 8)
+        sides = np.stack([front.at(s, floor, depth - 0.009), front.at(s, floor, depth + 0.009), front.at(s, floor + 1.0, depth + 0.009), front.at(s, floor + 1.0, depth - 0.009)], -2)  # fmt: skip
+        scenery.add(thing, _IRON, sides)
+
+
+def _lit_windows(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, holes: _Holes,
+    rooms: SceneryMaterial, share: float,
+) -> None:  # fmt: skip
+    """Light behind a share of the windows, in both halves of their frames."""
+    on = np.flatnonzero(rng.random(len(holes.left)) < share)
+    room = rng.integers(0, N_ROOMS, len(on))
+    left, low, right, high = holes.left[on], holes.low[on], holes.right[on], holes.high[on]
+    frame = 0.075 * (right - left)
+    middle = (left + right) / 2
+    unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    for half, (a, b) in enumerate(((left + frame, middle - 0.5 * frame), (middle + 0.5 * frame, right - frame))):  # fmt: skip
+        quads = _rectangles(front, a, low + frame, b, high - frame, 0.012 - _REVEAL_M)
+        first = (room + 0.5 * half) / N_ROOMS
+        uvs = np.stack([first, 0 * first], -1)[:, None] + unit * [0.5 / N_ROOMS, 1.0]
+        scenery.add(thing, rooms, quads, uvs)
+
+
+def _slope(scenery: Scenery, thing: str, own: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
+    """A slope of tiles, a to b along its eaves."""
+    long_, up = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
+    uvs = np.array([[0, 0], [long_, 0], [long_, up], [0, up]]) / own.roof.size_m
+    scenery.add(thing, own.roof, np.stack([a, b, c, d])[None], uvs[None])
+
+
+def _flat_roof(
+    scenery: Scenery, thing: str, front: Front, own: Facade, width: float, top: float, depth: float
+) -> None:
+    """A roof that is not seen from below, and a housing on it."""
+    scenery.add(thing, own.trim, np.stack([front.at(s, top + 0.1, o) for s, o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])  # fmt: skip
+    _front_box(scenery, thing, own.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2, -5.5, -3.0)  # fmt: skip
+
+
+def _roof(
+    scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, own: Facade, width: float,
+    top: float, depth: float,
+) -> None:  # fmt: skip
+    """Two slopes over eaves with a gutter, and chimneys."""
+    ridge = top + rng.uniform(2.2, 3.6)
+    drop = _EAVES_M * (ridge - top) / (depth / 2)
+    a, b = (front.at(s, top + 0.2 - drop, _EAVES_M) for s in (-0.2, width + 0.2))
+    c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
+    e, f = (front.at(s, top + 0.2 - drop, -depth - _EAVES_M) for s in (width + 0.2, -0.2))
+    _slope(scenery, thing, own, a, b, c, d)
+    _slope(scenery, thing, own, e, f, d, c)
+    y = top + 0.2 - drop
+    _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02, _EAVES_M + 0.1)  # fmt: skip
+    for s in (0.0, width):
+        gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth), front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])  # fmt: skip
+        uvs = np.array([[0, top], [depth, top], [depth / 2, ridge], [depth / 2, ridge]])
+        scenery.add(thing, own.wall, gable[None], (uvs / own.wall.size_m)[None])
+    for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
+        _front_box(scenery, thing, own.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9, -depth / 2 - 0.3, -depth / 2 + 0.4)  # fmt: skip
 
 
 def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) -> None:
@@ -249,9 +297,10 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
     body = SceneryMaterial(
         f"paint {paint[0]:.2f}{paint[2]:.2f}",
         rgb=tuple(float(c**0.45) for c in paint),  # type: ignore[arg-type]
+        is_glossy=True,
     )
     glass, tyre = (
-        SceneryMaterial("car glass", rgb=(0.2, 0.23, 0.26)),
+        SceneryMaterial("car glass", rgb=(0.2, 0.23, 0.26), is_glossy=True),
         SceneryMaterial("tyre", rgb=(0.12, 0.12, 0.12)),
     )
     scale = rng.uniform(0.94, 1.12)
@@ -283,10 +332,11 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
 
 def lamp_post(scenery: Scenery, thing: str, front: Front) -> None:
     """A street lamp, which shines."""
-    iron = SceneryMaterial("iron", rgb=(0.2, 0.2, 0.21))
-    _front_box(scenery, thing, iron, front, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
-    _front_box(scenery, thing, iron, front, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
-    _front_box(scenery, thing, lit((0.9, 0.82, 0.68), 9), front, -0.1, 0.1, 4.82, 4.9, -1.3, -0.8)
+    _front_box(scenery, thing, _IRON, front, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
+    _front_box(scenery, thing, _IRON, front, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
+    _front_box(
+        scenery, thing, lit("lamp", (0.9, 0.82, 0.68)), front, -0.1, 0.1, 4.82, 4.9, -1.3, -0.8
+    )
 
 
 def fence(
@@ -315,7 +365,7 @@ def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
 def ground_looks(rng: np.random.Generator) -> dict[str, SceneryMaterial]:
     """What the ground is made of."""
     return {
-        "lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.035, 0.07, 0.014), (0.10, 0.17, 0.04), size=192), size_m=(2.3, 2.3)),
+        "lawn": SceneryMaterial("lawn", picture=mottled(rng, (0.030, 0.052, 0.014), (0.115, 0.155, 0.042), size=256, slope=1.0), size_m=(3.7, 3.7)),
         "asphalt": SceneryMaterial("asphalt", picture=mottled(rng, (0.045, 0.045, 0.048), (0.10, 0.10, 0.10), slope=0.6), size_m=(3.1, 3.1)),
         "slabs": SceneryMaterial("slabs", picture=paved(rng, (0.33, 0.31, 0.28), 4), size_m=(2.0, 2.0)),
         "gravel": SceneryMaterial("gravel", picture=mottled(rng, (0.14, 0.13, 0.11), (0.42, 0.39, 0.34), slope=0.1), size_m=(1.0, 1.0)),

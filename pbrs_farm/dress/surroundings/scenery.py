@@ -6,11 +6,15 @@ itself (core/house.py).
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Final, NamedTuple
+from functools import cache
+from typing import Final, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from pbrs_farm.core.arrays import F32, F64
@@ -21,10 +25,31 @@ from pbrs_farm.dress.textures.maps import colour_bytes, texture_from_pixels
 from pbrs_farm.dress.textures.noise import noise
 from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.geometry.solids import quads_surface
+from pbrs_farm.images import png_from_array
 
 Rgb = tuple[float, float, float]
 
 _QUALITY: Final = 85  # JPEG quality
+_TABLE: Final = (1 << 14) - 1  # steps of linear light, finer than bytes of sRGB
+
+T = TypeVar("T")
+
+
+class Drawn(Generic[T]):
+    """Looks that are drawn where they are asked for, each by a seed of its own."""
+
+    def __init__(self, seed: int, n: int, draw: Callable[[np.random.Generator, int], T]) -> None:
+        """draw: of number k, 0 to n - 1, with the generator of its seed."""
+        self._seed, self._n, self._draw = seed, n, draw
+        self._found: dict[int, T] = {}
+
+    def __len__(self) -> int:
+        return self._n
+
+    def __getitem__(self, k: int) -> T:
+        if k not in self._found:
+            self._found[k] = self._draw(np.random.default_rng([self._seed, k]), k)
+        return self._found[k]
 
 
 class SceneryMaterial(NamedTuple):
@@ -32,8 +57,9 @@ class SceneryMaterial(NamedTuple):
 
     name: str
     rgb: Rgb = (1.0, 1.0, 1.0)  # sRGB-encoded, times the picture
-    picture: F32 | None = None  # (H, W, 3) linear
+    picture: F32 | None = None  # (H, W, 3) linear, with alpha (H, W, 4) of leaves with holes
     size_m: tuple[float, float] = (1.0, 1.0)
+    is_glossy: bool = False  # a clear coat mirrors the sky
 
 
 class Scenery:
@@ -93,13 +119,17 @@ class Scenery:
         for look in self._looks.values():
             texture = None
             if look.picture is not None:
-                pixels = colour_bytes(srgb_from_linear(look.picture).astype(np.float32))
-                texture = texture_from_pixels(look.name, pixels, _QUALITY)
+                texture = _texture(look.name, look.picture)
                 textures[texture.id] = texture
             index[look.name] = first_material + len(materials)
+            gloss = {"specular": (0.5, 0.5, 0.5), "shininess": 2000.0} if look.is_glossy else {}
             materials.append(
-                Material(look.name, diffuse=look.rgb, texture_id=texture.id if texture else None)
-            )
+                Material(
+                    look.name, diffuse=look.rgb, texture_id=texture.id if texture else None,
+                    alpha_cutout=look.picture is not None and look.picture.shape[2] == 4,
+                    **gloss,  # type: ignore[arg-type]
+                )
+            )  # fmt: skip
         items = []
         for thing in dict.fromkeys((*self._level, *self._quads)):
             surfaces = [replace(s, material=index[name]) for name, s in self._level.get(thing, [])]
@@ -114,6 +144,22 @@ class Scenery:
                 )
             )  # fmt: skip
         return items, materials, textures
+
+
+@cache
+def _bytes() -> NDArray[np.uint8]:
+    """(_TABLE + 1,) sRGB-encoded bytes of linear 0..1."""
+    return colour_bytes(srgb_from_linear(np.arange(_TABLE + 1) / _TABLE).astype(np.float32))
+
+
+def _texture(name: str, picture: F32) -> Texture:
+    """A linear picture as a JPEG, one with alpha as a PNG."""
+    pixels = _bytes()[(np.clip(picture[..., :3], 0, 1) * _TABLE).astype(np.uint16)]
+    if picture.shape[2] == 3:
+        return texture_from_pixels(name, pixels, _QUALITY)
+    alpha = np.uint8(255) * (picture[..., 3:] > 0.5)
+    data = png_from_array(np.concatenate([pixels, alpha], -1))
+    return Texture(hashlib.sha256(data).hexdigest()[:16], name, "image/png", data)
 
 
 def _surface_of_quads(
@@ -155,6 +201,6 @@ def paved(rng: np.random.Generator, rgb: Rgb, n: int) -> F32:
     return np.clip(picture, 0, 1)
 
 
-def lit(rgb: Rgb, number: int) -> SceneryMaterial:
+def lit(name: str, rgb: Rgb = (1.0, 1.0, 1.0), picture: F32 | None = None) -> SceneryMaterial:
     """A look that shines by itself."""
-    return SceneryMaterial(f"{LIT} {number}", rgb)
+    return SceneryMaterial(f"{LIT} {name}", rgb, picture)

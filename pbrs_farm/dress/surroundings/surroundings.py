@@ -20,19 +20,27 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Opening, Room
 from pbrs_farm.dress.surroundings.buildings import (
     STOREY_M,
-    Facade,
     Front,
     block,
     car,
-    facade,
     fence,
     ground_looks,
     house,
     lamp_post,
     railing,
 )
-from pbrs_farm.dress.surroundings.plants import FIR, bark, bush, hedge, leaf_looks, tree
-from pbrs_farm.dress.surroundings.scenery import Scenery, SceneryMaterial, mottled
+from pbrs_farm.dress.surroundings.facades import HOUSES, TOWN, Facade, facade, lit_rooms
+from pbrs_farm.dress.surroundings.plants import (
+    FIR,
+    SPECIES,
+    Leaves,
+    bush,
+    hedge,
+    leaves_of,
+    tree,
+    tree_line,
+)
+from pbrs_farm.dress.surroundings.scenery import Drawn, Scenery, SceneryMaterial, lit, mottled
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 LEAST_M: Final = 3.0
@@ -51,6 +59,9 @@ KINDS: Final = ("street", "garden", "court", "blocks", "hills")
 _N_RING: Final = 220
 _ROAD: Final = (5.0, 11.5)  # away from the home's side
 _PAVEMENT_M: Final = 2.0
+_TOWN_TREES: Final = (0, 2, 5)  # of plants.SPECIES
+_GARDEN_TREES, _SHARES = (0, 1, 2, FIR, 4), (0.26, 0.24, 0.22, 0.18, 0.10)
+_BUSHES: Final = (0, 1, 2, 4)
 _PATH_M: Final = 1.2  # width of the paving around a house
 
 
@@ -76,9 +87,11 @@ class _Place(NamedTuple):
 
     scenery: Scenery
     rng: np.random.Generator
-    leaves: list[SceneryMaterial]
-    trunk: SceneryMaterial
-    facades: list[Facade]
+    leaves: Drawn[Leaves]  # by the numbers of SPECIES
+    street_tree: int  # the species of a street's trees
+    facades: Drawn[Facade]  # of buildings
+    cottages: Drawn[Facade]  # of houses with gardens
+    rooms: SceneryMaterial  # with lamps on, behind windows
     ground: dict[str, SceneryMaterial]
     eye_m: float  # of a person at the home's highest window, above the ground
 
@@ -97,9 +110,14 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
     footprint = shapely.union_all([_walled_area(r) for r in rooms])
     ground_y, n_below = _level_of_ground(home, windows, rng)
     top = max(float(o.quad[:, 1].max()) for o in windows)
+    town = tuple(TOWN[int(k)] for k in rng.permutation(len(TOWN)))
+    looks = int(rng.integers(0, 1 << 31))
     place = _Place(
-        scenery=Scenery(), rng=rng, leaves=leaf_looks(rng), trunk=bark(rng),
-        facades=[facade(rng, k) for k in range(5)], ground=ground_looks(rng),
+        scenery=Scenery(), rng=rng, leaves=Drawn(looks, len(SPECIES), leaves_of),
+        street_tree=int(rng.choice(_TOWN_TREES)),
+        facades=Drawn(looks + 1, 5, lambda own, k: facade(own, k, town)),
+        cottages=Drawn(looks + 2, 3, lambda own, k: facade(own, k, HOUSES)),
+        rooms=lit("rooms", picture=lit_rooms(rng)), ground=ground_looks(rng),
         eye_m=max(top - ground_y - 0.5, 1.6),
     )  # fmt: skip
     sides = _sides(footprint, ground_y)
@@ -225,7 +243,7 @@ def _street(place: _Place, side: _Side, number: int) -> None:
         if k % 2 == 0:
             lamp_post(scenery, f"lamps_{number}", Front(side.at(s, _ROAD[1] + 0.6), side.along, side.out * -1))  # fmt: skip
         foot = side.at(s + 3.5, _ROAD[1] + 0.9)
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 7.5), place.leaves[int(rng.integers(0, 3))], place.trunk)  # fmt: skip
+        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 7.5), place.leaves[place.street_tree])  # fmt: skip
 
 
 def _court(place: _Place, side: _Side, number: int) -> None:
@@ -235,10 +253,10 @@ def _court(place: _Place, side: _Side, number: int) -> None:
     _row_of_blocks(place, side, number, away, extent=side.half + away, is_town=True, balconies=True)
     for _ in range(int(rng.integers(2, 5))):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 5), rng.uniform(5.5, away - 2.5))
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4, 8), place.leaves[int(rng.integers(0, 3))], place.trunk)  # fmt: skip
+        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4, 8), place.leaves[int(rng.choice(_TOWN_TREES))])  # fmt: skip
     for _ in range(9):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 6), rng.uniform(4.2, away - 1.5))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.6, 1.3), place.leaves[int(rng.integers(0, 3))])  # fmt: skip
+        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.6, 1.3), place.leaves[int(rng.choice(_BUSHES))])  # fmt: skip
 
 
 def _blocks(place: _Place, side: _Side, number: int) -> None:
@@ -263,14 +281,14 @@ def _garden(place: _Place, side: _Side, number: int) -> None:
         fence(scenery, f"fence_{number}", rng, front, 2 * half, rng.uniform(1.2, 1.9))
     for _ in range(10):
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(4.2, depth - 0.8))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.5, 1.4), place.leaves[int(rng.integers(0, 4))])  # fmt: skip
+        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.5, 1.4), place.leaves[int(rng.choice(_BUSHES))])  # fmt: skip
     _trees(place, side, number, 4, (5.0, depth + 6.0), half)
     s = -half - 4.0
     while s < half:
-        own = place.facades[int(rng.integers(0, len(place.facades)))]
+        own = place.cottages[int(rng.integers(0, len(place.cottages)))]
         away = depth + rng.uniform(7.0, 13.0)
         if rng.random() < 0.75:
-            house(scenery, f"houses_{number}", rng, side.front(s, away), own)
+            house(scenery, f"houses_{number}", rng, side.front(s, away), own, place.rooms)
         s += rng.uniform(15.0, 20.0)
     _trees(place, side, number, 8, (depth + 5.0, depth + 22.0), half + 12)
 
@@ -306,7 +324,7 @@ def _row_of_blocks(
         width = n_bays * own.bay_m
         set_back = 0.0 if is_town else rng.uniform(0, 6)
         block(
-            place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), own, n_bays, n_storeys,
+            place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), own, place.rooms, n_bays, n_storeys,
             depth_m=10.0, has_balconies=balconies or rng.random() < 0.25,
         )  # fmt: skip
         s += width + (0.0 if is_town else rng.uniform(3, 9))
@@ -317,12 +335,10 @@ def _trees(
 ) -> None:
     rng = place.rng
     for _ in range(n):
-        kind = int(rng.choice([0, 1, 2, FIR], p=[0.3, 0.3, 0.2, 0.2]))
+        kind = int(rng.choice(_GARDEN_TREES, p=_SHARES))
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(*away))
-        tree(
-            place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), place.leaves[kind], place.trunk,
-            is_fir=kind == FIR, n=340 if away[0] < 8.0 else 170,
-        )  # fmt: skip
+        own, n = place.leaves[kind], 360 if away[0] < 8.0 else 200
+        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), own, n=n)
 
 
 def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: list[str]) -> None:
@@ -333,20 +349,26 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
     radius = max(x1 - x0, z1 - z0) / 2 + _REACH_M
     turn = np.linspace(0, 2 * np.pi, _N_RING + 1)
     waves = sum(rng.uniform(0.4, 1) / k * np.sin(k * turn + rng.uniform(0, 7)) for k in range(1, 8))
-    grain = rng.uniform(-1, 1, _N_RING + 1)
-    grain[-1] = grain[0]
     far = "hills" in kinds
-    trees = SceneryMaterial("far trees", picture=mottled(rng, (0.012, 0.024, 0.010), (0.05, 0.085, 0.032), slope=0.6), size_m=(4.0, 4.0))  # fmt: skip
-    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.06, 0.10, 0.085), (0.12, 0.17, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
-    for look, away, share, wave_m, grain_m in (
-        (trees, radius, 0.17, 1.2, 1.1),
-        (hills, radius + 8.0, 0.32 if far else 0.27, 5.0 if far else 2.0, 0.0),
+    trees = SceneryMaterial("far trees", picture=tree_line(rng))
+    hills = SceneryMaterial("far hills", picture=mottled(rng, (0.09, 0.12, 0.10), (0.14, 0.18, 0.13), slope=2.4), size_m=(90.0, 90.0))  # fmt: skip
+    for look, away, share, wave_m in (
+        (trees, radius, 0.15, 1.5),
+        (hills, radius + 8.0, 0.30 if far else 0.22, 5.0 if far else 2.0),
     ):
-        top = place.eye_m + share * away + wave_m * waves + grain_m * grain
+        top = np.maximum(place.eye_m + share * away + wave_m * waves, 2.0)
         foot = np.stack([np.cos(turn) * away, np.zeros_like(turn), np.sin(turn) * away], 1) + centre
-        high = foot + np.stack([np.zeros_like(turn), np.maximum(top, 2.0), np.zeros_like(turn)], 1)
+        high = foot + np.stack([np.zeros_like(turn), top, np.zeros_like(turn)], 1)
         foot[:, 1] -= 1.0
-        place.scenery.add("horizon", look, np.stack([foot[:-1], foot[1:], high[1:], high[:-1]], 1))
+        quads = np.stack([foot[:-1], foot[1:], high[1:], high[:-1]], 1)
+        uvs = None
+        if look is trees:
+            # The picture goes round some whole times, each tree twice as high as wide, about.
+            n = round(2 * np.pi * away / (4.0 * float(top.mean())))
+            u = np.linspace(0, n, _N_RING + 1)
+            uvs = np.stack([np.stack([p, q], -1) for p, q in ((u[:-1], 0 * u[1:]), (u[1:], 0 * u[1:]), (u[1:], 0 * u[1:] + 1), (u[:-1], 0 * u[1:] + 1))], 1)  # fmt: skip
+            uvs[..., 1] *= 1 - 1 / 96
+        place.scenery.add("horizon", look, quads, uvs)
 
 
 def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) -> None:

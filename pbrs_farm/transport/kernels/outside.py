@@ -29,12 +29,14 @@ from pbrs_farm.transport.scene_tables.sky import Sky, directions, solid_angles
 
 GLOW_CD_M2: Final = 45.0
 """Luminance of what shines by itself, times its hue: a room seen through its window at night."""
+GLOW_ALBEDO: Final = 0.2
+"""Reflectance at which it does so; less shines less."""
 
 STREET_LX: Final = 2.5
 """Of street lamps on whatever lies outside, at any hour: by day it cannot be seen."""
 STREET_RGB: Final = (1.0, 0.72, 0.42)  # linear, its largest 1
 
-HAZE_M: Final = 75.0
+HAZE_M: Final = 105.0
 """Distance at which 1 - 1/e of what is seen is air: hills at the horizon's ring stand for far ones."""
 
 _LOW_SHAPE: Final = (32, 64)  # texels of the sky that coats mirror and that haze has the colour of
@@ -166,8 +168,8 @@ class Outside:
         mirrored = d - 2 * dr.dot(si.n, d) * si.n
         radiance = (1 - coat) * si.bsdf.kd * irradiance * (1 / np.pi)
         radiance += coat * self._mirrored_sky(mirrored, si.valid)
-        # Glass that a lit room stands behind is dark by day: its colour alone counts at night.
-        hue = si.bsdf.kd / dr.maximum(dr.max(si.bsdf.kd), 1e-6)
+        # Glass that a lit room stands behind is dark by day: GLOW_ALBEDO shines with all of it at night.
+        hue = dr.minimum(si.bsdf.kd * (1 / GLOW_ALBEDO), 1)
         radiance += dr.select(si.emitter != NO_LAMP, hue * self._glow, 0)
         # Air before it has the sky's colour over the horizon there.
         clear_air = dr.exp(-dr.square(dr.dot(si.p - o, d) * self._mist))
