@@ -78,8 +78,10 @@ class DressFields(FieldGroup):
     style: str = Field(
         "", max_length=64, description="the style of every home; empty = drawn by the seed"
     )
-    furnish: Literal["none", "empty"] = Field(
-        "none", description="rooms that get furniture first: `empty` = those that have none"
+    furnish: Literal["none", "empty", "sparse"] = Field(
+        "none",
+        description="rooms that get furniture first: `empty` = those that have none, `sparse` = those"
+        " with little too",
     )
     passes: str = Field(
         "", max_length=256, description="plugins' passes after our own, ':' between"

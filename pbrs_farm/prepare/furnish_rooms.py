@@ -1,16 +1,18 @@
 """Empty rooms of a home that was read, furnished as made homes are; no effects but the catalogue's.
 
-A room is empty where what stands on its floor covers less than 3 % of it. Its type follows from its
-name and size; a dining room, an office, a garage or an unnamed room is left as it is, with a note.
+A room is empty where what stands on its floor covers less than 3 % of it, and sparse below 20 %: asked
+for `sparse`, such a room keeps what it has and gets what its brief has beside. Its use follows from its name
+and what stands there; one without a name gets what the home lacks. A garage, and a name of no known use,
+stays as it is, with a note.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import shapely
@@ -19,6 +21,25 @@ from shapely.geometry import Point, Polygon
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
+from pbrs_farm.core.classes import (
+    BATHTUB,
+    BED,
+    BOOKSHELF,
+    CABINET,
+    CHAIR,
+    COUNTER,
+    DESK,
+    DRESSER,
+    LAMP,
+    OTHERFURNITURE,
+    REFRIGERATOR,
+    SHELVES,
+    SHOWER_CURTAIN,
+    SINK,
+    SOFA,
+    TABLE,
+    TOILET,
+)
 from pbrs_farm.core.house import House, ItemKind, Note
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace, floor_space
@@ -35,19 +56,45 @@ from pbrs_farm.generate.floor_plan import (
     turned_by,
     upright_angle,
 )
+from pbrs_farm.generate.furnish.briefs import UseWithoutType
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.plan_walls import corners
 from pbrs_farm.home.room_use import RoomKind
 
-_EMPTY_SHARE: Final = 0.03  # of a room's floor
+Furnish = Literal["none", "empty", "sparse"]
+
+# Of a room's floor: what stands there covers less.
+_MOST_COVERED: Final[dict[Furnish, float]] = {"none": 0.0, "empty": 0.03, "sparse": 0.2}
 _STANDS_M: Final = 0.5  # what begins higher above the floor hangs
 _FLAT_M: Final = 0.12  # what ends lower can be walked on
 _SMALL_BATH_M2: Final = 2.6
 _LEAST_M2: Final = 1.2
-_TYPES: Final = {
-    RoomKind.LIVING: RoomType.LIVING, RoomKind.BEDROOM: RoomType.BEDROOM,
-    RoomKind.KITCHEN: RoomType.KITCHEN, RoomKind.BATHROOM: RoomType.BATHROOM,
-    RoomKind.HALL: RoomType.HALL,
+_LEAST_LIVING_M2, _LEAST_BEDROOM_M2 = 12.0, 7.0  # of a room without a name
+
+
+class _Use(NamedTuple):
+    """How a room of a kind is furnished: as which type of generated plans, by which brief of no type."""
+
+    type: RoomType
+    brief: UseWithoutType | None = None
+
+
+_USES: Final = {
+    RoomKind.LIVING: _Use(RoomType.LIVING), RoomKind.BEDROOM: _Use(RoomType.BEDROOM),
+    RoomKind.KITCHEN: _Use(RoomType.KITCHEN), RoomKind.BATHROOM: _Use(RoomType.BATHROOM),
+    RoomKind.HALL: _Use(RoomType.HALL), RoomKind.DINING: _Use(RoomType.LIVING, "dining_room"),
+    RoomKind.OFFICE: _Use(RoomType.LIVING, "office"),
+}  # fmt: skip
+
+# Groups of briefs -> NYU40 classes of things of which a room needs no second one.
+_SERVED_BY: Final[dict[str, frozenset[int]]] = {
+    "bed": frozenset({BED}), "lounge": frozenset({SOFA}), "dining": frozenset({TABLE}),
+    "desk": frozenset({DESK}), "wardrobe": frozenset({CABINET, OTHERFURNITURE}),
+    "dresser": frozenset({CABINET, DRESSER}), "console": frozenset({CABINET, DRESSER, TABLE}),
+    "shelves": frozenset({BOOKSHELF, SHELVES}), "armchair": frozenset({CHAIR}),
+    "lamp": frozenset({LAMP}), "toilet": frozenset({TOILET}), "washbasin": frozenset({SINK}),
+    "bath": frozenset({BATHTUB, SHOWER_CURTAIN}),
+    "kitchen": frozenset({CABINET, COUNTER, SINK, REFRIGERATOR}),
 }  # fmt: skip
 
 
@@ -56,29 +103,38 @@ class _Storey:
     plan: Plan  # upright
     angle_rad: float  # by which it was turned
     rooms: tuple[RoomSpace, ...]
-    empty: tuple[int, ...]
+    uses: tuple[_Use, ...]
+    wanting: tuple[int, ...]  # rooms that are to be furnished
 
 
-def furnish_rooms(house: House, catalogue: Catalogue, seed: int, style: str = "") -> House:
+def furnish_rooms(
+    house: House, catalogue: Catalogue, seed: int, style: str = "", which: Furnish = "empty"
+) -> House:
     """The house with furniture in its empty rooms, the same for the same seed.
 
-    Raises BadInput for a style that there is none of.
+    which: `sparse` = rooms with little in them too; what stands there stays. Raises BadInput for a
+    style that there is none of.
     """
     with closing(MutableHouse(house, seed)) as mutable:
-        return _furnished(mutable, catalogue, style)
+        return _furnished(mutable, catalogue, style, _MOST_COVERED[which])
 
 
-def _furnished(mutable: MutableHouse, catalogue: Catalogue, style: str) -> House:
+def _furnished(
+    mutable: MutableHouse, catalogue: Catalogue, style: str, most_covered: float
+) -> House:
     house = mutable.source
     space = floor_space(mutable)
+    kinds = _kinds_of_rooms(space)
     rng = np.random.default_rng(keys.seed(house.id, "furnish", mutable.seed))
     for level in house.levels:
-        storey = _storey(house, space, level.id, mutable)
-        if storey.empty:
-            standing = {k: _standing(storey, k, mutable) for k in storey.empty}
+        storey = _storey(house, space, level.id, mutable, kinds, most_covered)
+        if storey.wanting:
+            standing = {k: _standing(storey, k, mutable) for k in storey.wanting}
             pieces = furnished(
-                storey.plan, catalogue, rng, style, rooms=storey.empty, standing=standing
-            )
+                storey.plan, catalogue, rng, style, rooms=storey.wanting, standing=standing,
+                uses={k: u.brief for k, u in enumerate(storey.uses) if u.brief is not None},
+                present={k: _present(storey.rooms[k], mutable) for k in storey.wanting},
+            )  # fmt: skip
             _add(mutable, storey, pieces, catalogue)
     # Attribution licences (CC-BY) oblige whoever shows the pictures: name their authors.
     owed = sorted(
@@ -92,15 +148,32 @@ def _furnished(mutable: MutableHouse, catalogue: Catalogue, style: str) -> House
     return replace(made, source=replace(made.source, attribution=line))
 
 
-def _storey(house: House, space: HouseSpace, level_id: str, mutable: MutableHouse) -> _Storey:
+def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
+    """Room id -> what it is for; a room without a name is what the home lacks, the largest first."""
+    kinds = {room.room.id: room.kind for room in space.rooms}
+    unnamed = [r for r in space.rooms if r.kind is RoomKind.OTHER and not r.room.name and r.windows]
+    for room in sorted(unnamed, key=lambda r: (-r.area.area, r.room.id)):
+        if room.area.area >= _LEAST_LIVING_M2 and RoomKind.LIVING not in kinds.values():
+            kinds[room.room.id] = RoomKind.LIVING
+        elif room.area.area >= _LEAST_BEDROOM_M2:
+            kinds[room.room.id] = RoomKind.BEDROOM
+    return kinds
+
+
+def _storey(
+    house: House, space: HouseSpace, level_id: str, mutable: MutableHouse,
+    kinds: Mapping[str, RoomKind], most_covered: float,
+) -> _Storey:  # fmt: skip
     """The rooms of a level as a plan, and which of them are to be furnished."""
-    rooms, shapes = [], []
+    rooms, shapes, uses = [], [], []
     for room in space.rooms:
         # Furniture stands at the walls' faces, wherever the outline was drawn.
         ground = corners(room.area.difference(room.walls.buffer(0.002, join_style="mitre")))
         if room.room.level_id == level_id and len(ground) >= 3:
+            use = _use_of(room, kinds[room.room.id])
             rooms.append(room)
-            shapes.append(PlanRoom(_type_of(room), room.room.name, ground))
+            uses.append(use)
+            shapes.append(PlanRoom(use.type, room.room.name, ground))
     number = {room.room.id: k for k, room in enumerate(rooms)}
     walls: list[PlanWall] = []
     openings: list[PlanOpening] = []
@@ -112,24 +185,37 @@ def _storey(house: House, space: HouseSpace, level_id: str, mutable: MutableHous
             walls.append(wall)
     height = min((r.room.ceiling_y - r.room.floor_y for r in rooms), default=2.5)
     plan = Plan(tuple(shapes), tuple(walls), tuple(openings), max(height, 2.0))
-    empty = [k for k, room in enumerate(rooms) if _is_empty(room, shapes[k], mutable)]
+    wanting = [
+        k
+        for k, room in enumerate(rooms)
+        if _is_wanting(room, kinds[room.room.id], shapes[k].area, mutable, most_covered)
+    ]
     angle = upright_angle(plan.rooms) if plan.rooms else 0.0
-    return _Storey(turned_by(plan, angle), angle, tuple(rooms), tuple(empty))
+    return _Storey(turned_by(plan, angle), angle, tuple(rooms), tuple(uses), tuple(wanting))
 
 
-def _type_of(room: RoomSpace) -> RoomType:
-    if room.kind is RoomKind.BATHROOM and room.area.area < _SMALL_BATH_M2:
-        return RoomType.WC
-    return _TYPES.get(room.kind, RoomType.STORE)
+def _use_of(room: RoomSpace, kind: RoomKind) -> _Use:
+    if kind is RoomKind.BATHROOM and room.area.area < _SMALL_BATH_M2:
+        return _Use(RoomType.WC)
+    return _USES.get(kind, _Use(RoomType.STORE))
 
 
-def _is_empty(room: RoomSpace, shape: PlanRoom, mutable: MutableHouse) -> bool:
-    if room.kind is RoomKind.OUTDOOR or shape.area < _LEAST_M2 or not room.room.has_floor:
+def _present(room: RoomSpace, mutable: MutableHouse) -> list[str]:
+    """Names of the groups of briefs that what stands in a room serves already."""
+    classes = {mutable.items[n].nyu40 for n in _on_floor(room, mutable)}
+    return [name for name, served in _SERVED_BY.items() if served & classes]
+
+
+def _is_wanting(
+    room: RoomSpace, kind: RoomKind, area: float, mutable: MutableHouse, most_covered: float
+) -> bool:
+    """Whether a room has so little in it that it is to be furnished; notes one of no known use."""
+    if kind is RoomKind.OUTDOOR or area < _LEAST_M2 or not room.room.has_floor:
         return False
     covered = sum(_ground(mutable.items[n].bounds).area for n in _on_floor(room, mutable))
-    if covered > _EMPTY_SHARE * shape.area:
+    if covered > most_covered * area:
         return False
-    if room.kind not in _TYPES:
+    if kind not in _USES:
         what = f"{room.room.name or 'a room without a name'} is empty and its use is not known"
         mutable.notes.append(Note("not-furnished", f"room {room.room.id}", what))
         return False

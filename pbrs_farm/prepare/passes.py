@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
+_FURNISH_VERSION: Final = 1  # of furnish_rooms.py, beside that of what furnishes generated homes
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
 
 
@@ -137,7 +138,7 @@ def _stand_ins_depend(_source: SourceRef, recipe: Recipe) -> list[object]:
 
 
 def _furnish_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    return [dress_seed(source, recipe), catalogue_of(recipe.dress).digest]
+    return [dress_seed(source, recipe), catalogue_of(recipe.dress).digest, recipe.dress.furnish]
 
 
 def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
@@ -185,11 +186,12 @@ def _stand_in(work: Preparation) -> Preparation:
 
 
 def _furnish(work: Preparation) -> Preparation:
-    """Furniture in rooms that are empty, drawn by the seed of dressing."""
+    """Furniture in rooms that are empty or nearly so, drawn by the seed of dressing."""
     from pbrs_farm.prepare.furnish_rooms import furnish_rooms
 
     catalogue, seed = catalogue_of(work.recipe.dress), dress_seed(work.source, work.recipe)
-    return replace(work, current=furnish_rooms(work.house, catalogue, seed))
+    which = work.recipe.dress.furnish
+    return replace(work, current=furnish_rooms(work.house, catalogue, seed, which=which))
 
 
 def _dress(work: Preparation) -> Preparation:
@@ -262,7 +264,7 @@ def _edit(work: Preparation) -> Preparation:
 PASSES: Final = (
     Pass("read", 3, ("read",), _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 3, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
-    Pass("furnish", GENERATE_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
+    Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 4, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass(

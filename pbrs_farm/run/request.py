@@ -83,8 +83,8 @@ class DressOptions(Record):
         None, "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7",
         group="dressing", metavar="SEEDS",
     )  # fmt: skip
-    furnish: Literal["none", "empty"] | None = option(
-        None, "furnish rooms that have nothing in them before the home is dressed (docs/homes.md)",
+    furnish: Literal["none", "empty", "sparse"] | None = option(
+        None, "furnish rooms that have nothing (empty) or little (sparse) in them before the home is dressed (docs/homes.md)",
         group="dressing", sets="dress.furnish",
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Shape
+from pbrs_farm.core.classes import SOFA
 from pbrs_farm.core.house import House, Material, Surface
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
@@ -89,16 +90,54 @@ def names_in(house: House, room: str) -> set[str]:
     return {i.name for i in house.items if i.room_id == room}
 
 
+def renamed(house: House, name: str, new: str) -> House:
+    """The house with another name for the room of a name, of which its use follows."""
+    types = (new,) if new else ()
+    rooms = tuple(replace(r, name=new, types=types) if r.name == name else r for r in house.rooms)
+    return replace(house, rooms=rooms)
+
+
 def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
-    house = empty_house()
-    rooms = tuple(
-        replace(r, name="Office", types=("Office",)) if r.name == "Kitchen" else r
-        for r in house.rooms
-    )
-    furnished = furnish_rooms(replace(house, rooms=rooms), boxes(), 1)
-    notes = [n for n in furnished.notes[len(house.notes) :] if "Office" in n.text]
+    house = renamed(empty_house(), "Kitchen", "Garage")
+    furnished = furnish_rooms(house, boxes(), 1)
+    notes = [n for n in furnished.notes[len(house.notes) :] if "Garage" in n.text]
     assert [n.kind for n in notes] == ["not-furnished"]
     assert not any("sink" in i.name for i in furnished.items)
+
+
+@pytest.mark.parametrize(("use", "has"), [("Office", "desk"), ("Dining room", "dining_table")])
+def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> None:
+    house = renamed(empty_house(), "Bedroom 1", use)
+    room = next(r for r in house.rooms if r.name == use)
+    names = names_in(furnish_rooms(house, boxes(), 1), room.id)
+    assert has in names
+    assert "bed" not in names
+
+
+def test_a_room_without_a_name_is_what_the_home_lacks() -> None:
+    house = empty_house()
+    living = next(r for r in house.rooms if r.name == "Living room")
+    names = names_in(furnish_rooms(renamed(house, living.name, ""), boxes(), 1), living.id)
+    assert "sofa" in names
+    bedroom = next(r for r in house.rooms if r.name == "Bedroom 1")
+    names = names_in(furnish_rooms(renamed(house, bedroom.name, ""), boxes(), 1), bedroom.id)
+    assert "bed" in names
+
+
+def test_a_sparse_room_keeps_what_it_has_and_gets_what_it_lacks() -> None:
+    house = empty_house()
+    room = next(r for r in house.rooms if r.name == "Living room")
+    full = furnish_rooms(house, boxes(), 1)
+    here = [i for i in full.items if i.room_id == room.id]
+    sofas = [replace(i, nyu40=SOFA) for i in here if i.name == "sofa"]
+    # A sofa alone covers more than an empty room has, and less than a furnished one.
+    start = house.with_items([*house.items, *sofas])
+    empty = furnish_rooms(start, boxes(), 2)
+    assert names_in(empty, room.id) == names_in(start, room.id)
+    sparse = furnish_rooms(start, boxes(), 2, which="sparse")
+    now = [i for i in sparse.items if i.room_id == room.id and i.name == "sofa"]
+    assert [i.bounds.tolist() for i in now] == [i.bounds.tolist() for i in sofas]
+    assert names_in(sparse, room.id) > names_in(start, room.id)
 
 
 def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:

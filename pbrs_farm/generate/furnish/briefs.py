@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -30,6 +30,14 @@ class RoomBrief:
     density: float = 0.0
     least_share: float = 0.0  # of the floor that stays walkable while fillers are added
     kitchen: Places | None = None  # where the group "kitchen" can stand
+
+    def without(self, names: Collection[str]) -> RoomBrief:
+        """The brief without the groups of these names."""
+        return replace(
+            self,
+            groups=tuple(g for g in self.groups if g.name not in names),
+            fillers=tuple(g for g in self.fillers if g.name not in names),
+        )
 
 
 # What holds of a room: it is a studio, no room is open to it, it is where the home's laundry is done.
@@ -82,21 +90,31 @@ class _Brief(Record):
     least_share: float = 0.0
 
 
+UseWithoutType = Literal["childs_room", "dining_room", "office"]
+"""Briefs of rooms that no generated plan has, or that are drawn: no RoomType."""
+
 _CHILDS_ROOM: Final = "childs_room"
 _BRIEFS: Final = read_toml(
-    Path(__file__).with_name("briefs.toml"), dict[RoomType | Literal["childs_room"], _Brief]
+    Path(__file__).with_name("briefs.toml"), dict[RoomType | UseWithoutType, _Brief]
 )
 
 
-def brief_of(plan: Plan, space: FurnishSpace, shelf: Shelf, rng: np.random.Generator) -> RoomBrief:
+def brief_of(
+    plan: Plan,
+    space: FurnishSpace,
+    shelf: Shelf,
+    rng: np.random.Generator,
+    use: UseWithoutType | None = None,
+) -> RoomBrief:
     """What a room must have, may have and is filled with, by its type and what else the home has.
 
     shelf: the pieces of which templates are made; where it has none of a group nobody misses it. rng:
-    draws what comes by chance, and whether a bedroom is a child's.
+    draws what comes by chance, and whether a bedroom is a child's. use: whose brief it has instead of
+    its type's.
     """
     type_ = plan.rooms[space.number].type
-    name: str = RoomType.LIVING if type_ is RoomType.STUDIO else type_
-    if type_ is RoomType.BEDROOM and _is_childs(plan, space, rng):
+    name: str = use or (RoomType.LIVING if type_ is RoomType.STUDIO else type_)
+    if use is None and type_ is RoomType.BEDROOM and _is_childs(plan, space, rng):
         name = _CHILDS_ROOM
     facts, measures = _facts_of_room(plan, space, type_), _measures(space, type_, rng)
 
@@ -148,7 +166,7 @@ def _facts_of_room(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fac
 def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) -> dict[str, Any]:
     x0, z0, x1, z1 = space.bounds
     found = {"bounds": space.bounds, "area": space.area, "row": max(x1 - x0, z1 - z0) - 0.2}
-    if type_ in (RoomType.LIVING, RoomType.STUDIO):
+    if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
         found["seats"] = 6 if space.area > 24 and rng.random() < 0.6 else 4
     return found
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Rect, RoomType, ground
-from pbrs_farm.generate.furnish.briefs import RoomBrief, brief_of
+from pbrs_farm.generate.furnish.briefs import RoomBrief, UseWithoutType, brief_of
 from pbrs_farm.generate.furnish.ceiling_lamps import ceiling_lamps
 from pbrs_farm.generate.furnish.pieces import Shelf, style_of
 from pbrs_farm.generate.furnish.place_search import Arrangement, arranged
@@ -28,11 +28,15 @@ _ON_FLOOR_M: Final = 0.05
 def furnished(
     plan: Plan, catalogue: Catalogue, rng: np.random.Generator, style: str = "", *,
     rooms: Collection[int] | None = None, standing: Mapping[int, Sequence[Rect]] | None = None,
+    uses: Mapping[int, UseWithoutType] | None = None,
+    present: Mapping[int, Collection[str]] | None = None,
 ) -> tuple[PlacedPiece, ...]:  # fmt: skip
     """The furniture of every room of a plan, or of some of them, by seed.
 
     rooms: their numbers, None = all. standing: room -> rectangles of what stands there already: nothing
-    is put on them, and one must be able to walk around them. What the catalogue lacks is left out.
+    is put on them, and one must be able to walk around them. uses: room -> the brief that it has instead
+    of its type's. present: room -> names of the groups of its brief that it has already, of which it gets
+    no second one. What the catalogue lacks is left out.
     Raises BadInput for a style that is none. gates.py says whether the result holds what it must.
     """
     shelf = Shelf(catalogue, rng, style_of(style, rng))
@@ -45,8 +49,9 @@ def furnished(
         taken = list((standing or {}).get(number, ()))
         space = with_bodies(room_space(plan, number), taken)
         others = [ground(p) for pieces in found.values() for p in pieces if p.elevation < 0.4]
-        brief = brief_of(plan, space, shelf, room_rng)
-        placed = arrangement_of(brief, space, [*others, *taken], room_rng)
+        brief = brief_of(plan, space, shelf, room_rng, (uses or {}).get(number))
+        brief = brief.without((present or {}).get(number, ()))
+        placed = arrangement_of(brief, space, [*others, *taken], room_rng, n_standing=len(taken))
         # A low ceiling makes tall pieces lower.
         pieces = [
             replace(p, height=min(p.height, round(plan.height - p.elevation - 0.02, 4)))
@@ -63,11 +68,17 @@ def _rank(type_: RoomType) -> int:
 
 
 def arrangement_of(
-    brief: RoomBrief, space: FurnishSpace, others: list[Rect], rng: np.random.Generator
+    brief: RoomBrief,
+    space: FurnishSpace,
+    others: list[Rect],
+    rng: np.random.Generator,
+    *,
+    n_standing: int = 0,
 ) -> Arrangement:
     """What stands in a room: all that must, then what may, then fillers up to its density.
 
-    others: rectangles of what stands in rooms that are open to it. Where what must stand does not fit in
+    others: rectangles of what stands in rooms that are open to it. n_standing: pieces that stand in it
+    already, which count towards its density. Where what must stand does not fit in
     the brief's order, other orders are tried.
     """
     walk = WalkMap(space, others)
@@ -80,7 +91,7 @@ def arrangement_of(
     # Try the groups in other orders where one that must stand does not.
     if best.missing:
         best = _other_orders(groups, places, walk, best)
-    return _add_fillers(best, brief, space, walk, rng)
+    return _add_fillers(best, brief, space, walk, rng, n_standing)
 
 
 def _is_kitchen(group: PieceGroup, brief: RoomBrief) -> bool:
@@ -110,12 +121,15 @@ def _add_fillers(
     space: FurnishSpace,
     walk: WalkMap,
     rng: np.random.Generator,
+    n_standing: int,
 ) -> Arrangement:
     """Add fillers until the room is as full as people's are, or one could hardly walk."""
     filled = start
     for group in brief.fillers:
         wanted = brief.density * space.area
-        n = sum(s.elevation < _ON_FLOOR_M for p in filled.standing for s in p.template.slots)
+        n = n_standing + sum(
+            s.elevation < _ON_FLOOR_M for p in filled.standing for s in p.template.slots
+        )
         if n + 0.5 > wanted or not group.templates:
             continue
         optional = replace(group, is_required=False)
