@@ -2,8 +2,8 @@
 
 A room is empty where what stands on its floor covers less than 3 % of it, and sparse below 20 %: asked
 for `sparse`, such a room keeps what it has and gets what its brief has beside. Its use follows from its name
-and what stands there; one without a name gets what the home lacks. A garage, and a name of no known use,
-stays as it is, with a note.
+and what stands there; one whose name says none gets what the home lacks. A garage, and a dark room of no
+known use, stays as it is, with a note.
 """
 
 from __future__ import annotations
@@ -149,10 +149,14 @@ def _furnished(
 
 
 def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
-    """Room id -> what it is for; a room without a name is what the home lacks, the largest first."""
+    """Room id -> what it is for; one of no known use is what the home lacks, the largest first.
+
+    A room without windows keeps no use, where others of the home have some.
+    """
     kinds = {room.room.id: room.kind for room in space.rooms}
-    unnamed = [r for r in space.rooms if r.kind is RoomKind.OTHER and not r.room.name and r.windows]
-    for room in sorted(unnamed, key=lambda r: (-r.area.area, r.room.id)):
+    has_windows = any(room.windows for room in space.rooms)
+    others = [r for r in space.rooms if r.kind is RoomKind.OTHER and (r.windows or not has_windows)]
+    for room in sorted(others, key=lambda r: (-r.area.area, r.room.id)):
         if room.area.area >= _LEAST_LIVING_M2 and RoomKind.LIVING not in kinds.values():
             kinds[room.room.id] = RoomKind.LIVING
         elif room.area.area >= _LEAST_BEDROOM_M2:

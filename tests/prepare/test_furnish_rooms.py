@@ -114,13 +114,14 @@ def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> 
     assert "bed" not in names
 
 
-def test_a_room_without_a_name_is_what_the_home_lacks() -> None:
+@pytest.mark.parametrize("name", ["", "Room 3"])
+def test_a_room_whose_name_says_no_use_is_what_the_home_lacks(name: str) -> None:
     house = empty_house()
     living = next(r for r in house.rooms if r.name == "Living room")
-    names = names_in(furnish_rooms(renamed(house, living.name, ""), boxes(), 1), living.id)
+    names = names_in(furnish_rooms(renamed(house, living.name, name), boxes(), 1), living.id)
     assert "sofa" in names
     bedroom = next(r for r in house.rooms if r.name == "Bedroom 1")
-    names = names_in(furnish_rooms(renamed(house, bedroom.name, ""), boxes(), 1), bedroom.id)
+    names = names_in(furnish_rooms(renamed(house, bedroom.name, name), boxes(), 1), bedroom.id)
     assert "bed" in names
 
 
