@@ -27,6 +27,7 @@ from pbrs_farm.dress.mess import move_chairs, tilt_pictures
 from pbrs_farm.dress.mutable_house import CHANGED_TAG, MutableHouse
 from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.report import Credit, DressReport, Gate, is_owed
+from pbrs_farm.dress.soft_cloth import weave_soft_things
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surfaces import dress_surfaces
 from pbrs_farm.dress.swap import swap_furniture
@@ -54,6 +55,7 @@ _THINGS: Final[tuple[tuple[str, DressingPass], ...]] = (
     ("walls", furnish_walls),
     ("mess", tilt_pictures),
     ("clutter", add_clutter),
+    ("parts", weave_soft_things),
 )
 """The same of what is done when it is known which furniture stays."""
 

@@ -53,8 +53,9 @@ _PALE: Final = "birch"
 
 
 @dataclass(frozen=True, slots=True)
-class _LaidMaterial:
-    # A material, and how its picture is laid; size None: its coordinates stay.
+class LaidMaterial:
+    """A material, and how its picture is laid; size None: its coordinates stay."""
+
     number: int
     size_m: tuple[float, float] | None = None
     is_grained: bool = False
@@ -158,7 +159,7 @@ def _finish_surface(
 def _finish_wood(
     house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:  # fmt: skip
     own, stays = material.diffuse, rng.random()
     # Paint may stay paint; so may grey.
     is_other = not (is_brown(own) or is_dark(own) or is_vivid(own))
@@ -176,7 +177,7 @@ def _finish_wood(
     is_pale = float(wanted @ LUMINANCE) > float(mean @ LUMINANCE)
     wood = WOODS[_PALE] if is_pale else style.wood
     pattern = photographed(house, catalogue, grain_pattern(house, wood))
-    return _tinted(house, pattern, wanted, is_grained=True)
+    return tinted(house, pattern, wanted, is_grained=True)
 
 
 def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
@@ -188,7 +189,7 @@ def grain_pattern(house: MutableHouse, wood: Wood) -> Pattern:
 def _finish_soft(
     house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:  # fmt: skip
     colours: Mapping[bool, tuple[Rgb, ...]] = {False: style.textiles, True: style.textiles[:3]}
     wanted = linear_from_srgb(
         np.array(colours[is_bed(item)][int(rng.integers(len(colours[is_bed(item)])))])
@@ -206,13 +207,13 @@ def _finish_soft(
         wanted = linear_from_srgb(np.array(hides[int(rng.integers(len(hides)))]))
     seed = int(house.rng(PASS, family).integers(SEEDS))
     pattern = photographed(house, catalogue, Pattern(family, seed))
-    return _tinted(house, pattern, wanted, is_grained=False)
+    return tinted(house, pattern, wanted, is_grained=False)
 
 
 def _finish_lacquer(
     house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:  # fmt: skip
     has_sheen = material.specular != (0.0, 0.0, 0.0) and material.shininess > 1
     own = material.diffuse
     # Screen colours are mixed down to those that paint has.
@@ -228,13 +229,13 @@ def _finish_lacquer(
         material, diffuse=(r, g, b), specular=_SHEEN, roughness=roughness,
         shininess=round(2 / roughness**4 - 2, 1),
     )  # fmt: skip
-    return _LaidMaterial(house.material(painted))
+    return LaidMaterial(house.material(painted))
 
 
 def _finish_metal(
     house: MutableHouse, catalogue: Catalogue, style: Style, item: Item, material: Material,
     rng: np.random.Generator,
-) -> _LaidMaterial | None:  # fmt: skip
+) -> LaidMaterial | None:  # fmt: skip
     if is_dark(material.diffuse) or (is_vivid(material.diffuse) and not is_brown(material.diffuse)):
         return None
     metal = metal_of(material.name.lower(), METALS["chrome"] if has_taps(item) else style.metal)
@@ -244,19 +245,17 @@ def _finish_metal(
         material, diffuse=(r, g, b), specular=metal.colour, roughness=metal.roughness,
         shininess=round(2 / max(metal.roughness, 0.1) ** 4 - 2, 1),
     )  # fmt: skip
-    return _LaidMaterial(house.material(polished))
+    return LaidMaterial(house.material(polished))
 
 
-def _tinted(
-    house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bool
-) -> _LaidMaterial:
-    # The pattern's material in another colour: its picture times a diffuse of at most 1.
+def tinted(house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bool) -> LaidMaterial:
+    """The pattern's material in another mean colour, linear: its picture times a diffuse of at most 1."""
     made = pattern_material(house, pattern)
     ratio = wanted / np.maximum(np.array(made.mean_rgb), 1e-3)
     ratio = ratio / max(1.0, float(ratio.max()))
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
     tinted = replace(house.materials[made.number], diffuse=(r, g, b))
-    return _LaidMaterial(house.material(tinted), made.size_m, is_grained)
+    return LaidMaterial(house.material(tinted), made.size_m, is_grained)
 
 
 def _area_of_surface(surface: Surface) -> float:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
-_FURNISH_VERSION: Final = 1  # of furnish_rooms.py, beside that of what furnishes generated homes
+_FURNISH_VERSION: Final = 2  # of furnish_rooms.py, beside that of what furnishes generated homes
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
 
 
@@ -265,7 +265,7 @@ PASSES: Final = (
     Pass("read", 3, ("read",), _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 3, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
-    Pass("dress", 4, ("dress",), _dress, _is_dressed, _dress_depends),
+    Pass("dress", 5, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass(
         "surroundings", 2, ("surroundings",), _surround,

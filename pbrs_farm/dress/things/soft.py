@@ -34,9 +34,12 @@ def cushion(m: Maker) -> None:
                 m.add(bulged((edge, thick, edge), n=9))
                 m.add(hoop(rect(edge * 0.94, edge * 0.94, 0.03, n=2), 0.0, 0.006, n=5), of=trim)
             case 4:  # round, with a button
-                m.add(revolve([(0, -0.06), (0.13, -0.055), (0.19, -0.03), (0.2, 0), (0.19, 0.03),
-                    (0.13, 0.055), (0.02, 0.05), (0, 0.045)], n=26))  # fmt: skip
-                m.add(revolve([(0, 0.044), (0.018, 0.05), (0.014, 0.058), (0, 0.06)], n=12),
+                # Both sides are drawn in towards the middle, where the button holds them.
+                upper = [(0.2, 0), (0.196, 0.02), (0.184, 0.04), (0.162, 0.057), (0.132, 0.066),
+                    (0.1, 0.068), (0.066, 0.062), (0.036, 0.05), (0.014, 0.038), (0, 0.034)]  # fmt: skip
+                lower = [(r, -y) for r, y in reversed(upper)]
+                m.add(revolve([*lower, *upper[1:]], n=28))
+                m.add(revolve([(0, 0.032), (0.016, 0.036), (0.013, 0.044), (0, 0.047)], n=12),
                     of=trim)  # fmt: skip
             case 5:  # a roll
                 m.add(tube([(-edge / 2, 0, 0), (-edge / 2 + 0.01, 0, 0), (edge / 2 - 0.01, 0, 0),
