@@ -36,7 +36,10 @@ def add_verbs(verb: Verb) -> None:
     add = p.add_argument
     add("folder", help="output folder or store URL")
     text = "a reference file, a folder of RGB-D pairs, or a .mat"
-    add("--reference", type=Path, required=True, help=text)
+    add("--reference", type=Path, help=text)
+    text = "without a reference: leave out what teaches nothing (black plane cut twins)"
+    add("--by", nargs="+", metavar="RULE", help=text)
+    add("--selection", metavar="RUN", help="with --by: among what this run keeps")
     add("--run", default="default", help="name of the selection's files")
     add_set(p, "FIELD=VALUE", "selection.FIELD, e.g. selection.min_depth=0.6")
     add("--score-mode", help="mode to score where a view lacks mlt_il_ol")
@@ -96,6 +99,10 @@ def _select(args: argparse.Namespace) -> int:
 
     if "://" not in args.folder and not Path(args.folder).is_dir():
         raise BadInput(args.folder, "", "no such folder")
+    if (args.reference is None) == (args.by is None):
+        raise BadInput("select", "", "give --reference or --by, one of them")
+    if args.by is not None:
+        return _select_by(args)
     store = store_from_url(args.folder, settings_from_environment().store)
     recipe = recipe_from_json(store.get("recipe.json"), f"{store.url}: recipe.json")
     fields = _fields(recipe, args)
@@ -116,6 +123,40 @@ def _select(args: argparse.Namespace) -> int:
         return 0
     _echo_summary(summary)
     echo(keys.selection_key(args.run, "html" if args.report else "parquet"))
+    return 0
+
+
+def _select_by(args: argparse.Namespace) -> int:
+    """Judge every view, or those that a run keeps, by rules, and write selection/<run>.jsonl."""
+    import json
+
+    from pbrs_farm.curate.teaching_rules import REASONS, judged_by
+    from pbrs_farm.export.export_views import finished_entries
+    from pbrs_farm.run.output_root import as_files
+    from pbrs_farm.settings import settings_from_environment
+    from pbrs_farm.store import store_from_url
+
+    settings = settings_from_environment().store
+    with as_files(args.folder, settings) as folder:
+        found = judged_by(finished_entries(folder, args.selection), args.by)
+    store = store_from_url(args.folder, settings)
+    lines = "".join(verdict.json_line for verdict in found)
+    store.put(keys.selection_key(args.run, "jsonl"), lines.encode())
+    counts = {
+        REASONS[name]: sum(verdict.reason == REASONS[name] for verdict in found)
+        for name in REASONS
+        if name in args.by
+    }
+    kept = len(found) - sum(counts.values())
+    summary = {"run": args.run, "by": args.by, "views": len(found), "kept": kept, "reasons": counts}
+    store.put(keys.SELECTION, (json.dumps(summary, indent=1) + "\n").encode())
+    if args.json:
+        echo_json(summary)
+        return 0
+    echo(f"{kept} of {len(found)} views kept")
+    for reason, n in counts.items():
+        echo(f"  {n:>6}  {reason}")
+    echo(keys.selection_key(args.run, "jsonl"))
     return 0
 
 

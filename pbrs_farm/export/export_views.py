@@ -67,14 +67,9 @@ def export(
     if choice.classes is not None and not form.has_classes:
         hint = f"--to {', '.join(forms_with_classes())}"
         raise BadInput("--classes", "", f"{name} has no classes of your own", hint=hint)
-    # A view is finished when its labels are there.
-    found = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
-    # Leave out views that are not asked for, and those that the selection does not keep.
+    found = finished_entries(folder, selection)
     if views is not None:
         found = [v for v in found if (v.house.id, v.id) in views]
-    if selection is not None:
-        kept = _kept(folder, selection)
-        found = [v for v in found if (v.house.id, v.id) in kept]
     if not found:
         raise BadInput(folder, "", "no finished view to export")
     with new_folder(out) as scratch:
@@ -87,6 +82,16 @@ def export(
         if form.finish is not None:
             n_files += form.finish(scratch, tuple(filter(None, by_split)), choice)
     return len(found), n_files
+
+
+def finished_entries(folder: Path, selection: str | None = None) -> list[ViewEntry]:
+    """The finished views of a folder, or those that selection/<selection>.jsonl keeps; BadInput as export."""
+    # A view is finished when its labels are there.
+    found = [v for v in views_of(folder) if "instances" in v.facts and v.file("instance.png")]
+    if selection is None:
+        return found
+    kept = _kept(folder, selection)
+    return [v for v in found if (v.house.id, v.id) in kept]
 
 
 def export_frames(
