@@ -19,6 +19,7 @@ from pbrs_farm import images
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.installation import install_command
 from pbrs_farm.regular_files import (
     MAX_DIGEST_BYTES,
@@ -34,6 +35,7 @@ _RGB_NAMES: Final = ("rgb", "color", "colour", "image", "images")  # of folders
 _DEPTH_NAMES: Final = ("depth_bfx", "depth")  # the preferred first
 _RGB_FILES: Final = (".jpg", ".jpeg", ".png", ".bmp")
 _DEPTH_FILES: Final = (".png", ".npy", ".exr")
+_SAME_FORM: Final = 0.02  # of each other, widths over heights of a picture and its depth
 _SUFFIX: Final = re.compile(r"(.+)_(rgb|color|colour|image|depth)", re.IGNORECASE)  # of files
 
 
@@ -136,12 +138,16 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
 def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
     """The photograph of two files; BadInput naming the file that is wrong.
 
-    depth_scale: depth units per metre; None = 1000 for whole numbers, 1 for .npy and .exr.
+    depth_scale: depth units per metre; None = 1000 for whole numbers, 1 for .npy and .exr. A picture
+    of another size than depth, in the same form, is brought to depth's (ScanNet's are).
     """
     rgb = images.decode_photo(read_given(pair.rgb), str(pair.rgb))
     stored = _stored_depth(pair.depth)
     if stored.ndim != 2:
         raise BadInput(pair.depth, "", f"expected one channel of depth, got {stored.shape}")
+    across, down = (n / m for n, m in zip(rgb.shape[1::-1], stored.shape[::-1], strict=True))
+    if stored.shape != rgb.shape[:2] and abs(across / down - 1) <= _SAME_FORM:
+        rgb = resized_by_area(rgb, stored.shape[1], stored.shape[0])
     if stored.shape != rgb.shape[:2]:
         sizes = f"{stored.shape[1]}x{stored.shape[0]}, the picture {rgb.shape[1]}x{rgb.shape[0]}"
         raise BadInput(pair.depth, "", f"sizes differ: depth is {sizes}")

@@ -1,8 +1,12 @@
-"""Photographs with depth as views to judge normals and depth on. Effects: reads files.
+"""Photographs with depth as views to judge normals and depth on, of ScanNet classes too. Effects: reads files.
 
 A folder of pairs in a layout of docs/selection.md, and the camera: intrinsics.json with fx, fy,
 cx, cy in pixels (depth_scale: units a metre), or intrinsics.txt with those four numbers or the
 nine of K, beside the pictures or in a folder above. The truth of normals is planes fitted to depth.
+
+ScanNet: <scene>/{color,depth,label}/NAME and the depth camera's 4 x 4, where its tools put it; depth
+is in mm, label NYU40's ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt, extrinsics;
+its depth has rotated bits.
 """
 
 from __future__ import annotations
@@ -13,16 +17,27 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.curate.photographs import pairs_in, photo_from_pair
-from pbrs_farm.regular_files import text_given
+from pbrs_farm.core.resampling import resized_nearest
+from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
+from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import read_given, text_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
 from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
+from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.training_plan import TrainingPlan
 
-_FILES: Final = ("intrinsics.json", "intrinsics.txt")
+_FILES: Final = (
+    "intrinsics.json", "intrinsics.txt",
+    # ScanNet's: of its 25,000 frames, and of what its reader writes of a scan.
+    "intrinsics_depth.txt", "intrinsic/intrinsic_depth.txt", "intrinsics/intrinsic_depth.txt",
+)  # fmt: skip
+_LABEL_TRUTH: Final = "NYU40 classes of the picture's own label, where labelled"
+_LABELS: Final = "label"  # ScanNet's folder of classes, beside the pictures'
+_OF_SUN_RGBD: Final = ("extrinsics", "depth_bfx", "seg.mat")  # beside image/ and intrinsics.txt
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,25 +54,57 @@ class PhotoCamera:
 
 
 def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
-    """Every pair below a folder, for normals and depth; BadInput for one without intrinsics.
+    """Every pair below a folder, for normals and depth, of ScanNet for classes; BadInput for one without intrinsics.
 
-    All are held in memory, at the plan's size of picture. BadInput also for tasks of which depth
-    says nothing.
+    All are held in memory, at the plan's size of picture. BadInput also for tasks of which its files
+    say nothing.
     """
-    if plan.task not in ("normals", "depth"):
+    pairs, has_labels = pairs_in(folder), plan.task == "segmentation"
+    if has_labels:
+        pairs = tuple(pair for pair in pairs if _label_of(pair).is_file())
+    if plan.task not in ("normals", "depth", "segmentation") or not pairs:
         text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
         raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
     ids, colours, truths = [], [], []
-    for pair in pairs_in(folder):
+    for pair in pairs:
         camera = camera_of(pair.rgb.parent, folder)
-        photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=False)
+        is_sun = _is_of_sun_rgbd(pair)
+        photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=is_sun)
         colour, rows, columns = crop_to_plan(photo.rgb, plan)
-        truth = photo_truth(photo, camera.matrix(), plan)
+        if has_labels:
+            truth = {"labels": classes_of(_labels(pair, photo), plan)}
+        else:
+            truth = photo_truth(photo, camera.matrix(), plan)
         ids.append(pair.id)
         colours.append(colour)
         truths.append({key: array[rows, columns] for key, array in truth.items()})
-    said = PLANE_TRUTH if plan.task == "normals" else DEPTH_TRUTH
+    said = {"normals": PLANE_TRUTH, "depth": DEPTH_TRUTH}.get(plan.task, _LABEL_TRUTH)
     return JudgedViews(name, said, tuple(ids), np.stack(colours), tuple(truths))
+
+
+def _label_of(pair: PhotoFiles) -> Path:
+    """Where ScanNet has the classes of a picture."""
+    return pair.rgb.parent.parent / _LABELS / f"{pair.rgb.stem}.png"
+
+
+def _labels(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
+    """(H, W) NYU40 ids at the photograph's size, 0 = none."""
+    file = _label_of(pair)
+    stored = array_from_png(read_given(file), str(file))
+    if stored.ndim != 2 or int(stored.max(initial=0)) > 40:
+        raise BadInput(file, "", "expected one channel of NYU40 ids, 0 to 40")
+    height, width = photo.rgb.shape[:2]
+    return resized_nearest(stored.astype(np.uint8), width, height)
+
+
+def _is_of_sun_rgbd(pair: PhotoFiles) -> bool:
+    scene = pair.rgb.parent.parent
+    has_camera = (scene / "intrinsics.txt").is_file()
+    return (
+        has_camera
+        and pair.rgb.parent.name == "image"
+        and any((scene / name).exists() for name in _OF_SUN_RGBD)
+    )
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:
@@ -86,10 +133,13 @@ def _read_camera(path: Path) -> PhotoCamera:
             scale = float(row["depth_scale"]) if "depth_scale" in row else None
         else:
             values = [float(word) for word in text.replace(",", " ").split()]
-            values = [values[k] for k in (0, 4, 2, 5)] if len(values) == 9 else values
+            places = {9: (0, 4, 2, 5), 16: (0, 5, 2, 6)}.get(len(values))  # of 3 x 3, of 4 x 4
+            values = values if places is None else [values[k] for k in places]
     except (ValueError, KeyError, TypeError):
         values = []
     if len(values) != 4 or not np.isfinite(values).all() or min(values[:2]) <= 0:
-        raise BadInput(path, "", "expected fx, fy, cx and cy in pixels, or the nine numbers of K")
+        raise BadInput(
+            path, "", "expected fx, fy, cx and cy in pixels, or the numbers of K, 3 x 3 or 4 x 4"
+        )
     fx, fy, cx, cy = values
     return PhotoCamera((fx, fy, cx, cy), scale)

@@ -10,7 +10,7 @@ import pytest
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.images import png_from_array
+from pbrs_farm.images import jpeg_from_array, png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
@@ -158,6 +158,66 @@ def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
     (pairs / "intrinsics.txt").write_text("80 zero")
     with pytest.raises(BadInput, match="expected fx, fy, cx and cy"):
         camera_of(pairs, pairs)
+
+
+def write_scene(scene: Path, camera_file: str, *, label: bool = True) -> None:
+    """A frame of ScanNet: a larger picture, depth of a wall 2 m away in mm, NYU40 labels."""
+    for name in ("color", "depth", "label", camera_file.rpartition("/")[0]):
+        (scene / name).mkdir(parents=True, exist_ok=True)
+    picture = np.zeros((968, 1296, 3), np.uint8)
+    picture[:, 648:] = 200
+    (scene / "color/000100.jpg").write_bytes(jpeg_from_array(picture))
+    depth = np.full((480, 640), 2000, np.uint16)
+    (scene / "depth/000100.png").write_bytes(png_from_array(depth))
+    if label:
+        ids = np.full((480, 640), 1, np.uint8)
+        ids[:, 320:] = 5
+        (scene / "label/000100.png").write_bytes(png_from_array(ids))
+    rows = "577.87 0 319.5 0\n0 577.87 239.5 0\n0 0 1 0\n0 0 0 1\n"
+    (scene / camera_file).write_text(rows)
+
+
+@pytest.mark.parametrize("camera", ["intrinsics_depth.txt", "intrinsic/intrinsic_depth.txt"])
+def test_scannets_scenes_are_judged(tmp_path: Path, camera: str) -> None:
+    for scene in ("scene0000_00", "scene0001_00"):
+        write_scene(tmp_path / scene, camera)
+    assert camera_of(tmp_path / "scene0000_00/color", tmp_path).K == (577.87, 577.87, 319.5, 239.5)
+    views = open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
+    assert views.ids == ("scene0000_00/000100", "scene0001_00/000100")
+    truth = views.truths[0]
+    wanted = [[0, 0, -32767]] * truth["valid"].sum()
+    np.testing.assert_allclose(truth["normal"][truth["valid"]], wanted, atol=40)
+    # The picture lies on its depth: dark on the left, bright on the right.
+    colour = views.colour[0].astype(int)
+    assert colour[:, :18].max() < 30
+    assert colour[:, 22:].min() > 170
+    classes = open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
+    labels = classes.truths[0]["labels"]
+    half = labels.shape[1] // 2
+    assert len(np.unique(labels[:, : half - 1])) == len(np.unique(labels[:, half + 1 :])) == 1
+    assert labels[0, 0] != labels[0, -1]
+
+
+def test_scannets_labels_must_be_nyu40s(tmp_path: Path) -> None:
+    write_scene(tmp_path / "s", "intrinsics_depth.txt")
+    raw = np.full((480, 640), 1163, np.uint16)  # ids of its own, of label-filt
+    (tmp_path / "s/label/000100.png").write_bytes(png_from_array(raw))
+    with pytest.raises(BadInput, match="NYU40 ids, 0 to 40"):
+        open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
+
+
+def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
+    for k, sensor in enumerate(("kv1/NYUdata/NYU0001", "xtion/sun3ddata/x")):
+        scene = tmp_path / "SUNRGBD" / sensor
+        for name in ("image", "depth", "depth_bfx", "extrinsics"):
+            (scene / name).mkdir(parents=True)
+        (scene / f"image/{k}.jpg").write_bytes(jpeg_from_array(np.full((60, 90, 3), 99, np.uint8)))
+        for name in ("depth", "depth_bfx"):
+            mm = np.full((60, 90), 2000 + 100 * k, np.uint16)
+            (scene / f"{name}/{k}_abs.png").write_bytes(png_from_array(mm << 3 | mm >> 13))
+        (scene / "intrinsics.txt").write_text("80 0 45\n0 80 30\n0 0 1\n")
+    views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
+    assert [float(t["depth"].mean()) for t in views.truths] == pytest.approx([2.0, 2.1])
 
 
 def test_depth_says_nothing_of_classes(pairs: Path) -> None:
