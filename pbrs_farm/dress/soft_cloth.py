@@ -1,7 +1,8 @@
 """The part of dressing that weaves: cushions, covers, throws and generated seats get threads or a print.
 
-Generated soft things come in one plain colour each; bare of threads they look like plastic. cloths.toml
-beside says what each material is woven as. Effects: those of textures.families.
+Generated soft things come in one plain colour each, and so do the cushions of many a library's sofa; bare of
+threads they look like plastic. cloths.toml beside says what each material is woven as. Effects: those of
+textures.families.
 """
 
 from __future__ import annotations
@@ -16,12 +17,15 @@ from pydantic import Field
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.classes import SOFA
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.house import Item, Material, Surface
+from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.dress.finishes import tinted
 from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.part_kinds import PartKind, kind_by_name
 from pbrs_farm.dress.style import Rgb, Style, mix
 from pbrs_farm.dress.textures.families import Pattern, pattern_material, photographed
 from pbrs_farm.dress.textures.wallpaper import PATTERNS
@@ -36,6 +40,10 @@ class _Cloth(Record):
     contrast: float = Field(ge=0, le=1)  # of the print: 0 = tone in tone, 1 = in another colour
 
 
+_SEATS: Final = ("sofa", "armchair")  # groups of which any large plain part is cloth
+_SEAT_CLOTH: Final = _Cloth(families=("weave", "twill"), printed=0.0, contrast=0.0)
+_LEAST_M2: Final = 0.3  # of such a part: feet and buttons are smaller
+
 _CLOTHS: Final = read_toml(Path(__file__).with_name("cloths.toml"), dict[str, _Cloth])
 
 
@@ -46,10 +54,14 @@ def weave_soft_things(
 
     What has one colour in one room gets one look, so that sets stay sets.
     """
+    seats = {p.id for p in catalogue.of(*_SEATS)}
     for index, item in enumerate(house.items):
         if item.kind.is_structure:
             continue
-        woven = tuple(_woven(house, catalogue, style, share, item, s) for s in item.surfaces)
+        is_seat = item.nyu40 == SOFA or item.source_class in seats
+        woven = tuple(
+            _woven(house, catalogue, style, share, item, s, is_seat=is_seat) for s in item.surfaces
+        )
         if any(a is not b for a, b in zip(woven, item.surfaces, strict=True)):
             house.change(index, replace(item, surfaces=woven), PASS)
             house.done[PASS] += 1
@@ -57,12 +69,17 @@ def weave_soft_things(
 
 def _woven(
     house: MutableHouse, catalogue: Catalogue, style: Style, share: float, item: Item,
-    surface: Surface,
+    surface: Surface, *, is_seat: bool,
 ) -> Surface:  # fmt: skip
     material = house.materials[surface.material]
     name = _plain_name(material)
     cloth = _CLOTHS.get(name)
-    if cloth is None or material.texture_ids or material.opacity < 1:
+    if material.texture_ids or material.opacity < 1 or material.kind is not MaterialKind.OPAQUE:
+        return surface
+    if cloth is None and is_seat and kind_by_name(name) in (None, PartKind.SOFT):
+        is_large = face_areas(triangle_corners(surface.positions, surface.faces)).sum() >= _LEAST_M2
+        cloth = _SEAT_CLOTH if is_large else None
+    if cloth is None:
         return surface
     shade = "".join(f"{round(31 * c):02x}" for c in material.diffuse)
     rng = house.rng(PASS, item.level_id, item.room_id or "", name, shade)

@@ -67,3 +67,14 @@ def test_a_packed_models_name_is_known_and_no_other_material_changes() -> None:
         assert woven(cushion(), name=name).items[0].surfaces[0].material == 0
     assert woven(cushion(), texture_id="t").items[0].surfaces[0].material == 0
     assert woven(cushion(), share=0.0).items[0].surfaces[0].material == 0
+
+
+def test_the_large_plain_parts_of_a_sofa_are_woven_in_their_own_colour_and_its_feet_stay() -> None:
+    sofa = solid("s", [0, 0, 0], [2, 0.8, 0.9], NYU40_NAMES.index("sofa"))
+    assert material_of(woven(sofa, name="cojines")).texture_id
+    for name in ("steel", "oak wood"):
+        assert woven(sofa, name=name).items[0].surfaces[0].material == 0
+    foot = solid("f", [0, 0, 0], [0.05, 0.1, 0.05], NYU40_NAMES.index("sofa"))
+    assert woven(foot, name="patas").items[0].surfaces[0].material == 0
+    table = solid("t", [0, 0, 0], [2, 0.8, 0.9], NYU40_NAMES.index("table"))
+    assert woven(table, name="cojines").items[0].surfaces[0].material == 0
