@@ -33,6 +33,7 @@ OWN_TARGET: Final = {
     "light": "light.equal_time",
     "light_pictures": "light.light_pictures",
     "sky": "light.sky_lux",
+    "outside": "views.outside",
     "light_tables": "light.light_tables",
     "denoised": "light.denoised",
     "growth": "light.growth",

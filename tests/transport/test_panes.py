@@ -20,6 +20,7 @@ RECIPE: Recipe = recipe_from_name("fast")
 FIELDS: LightFields = RECIPE.light.model_copy(
     update={"filter": "box", "pilot_spp": 0, "spp": 16, "max_depth": 4}
 )
+MANY: LightFields = FIELDS.model_copy(update={"spp": 4096})
 
 
 def fresnel(cos: float) -> float:
@@ -48,14 +49,16 @@ def test_a_pane_before_a_black_wall_mirrors_the_sky_by_fresnels_law(cos: float) 
     sin = float(np.sqrt(1 - cos * cos))
     camera = rooms.camera((2 * sin, 0.0, 2 * cos), (0, 0, 0), 4, 4, 0.01)
     scene = LightScene.load(pane_before_black(), {}, RECIPE, uniform_sky((1.0, 2.0, 3.0)))
-    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
-    np.testing.assert_allclose(found, np.tile(fresnel(cos) * np.array([1.0, 2, 3]), (4, 4, 1)), rtol=0.02)  # fmt: skip
+    # By day it is followed by chance.
+    found = scene.render(camera, "0_0", MANY, 1).outdoor.mean((0, 1))
+    np.testing.assert_allclose(found, fresnel(cos) * np.array([1.0, 2.0, 3.0]), rtol=0.03)
 
 
 def test_only_the_first_of_two_panes_mirrors() -> None:
     camera = rooms.camera((0, 0, 2), (0, 0, 0), 4, 4, 0.01)
     scene = LightScene.load(pane_before_black(n_panes=2), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
-    np.testing.assert_allclose(scene.render(camera, "0_0", FIELDS, 1).outdoor, fresnel(1.0), rtol=0.02)  # fmt: skip
+    found = scene.render(camera, "0_0", MANY, 1).outdoor.mean()
+    assert found == pytest.approx(fresnel(1.0), rel=0.03)
 
 
 @pytest.mark.parametrize("name", ["released", "fast"])

@@ -124,11 +124,13 @@ class DirectionPdfs:
 class MirroredRay(NamedTuple):
     """The ray that a pane sends back, where the path itself has gone through."""
 
-    is_there: Any  # Bool
+    is_there: Any  # Bool: the path is at a pane
+    is_followed: Any  # Bool
     o: Any
     d: Any
     beta: Any  # throughput
     share: Any  # about, of the light that comes by the pane
+    own_share: Any  # the same, over the chance that it is followed
 
 
 class StepResult(NamedTuple):

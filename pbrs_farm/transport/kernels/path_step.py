@@ -52,6 +52,8 @@ from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 MAX_NULLS = 32
 _MAX_COUNT = 64  # vertices with random dimensions of their own
 _MAX_SURVIVAL = 0.95
+# Chance that `path` follows what a pane mirrors, by its share of the light that comes from there.
+_LEAST_FOLLOWED, _FOLLOWED = 0.05, 8.0
 _MAX_PANE = 0.5  # of the rays at a pane, those that are reflected, where it reflects less itself
 
 # Random dimensions of a vertex, one or two numbers each; direct_light.py has the others.
@@ -128,7 +130,7 @@ def advance(
         is_view_independent=strategy.is_view_independent,
     )
     if context.splits_panes and vertex.is_pane is not None:
-        mirrored = _mirrored_ray(context.emitters, vertex, path, active)
+        mirrored = _mirrored_ray(context.emitters, vertex, path, lobe.u, active)
         result = result._replace(mirrored=mirrored)
     return following, result, alive
 
@@ -188,13 +190,17 @@ def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
     return dr.minimum(wanted, dr.maximum(reflectance, _MAX_PANE))
 
 
-def _mirrored_ray(emitters: Emitters, vertex: Vertex, path: PathState, active: Any) -> MirroredRay:
-    """What a pane sends back of a path that goes through it."""
+def _mirrored_ray(
+    emitters: Emitters, vertex: Vertex, path: PathState, u: Any, active: Any
+) -> MirroredRay:
+    """What a pane sends back of a path that goes through it: by chance where that is faint."""
     si, reflectance = vertex.si, thin_glass_reflectance(vertex.wi.z)
     d = path.d - 2 * dr.dot(si.n, path.d) * si.n
     share = _mirrored_share(emitters, reflectance)
-    is_there = active & vertex.is_pane
-    return MirroredRay(is_there, offset_ray_origin(si.p, si.ng), d, path.beta * reflectance, share)
+    chance = dr.minimum(_LEAST_FOLLOWED + _FOLLOWED * share, 1)
+    beta = path.beta * (reflectance / chance)
+    o = offset_ray_origin(si.p, si.ng)
+    return MirroredRay(active & vertex.is_pane, u < chance, o, d, beta, share, share / chance)
 
 
 def _strategy(
