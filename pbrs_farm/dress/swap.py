@@ -6,6 +6,7 @@ Things on the old piece are set down on the new one.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -50,6 +51,7 @@ _MOST_LIFT_M: Final = 0.3  # things on a swapped piece go at most so far up or d
 _ON_FLOOR_M: Final = 0.005  # what the source draws less than this above a floor is set on it
 _ON_WALLS: Final = frozenset({"radiator", "wall_lamp"})
 _NEAR_WALL_M: Final = 0.05
+_CHILDS: Final = re.compile(r"child|junior|(?<![a-z])(kid|baby)", re.IGNORECASE)
 _UNDER_TABLES: Final = frozenset({"dining_table", "desk", "coffee_table"})
 
 
@@ -156,10 +158,13 @@ def _swap_set(
 ) -> None:  # fmt: skip
     places, items = [m.place for m in members], [m.item for m in members]
     old = plain_id(items[0].source_class)
+    is_childs = _is_childs(f"{items[0].source_class} {items[0].name}")
     candidates = [
         (piece, scale)
         for piece in catalogue.of(group)
-        if plain_id(piece.id) != old and (scale := common_scale(piece, places)) is not None
+        if plain_id(piece.id) != old
+        and _is_childs(f"{piece.id} {piece.name}") == is_childs
+        and (scale := common_scale(piece, places)) is not None
     ]
     if not candidates:
         house.refused[f"{PASS}: no other model fits"] += 1
@@ -189,6 +194,11 @@ def _swap_set(
             _put_set(house, group, piece, members, new, lifts)
             return
     house.refused[f"{PASS}: {why}"] += 1
+
+
+def _is_childs(words: str) -> bool:
+    """Whether a piece is made for a child, by its id and name: no grown-up dines on its chair."""
+    return bool(_CHILDS.search(words))
 
 
 def _item_at_old_place(

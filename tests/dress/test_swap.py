@@ -167,6 +167,18 @@ def test_a_chair_on_a_balcony_stays_and_one_in_a_room_is_swapped(name: str, is_k
     assert (mutable.items[0] is home.items[0]) == is_kept
 
 
+def test_no_grown_up_gets_a_childs_chair_and_no_child_a_grown_ups() -> None:
+    size = (0.45, 0.45, 0.9)
+    chair = _item("c", size, [2, 0, 1], 5, is_seat=True)
+    for name in ("childChair", "junior chair"):
+        mutable = _swapped(_catalogue(("chair", name, size)), chair)
+        assert mutable.items[0].source_class == "T#old"
+    childs = replace(chair, name="Child chair")
+    assert _swapped(_catalogue(("chair", "new", size)), childs).items[0].source_class == "T#old"
+    new = _swapped(_catalogue(("chair", "childChair", size)), childs).items[0]
+    assert new.source_class == "T#childChair"
+
+
 def test_chairs_of_one_room_get_one_model() -> None:
     size = (0.45, 0.45, 0.9)
     catalogue = _catalogue(*(("chair", f"n{k}", (0.45, 0.43, 0.88 + 0.01 * k)) for k in range(6)))
