@@ -12,12 +12,15 @@ import csv
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
 from benchmarks.question_check import wrong_answers
+from pbrs_farm.curate.teaching_rules import REASONS, judged_by
+from pbrs_farm.export.export_views import finished_entries
 
 UNITS: Final = {
     "sets.forms": "forms of views read back equal by code that shares nothing with the writers",
@@ -27,6 +30,7 @@ UNITS: Final = {
     "sets.questions_wrong": "of them whose answer a checker that shares no code denies",
     "sets.blind_best": "largest share that one letter or answer gets right of choices of four",
     "sets.blind": "score of the best blind answer, by type",
+    "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
 }
 _PICTURES: Final = "made:70101..70114"
 _WALKS: Final = "made:70115..70117"
@@ -77,6 +81,7 @@ def _questions() -> dict[str, Any]:
     """Figures of the questions about pictures and walks."""
     scores: dict[str, float] = {}
     n = n_wrong = 0
+    curated: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         for name, homes, how in (
             ("pictures", _PICTURES, ["--views", "5"]),
@@ -88,6 +93,8 @@ def _questions() -> dict[str, Any]:
                 "--modes", "opengl_dl", *how, "--out", str(root),
             )  # fmt: skip
             _pbrs_farm("export", str(root), "--to", "questions", "--out", str(out))
+            verdicts = judged_by(finished_entries(root), list(REASONS))
+            curated.update(f"{name} {verdict.reason or 'kept'}" for verdict in verdicts)
             wrong = wrong_answers(root, out)
             print(*wrong, sep="\n", flush=True)
             n_wrong += len(wrong)
@@ -98,7 +105,7 @@ def _questions() -> dict[str, Any]:
     best = [score for name, score in scores.items() if name.split()[1] in _CHOICES_OF_FOUR]
     return {
         "sets.questions": n, "sets.questions_wrong": n_wrong, "sets.blind_best": max(best),
-        "sets.blind": scores,
+        "sets.blind": scores, "sets.curated": dict(sorted(curated.items())),
     }  # fmt: skip
 
 

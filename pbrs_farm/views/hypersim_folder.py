@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, PUBLISHED_FROM_OPENGL, srgb_from_linear
 from pbrs_farm.core.house_split import SplitShares, split_of_house
@@ -116,17 +117,17 @@ class HypersimFolder:
 
     def table(self, ref: ViewRef) -> dict[str, Any]:
         facts = self.facts(ref)
-        pose = np.array(facts.world_from_camera_opencv)
-        instance = self.layer(ref, "instance") if "instance" in self.layers(ref) else np.zeros(0)
+        pose, has = np.array(facts.world_from_camera_opencv), self.layers(ref)
+        empty = np.zeros((1, 1), np.int64)
+        instance = self.layer(ref, "instance") if "instance" in has else empty
+        class40 = self.layer(ref, "semantic") if "semantic" in has else np.zeros_like(instance)
         return {
             "house": ref.house, "view": ref.view, "width_px": facts.size[0],
             "height_px": facts.size[1], "K": [list(row) for row in facts.K],
             "world_from_camera_opencv": pose.tolist(),
             "world_from_camera_opengl": (pose @ OPENCV_FROM_OPENGL).tolist(),
             "instances": [
-                {"id": int(number), "pixels": int(n)}
-                for number, n in zip(*np.unique(instance, return_counts=True), strict=True)
-                if number
+                _row(int(n), instance == n, class40) for n in np.unique(instance) if n
             ],
         }  # fmt: skip
 
@@ -230,6 +231,19 @@ class HypersimFolder:
         pose[:3, :3] = turn @ orientations[frame]
         pose[:3, 3] = turn @ positions[frame] * self._metres(ref.house)
         return np.asarray(pose @ OPENCV_FROM_OPENGL)
+
+
+def _row(number: int, mask: NDArray[np.bool_], class40: NDArray[Any]) -> dict[str, Any]:
+    """A row of view.json's instances, as far as pictures tell: its class is that of most of its pixels."""
+    nyu40 = int(np.bincount(class40[mask]).argmax())
+    y, x = np.nonzero(mask.any(1))[0], np.nonzero(mask.any(0))[0]
+    pixels = int(mask.sum())
+    return {
+        "id": number, "item": str(number), "name": NYU40_NAMES[nyu40], "kind": "object",
+        "nyu40": nyu40, "class": NYU40_NAMES[nyu40], "pixels": pixels,
+        "fraction": pixels / mask.size, "visible_fraction": None, "truncated": None,
+        "box2d": [int(x[0]), int(y[0]), int(x[-1]) + 1, int(y[-1]) + 1],
+    }  # fmt: skip
 
 
 def _intrinsics(row: Mapping[str, str]) -> Intrinsics | None:

@@ -191,6 +191,13 @@ def test_our_own_reader_gives_the_views_again(root, written):
         sample = frame.sample(pf.SampleRequest(layers=("colour", "depth", "normal", "class40")))
         assert sample.colour.mean() == pytest.approx(120, abs=1)
         assert sample.depth.dtype == np.float32
+        rows = {r["id"]: r for r in facts["instances"]}
+        assert {r["id"] for r in frame.instances} == set(rows)
+        for row in frame.instances:
+            mine = rows[row["id"]]
+            assert (row["pixels"], row["box2d"]) == (mine["pixels"], mine["box2d"])
+            assert row["class"] == mine["class"]
+            assert frame.mask(row["id"]).sum() == row["pixels"]
     assert len(frames.only(split="train")) == 2
 
 
