@@ -29,6 +29,10 @@ _EXACT_STEPS, _EXACT_SHARE = 1, 0.002  # by one step at most, in so few values
 _DENOISED_STEPS, _DENOISED_SHARE = 2, 0.01  # another processor's denoiser
 _TILE_PX = 16  # over which a sensor's noise is averaged
 _SENSOR_STEPS, _SENSOR_TILES = 14, 0.9  # mean of a tile, share of tiles
+_HALVED_STEPS, _HALVED_TILES = (
+    16,
+    0.7,
+)  # mean of a tile, share of tiles: half the size has half the noise
 _FACTOR = 0.002  # of exposure and gains that view.json tells
 
 
@@ -37,8 +41,13 @@ def check_developed(
     channels: Mapping[str, NDArray[np.float32]],
     arrays: Mapping[str, NDArray[Any]],
     tally: Tally,
+    *,
+    denoise: bool = True,
 ) -> None:
     """Develop radiance.exr (its channels) again, and compare with the stored pictures of the light modes.
+
+    denoise: whether light that was denoised is denoised again as it stands, which costs most of the
+    time; else its pictures are compared by tiles at half their size.
 
     Does nothing where the view has no picture of a light mode, no radiance.exr or no recipe:
     `methods.not_looked_at` says so. arrays has the layers by name.
@@ -46,16 +55,17 @@ def check_developed(
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None:
         return
-    light = _stored_light(view, channels, tally)
+    is_halved = view.recipe.light.denoise and not denoise
+    light = _stored_light(view, channels, is_halved, tally)
     if light is None:
         return
     stated = view.table.get("modes", {}).get("develop", {})
     camera = _camera_of(view, view.recipe, 0)
     for mode in modes:
-        shot = _Shot(f"{view.place}/{mode}.png", mode, stated.get(mode, {}), camera)
+        shot = _Shot(f"{view.place}/{mode}.png", mode, stated.get(mode, {}), camera, is_halved)
         _check_picture(shot, arrays[mode], light, view.recipe, tally)
     _check_errors(view, stated, camera, tally)
-    _check_variants(view, stated.get("variants", []), light, view.recipe, tally)
+    _check_variants(view, stated.get("variants", []), light, is_halved, tally)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +76,7 @@ class _Shot:
     mode: str
     stated: Mapping[str, Any]
     camera: PictureCamera
+    is_halved: bool  # its light is denoised at half its size
 
 
 def _camera_of(view: StoredView, recipe: Recipe, variant: int) -> PictureCamera:
@@ -76,11 +87,12 @@ def _check_variants(
     view: StoredView,
     rows: Any,
     light: Mapping[str, NDArray[np.float32]],
-    recipe: Recipe,
+    is_halved: bool,
     tally: Tally,
 ) -> None:
     """Each further picture is there, is stated, and is what the camera drawn for it takes."""
-    rows = rows if isinstance(rows, list) else []
+    rows, recipe = rows if isinstance(rows, list) else [], view.recipe
+    assert recipe is not None
     wanted = [f"mlt_il_ol.{n}.png" for n in range(1, recipe.tone.variants + 1)]
     told = [row.get("file") if isinstance(row, dict) else None for row in rows]
     there = sorted(path.name for path in view.folder.glob("mlt_il_ol.*.png"))
@@ -96,7 +108,7 @@ def _check_variants(
         _check_errors(view, row, camera, tally)
         place = f"{view.place}/{row['file']}"
         stored = view.png(row["file"])
-        shot = _Shot(place, "mlt_il_ol", row, camera)
+        shot = _Shot(place, "mlt_il_ol", row, camera, is_halved)
         _check_picture(shot, stored, light, recipe, tally)
 
 
@@ -130,6 +142,9 @@ def _check_picture(
     # A sensor's exposure is what its shutter and speed gave.
     if sensor.is_on:
         exposure = float(stated.get("exposure", exposure))
+    elif shot.is_halved:
+        _check_halved(shot, stored, total, tally)
+        return
     else:
         off = abs(float(stated.get("exposure", exposure)) / exposure - 1)
         told = np.array(stated.get("gains", gains), np.float64)
@@ -161,6 +176,30 @@ def _check_picture(
         tally.fail("light developed", place, what, max(n_wrong, 1))
 
 
+def _check_halved(
+    shot: _Shot, stored: NDArray[Any], total: NDArray[np.float32], tally: Tally
+) -> None:
+    """A picture at half its size against light that was denoised at that size, by the factors that are told."""
+    told = shot.stated
+    what = "view.json tells no factors"
+    if not tally.expect("light by tiles", shot.place, {"exposure", "gains"} <= told.keys(), what):
+        return
+    light = np.maximum(np.nan_to_num(total * np.array(told["gains"], np.float64), posinf=0.0), 0)
+    expected = _tone(light, float(told["exposure"]), shot.camera.tone, shot.camera.sensor)
+    difference = np.abs(_tiles(_halved(stored)) - _tiles(expected)).mean(axis=-1)
+    share = float((difference <= _HALVED_STEPS).mean())
+    what = f"{1 - share:.0%} of its tiles differ from radiance.exr"
+    tally.expect("light by tiles", shot.place, share >= _HALVED_TILES, what)
+
+
+def _halved(picture: NDArray[Any]) -> NDArray[np.float32]:
+    """(H / 2, W / 2, 3) means of 2 x 2 pixels; an odd row or column is left out."""
+    height, width = (n // 2 * 2 for n in picture.shape[:2])
+    cut = picture[:height, :width].astype(np.float32)
+    parts = cut.reshape(height // 2, 2, width // 2, 2, 3)
+    return np.ascontiguousarray(parts.mean(axis=(1, 3)))
+
+
 def _compare_tiles(place: str, stored: NDArray[Any], expected: NDArray[Any], tally: Tally) -> None:
     """A sensor's noise goes in the mean of a tile; what is left is its lens, mosaic and JPEG."""
     difference = np.abs(_tiles(stored) - _tiles(expected)).mean(axis=-1)
@@ -178,14 +217,19 @@ def _tiles(picture: NDArray[Any]) -> Floats:
 
 
 def _stored_light(
-    view: StoredView, channels: Mapping[str, NDArray[np.float32]], tally: Tally
+    view: StoredView, channels: Mapping[str, NDArray[np.float32]], is_halved: bool, tally: Tally
 ) -> dict[str, NDArray[np.float32]] | None:
-    """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had."""
+    """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had.
+
+    is_halved: at half the picture's size.
+    """
     names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
     names["normal"] = [f"normal.{c}" for c in "XYZ"]
     if not all(n in channels for row in names.values() for n in row):
         return None  # the check of radiance says so
     planes = {g: np.stack([channels[n] for n in row], axis=-1) for g, row in names.items()}
+    if is_halved:
+        planes = {g: _halved(plane) for g, plane in planes.items()}
     if view.recipe is None or not view.recipe.light.denoise:
         return planes
     try:

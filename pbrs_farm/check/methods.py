@@ -33,18 +33,14 @@ HOW: dict[str, str] = {
     "opengl_il.png": "its edges against those of the instances",
     "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
     "radiance.exr": "its guides against surfaces, its steps against their albedo, sun and bulbs by shadow rays",
-    "projector.png": "size and type alone",
-    "normal_shading.png": "unit length alone",
-    "boundary_occlusion.png": "values that there are alone",
-    "boundary_crease.png": "values that there are alone",
+    "projector.png": "dots thrown again by rays, where rays through pixels meet",
+    "boundary_occlusion.png": FORMULA, "boundary_crease.png": FORMULA,
     "behind_glass/depth.png": _BEHIND, "behind_glass/normal.png": _BEHIND,
     "behind_glass/semantic.png": _BEHIND, "behind_glass/instance.png": _BEHIND,
     "flow_forward.exr": _MOTION, "flow_forward_kitti.png": _MOTION, "occlusion_forward.png": _MOTION,
     "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
 }  # fmt: skip
-
-_LIGHTLY = ("projector.png", "normal_shading.png", "boundary_occlusion.png", "boundary_crease.png")
 
 # What is looked at of the files of a house and of a root, beside their fields.
 HOW_OF_HOUSE: dict[str, str] = {
@@ -70,16 +66,16 @@ def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tupl
     kinds of fields of each JSON file have a check (fields: as of `fields.stored_fields`).
     """
     counts = _file_counts(views)
-    files = tuple(
-        f"{file} ({counts[file]}): {how}"
-        for file, how in HOW.items()
-        if counts[file] and file not in _LIGHTLY
-    )
+    files = tuple(f"{file} ({counts[file]}): {how}" for file, how in HOW.items() if counts[file])
     return (*files, *field_lines(fields)[0])
 
 
 def not_looked_at(
-    root: Path, houses: list[Path], views: list[StoredView], fields: Counter[tuple[str, str]]
+    root: Path,
+    houses: list[Path],
+    views: list[StoredView],
+    fields: Counter[tuple[str, str]],
+    n_by_tiles: int = 0,
 ) -> tuple[str, ...]:
     """A line for each kind of file that a hash alone speaks for, or little more, and for each field without a check.
 
@@ -90,14 +86,18 @@ def not_looked_at(
     layers = {layer.file for layer in LAYERS}
     lines = []
     for file in sorted(counts):
-        if file in _LIGHTLY:
-            lines.append(f"{file} ({counts[file]}): {HOW[file]}")
-        elif file not in HOW:
+        if file not in HOW:
             how = "hash, size and type alone" if file in layers else "hash alone"
             lines.append(f"{file} ({counts[file]}): {how}")
     lines += unknown_files(root, houses)
     lines += field_lines(fields)[1]
     lines += [f"light of {view.place}: {why}" for view in views if (why := _light_fault(view))]
+    denoised = [v for v in views if v.recipe is not None and v.recipe.light.denoise]
+    if n_by_tiles and denoised:
+        lines.append(
+            f"light of {n_by_tiles} views was denoised again at half its size: compared by tiles of 32 px; "
+            "--all denoises it as it stands"
+        )
     return (*lines, *_NEVER)
 
 

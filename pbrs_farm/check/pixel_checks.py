@@ -28,6 +28,9 @@ ROUNDING_MM = 0.505  # of depth stored in whole mm
 RAY_ERROR_MM = 2e-4
 MAX_RAY_ERROR_MM = 5.0
 NORMAL_TOLERANCE_DEG = 0.02
+SHADING_TOLERANCE_DEG = (
+    0.5  # of a normal between texels of a map, whose bytes are half a degree apart
+)
 TIE_DEPTH_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 METRES = 2e-4  # tolerance of depths and positions stored as floats
 ALBEDO_STEPS = 2  # of 255, by which an albedo may differ
@@ -183,6 +186,13 @@ def _position_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
     return np.where(at.hit, near, ~stored.any(axis=1))
 
 
+def _shading_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    expected = np.zeros(at.point.shape)
+    hit = np.nonzero(at.hit)[0]
+    expected[hit] = at.triangles.shading_normals(at.face[hit], at.point[hit], at.normal[hit])
+    return normal_is_right(stored, published_axes(expected, at.view), SHADING_TOLERANCE_DEG)
+
+
 def _albedo_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
     expected = albedo_of_faces(at.view, at.face, at.point, at.triangles)
     return np.asarray(np.abs(stored - expected).max(axis=1) <= ALBEDO_STEPS + 0.5)
@@ -242,18 +252,20 @@ def published_axes(world: Floats, view: StoredView) -> Floats:
     return np.stack([camera[:, 0], camera[:, 2], -camera[:, 1]], axis=1)
 
 
-def normal_is_right(stored: NDArray[np.int64], expected: Floats) -> Bools:
+def normal_is_right(
+    stored: NDArray[np.int64], expected: Floats, tolerance_deg: float = NORMAL_TOLERANCE_DEG
+) -> Bools:
     """(N,) stored 16-bit normals decode to the expected ones; where those are 0, to nothing.
 
     stored is (N, 3) as in the layer, 0..65535 for -1..1, nothing = 32768 three times; expected is
-    (N, 3) float64, of unit length or 0. The tolerance is NORMAL_TOLERANCE_DEG.
+    (N, 3) float64, of unit length or 0. tolerance_deg: between the two.
     """
     # Compare by the sine: the cosine of a small angle is too flat.
     decoded = stored * (2 / 65535) - 1
     length = np.linalg.norm(decoded, axis=1)
     sine = np.linalg.norm(np.cross(decoded, expected), axis=1)
     close = (np.einsum("ni,ni->n", decoded, expected) > 0) & (
-        sine <= np.radians(NORMAL_TOLERANCE_DEG) * length
+        sine <= np.radians(tolerance_deg) * length
     )
     nothing = (stored == 32768).all(axis=1)
     right = np.where(expected.any(axis=1), close & (np.abs(length - 1) < 1e-3), nothing)
@@ -355,6 +367,7 @@ _CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
     "glass": lambda stored, at: (
         stored == np.where(at.hit & _of_face(at.triangles.see_through, at.face), 255, 0)
     ),
+    "normal_shading": _shading_is_right,
     "nocs": _nocs_is_right,
     "albedo": _albedo_is_right,
 }

@@ -7,6 +7,7 @@ in this place of the picture and in no other, whatever the noise.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tal
     total = np.zeros(view.size)
     n_edges = 0
     for k, c in enumerate("XYZ"):
-        found, _energy = _correlation(channels[f"normal.{c}"], world[..., k])
+        found, _energy = _correlation(channels[f"normal.{c}"], _Transformed.of(world[..., k]))
         total += found
         n_edges += int((np.hypot(*_steps(world[..., k])) > _EDGE).sum())
     if n_edges < _FEW_EDGES:
@@ -129,11 +130,12 @@ def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
         )
         for name in ("outdoor", "indoor", "albedo")
     }
-    surface = np.log(level.pop("albedo") + _FAINT)
-    across, down = _steps(surface)
+    logs_of_albedo = np.log(level.pop("albedo") + _FAINT)
+    across, down = _steps(logs_of_albedo)
     if int((np.hypot(across, down) > _EDGE).sum()) < _FEW_EDGES:
         tally.note(f"{view.place}/radiance.exr has too few edges to compare")
         return
+    surface = _Transformed.of(logs_of_albedo)
     level["all light"] = level["outdoor"] + level["indoor"]
     place = f"{view.place}/radiance.exr"
     for name, light in level.items():
@@ -168,7 +170,21 @@ def _steps(picture: NDArray[Any]) -> tuple[Floats, Floats]:
     return tuple(np.clip(s.astype(np.float64), -_MOST_STEP, _MOST_STEP) for s in (across, down))  # type: ignore[return-value]
 
 
-def _slopes(light: NDArray[Any], surface: NDArray[Any]) -> tuple[float, float, float]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Transformed:
+    """A picture's steps across and down, transformed once to be compared with many."""
+
+    steps: tuple[NDArray[np.complex128], ...]  # conjugate
+    energy: float  # sum of their squares
+
+    @staticmethod
+    def of(picture: NDArray[Any]) -> _Transformed:
+        steps = _steps(picture)
+        energy = sum(float((s**2).sum()) for s in steps)
+        return _Transformed(tuple(np.conj(np.fft.rfft2(s)) for s in steps), energy)
+
+
+def _slopes(light: NDArray[Any], surface: _Transformed) -> tuple[float, float, float]:
     """Steps of light over those of the surface: the slope here, its error, and the largest elsewhere.
 
     The error is the spread over all other places, which a Fourier transform compares at once.
@@ -181,10 +197,9 @@ def _slopes(light: NDArray[Any], surface: NDArray[Any]) -> tuple[float, float, f
     return own, float(rest.std()), float(rest.max())
 
 
-def _correlation(light: NDArray[Any], surface: NDArray[Any]) -> tuple[Floats, float]:
+def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[Floats, float]:
     """(H, W) products of steps of light with those of the surface moved by so much; squares of the latter."""
-    found, energy = np.zeros(light.shape), 0.0
-    for a, b in zip(_steps(light), _steps(surface), strict=True):
-        found += np.fft.irfft2(np.fft.rfft2(a) * np.conj(np.fft.rfft2(b)), light.shape)
-        energy += float((b**2).sum())
-    return found, energy
+    products = sum(
+        np.fft.rfft2(s) * other for s, other in zip(_steps(light), surface.steps, strict=True)
+    )
+    return np.asarray(np.fft.irfft2(products, light.shape)), surface.energy

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.shading_normals import NormalMaps, bent, between_corners, decoded
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import decode_texture
 
@@ -127,6 +128,28 @@ class Triangles:
         return np.asarray(self.vertices[self.faces[own].reshape(-1)], np.float64)
 
     kinds: tuple[str, ...]  # of each material
+    normals: NDArray[np.float32]  # (V, 3) of the corners; 0 where there are none
+    maps: NormalMaps
+
+    def shading_normals(
+        self, face: NDArray[np.int64], points: NDArray[np.float64], facing: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(N, 3) unit normals that light follows at points (N, 3) on faces (N,), on the side of facing."""
+        corners = self.faces[face]
+        weights = self._weights(face, points)
+        seen = between_corners(weights, self.normals[corners], facing)
+        at = self.uv_at(face, points)
+        for number in np.unique(self.material[face]):
+            pixels = self.maps.of(int(number))
+            if pixels is None:
+                continue
+            own = self.material[face] == number
+            values = _between_texels(pixels[..., :3], at[own], np.arange(256.0))
+            mapped = decoded(values, float(self.maps.scales[number]))
+            triangles = self.vertices[corners[own]].astype(np.float64)
+            uv = self.uv[corners[own]].astype(np.float64)
+            seen[own] = bent(seen[own], triangles, uv, mapped)
+        return seen
 
     def kinds_of(self, face: NDArray[np.int64]) -> NDArray[Any]:
         """(N,) the kind of each face's material; "" where face is -1."""
@@ -142,17 +165,21 @@ class Triangles:
 
     def uv_at(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(N, 2) texture coordinates, v down, of points (N, 3) on faces (N,)."""
+        weights = self._weights(face, points)
+        uv = self.uv[self.faces[face]].astype(np.float64)
+        at = uv[:, 0] + weights[:, 1:2] * (uv[:, 1] - uv[:, 0])
+        return np.asarray(np.nan_to_num(at + weights[:, 2:] * (uv[:, 2] - uv[:, 0])))
+
+    def _weights(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, 3) weights of the corners at points: the areas over against them."""
         corners = self.faces[face]
         a, b, c = (self.vertices[corners[:, k]].astype(np.float64) for k in range(3))
-        # Weights of the corners: areas over against them.
         normal = np.cross(b - a, c - a)
         squared = np.einsum("ni,ni->n", normal, normal)
         with np.errstate(divide="ignore", invalid="ignore"):
             at_b = np.einsum("ni,ni->n", np.cross(points - a, c - a), normal) / squared
             at_c = np.einsum("ni,ni->n", np.cross(b - a, points - a), normal) / squared
-        uv = self.uv[corners].astype(np.float64)
-        at = uv[:, 0] + at_b[:, None] * (uv[:, 1] - uv[:, 0])
-        return np.asarray(np.nan_to_num(at + at_c[:, None] * (uv[:, 2] - uv[:, 0])))
+        return np.stack([1 - at_b - at_c, at_b, at_c], axis=1)
 
     def is_hole(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(N,) whether alpha leaves nothing of faces (N,) at points (N, 3) on them."""
@@ -204,6 +231,7 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
     uvs = [np.zeros((0, 2), np.float32)]
+    normals = [np.zeros((0, 3), np.float32)]
     loose: dict[int, list[NDArray[np.float32]]] = {}
     n_vertices = n_faces = 0
     # Join the primitives of all nodes: those of this package carry no transform.
@@ -221,6 +249,9 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
             none = np.zeros((len(points), 2), np.float32)
             uv = attributes.get("TEXCOORD_0")
             uvs.append(none if uv is None else _accessor(document, binary, uv))
+            normal = attributes.get("NORMAL")
+            flat = np.zeros((len(points), 3), np.float32)
+            normals.append(flat if normal is None else _accessor(document, binary, normal))
             corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
             faces.append(corners.astype(np.int64) + n_vertices)
@@ -248,7 +279,27 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         {instance: np.concatenate(points) for instance, points in loose.items()},
         np.repeat(table[:, 2], table[:, 3]),
         tuple(str(k) for k in kinds),
+        np.concatenate(normals),
+        _normal_maps(document, binary, tuple(str(k) for k in kinds)),
     )
+
+
+def _picture(
+    document: dict[str, Any], binary: bytes, texture: dict[str, Any] | None
+) -> tuple[str, bytes] | None:
+    """Media type and bytes of a material's picture, by its texture's source."""
+    if texture is None:
+        return None
+    image = document["images"][document["textures"][texture["index"]]["source"]]
+    view = document["bufferViews"][image["bufferView"]]
+    start = view.get("byteOffset", 0)
+    return image["mimeType"], binary[start : start + view["byteLength"]]
+
+
+def _normal_maps(document: dict[str, Any], binary: bytes, kinds: tuple[str, ...]) -> NormalMaps:
+    rows = [m.get("normalTexture") for m in document.get("materials", [])]
+    scales = np.array([1.0 if row is None else row.get("scale", 1.0) for row in rows], np.float64)
+    return NormalMaps(tuple(_picture(document, binary, row) for row in rows), scales, kinds)
 
 
 def _colours(document: dict[str, Any], binary: bytes) -> Colours:
@@ -256,15 +307,7 @@ def _colours(document: dict[str, Any], binary: bytes) -> Colours:
     for material in document.get("materials", []):
         pbr = material["pbrMetallicRoughness"]
         factors.append(pbr["baseColorFactor"][:3])
-        texture = pbr.get("baseColorTexture")
-        # A material's picture, by its texture's source.
-        picture = None
-        if texture is not None:
-            image = document["images"][document["textures"][texture["index"]]["source"]]
-            view = document["bufferViews"][image["bufferView"]]
-            start = view.get("byteOffset", 0)
-            picture = image["mimeType"], binary[start : start + view["byteLength"]]
-        pictures.append(picture)
+        pictures.append(_picture(document, binary, pbr.get("baseColorTexture")))
         # Glass with holes, for which glTF has no mode, has its cutoff among its extras.
         given = material if material.get("alphaMode") == "MASK" else material.get("extras", {})
         cutoffs.append(float(given.get("alphaCutoff", 0.5 if given is material else 0.0)))

@@ -154,13 +154,6 @@ def _check_optional(view: StoredView, arrays: dict[str, NDArray[Any]], tally: Ta
     if "boundary_semantic" in arrays:
         edges = np.where(_boundary(semantic), 255, 0)
         _same(view, tally, "boundary_semantic", arrays["boundary_semantic"] == edges)
-    # Edge layers hold 0 where there is no edge, and a value for each kind of edge.
-    for name, values in (("boundary_occlusion", (0, 128, 255)), ("boundary_crease", (0, 255))):
-        if name in arrays:
-            _same(view, tally, name, np.isin(arrays[name], values))
-    if "normal_shading" in arrays:
-        unit = _is_unit(arrays["normal_shading"], arrays["valid"])
-        _same(view, tally, "normal_shading", unit)
     if "class_source" in arrays:
         _same(view, tally, "class_source", _source_class_is_right(view, arrays))
 

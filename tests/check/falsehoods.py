@@ -241,6 +241,18 @@ def pairs(change: Callable[[list[dict]], object]) -> Plant:
     return plant
 
 
+def turned_by(degrees: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Stored normals turned about the camera's up."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+
+    def change(stored: np.ndarray) -> np.ndarray:
+        n = stored * (2 / 65535) - 1
+        turned = n @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        return (turned + 1) * 65535 / 2
+
+    return change
+
+
 def lamps(change: Callable[[dict, dict], object]) -> Plant:
     """Of the two lamps that bring most."""
 
@@ -624,6 +636,19 @@ _FINISHED |= {
     "guides mirrored": (light(lambda p: p.update({n: a[:, ::-1] for n, a in p.items() if n[0] in "an"})), "light guides"),
     "normal guides of another frame": (light(lambda p: swap_keys_of(p, "normal.X", "normal.Z")), "light guides"),
     "albedo guide flattened": (light(lambda p: p.update({n: np.full_like(a, 0.5) for n, a in p.items() if n.startswith("albedo")})), "light guides"),
+}  # fmt: skip
+
+_FINISHED |= {
+    "occlusion moved": (picture("boundary_occlusion.png", lambda a: np.roll(a, 2, 1)), "boundary_occlusion"),
+    "occlusion of the other side": (picture("boundary_occlusion.png", lambda a: np.where(a > 0, 383 - a, 0)), "boundary_occlusion"),
+    "occlusion left out": (picture("boundary_occlusion.png", scaled(0)), "boundary_occlusion"),
+    "creases moved": (picture("boundary_crease.png", lambda a: np.roll(a, 2, 0)), "boundary_crease"),
+    "creases left out": (picture("boundary_crease.png", scaled(0)), "boundary_crease"),
+    "shading normals mirrored": (picture("normal_shading.png", lambda a: np.dstack([65535 - a[..., 0], a[..., 1:]])), "ray: normal_shading"),
+    "shading normals turned by 3 degrees": (picture("normal_shading.png", turned_by(3)), "ray: normal_shading"),
+    "projector's dots moved": (picture("projector.png", lambda a: np.roll(a, 2, 1)), "projector"),
+    "projector's dots of half the light": (picture("projector.png", scaled(0.7)), "projector"),
+    "projector's dots left out": (picture("projector.png", scaled(0)), "projector"),
 }  # fmt: skip
 
 _LAMPS |= {"layers of two lamps exchanged, and their shares": (exchange_lamps, "lamplight")}

@@ -73,6 +73,7 @@ def make_root(
             camera,
             lambda skip, c=camera: caster.hit_record(c, skip_faces=skip),
             decoded_textures(home)[0],
+            first_hit=caster.first_hit,
         )
         names = truth.OPTIONAL_NAMES if with_optional else ()
         layers |= truth.optional_layers(names, label_inputs)

@@ -83,7 +83,7 @@ def test_optional_layers_are_checked_where_they_exist(rich):
         ("class_source.png", "class_source"),
         ("boundary_semantic.png", "boundary_semantic"),
         ("boundary_occlusion.png", "boundary_occlusion"),
-        ("normal_shading.png", "normal_shading"),
+        ("normal_shading.png", "ray: normal_shading"),
     ],
 )
 def test_one_changed_pixel_of_an_optional_layer_is_caught(rich, tmp_path, file, check):
