@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.mesh import area_vectors, triangle_bounds
+from pbrs_farm.core.mesh import area_vectors, cross_products, triangle_bounds
 from pbrs_farm.dress.gates.bodies import Shell
 
 _STEEP: Final = 0.5  # cosine of edge and normal: an edge that grazes a round thing crosses nothing
@@ -65,7 +65,7 @@ def _either_side(start: F64, end: F64, corners: F64) -> F64:
     # A place inside lies on the same side of all three edges.
     for k in range(3):
         edge = corners[:, (k + 1) % 3] - corners[:, k]
-        inside &= (np.cross(edge, place - corners[:, k]) * normal).sum(1) >= 0
+        inside &= (cross_products(edge, place - corners[:, k]) * normal).sum(1) >= 0
     return np.where(inside, np.minimum(t, 1 - t) * length, 0.0)
 
 

@@ -65,7 +65,11 @@ def plan_area(corners: F64, *, upright: bool = True) -> BaseGeometry:
 
 
 def _area_by_squares(points: F64) -> BaseGeometry:
-    cells = np.unique(np.floor(points[:, [2, 0]] / _SQUARE_M).astype(np.int64), axis=0)
+    cells = np.floor(points[:, [2, 0]] / _SQUARE_M).astype(np.int64)
+    # Number the squares row by row: faster than comparing rows and columns.
+    least, n_columns = cells.min(0), int(np.ptp(cells[:, 1])) + 1
+    number = np.unique((cells[:, 0] - least[0]) * n_columns + cells[:, 1] - least[1])
+    cells = np.stack(np.divmod(number, n_columns), -1) + least
     # Join neighbours of a row into one rectangle.
     new = np.r_[True, (np.diff(cells[:, 0]) != 0) | (np.diff(cells[:, 1]) != 1)]
     first = np.flatnonzero(new)

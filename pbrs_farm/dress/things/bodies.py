@@ -13,6 +13,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
+from pbrs_farm.core.mesh import area_vectors, cross_products, lengths
 from pbrs_farm.dress.things.outlines import Outline, Profile, Triple, oval, rect
 from pbrs_farm.geometry import solids
 
@@ -248,13 +249,14 @@ def tube(path: Sequence[Triple], r: float, *, n: int = 8, end: float | None = No
     along = np.concatenate([step[:1], step[:-1] + step[1:], step[-1:]])
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
     # Carry one direction across along the path, so that the tube does not twist.
-    side = np.cross(along[0], (0.0, 1.0, 0.0) if abs(along[0, 1]) < 0.9 else (1.0, 0.0, 0.0))
+    aside = (0.0, 1.0, 0.0) if abs(along[0, 1]) < 0.9 else (1.0, 0.0, 0.0)
+    side = cross_products(along[0], np.array(aside))
     t = 2 * np.pi * np.arange(n) / n
     rings = []
     for k, direction in enumerate(along):
         side = side - direction * float(side @ direction)
         side = side / max(float(np.linalg.norm(side)), 1e-12)
-        up = np.cross(side, direction)
+        up = cross_products(side, direction)
         # At a corner the cut is longer than the tube is thick.
         stretch = 1.0
         if 0 < k < len(along) - 1:
@@ -347,8 +349,8 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
     """A surface whose normals are means of faces that turn by less than sharp_rad, by area."""
     faces = np.asarray(faces, np.int64)
     corners = points[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(area, axis=1)
+    area = area_vectors(corners)
+    size = lengths(area)
     faces, area, size = faces[size > 1e-12], area[size > 1e-12], size[size > 1e-12]
     unit = area / size[:, None]
     # All pairs of corners at one vertex.
@@ -365,9 +367,11 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
     for k in range(3):
         normals[:, k] = np.bincount(a[soft], area[b[soft] // 3, k], len(vertex))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    # One vertex for each place and normal.
-    key = np.concatenate([vertex[:, None], np.rint(normals * 1e4).astype(np.int64)], 1)
-    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    # One vertex for each place and normal: one number for both, in the order of rows.
+    key = vertex
+    for column in np.rint(normals * 1e4).astype(np.int64).T:
+        key = (key << 15) + (column + (1 << 14))
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
     return Surface(
         name, points[vertex[first]].astype(np.float32),
         number.reshape(-1, 3).astype(np.int32), 0, None, normals[first].astype(np.float32),
