@@ -1,6 +1,6 @@
 """Walks, labels between views, pace and lenses -> out/bench/motion.json.
 
-`python -m benchmarks.motion.motion [PART...]`: walks, between, pace, lenses; all of them if none is
+`python -m benchmarks.motion.motion [PART...]`: walks, between, light, pace, lenses; all of them if none is
 named. A part's figures stay in out/bench/motion/ and are written again when it is named.
 """
 
@@ -20,6 +20,7 @@ FOLDER: Final = Path("out/bench/motion")
 PARTS: Final = {
     "walks": "benchmarks.motion.walks",
     "between": "benchmarks.motion.between_views",
+    "light": "benchmarks.motion.light_motion",
     "pace": "benchmarks.motion.pace",
     "lenses": "benchmarks.motion.lens_error",
 }
@@ -32,6 +33,10 @@ UNITS: Final = {
     "warp_psnr_cubic_db": "dB, the same with a cubic look-up",
     "warp_psnr_box_db": "dB, the same of pictures by a box filter, linear look-up",
     "warp_psnr_within_db": "dB, occluded and pixels on an edge of depth apart",
+    "light_psnr": "dB, the next frame's denoised light drawn into this one's by flow, one exposure",
+    "picture_psnr": "dB, the same of the stored pictures, each with its own exposure",
+    "opengl_psnr": "dB, the same of OpenGL-IL",
+    "light_s": "CPU s of light and its pictures, a frame of 640x480 by fast",
     "frames_per_s": "frames a second at 640x480: labels, flow, OpenGL",
     "path_blocked": "frames nearer than 10 cm to a surface",
     "walks": "share of homes with a walk of 300 frames",

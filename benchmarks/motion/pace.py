@@ -6,7 +6,6 @@ import tempfile
 import time
 from typing import Any, Final
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.house import geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.finished_house import repaired_house
@@ -18,7 +17,7 @@ from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.steps import camera_seed
-from pbrs_farm.run.view_light import pilot_of_view
+from pbrs_farm.run.view_light import light_seed, pilot_of_view
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
@@ -69,7 +68,7 @@ def _light_reuse() -> float:
         camera = view.camera.with_size(recipe.image.width_px, recipe.image.height_px)
         began = time.process_time()
         # Seed it as the step `light` does: the pilot that frame 1 leaves is then frame 2's.
-        seed = keys.seed(house.id, view.id, "light", "")
+        seed = light_seed(view, house.id, "")
         pilot = pilot_of_view(view, by_id, camera, house.id, "")
         scene.render(camera, view.room_id, recipe.light, seed, pilot=pilot)
         cpu.append(time.process_time() - began)

@@ -224,7 +224,7 @@ def _missed(cached: CachedHouse, camera: Camera) -> Bools:
 
 def _light(work: Work) -> StepOutput:
     """radiance.exr: both light groups (and each lamp) as linear images, with the denoiser's guides."""
-    from pbrs_farm.run.view_light import blurred, pilot_of_view
+    from pbrs_farm.run.view_light import blurred, light_seed, noise_anchors, pilot_of_view
     from pbrs_farm.transport.lamp_layers import layer_name
 
     # Render; the seed knows all that changes the picture and nothing else.
@@ -234,13 +234,15 @@ def _light(work: Work) -> StepOutput:
     if work.recipe.blur.is_on:
         camera = blurred(camera, view, views, work.recipe.blur, cached.caster)
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
-    seed = keys.seed(work.house_id, view.id, "light", digest)
+    seed = light_seed(view, work.house_id, digest)
     # Go on from what a killed render of this step has kept.
     unfinished = keys.unfinished_key(work.house_id, "light", view.id)
     checkpoint = LightCheckpoint(work.store, unfinished, work.digest, work.tell_share)
     fields, pilot = work.recipe.light, pilot_of_view(view, views, camera, work.house_id, digest)
-    scene = cached.light_scene
-    result = scene.render(camera, view.room_id, fields, seed, checkpoint, pilot=pilot)
+    scene, anchors = cached.light_scene, noise_anchors(view, views, camera)
+    result = scene.render(
+        camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors
+    )
     # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
     images |= {layer_name(number): image for number, image in result.lamps.items()}

@@ -1,7 +1,7 @@
-"""How the light of a view differs from its labels: its camera is blurred, its pilot may be another frame's.
+"""How the light of a view differs from its labels: its camera is blurred, its pilot and its noise may be a film's.
 
 Blur comes from the recipe, a walk's poses and what the picture's middle shows. Frames of a walk share a
-pilot, since neighbours in time see nearly the same lamps. No effects.
+pilot, since neighbours in time see nearly the same lamps, and a seed, so that noise stays on surfaces. No effects.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pbrs_farm.core.camera import Camera, CameraBlur, View
 from pbrs_farm.core.recipe import BlurFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.transport.light_scene import Pilot
+from pbrs_farm.transport.surface_noise import NoiseAnchors
 
 _FARTHEST_M = 100.0  # of the focus where the middle shows nothing
 
@@ -73,6 +74,7 @@ def _speed_on_walk(view: View, views: Mapping[str, View]) -> tuple[F64, F64] | N
 
 
 FRAMES_A_PILOT: Final = 10
+FRAMES_AN_ANCHOR: Final = 20  # from one frame whose pixels name the noise to the next
 
 
 def pilot_view(view: View, views: Mapping[str, View]) -> View:
@@ -86,6 +88,19 @@ def pilot_view(view: View, views: Mapping[str, View]) -> View:
     return views.get(keys.right_id(left) if view.left_id else left, view)
 
 
+def light_seed(view: View, house_id: str, digest: str) -> int:
+    """The seed of a view's light; all frames that one eye takes have the same.
+
+    digest: of the recipe's groups that light uses. What parts the pixels of these frames are their
+    streams (`noise_anchors`).
+    """
+    name = view.id
+    if view.frame is not None:
+        clip = keys.take_id(view.id)
+        name = keys.right_id(clip) if view.left_id else clip
+    return keys.seed(house_id, name, "light", digest)
+
+
 def pilot_of_view(
     view: View, views: Mapping[str, View], camera: Camera, house_id: str, digest: str
 ) -> Pilot | None:
@@ -97,5 +112,22 @@ def pilot_of_view(
     if lead is view:
         return None
     size = camera.intrinsics.width_px, camera.intrinsics.height_px
-    seed = keys.seed(house_id, lead.id, "light", digest)
+    seed = light_seed(lead, house_id, digest)
     return Pilot(lead.camera.with_size(*size), seed)
+
+
+def noise_anchors(view: View, views: Mapping[str, View], camera: Camera) -> NoiseAnchors | None:
+    """The frames whose pixels name the noise of a film's frame; None for a view that is none.
+
+    views: of the house, by id; which of them are rendered changes nothing. camera: the view's, at
+    the picture's size. Where the film ends before the later frame, its last one stands for that.
+    """
+    if view.frame is None:
+        return None
+    film = {v.frame: v for v in views.values() if bool(v.left_id) == bool(view.left_id)}
+    last = max(frame for frame in film if frame is not None)
+    first = view.frame - view.frame % FRAMES_AN_ANCHOR
+    numbers = first, min(first + FRAMES_AN_ANCHOR, last)
+    size = camera.intrinsics.width_px, camera.intrinsics.height_px
+    early, late = (film.get(number, view).camera.with_size(*size) for number in numbers)
+    return NoiseAnchors((early, late), numbers, (view.frame - first) / FRAMES_AN_ANCHOR)

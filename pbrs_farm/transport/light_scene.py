@@ -5,7 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -25,6 +25,7 @@ from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import panes_of_house, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
+from pbrs_farm.transport.surface_noise import NoiseAnchors, Streams, surface_streams
 
 if TYPE_CHECKING:
     from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
@@ -119,6 +120,7 @@ class LightScene:
         checkpoint: RenderCheckpoint | None = None,
         *,
         pilot: Pilot | None = None,
+        anchors: NoiseAnchors | None = None,
     ) -> LightResult:
         """The radiance of both light groups in a camera's view, by the integrator of fields.
 
@@ -131,12 +133,15 @@ class LightScene:
         time budget similar pictures. checkpoint: what an earlier render of equal arguments kept,
         and where this one keeps what it has; the picture is the same as without.
         pilot: of another view, whose choice of emitters this one takes over; None = its own.
+        anchors: frames whose pixels name the random numbers of this view's surfaces, so that noise
+        stays on them; None: each pixel has its own.
         Pixels without a ray are black. Raises MachineFailed for a lens or blur on a scalar variant,
         RenderFailed for blur by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         own = pilot or Pilot(camera, seed)
-        result = self._render(camera, room_id, fields, seed, checkpoint or NoCheckpoint(), own)
+        kept = checkpoint or NoCheckpoint()
+        result = self._render(camera, room_id, fields, seed, kept, own, anchors)
         return result if camera.blind is None else blacken(result, camera.blind)
 
     def _render(
@@ -147,6 +152,7 @@ class LightScene:
         seed: int,
         checkpoint: RenderCheckpoint,
         pilot: Pilot,
+        anchors: NoiseAnchors | None,
     ) -> LightResult:
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
@@ -154,7 +160,8 @@ class LightScene:
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
         emitters, weights = self._view_emitters.of_pilot(pilot.camera, fields, pilot.seed)
-        view = SampledView(self.device_scene, emitters, camera, fields, seed)
+        streams = self._streams(camera, anchors) if anchors else None
+        view = SampledView(self.device_scene, emitters, camera, fields, seed, streams)
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
             if camera.blur is not None:
@@ -170,6 +177,13 @@ class LightScene:
         sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
         return add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+
+    def _streams(self, camera: Camera, anchors: NoiseAnchors) -> Streams:
+        """(H * W,) the stream of each pixel's random numbers, by what its centre shows."""
+        from pbrs_farm.transport.kernels.camera_rays import first_points
+
+        sharp = replace(camera, blur=None)
+        return surface_streams(first_points(self.device_scene, sharp), anchors)
 
     def _weights_by_name(self, weights: EmitterWeights) -> dict[str, float]:
         names = [lamp.name for lamp in self.tables.lamps]

@@ -38,7 +38,7 @@ from pbrs_farm.transport.kernels.path_state import (
     film_position,
 )
 from pbrs_farm.transport.kernels.path_step import advance
-from pbrs_farm.transport.kernels.sampler import SobolSampler, stream_key
+from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
 _NULLS_APART: Final = (
     12  # random dimensions, in vertices, of what a pane mirrors from what is behind it
@@ -96,6 +96,7 @@ class Lanes:
     n_only_outdoor: int = 0  # the same, outdoor techniques
     n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
     is_trial: bool = False  # count the shadow rays that arrive, too
+    streams: NDArray[np.uint32] | None = None  # (pixels,) of their random numbers; None: their own
 
     @property
     def n_only(self) -> int:
@@ -261,7 +262,7 @@ def trace(
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
-        stream_key(stream, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF)),
+        _keys(stream, lanes),
         _Beside(lamp_sums, counts, arrivals, counts_arrivals),
     )
     dr.eval(total, counts, arrivals)
@@ -278,6 +279,14 @@ def trace(
     of_pilot = counts.numpy() if lanes.n_only_outdoor > 0 else None
     of_trial = arrivals.numpy() if lanes.is_trial else None
     return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot, arrivals=of_trial)
+
+
+def _keys(stream: Any, lanes: Lanes) -> Any:
+    """The key of each lane's random numbers: an argument of the kernel, wherever it comes from."""
+    named = stream if lanes.streams is None else device_array(mi.UInt32, lanes.streams)
+    key = stream_key(named, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF))
+    dr.eval(key)
+    return key
 
 
 def _pixels_and_emitters(stream: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
@@ -37,6 +38,7 @@ class SampledView:
     camera: Camera
     fields: LightFields
     seed: int
+    streams: NDArray[np.uint32] | None = None  # of each pixel's random numbers (surface_noise.py)
 
 
 def path_sums(
@@ -104,7 +106,9 @@ def _traced(
 ) -> SampleSums:
     """Sums over n samples of every pixel, from the first on."""
     i = view.camera.intrinsics
-    lanes = Lanes(i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps)
+    lanes = Lanes(
+        i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps, streams=view.streams
+    )
     return trace(view.scene, view.emitters, view.camera, lanes, view.fields, max_depth=max_depth)
 
 

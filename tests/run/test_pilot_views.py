@@ -1,14 +1,17 @@
-"""Frames of a walk take over the pilot of every tenth one: fewer pilots, and no order of rendering shows."""
+"""Frames of a walk share pilots and noise: fewer pilots, noise that stays, and no order of rendering shows."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.recipe import RepairFields, recipe_from_name
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
-from pbrs_farm.run.view_light import pilot_of_view, pilot_view
+from pbrs_farm.run.view_light import light_seed, noise_anchors, pilot_of_view, pilot_view
 from pbrs_farm.sample.house_sampler import add_right_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
@@ -61,3 +64,38 @@ def test_whichever_frame_is_rendered_first_changes_no_picture(
     for view in frames:
         np.testing.assert_array_equal(there[view.id], back[view.id])
     assert len(n_pilots) == 2  # one for each scene
+
+
+def test_frames_of_an_eye_have_one_seed_and_other_views_their_own() -> None:
+    every = views()
+    assert len({light_seed(view, "home", "x") for view in every.values()}) == 2
+    alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
+    assert light_seed(alone, "home", "x") == keys.seed("home", "0_0_1", "light", "x")
+
+
+def test_a_camera_that_stands_still_sees_its_noise_again() -> None:
+    every = views()
+    still = every["frame_00000"].camera
+    every["frame_00001"] = replace(every["frame_00001"], camera=still)
+    recipe = recipe_from_name("preview", {"light.spp": "4"})
+    house, _report = repair(builtin_home(), RepairFields())
+    sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
+    scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
+    first, second = (
+        scene.render(
+            still, "0_0", recipe.light, light_seed(view, house.id, ""),
+            pilot=pilot_of_view(view, every, still, house.id, ""),
+            anchors=noise_anchors(view, every, still),
+        ).indoor
+        for view in (every["frame_00000"], every["frame_00001"])
+    )  # fmt: skip
+    # A share of the points goes over to the next anchor: one of the frames from one to the next.
+    same = float((first == second).all(-1).mean())
+    assert 0.8 < same < 1
+    assert np.abs(first - second).max() > 0
+
+
+def test_a_view_that_is_no_frame_has_no_anchors() -> None:
+    every = views()
+    alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
+    assert noise_anchors(alone, every | {alone.id: alone}, alone.camera) is None

@@ -150,3 +150,15 @@ def _turn_camera_vector(camera: LensCamera, v: Any, angle: Any) -> Any:
     axis, c, s = camera.turn_axis, dr.cos(angle), dr.sin(angle)
     # Rodrigues' formula.
     return world * c + dr.cross(axis, world) * s + axis * (dr.dot(axis, world) * (1 - c))
+
+
+def first_points(scene: Any, camera: Camera) -> F32:
+    """(H * W, 3) the surface point at each pixel's centre, row by row; infinite where there is none."""
+    width = dr.opaque(mi.UInt32, camera.intrinsics.width_px)
+    pixel = dr.arange(mi.UInt32, camera.intrinsics.width_px * camera.intrinsics.height_px)
+    corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
+    origin, d = camera_ray(device_camera(camera), corner, mi.Point2f(0.5), None)
+    si = scene.intersect(origin, d, mi.Bool(True))
+    p = dr.select(si.valid, si.p, dr.inf)
+    dr.eval(p)
+    return np.stack([axis.numpy() for axis in p], axis=-1)
