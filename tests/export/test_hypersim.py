@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -14,9 +16,11 @@ import pbrs_farm as pf
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
+from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.optics_fields import LensFields
-from pbrs_farm.export.chosen_view import Choice
+from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export
+from pbrs_farm.export.forms import hypersim as hypersim_form
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.images import png_from_array
@@ -171,6 +175,29 @@ def test_colour_is_the_light_of_the_picture_in_half_floats(root, written):
         shown = frame.preview("color").astype(float)
         assert np.percentile(shown @ [0.3, 0.59, 0.11], 90) == pytest.approx(0.8 * 255, abs=12)
         assert not frame.has("final_hdf5", "residual.hdf5")
+
+
+def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(monkeypatch) -> None:
+    rng = np.random.default_rng(2)
+    arrays = {
+        "albedo": rng.integers(0, 256, (6, 8, 3)).astype(np.uint8),
+        "shading": (40 * rng.random((6, 8, 3))).astype(np.float32),
+        "residual": (rng.random((6, 8, 3)) - 0.3).astype(np.float32),
+    }
+    layers = dict.fromkeys(("shading", "residual"), LAYER["position"])
+    monkeypatch.setattr(hypersim_form, "LAYER", {**LAYER, **layers})
+    view = cast(ChosenView, SimpleNamespace(has=arrays.__contains__, array=arrays.__getitem__))
+    light = hypersim_form._light(view)
+    assert set(light) == {"color", "diffuse_reflectance", "diffuse_illumination", "residual"}
+    total = (
+        light["diffuse_reflectance"].astype(float) * light["diffuse_illumination"]
+        + light["residual"]
+    )
+    np.testing.assert_allclose(light["color"], total, rtol=1e-3, atol=1e-3)
+    np.testing.assert_allclose(light["diffuse_illumination"], arrays["shading"], rtol=1e-3)
+    srgb = arrays["albedo"] / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(light["diffuse_reflectance"], linear, rtol=2e-3, atol=1e-5)
 
 
 def test_our_own_reader_gives_the_views_again(root, written):
