@@ -322,7 +322,7 @@ def hanging_lamp(m: Maker, size: Size) -> None:
                         (r - 0.015) * sin(2.0944 * k)), (0.02 * cos(2.0944 * k), h - 0.025,
                         0.02 * sin(2.0944 * k))], 0.0015, n=5), of=material)  # fmt: skip
             case 6:  # a cluster of small balls at several heights
-                n = m.integers(3, 6)
+                n = m.integers(4, 7)  # three would fill five sixths of the width alone
                 for k in range(n):
                     a, y = 2 * pi * k / n, 0.0 if k == 0 else h * m.uniform(0.0, 0.35)
                     x, z, q = (r - 0.06) * cos(a), (d / 2 - 0.06) * sin(a), 0.06
