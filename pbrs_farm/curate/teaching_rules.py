@@ -19,10 +19,9 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, opengl_normals
 from pbrs_farm.export.sequences import pose_opencv
-from pbrs_farm.formats.histogram_json import record_from_json
 from pbrs_farm.formats.output_folder import ViewEntry
-from pbrs_farm.regular_files import read_given
 from pbrs_farm.selection.histogram_pack import BLACK
+from pbrs_farm.selection.quality import picture_quality
 
 _PLANE_COS: Final = float(np.cos(np.radians(5)))  # between normals of one plane
 _PLANE_M: Final = 0.03  # across it
@@ -91,12 +90,10 @@ def cut_share(view: ChosenView) -> float:
 
 
 def darkness(view: ChosenView) -> float:
-    """1 where nothing is seen in the picture of its light, else 0."""
-    file = view.entry.folder / "histogram.json"
-    if view.picture is None or not file.is_file():
+    """1 where nothing is seen in the view's picture, else 0; 0 without one."""
+    if view.picture is None:
         return 0.0
-    picture = record_from_json(read_given(file), str(file)).picture.get(view.picture)  # type: ignore[call-overload]
-    return float(picture is not None and picture.brightness <= BLACK)
+    return float(picture_quality(view.array(view.picture)).brightness <= BLACK)
 
 
 def twin_share(view: ChosenView, other: ChosenView) -> float:

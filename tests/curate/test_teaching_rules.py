@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -69,6 +70,22 @@ def test_a_view_of_one_plane_is_left_out(root: Path) -> None:
     assert found["a_room"] < 0.6
     assert reasons(root, "plane")["d_ceiling"] == "one-plane"
     assert reasons(root, "plane")["a_room"] == ""
+
+
+def test_a_black_picture_is_left_out(root: Path, tmp_path: Path) -> None:
+    assert set(reasons(root, "black").values()) == {""}
+    copy = shutil.copytree(root, tmp_path / "copy")
+    for name, level in (("a_room", 1), ("c_other", 2)):
+        picture = np.full((SIZE[1], SIZE[0], 3), level, np.uint8)
+        picture[:20] = 200  # a bright window does not lighten the rest
+        file = next((copy / "houses").iterdir()) / "views" / name / "mlt_il_ol.png"
+        file.write_bytes(png_from_array(picture))
+    assert reasons(copy, "black") == {
+        "a_room": "black",
+        "b_twin": "",
+        "c_other": "",
+        "d_ceiling": "",
+    }
 
 
 def test_of_near_twins_the_first_stays(root: Path) -> None:
