@@ -63,15 +63,17 @@ def blocks(picture: F32, n: int = 4) -> F64:
 def z_scores(a: Sequence[F64], b: Sequence[F64]) -> F64:
     """z of the difference of two means, one per block; a, b: independent runs of one shape.
 
-    The variance is pooled over all blocks, each brought to relative terms first.
+    The variance of a block is its own, and at least the one pooled over all blocks, each brought to
+    relative terms first: a few runs may agree by chance, and a block with a bulb in it varies more
+    than the others.
     """
     # Divide each block by its mean over both, so that bright blocks do not dominate.
     x, y = np.array(a), np.array(b)
     scale = 0.5 * (x.mean(0) + y.mean(0))
     x, y = x / scale, y / scale
     # Divide the difference by its standard error.
-    error = np.sqrt(x.var(0, ddof=1).mean() / len(x) + y.var(0, ddof=1).mean() / len(y))
-    return np.asarray((x.mean(0) - y.mean(0)) / error)
+    own = x.var(0, ddof=1) / len(x) + y.var(0, ddof=1) / len(y)
+    return np.asarray((x.mean(0) - y.mean(0)) / np.sqrt(np.maximum(own, own.mean())))
 
 
 @dataclass(frozen=True, slots=True)

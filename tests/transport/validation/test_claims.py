@@ -118,3 +118,17 @@ def test_verify_wants_a_folder_or_light_and_not_both(capsys: pytest.CaptureFixtu
     assert "give a FOLDER, or --light" in capsys.readouterr().err
     assert main(["verify", "somewhere", "--light"]) == 1
     assert "one at a time" in capsys.readouterr().err
+
+
+def test_a_block_that_varies_more_than_the_others_is_no_difference() -> None:
+    rng = np.random.default_rng(1)
+    spread = np.full(16, 0.03)
+    spread[2] = 0.2  # a bulb's
+    worst = []
+    for _ in range(200):
+        a, b = (list(1 + spread * rng.standard_normal((4, 16))) for _ in range(2))
+        worst.append(np.abs(z_scores(a, b)).max())
+    assert np.mean(np.array(worst) > 5) < 0.02
+    # A difference of a block that varies as the others do is seen.
+    moved = [x + 0.2 * (np.arange(16) == 5) for x in b]
+    assert np.abs(z_scores(a, moved)).max() > 5
