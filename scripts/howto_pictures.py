@@ -154,6 +154,40 @@ def _of_coco(n: int) -> Image.Image:
     return image
 
 
+def questions() -> Image.Image:
+    """A picture with the things of its phrases, and four of its questions."""
+    folder = first("questions/*/refs.json").parent
+    refs = json.loads((folder / "refs.json").read_text())
+    medium = refs[0]["file_name"]
+    boxes = {
+        a["id"]: a["bbox"]
+        for a in json.loads((folder / "instances.json").read_text())["annotations"]
+    }
+    image = Image.open(folder / medium).convert("RGB").resize((WIDTH_PX, WIDTH_PX * 3 // 4))
+    scale = WIDTH_PX / Image.open(folder / medium).width
+    draw = ImageDraw.Draw(image)
+    for k, ref in enumerate(r for r in refs if r["file_name"] == medium):
+        x, y, width, height = (scale * v for v in boxes[ref["ann_id"]])
+        colour = tuple(int(c) for c in PALETTE[k % len(PALETTE)])
+        draw.rectangle((x, y, x + width, y + height), outline=colour)
+        said = ref["sentences"][-1]["sent"]
+        draw.text((x + 2, y + 1), said, fill="white", stroke_width=1, stroke_fill="black")
+    asked = [json.loads(line) for line in (folder / "questions.jsonl").read_text().splitlines()]
+    kinds = (
+        "object_counting",
+        "object_abs_distance",
+        "object_rel_distance",
+        "object_rel_direction_easy",
+    )
+    of_kind = {q["question_type"]: q for q in asked if q["media"] == medium}
+    page = Image.new("RGB", (WIDTH_PX, 22 * len(kinds) + 8), "white")
+    draw = ImageDraw.Draw(page)
+    for k, question in enumerate(of_kind[kind] for kind in kinds if kind in of_kind):
+        words = f"{question['question']}  {' '.join(question['options'] or ())}  -> {question['ground_truth']}"
+        draw.text((6, 6 + 22 * k), words, fill="black")
+    return rows(image, page)
+
+
 def yolo() -> Image.Image:
     return row(*(_of_yolo(path) for path in sorted(OUT.glob("yolo_seg/*/labels/*.txt"))[1:3]))
 
@@ -264,7 +298,7 @@ def switches() -> None:
 PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
     f.__name__: f
     for f in (
-        own_camera, sun_and_hour, night, class_map, stereo, plugin, blenderproc, coco, yolo, hugging_face,
+        own_camera, sun_and_hour, night, class_map, stereo, plugin, blenderproc, coco, questions, yolo, hugging_face,
         predict, train, gpu, simulators, own_furniture, cluster, estimate, resume,
     )
 }  # fmt: skip
