@@ -2,7 +2,7 @@
 
 A ray that grazes an edge, or meets two surfaces in the same place, has more than one right
 answer. Where the centre's answer does not explain what is stored, the triangles next to it (rays
-0.02 px away) and those of the stored instance at the same depth are tried. If one of them
+at most 0.02 px away) and those of the stored instance at the same depth are tried. If one of them
 explains every layer at once the pixel is a tie, which is counted; otherwise it failed. A tie of
 two parallel surfaces within 0.1 mm is the source's own: a window frame in the plane of its wall.
 """
@@ -39,9 +39,13 @@ PHYSICAL_ALBEDO = (
 )
 
 _PARALLEL = 0.999  # least cosine between the normals of coincident surfaces
-_JITTER_PX = 0.02  # from the pixel's centre to the neighbouring rays
-_JITTER = _JITTER_PX * np.array(
-    [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]], np.float64
+# From the pixel's centre to the neighbouring rays: a silhouette may be nearer than a thin thing is wide.
+_JITTER_PX = (0.02, 0.005, 0.002)
+_JITTER = np.concatenate(
+    [
+        r * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]])
+        for r in _JITTER_PX
+    ]
 )
 
 
@@ -71,7 +75,7 @@ def judge(
     """Compare labels at pixels (rows, columns) with rays through the scene.
 
     labels: layer -> (N,) or (N, 3) stored values, of RAY_LAYERS. rows, columns: (N,). Where the ray
-    through a centre does not explain what is stored, eight rays beside it and coincident surfaces
+    through a centre does not explain what is stored, rays beside it and coincident surfaces
     are tried; the result says which checks hold by the triangle that explains most, and where that
     was a tie.
     """
