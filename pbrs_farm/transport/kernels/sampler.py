@@ -7,7 +7,7 @@ coordinates instead. An alias table samples a discrete distribution in constant 
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
+
+_PACKET: Final = 64  # values: more than any processor takes at once
 
 CAMERA_DIMS = 2  # dimensions of the film position
 VERTEX_DIMS = 10  # of each vertex (path_step.py)
@@ -83,10 +85,15 @@ def device_array(kind: Any, values: Any) -> Any:
     An array that merely wraps NumPy's memory may be less aligned; then its packet gathers fall
     apart into single ones, and the kernel is another one each time.
     """
-    wrapped = kind(values)
+    # Kernels read whole packets: past the end of NumPy's memory there may be none to read.
+    host = np.asarray(values)
+    padded = np.zeros(len(host) + _PACKET, host.dtype)
+    padded[: len(host)] = host
+    wrapped = kind(padded[: len(host)])
     copy = dr.empty(kind, len(wrapped))
     dr.scatter(copy, wrapped, dr.arange(mi.UInt32, len(wrapped)))
     dr.eval(copy)
+    dr.sync_thread()  # before NumPy frees what is copied
     return copy
 
 
