@@ -29,6 +29,7 @@ _EXACT_STEPS, _EXACT_SHARE = 1, 0.002  # by one step at most, in so few values
 _DENOISED_STEPS, _DENOISED_SHARE = 2, 0.01  # another processor's denoiser
 _TILE_PX = 16  # over which a sensor's noise is averaged
 _SENSOR_STEPS, _SENSOR_TILES = 14, 0.9  # mean of a tile, share of tiles
+_LEAST_HALVED_PX = 160  # the shorter side of a picture that is denoised at half its size
 _HALVED_STEPS, _HALVED_TILES = (
     16,
     0.7,
@@ -55,7 +56,9 @@ def check_developed(
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None:
         return
-    is_halved = view.recipe.light.denoise and not denoise
+    # A small picture at half its size has few tiles, and costs little as it stands.
+    is_large = min(view.table["width_px"], view.table["height_px"]) >= _LEAST_HALVED_PX
+    is_halved = view.recipe.light.denoise and not denoise and is_large
     light = _stored_light(view, channels, is_halved, tally)
     if light is None:
         return

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pbrs_farm.core import keys
 from pbrs_farm.core.checked_calls import checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store import Store, store_from_url
@@ -32,6 +31,8 @@ def open_views(place: str | Path | Store) -> Views:
         from pbrs_farm.views.shard_set import views_of_shards
 
         return views_of_shards(store)
+    from pbrs_farm.core import keys  # needs pydantic, which readers of shards do without
+
     if isinstance(store, FolderStore) and not (store.root / keys.FOLDERS[0]).is_dir():
         from pbrs_farm.views.hypersim_folder import is_hypersim, views_of_hypersim
 

@@ -145,8 +145,8 @@ def test_verify_recomputes_pairs_through_any_lens(lens: dict[str, str], tmp_path
     want = wanted(["opengl_dl"], [], pairs=True)
     run_local(Run(["builtin"], str(tmp_path), recipe_from_name("preview", fields), want))
     pairs = verify(tmp_path, sample=10).counts["pairs"]
-    # Three pairs have two shares each; the names of the views are one check more.
-    assert (pairs.checked, pairs.failed) == (7, 0)
+    # Three pairs have two shares, their mean, room, baseline and angle each; names and number are two more.
+    assert (pairs.checked, pairs.failed) == (20, 0)
 
 
 def _flow_moved(view: Path) -> None:
