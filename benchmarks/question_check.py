@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -43,6 +43,7 @@ class _Scene:
         self.views = tables
         self.house = json.loads((self.folder / "house.json").read_text())
         self.rows: dict[int, dict[str, Any]] = {}
+        self._points: dict[int, Array] = {}
         for table in tables:
             for row in table["instances"]:
                 best = self.rows.setdefault(row["id"], row)
@@ -53,9 +54,13 @@ class _Scene:
     def meshes(self) -> trimesh.Scene:
         return trimesh.load(self.folder / "house.glb", force="scene")
 
-    @lru_cache(maxsize=256)  # noqa: B019  a scene lives as long as its questions
     def points(self, instance: int) -> Array:
-        """Points on the surface of a thing, none farther than _SPACING_M from the next."""
+        """Points on the surface of a thing, none farther than _SPACING_M from the next; kept."""
+        if instance not in self._points:
+            self._points[instance] = self._points_on(instance)
+        return self._points[instance]
+
+    def _points_on(self, instance: int) -> Array:
         node = self.rows[instance]["item"]
         parts = []
         for name in self.meshes.graph.nodes_geometry:

@@ -44,15 +44,15 @@ def main() -> None:
     seen, light = np.array(rows).T
     share = np.minimum(seen, light) / np.maximum(seen, light)
     figures = {
-        "outside.share": round(float(np.median(share)), 3),
-        "outside.share_p10": round(float(np.quantile(share, 0.1)), 3),
-        "outside.ratio": round(float(light.sum() / seen.sum()), 3),
+        "outside.light_share": round(float(np.median(share)), 3),
+        "outside.light_share_p10": round(float(np.quantile(share, 0.1)), 3),
+        "outside.light_ratio": round(float(light.sum() / seen.sum()), 3),
         "outside.windows": len(rows),
     }
     units = {
-        "outside.share": "min/max of the irradiance of a pane by what is seen and by the light scene, median of windows",
-        "outside.share_p10": "the same, of the worst tenth",
-        "outside.ratio": "light of all windows over that of what is seen",
+        "outside.light_share": "min/max of the irradiance of a pane by what is seen and by the light scene, median of windows",
+        "outside.light_share_p10": "the same, of the worst tenth",
+        "outside.light_ratio": "light of all windows over that of what is seen",
         "outside.windows": "windows of six homes, two seeds each",
     }
     write_report("outside", figures, units)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, I32, Mask
 from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.raycast.host_memory import with_slack
 from pbrs_farm.raycast.variant import mitsuba
 
 _RAYS_PER_LAUNCH: Final = 1 << 22  # both bound the memory of one kernel launch
@@ -160,11 +161,10 @@ class JitTracer:
         # Hand rays over component by component, as Dr.Jit stores vectors.
         mi = mitsuba(self._variant)
         ray = mi.Ray3f(
-            mi.Point3f(np.ascontiguousarray(origins.T)),
-            mi.Vector3f(np.ascontiguousarray(directions.T)),
+            mi.Point3f(*map(with_slack, origins.T)), mi.Vector3f(*map(with_slack, directions.T))
         )
         if max_distance is not None:
-            ray.maxt = mi.Float(max_distance)
+            ray.maxt = mi.Float(with_slack(max_distance))
         hit = self._watertight.ray_intersect_preliminary(ray, coherent)
         # Read distance and face back together: one kernel.
         valid = hit.is_valid()

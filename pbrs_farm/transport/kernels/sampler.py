@@ -7,7 +7,7 @@ coordinates instead. An alias table samples a discrete distribution in constant 
 
 from __future__ import annotations
 
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
-
-_PACKET: Final = 64  # values: more than any processor takes at once
+from pbrs_farm.raycast.host_memory import with_slack
 
 CAMERA_DIMS = 2  # dimensions of the film position
 VERTEX_DIMS = 10  # of each vertex (path_step.py)
@@ -85,11 +84,7 @@ def device_array(kind: Any, values: Any) -> Any:
     An array that merely wraps NumPy's memory may be less aligned; then its packet gathers fall
     apart into single ones, and the kernel is another one each time.
     """
-    # Kernels read whole packets: past the end of NumPy's memory there may be none to read.
-    host = np.asarray(values)
-    padded = np.zeros(len(host) + _PACKET, host.dtype)
-    padded[: len(host)] = host
-    wrapped = kind(padded[: len(host)])
+    wrapped = kind(with_slack(np.asarray(values)))
     copy = dr.empty(kind, len(wrapped))
     dr.scatter(copy, wrapped, dr.arange(mi.UInt32, len(wrapped)))
     dr.eval(copy)

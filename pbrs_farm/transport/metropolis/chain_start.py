@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.raycast.host_memory import with_slack
 from pbrs_farm.transport.kernels.sampler import HashedSampler, device_array, stream_key
 from pbrs_farm.transport.metropolis.film import ChainContext, Chains, Film
 from pbrs_farm.transport.metropolis.markov_chains import STORED_DIMS, draw_paths
@@ -96,7 +97,7 @@ def bootstrap_chains(
     quantiles = (np.arange(n_chains) + np.random.default_rng(seed).random()) / n_chains
     chosen = np.searchsorted(np.cumsum(targets) / targets.sum(), quantiles)
     chosen = np.random.default_rng(seed + 1).permutation(np.minimum(chosen, n_bootstrap - 1))
-    at = mi.UInt32(chosen.astype(np.uint32))
+    at = mi.UInt32(with_slack(chosen.astype(np.uint32)))
 
     # Draw the numbers of the chosen paths again; copy what the paths are.
     n, n_paths = dr.opaque(mi.UInt32, n_chains), dr.opaque(mi.UInt32, n_bootstrap)

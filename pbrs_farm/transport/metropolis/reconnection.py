@@ -39,6 +39,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from pbrs_farm.raycast.host_memory import with_slack
 from pbrs_farm.transport.kernels.bsdf import Bsdf, evaluate_bsdf
 from pbrs_farm.transport.kernels.device_scene import DeviceScene, bend_normal, offset_ray_origin
 from pbrs_farm.transport.kernels.packets import colour, gather_packets, point, vector
@@ -103,8 +104,8 @@ def reconnect(
     chosen = dr.compress(records.is_shared)
     if dr.width(chosen) == 0:
         return
-    pixels = mi.UInt32(np.concatenate([g.pixels for g in groups]))
-    slots = mi.UInt32(np.concatenate([g.slots for g in groups]))
+    pixels = mi.UInt32(with_slack(np.concatenate([g.pixels for g in groups])))
+    slots = mi.UInt32(with_slack(np.concatenate([g.slots for g in groups])))
     # Use the limit as a literal: Dr.Jit 1.5 caches kernels by their code, which does not contain the size
     # of local memory, and would take a kernel with less of it.
     n = dr.minimum(dr.opaque(mi.UInt32, groups[0].n), mi.UInt32(rounds.max_n))
