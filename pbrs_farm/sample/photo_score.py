@@ -137,7 +137,11 @@ def photo_shares(
         n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=_median_depth(depth_m),
         foreground=np.stack(
-            [((depth_m > 0) & (depth_m < f.nearer_m)).mean(1) for f in FOREGROUND], 1
+            [
+                ((depth_m > 0) & (depth_m < f.nearer_m)).sum(1) / max(depth_m.shape[1], 1)
+                for f in FOREGROUND
+            ],
+            1,
         ),
         nyu13=classes,
     )

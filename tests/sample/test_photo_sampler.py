@@ -117,6 +117,9 @@ def test_shares_are_those_of_the_pixels() -> None:
     assert seen.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
     assert seen.nyu13[0].sum() == pytest.approx(1)
     assert photo_shares(counts, depth / 2, item_roles(house), 0.01).foreground[0].max() == 0.25
+    # Without a candidate there are no shares, and no warning (warnings are errors here).
+    none = photo_shares(counts[:0], np.zeros((0, 0), np.float32), item_roles(house), 0.01)
+    assert none.foreground.shape[0] == 0
 
 
 def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:
