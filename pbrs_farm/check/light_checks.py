@@ -35,6 +35,7 @@ _HALVED_STEPS, _HALVED_TILES = (
     0.7,
 )  # mean of a tile, share of tiles: half the size has half the noise
 _FACTOR = 0.002  # of exposure and gains that view.json tells
+_TIE = 1e-6  # of a level: what single precision keeps of it
 
 
 def check_developed(
@@ -139,7 +140,12 @@ def _check_picture(
     tone, sensor = shot.camera.tone, shot.camera.sensor
     total = sum((light[g] for g in _GROUPS[shot.mode]), np.zeros_like(light["outdoor"]))
     total = _add_glare(total, tone.glare)
+    told_gains = stated.get("gains")
     gains = _white_balance(total, light["albedo"], tone)
+    if told_gains is not None and np.abs(told_gains - gains).max() > _FACTOR:
+        # Half the picture may be a sky of one level, of which a last bit decides what counts.
+        either = [_white_balance(total, light["albedo"], tone, least=1 + s) for s in (-_TIE, _TIE)]
+        gains = min(either, key=lambda found: float(np.abs(told_gains - found).max()))
     balanced = np.maximum(np.nan_to_num((total * gains).astype(np.float64), posinf=0.0), 0)
     exposure = _exposure(balanced, tone)
     # A sensor's exposure is what its shutter and speed gave.
@@ -150,7 +156,7 @@ def _check_picture(
         return
     else:
         off = abs(float(stated.get("exposure", exposure)) / exposure - 1)
-        told = np.array(stated.get("gains", gains), np.float64)
+        told = np.array(gains if told_gains is None else told_gains, np.float64)
         off = max(off, float(np.abs(told - gains).max()))
         what = f"view.json tells other factors, by {off:.4f}"
         if tally.expect("light developed", place, off <= _FACTOR, what):
@@ -284,22 +290,27 @@ def _add_glare(total: NDArray[np.float32], share: float) -> NDArray[np.float32]:
     return np.asarray((1 - share) * finite + share * blurred, np.float32)
 
 
-def _white_balance(total: NDArray[Any], albedo: NDArray[Any], tone: ToneFields) -> Floats:
-    """(3,) gains against the median of radiance over albedo where it is high, of constant luminance."""
+def _white_balance(
+    total: NDArray[Any], albedo: NDArray[Any], tone: ToneFields, *, least: float = 1.0
+) -> Floats:
+    """(3,) gains against the median of radiance over albedo where it is high, of constant luminance.
+
+    least: of the median level, from which a pixel counts.
+    """
     errors = 2.0 ** np.array([tone.warmth_ev / 2, tone.tint_ev, -tone.warmth_ev / 2])
     light = np.ones(3)
     known = (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
     if tone.white_balance > 0 and known.sum() >= 16:
-        light = _light_colour(total[known], albedo[known].astype(np.float64))
+        light = _light_colour(total[known], albedo[known].astype(np.float64), least)
     gains = (light / (light @ _LUMINANCE)) ** -tone.white_balance * errors
     return np.asarray((gains / (gains @ _LUMINANCE)).astype(np.float32))
 
 
-def _light_colour(total: NDArray[Any], surface: Floats) -> Floats:
+def _light_colour(total: NDArray[Any], surface: Floats, least: float) -> Floats:
     """(3,) of (N, 3) radiance over albedo, the median of those from the middle to the 95th percentile."""
     level = (total / surface) @ _LUMINANCE
     low, high = np.percentile(level, [50, 95])
-    lit = (level >= low) & (level <= high)
+    lit = (level >= low * least) & (level <= high)
     total, surface = total[lit], surface[lit]
     logs = np.median(np.log(total / surface), axis=0)
     # Walls of one hue colour the light they reflect at each other: hold it to lamps and skies.

@@ -26,13 +26,15 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 _GUIDE_DEG = 25.0  # a normal map may bend a guide, and a pixel is not flat
 _GUIDE_ALBEDO = 0.1  # of 1, in linear light: a texture's mean over the pixel against its middle
 _GUIDE_SHARE = 0.8  # of pixels amid one surface; blur and depth of field cost the rest
-_GUIDE_PX = 0  # by which the guides' edges may lie beside the labels'
+_GUIDE_PX = 1  # by which the guides' edges may lie beside the labels': a few samples against one
 _FEW_GUIDES = 50  # pixels amid surfaces that tell nothing
 _FAINT = 0.05  # of albedo, and of the mean light: darker steps count less
 _MOST_STEP = 1.0  # of a logarithm: one firefly is not a picture
 _EDGE = 0.1  # step of albedo's logarithm that counts as an edge
 _FEW_EDGES = 300  # pixels with one that tell nothing
 _BLUR_PX = 0.7  # of both before they are compared: noise goes, edges stay within a pixel
+_BRIGHT = (0, 9, 19, 35)  # outside, windows, mirrors, lamps
+_BRIGHT_PX = 2  # beside them, which the blur reaches
 _NOISY = 0.09  # error of the slope above which noise hides all
 _LEAST_SLOPE = 0.15  # of steps of light over those of albedo, whose logarithms rise alike
 _LEAST_SIGMAS = 5.0  # of the slope where the picture stands
@@ -114,11 +116,12 @@ def _is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray(flat, bool)
 
 
-def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
+def check_fit(view: StoredView, channels: Channels, semantic: NDArray[Any], tally: Tally) -> None:
     """The light of radiance.exr fits its albedo as it stands, and mirrored, turned or moved no better.
 
     All light together must fit; a light group alone may reach few edges, and must not fit another
-    place much better. Pictures with few edges, or more noise than light, are a note.
+    place much better. Steps at what shines, mirrors or lies outside, by semantic, do not count: a
+    bright window is no bright wall. Pictures with few edges, or more noise than light, are a note.
     """
     needed = [f"{name}.{c}" for name in ("outdoor", "indoor", "albedo") for c in "RGB"]
     if not all(n in channels and channels[n].shape == view.size for n in needed):
@@ -130,7 +133,8 @@ def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
         )
         for name in ("outdoor", "indoor", "albedo")
     }
-    logs_of_albedo = np.log(level.pop("albedo") + _FAINT)
+    bright = ndimage.binary_dilation(np.isin(semantic, _BRIGHT), iterations=_BRIGHT_PX)
+    logs_of_albedo = _filled(np.log(level.pop("albedo") + _FAINT), bright)
     across, down = _steps(logs_of_albedo)
     if int((np.hypot(across, down) > _EDGE).sum()) < _FEW_EDGES:
         tally.note(f"{view.place}/radiance.exr has too few edges to compare")
@@ -141,7 +145,7 @@ def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
     for name, light in level.items():
         if not (light > 0).any():
             continue
-        logs = np.log(light + _FAINT * float(light[light > 0].mean()))
+        logs = _filled(np.log(light + _FAINT * float(light[light > 0].mean())), bright)
         own, error, elsewhere = _slopes(logs, surface)
         if error > _NOISY:
             if name == "all light":
@@ -162,6 +166,14 @@ def check_fit(view: StoredView, channels: Channels, tally: Tally) -> None:
             text = f"{name} does not follow the albedo: {own:.2f} +- {error:.2f}"
             least = max(_LEAST_SIGMAS * error, _LEAST_SLOPE)
             tally.expect("light edges", place, own >= least, text)
+
+
+def _filled(picture: NDArray[Any], hole: NDArray[np.bool_]) -> NDArray[Any]:
+    """The picture whose pixels in a hole are those of the nearest outside it, so that no step leads across."""
+    if not hole.any() or hole.all():
+        return picture
+    nearest = ndimage.distance_transform_edt(hole, return_distances=False, return_indices=True)
+    return np.asarray(picture[tuple(nearest)])
 
 
 def _steps(picture: NDArray[Any]) -> tuple[Floats, Floats]:

@@ -20,6 +20,7 @@ BOX_M = 0.001  # by which a side of a box may differ from its triangles
 FLOOR_M = 0.05  # above a floor, where what lies on it is not met, and below it
 FLOOR_SHARE = 0.5  # of a room's floor: the rest may be covered, or a stairwell
 LIGHT_M = 0.05  # between a light and its surfaces, beside its radius: a shade's ring about a bulb
+TOLD_STEP = 1e-6  # repair.json tells measures to six digits
 
 
 def check_solids(house: StoredHouse, triangles: Triangles, rays: Rays, tally: Tally) -> None:
@@ -80,7 +81,7 @@ def _check_lights(
             tally.expect("lights", place, off <= LIGHT_M + light["radius_m"], what)
         told = measured.get((row["id"], k))
         if told is not None:
-            same = (told["escape"], told["radius_m"]) == (light["escape"], light["radius_m"])
+            same = all(abs(told[n] - light[n]) <= TOLD_STEP for n in ("escape", "radius_m"))
             tally.expect("lights", place, same, f"light {k} is another in repair.json")
 
 

@@ -193,7 +193,7 @@ def _check_view(
         check_radiance(view, scenes.house, channels, arrays["valid"], tally)
         check_developed(view, channels, arrays, tally, denoise=is_denoised_again(view, n_pixels))
         check_guides(view, channels, _chosen(view, SAMPLE), arrays, scenes.all, tally)
-        check_fit(view, channels, tally)
+        check_fit(view, channels, arrays["semantic"], tally)
         check_lit(view, channels, arrays, scenes.lit, scenes.all[1], tally)
     check_edges(view, arrays, tally)
     check_histogram(view, arrays, scenes.house.house, tally)
