@@ -28,6 +28,7 @@ MODULES: Final = {
     "looking": ("doctor", "inputs", "skies", "recipes", "layers", "completion"),
     "homes": ("homes",),
     "making": ("demo", "run", "objects", "step"),
+    "data_sets": ("make",),
     "scattering": ("scatter",),
     "explaining": ("dress", "catalogue", "repair", "cameras"),
     "using": ("sheet", "verify", "relight", "pull"),
@@ -46,6 +47,7 @@ _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and
 # Modules whose verbs read files of others: the command runs them in a process that may die.
 _OF_STRANGERS: Final = (
     "making",
+    "data_sets",
     "scattering",
     "explaining",
     "using",

@@ -14,7 +14,7 @@ from pbrs_farm.core.shown_text import did_you_mean
 # What a user wants -> the verbs for it, in the order of the help.
 GROUPS: Final = {
     "start here": ("demo", "doctor", "homes", "run", "board", "export"),
-    "make pictures and labels": ("scatter", "objects", "step", "recipes", "layers", "inputs", "skies"),
+    "make pictures and labels": ("make", "scatter", "objects", "step", "recipes", "layers", "inputs", "skies"),
     "look into one home": ("dress", "catalogue", "repair", "cameras"),
     "look at what was made": ("sheet", "label-sheet", "classes", "verify", "relight"),
     "choose and pack": ("reference", "select", "pack", "pull"),

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import VIEW, Verb, counted, echo, echo_json, size_of, warn
-from pbrs_farm.commands.options import add_options
+from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.form import HomeForm, form_names, form_of
+
+if TYPE_CHECKING:
+    from pbrs_farm.export.chosen_view import Choice
+    from pbrs_farm.export.export_options import ExportOptions
 
 SPLIT = "by home: train/val/test (default 80/10/10); without it all views are one"
 
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
+    from pbrs_farm.export.export_options import ExportOptions
     from pbrs_farm.run.request import ModelsOption
 
     text = "export finished views to other tools' formats, or homes to simulators"
@@ -24,15 +30,8 @@ def add_verbs(verb: Verb) -> None:
     add("--to", required=True, choices=form_names(), help="docs/formats.md describes the forms")
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
-    text = "labels by name (`pbrs-farm layers`), default all there are but radiance"
-    add("--layers", nargs="+", metavar="LAYER", help=text)
-    add_modes_and_size(p)
-    text = "classes of your own: CSV with columns from,id,name (default NYU40)"
-    add("--classes", type=Path, metavar="FILE.csv", help=text)
+    add_options(p, ExportOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
-    add("--shard-size", type=int, default=500, metavar="N", help="views a tar (webdataset)")
-    text = "whose scans the form lidar has (default vlp16; docs/formats.md has them all)"
-    add("--lidar", default="vlp16", metavar="SCANNER", help=text)
 
     p = verb("pack", _pack_views, "pack finished views into shards to train from, or into Parquet")
     add = p.add_argument
@@ -42,7 +41,9 @@ def add_verbs(verb: Verb) -> None:
     add("--selection", metavar="RUN", help="only what this run keeps")
     layers = "colour normal depth class40 instance boundary (default all)"
     add("--layers", nargs="+", metavar="LAYER", help=layers)
-    add_modes_and_size(p)
+    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
+    add("--modes", nargs="+", metavar="MODE", help=modes)
+    add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
     add("--shard-size", type=int, default=200, metavar="N", help="views a shard (default 200)")
     text = "png (default) keeps every bit; jpeg:95 is a quarter as large and loses a little"
@@ -69,21 +70,12 @@ def _export(args: argparse.Namespace) -> int:
     if isinstance(form_of(args.to), HomeForm):
         return _export_homes(args)
     from pbrs_farm.core.house_split import shares_from_text
-    from pbrs_farm.export.chosen_view import Choice
+    from pbrs_farm.export.export_options import ExportOptions
     from pbrs_farm.export.export_views import export, remarks_of
-    from pbrs_farm.formats.class_map import class_map
     from pbrs_farm.run.output_root import as_files
     from pbrs_farm.settings import settings_from_environment
 
-    # None is all there is: layers (but radiance), modes, the stored size.
-    choice = Choice(
-        layers=tuple(args.layers) if args.layers else None,
-        modes=tuple(args.modes) if args.modes else None,
-        size=size_of(args.size),
-        views_per_shard=args.shard_size,
-        classes=class_map(args.classes) if args.classes else None,
-        lidar=args.lidar,
-    )
+    choice = choice_of(request_from(args, ExportOptions))
     shares = shares_from_text(args.split) if args.split else None
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
     with as_files(args.folder, settings_from_environment().store) as folder:
@@ -96,6 +88,22 @@ def _export(args: argparse.Namespace) -> int:
     return 0
 
 
+def choice_of(options: ExportOptions) -> Choice:
+    """What is exported by options; BadInput for a layer, mode, size or table that there is not."""
+    from pbrs_farm.export.chosen_view import Choice
+    from pbrs_farm.formats.class_map import class_map
+
+    # None is all there is: layers (but radiance), modes, the stored size.
+    return Choice(
+        layers=options.layers or None,
+        modes=options.modes or None,
+        size=size_of(options.size),
+        views_per_shard=options.shard_size,
+        classes=class_map(options.classes) if options.classes else None,
+        lidar=options.lidar,
+    )
+
+
 def _export_homes(args: argparse.Namespace) -> int:
     from pbrs_farm.export.export_homes import export_homes
     from pbrs_farm.run.output_root import as_files
@@ -104,7 +112,7 @@ def _export_homes(args: argparse.Namespace) -> int:
     options = {"--selection": args.selection, "--layers": args.layers, "--modes": args.modes}
     options |= {"--size": args.size, "--classes": args.classes, "--split": args.split}
     for option, value in options.items():
-        if value is not None:
+        if value:
             raise BadInput(option, "", f"chooses of views; --to {args.to} writes homes")
     out = args.out or Path(f"{Path(args.folder).resolve().name}_{args.to}")
     with as_files(args.folder, settings_from_environment().store) as folder:
@@ -113,17 +121,6 @@ def _export_homes(args: argparse.Namespace) -> int:
     for remark in remarks:
         warn(remark)
     return 0
-
-
-def add_modes_and_size(p: argparse.ArgumentParser) -> None:
-    """Add --modes and --size: which lighting modes are taken, and the size they are resized to.
-
-    `args.modes` is a list or None for all there are, `args.size` WxH or None.
-    """
-    add = p.add_argument
-    modes = "opengl_dl opengl_il mlt_ol mlt_il_ol (default all there are)"
-    add("--modes", nargs="+", metavar="MODE", help=modes)
-    add("--size", metavar="WxH", help="resize to, e.g. 320x240 (default as rendered)")
 
 
 def _pack_views(args: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
     HOME,
@@ -32,7 +32,7 @@ from pbrs_farm.installation import need, system_command
 if TYPE_CHECKING:
     from pbrs_farm.prepare.source import SourceRef
     from pbrs_farm.read.objects.model_folders import ObjectModel
-    from pbrs_farm.run.local_run import Observer, Run
+    from pbrs_farm.run.local_run import Observer, Run, Summary
     from pbrs_farm.run.processes.render_task import Event
 
 
@@ -124,17 +124,27 @@ def _run_homes(
     refused: what was asked for and cannot be read, and why. observe: hears of the run beside the
     user. A wall that repair lost is an error.
     """
+    run = replace(_described(args, homes, sources), refused=refused)
+    n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
+    summary = run_and_report(run, n_homes, as_json=args.json, observe=observe)
+    return 1 if summary.failures or summary.walls_lost or summary.n_views == 0 else 0
+
+
+def run_and_report(
+    run: Run, n_homes: int, *, as_json: bool, observe: Observer | None = None
+) -> Summary:
+    """Run it, tell its progress as standard output suits, then what came of it.
+
+    n_homes: for the time left. observe: hears each event beside the user. Raises as run_local.
+    """
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
 
-    run = replace(_described(args, homes, sources), refused=refused)
     # Say at once which extra is missing, not once a step.
     need("mitsuba", "drjit", "pyoidn", "moderngl")
-    # Run it, reporting progress as standard output suits.
     _warn_of_slowness()
     started = time.monotonic()
-    n_homes = (len(homes) + len(sources)) * max(1, len(run.dress_seeds))
-    with progress_reporter(n_homes, as_json=args.json) as report:
+    with progress_reporter(n_homes, as_json=as_json) as report:
 
         def hear(event: Event) -> None:
             report(event)
@@ -142,8 +152,8 @@ def _run_homes(
                 observe(event)
 
         summary = run_local(run, hear)
-    _report(args, summary, time.monotonic() - started)
-    return 1 if summary.failures or summary.walls_lost or summary.n_views == 0 else 0
+    _report(summary, time.monotonic() - started, run.store_url, as_json=as_json)
+    return summary
 
 
 def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[SourceRef]) -> Run:
@@ -192,8 +202,8 @@ def _warn_of_slowness() -> None:
         )
 
 
-def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
-    if args.json:
+def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> None:
+    if as_json:
         echo(_summary_line(summary, seconds))
         return
     lost = f"{counted(len(summary.walls_lost), 'wall')} LOST, " if summary.walls_lost else ""
@@ -222,10 +232,10 @@ def _report(args: argparse.Namespace, summary: Any, seconds: float) -> None:
     if summary.taken_out:
         kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
         echo(f"{kinds} taken out: `removed` in repair.json (repair.remove_persons, remove_plants)")
-    echo_notes(summary.notes, args.out)
+    echo_notes(summary.notes, out)
 
 
-def _summary_line(summary: Any, seconds: float) -> str:
+def _summary_line(summary: Summary, seconds: float) -> str:
     """The run's outcome as one line of JSON."""
     failures = [dict(zip(("what", "message", "command"), f, strict=True)) for f in summary.failures]
     row = {

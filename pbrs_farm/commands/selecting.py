@@ -128,9 +128,7 @@ def _select(args: argparse.Namespace) -> int:
 
 def _select_by(args: argparse.Namespace) -> int:
     """Judge every view, or those that a run keeps, by rules, and write selection/<run>.jsonl."""
-    import json
-
-    from pbrs_farm.curate.teaching_rules import REASONS, judged_by
+    from pbrs_farm.curate.teaching_rules import judged_by, write_verdicts
     from pbrs_farm.export.export_views import finished_entries
     from pbrs_farm.run.output_root import as_files
     from pbrs_farm.settings import settings_from_environment
@@ -139,22 +137,12 @@ def _select_by(args: argparse.Namespace) -> int:
     settings = settings_from_environment().store
     with as_files(args.folder, settings) as folder:
         found = judged_by(finished_entries(folder, args.selection), args.by)
-    store = store_from_url(args.folder, settings)
-    lines = "".join(verdict.json_line for verdict in found)
-    store.put(keys.selection_key(args.run, "jsonl"), lines.encode())
-    counts = {
-        REASONS[name]: sum(verdict.reason == REASONS[name] for verdict in found)
-        for name in REASONS
-        if name in args.by
-    }
-    kept = len(found) - sum(counts.values())
-    summary = {"run": args.run, "by": args.by, "views": len(found), "kept": kept, "reasons": counts}
-    store.put(keys.SELECTION, (json.dumps(summary, indent=1) + "\n").encode())
+    summary = write_verdicts(store_from_url(args.folder, settings), args.run, args.by, found)
     if args.json:
         echo_json(summary)
         return 0
-    echo(f"{kept} of {len(found)} views kept")
-    for reason, n in counts.items():
+    echo(f"{summary['kept']} of {len(found)} views kept")
+    for reason, n in summary["reasons"].items():
         echo(f"  {n:>6}  {reason}")
     echo(keys.selection_key(args.run, "jsonl"))
     return 0

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind
@@ -22,6 +23,7 @@ from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.selection.histogram_pack import BLACK
 from pbrs_farm.selection.quality import picture_quality
+from pbrs_farm.store.object_store import Store
 
 _PLANE_COS: Final = float(np.cos(np.radians(5)))  # between normals of one plane
 _PLANE_M: Final = 0.03  # across it
@@ -163,6 +165,26 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
         )
         found[entry.house.id, entry.id] = RuleVerdict(entry.house.id, entry.id, reason, numbers)
     return [found[at] for at in sorted(found)]
+
+
+def write_verdicts(
+    store: Store, run: str, by: Sequence[str], verdicts: Sequence[RuleVerdict]
+) -> dict[str, Any]:
+    """Write selection/<run>.jsonl and selection.json; the summary, as selection.json has it.
+
+    by: names of the rules that judged, which may be none. BadInput for a run's name that is none.
+    """
+    key = keys.selection_key(run, "jsonl")
+    store.put(key, "".join(verdict.json_line for verdict in verdicts).encode())
+    counts = {
+        reason: sum(verdict.reason == reason for verdict in verdicts)
+        for name, reason in REASONS.items()
+        if name in by
+    }
+    kept = len(verdicts) - sum(counts.values())
+    summary = {"run": run, "by": list(by), "views": len(verdicts), "kept": kept, "reasons": counts}
+    store.put(keys.SELECTION, (json.dumps(summary, indent=1) + "\n").encode())
+    return summary
 
 
 def _judged(

@@ -218,8 +218,8 @@ def wanted_of(request: Wanted) -> Wanted:
     return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in want.layers)})
 
 
-class ProcessOptions(Record):
-    """How this machine's processes do a run."""
+class ProcessLimitOptions(Record):
+    """How many processes this machine has for a run, and what each may take."""
 
     jobs: int = option(
         1, "processes (default 1, and a second one for most of all but light; each view uses all cores)",
@@ -236,6 +236,11 @@ class ProcessOptions(Record):
         0.0, "memory a process may hold (default: its share of the machine)",
         group="the run", metavar="MB", least=0,
     )  # fmt: skip
+
+
+class ProcessOptions(ProcessLimitOptions):
+    """How this machine's processes do a run."""
+
     update: bool = option(
         False, "give the output folder this recipe, rendering again what differs", group="the run"
     )

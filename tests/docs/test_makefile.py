@@ -35,7 +35,7 @@ def named_in_pages() -> Iterator[tuple[str, str]]:
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         for code in re.findall(r"^```.*?^```|`[^`\n]+`", text, re.MULTILINE | re.DOTALL):
-            for words in re.findall(r"(?:^|[`\s])make ([a-z][^`#\n]*)", code):
+            for words in re.findall(r"(?:^|[`\s])(?<!pbrs-farm )make ([a-z][^`#\n]*)", code):
                 name = re.search(r"\bNAME=(\w+)", words)
                 for word in words.split():
                     if "=" not in word:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 from dataclasses import replace
@@ -121,7 +120,7 @@ def test_a_view_that_came_out_black_is_told(
         ("0_0_0", "black"),
         ("0_0_1", "black"),
     ]
-    making._report(argparse.Namespace(json=False, out=str(tmp_path)), summary, 1.0)
+    making._report(summary, 1.0, str(tmp_path), as_json=False)
     assert "0_0_1: dark: black" in capsys.readouterr().err
     # A second run finds them done and tells it again.
     assert len(run(tmp_path, "black").dark) == 2
@@ -131,9 +130,7 @@ def test_leaks_notes_and_lost_walls_are_told_also_by_a_run_that_finds_them_done(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for _ in range(2):
-        making._report(
-            argparse.Namespace(json=False, out=str(tmp_path)), run(tmp_path, "spoilt"), 1.0
-        )
+        making._report(run(tmp_path, "spoilt"), 1.0, str(tmp_path), as_json=False)
         told = capsys.readouterr()
         assert "LIGHT LEAKS IN: 833 of 20000 rays" in told.err
         assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in told.err

@@ -1,0 +1,240 @@
+"""A data set as one file: homes, options of `run`, `select` and `export`, a card. Effect: reads it.
+
+split = "80/10/10"        # by home; without it nothing is split
+[card]
+title = "Rooms"
+[render]                  # options of `run`, for every part
+recipe = "fast"
+dress = "1"
+[part.views]              # homes, and options that hold for them
+homes = ["made:1..100"]
+views = 10
+select = ["black", "twins"]
+[form.coco]               # options of `export`, or of `pack` (shards, parquet)
+parts = ["views"]
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.commands.arguments import dress_seeds, recipe_of, size_of
+from pbrs_farm.commands.labelling import choice_of
+from pbrs_farm.commands.options import request_from, values_of_table
+from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.core.house_split import shares_from_text
+from pbrs_farm.core.record import Record
+from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
+from pbrs_farm.curate.teaching_rules import REASONS
+from pbrs_farm.export.export_options import ExportOptions
+from pbrs_farm.export.form import ViewForm, form_names, form_of
+from pbrs_farm.prepare.source import words_of_homes
+from pbrs_farm.regular_files import read_given, text_from_bytes
+from pbrs_farm.run.request import (
+    CameraOptions,
+    ModelsOption,
+    Request,
+    option,
+    options_of,
+    wanted_of,
+)
+from pbrs_farm.sets.data_set import SHIPPED, DataSet, SetCard, SetForm, SetPart, shipped_sets
+from pbrs_farm.study.packing.packing_plan import FORMS, Packing
+from pbrs_farm.truth.optional_layers import check_lens
+from pbrs_farm.views.view_sample import LAYERS
+
+_ENDING: Final = ".toml"
+_TABLES: Final = ("card", "render", "part", "form")
+_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,40}")
+
+
+class PartOptions(Request, CameraOptions, ModelsOption):
+    """What a part is rendered with: as `run`, for its homes."""
+
+    select: tuple[str, ...] = option(
+        (), "rules by which views are left out of the forms", choices=tuple(REASONS)
+    )
+
+
+class PartTable(PartOptions):
+    """A table [part.NAME]."""
+
+    homes: tuple[str, ...] = option((), "homes, as `run` takes them")
+
+
+class CardTable(Record):
+    """The table [card]."""
+
+    title: str = option("", "the set's name for people")
+    text: str = option("", "what it is for, in Markdown")
+    licence: str = option("", "under which it may be used")
+
+
+class FormTable(ExportOptions):
+    """A table [form.NAME]."""
+
+    to: str = option("", "the form; the table's name where it is left out")
+    parts: tuple[str, ...] = option((), "of these parts, all where it is left out")
+    colour: str = option("png", "of shards and parquet: png or jpeg:QUALITY")
+
+
+def is_set(word: str) -> bool:
+    """Whether a word names a data set: one that is shipped, or a .toml file with parts."""
+    if word in shipped_sets() and not Path(word).exists():
+        return True
+    if not word.endswith(_ENDING) or not Path(word).is_file():
+        return False
+    # Another TOML file is a job, or a home's programme; one that is none is told where it is read.
+    try:
+        return "part" in tomllib.loads(text_from_bytes(read_given(Path(word))))
+    except (ValueError, RecursionError):
+        return False
+
+
+def set_from_word(word: str) -> DataSet:
+    """The set of that name, or of a user's file.
+
+    Everything in it is checked, and nothing of its homes is read. Raises BadInput with file and place.
+    """
+    if word in shipped_sets() and not Path(word).exists():
+        return set_from_bytes((SHIPPED / f"{word}{_ENDING}").read_bytes(), f"{word}{_ENDING}")
+    if not word.endswith(_ENDING):
+        hint = hint_of_choice(word, shipped_sets())
+        raise BadInput(word, "", "no such set", hint=f"{hint}, or your own FILE.toml")
+    return set_from_bytes(read_given(Path(word)), word)
+
+
+def set_from_bytes(data: bytes, file: str) -> DataSet:
+    """The set that a file holds; file is its name, for messages and the set's own name."""
+    name = Path(file).stem
+    if not _NAME.fullmatch(name):
+        raise BadInput(file, "", "a set's name is of small letters, digits, - and _")
+    try:
+        # As tables of TOML are read: without the byte order mark that some editors write.
+        tables = tomllib.loads(text_from_bytes(data))
+    except (ValueError, RecursionError) as error:
+        raise BadInput(file, "", f"is no TOML: {error}") from None
+    _check_tables(tables, file)
+    with _placed(file, "split"):
+        shares = shares_from_text(str(tables["split"])) if "split" in tables else None
+    of_card = values_of_table(tables.get("card", {}), CardTable, f"{file} [card]")
+    parts = tuple(
+        _part(part, table, tables.get("render", {}), file) for part, table in tables["part"].items()
+    )
+    names = tuple(part.name for part in parts)
+    forms = tuple(
+        _form(form, table, names, shares, file) for form, table in tables.get("form", {}).items()
+    )
+    card = SetCard(
+        of_card.get("title") or name, of_card.get("text", ""), of_card.get("licence", "")
+    )
+    return DataSet(name, data, card, shares, parts, forms)
+
+
+def _check_tables(tables: Mapping[str, Any], file: str) -> None:
+    for name, table in tables.items():
+        if name != "split" and (name not in _TABLES or not isinstance(table, dict)):
+            hint = did_you_mean(name, [*_TABLES, "split"]) or f"[{'], ['.join(_TABLES)}], split"
+            raise BadInput(file, name, "is no table of a set", hint=hint)
+    if not tables.get("part"):
+        raise BadInput(file, "part", "names no homes", hint="[part.views] with homes = [...]")
+    for kind in ("part", "form"):
+        for name, table in tables.get(kind, {}).items():
+            if not isinstance(table, dict):
+                raise BadInput(file, f"{kind}.{name}", f"expected a table [{kind}.NAME]")
+            if not _NAME.fullmatch(name):
+                text = "a name is of small letters, digits, - and _"
+                raise BadInput(file, f"{kind}.{name}", text)
+
+
+@contextmanager
+def _placed(file: str, place: str) -> Iterator[None]:
+    """Errors within name the file and the place in it."""
+    try:
+        yield
+    except PbrsError as error:
+        raise BadInput(file, place, error.message, hint=error.hint) from None
+
+
+def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: str) -> SetPart:
+    """A part: the options of [render], then its own; lists of both are joined."""
+    values = values_of_table(common, PartOptions, f"{file} [render]")
+    for option_name, value in values_of_table(table, PartTable, f"{file} [part.{name}]").items():
+        held = values.get(option_name)
+        values[option_name] = [*held, *value] if isinstance(held, list) else value
+    homes = values.pop("homes", [])
+    with _placed(file, f"part.{name}"):
+        words = words_of_homes(homes)
+        if not words:
+            raise BadInput("homes", "", "expected a list of homes", hint='homes = ["made:1..100"]')
+        request = request_from(argparse.Namespace(**values), PartOptions)
+        recipe = recipe_of(request)
+        want = wanted_of(request)
+        if want.layers:
+            check_lens(want.layers, recipe.lens.lens)
+        seeds = dress_seeds(request.dress)
+    rules = tuple(rule for rule in REASONS if rule in request.select)
+    return SetPart(
+        name, tuple(dict.fromkeys(words)), recipe, want, seeds, request.models, rules, values
+    )
+
+
+def _form(
+    name: str, table: Mapping[str, Any], parts: tuple[str, ...], shares: Any, file: str
+) -> SetForm:
+    values = values_of_table(table, FormTable, f"{file} [form.{name}]")
+    with _placed(file, f"form.{name}"):
+        asked = request_from(argparse.Namespace(**values), FormTable)
+        to = asked.to or name
+        known = (*form_names(), *FORMS)
+        if to not in known:
+            raise BadInput("to", to, "no such form", hint=hint_of_choice(to, known))
+        for part in asked.parts:
+            if part not in parts:
+                raise BadInput("parts", part, "no such part", hint=hint_of_choice(part, parts))
+        if to in FORMS:
+            return SetForm(name, to, asked.parts or parts, packing=_packing(asked, shares))
+        form = form_of(to)
+        if not isinstance(form, ViewForm):
+            raise BadInput("to", to, "is a form of homes, not of views")
+        if asked.classes and not form.has_classes:
+            raise BadInput("classes", "", f"{to} has no classes of your own")
+        return SetForm(name, to, asked.parts or parts, choice_of(asked))
+
+
+def _packing(asked: FormTable, shares: Any) -> Packing:
+    """How `pack` would do it; without modes, those of each part."""
+    colour, _, quality = asked.colour.partition(":")
+    if quality and not quality.isdigit():
+        raise BadInput("colour", asked.colour, "expected png, jpeg or jpeg:QUALITY")
+    return Packing(
+        size=size_of(asked.size), layers=asked.layers or LAYERS, shares=shares,
+        views_per_shard=asked.shard_size, colour=colour, quality=int(quality or 95),
+        modes=asked.modes,
+    )  # fmt: skip
+
+
+def options_given(part: SetPart) -> dict[str, Any]:
+    """A part's options for `submit`, by name: those of viewpoints, which it lacks, are fields of the recipe.
+
+    Raises BadInput for a trajectory of the user's, which workers do not have.
+    """
+    values = dict(part.values)
+    values.pop("select", None)
+    if "trajectory" in values:
+        raise BadInput("trajectory", str(values["trajectory"]), "is not sent to a farm")
+    of_cameras = {
+        name: shown.sets
+        for name, (_field, shown) in options_of(CameraOptions).items()
+        if shown.sets
+    }
+    pairs = [f"{of_cameras[name]}={values.pop(name)}" for name in of_cameras if name in values]
+    if pairs:
+        values["set"] = [*values.get("set", []), *pairs]
+    return values

@@ -1,0 +1,284 @@
+"""A set's folder: what was rendered is selected, split, written in its forms, described and summed.
+
+Effects: reads and writes the set's folder. A step is done when its marker `done/<name>.json` has the right
+digest and its files are there; the marker is written last, so that what was killed is made again.
+
+    <set>.toml            the file, as it was given
+    README.md             the card
+    index.csv             each view: part, house, view, split, kept or why not
+    SHA256SUMS            of all files but markers
+    parts/<part>/         an output root
+    forms/<form>/<part>/  the kept views in that form
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final
+
+import pbrs_farm
+from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house_split import split_of_house
+from pbrs_farm.curate.teaching_rules import RuleVerdict, judged_by, write_verdicts
+from pbrs_farm.export.export_views import export
+from pbrs_farm.formats.manifest import lines_by_house, sha256_by_key
+from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.regular_files import digest_of_regular, read_regular
+from pbrs_farm.run.local_run import Run
+from pbrs_farm.run.request import ProcessLimitOptions
+from pbrs_farm.sets.data_set import DataSet, SetForm, SetPart
+from pbrs_farm.sets.set_card import card_text
+from pbrs_farm.store import StoreSettings
+from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.object_store import get_or_none
+from pbrs_farm.study.packing.pack_shards import pack
+from pbrs_farm.views.open_views import open_views
+
+SUMS: Final = "SHA256SUMS"
+_PARTS: Final = "parts"
+_FORMS: Final = "forms"
+_INDEX: Final = "index.csv"
+_CARD: Final = "README.md"
+_ROOT_FILES: Final = (keys.RECIPE, keys.MANIFEST, keys.ATTRIBUTION)
+
+Planned = Mapping[str, Sequence[str]]
+"""House -> the views of it that a run makes."""
+
+
+@dataclass(frozen=True, slots=True)
+class MadePart:
+    """A part that is rendered and judged."""
+
+    part: SetPart
+    root: Path
+    verdicts: tuple[RuleVerdict, ...]  # by house and view
+    reasons: Mapping[str, int] = field(default_factory=dict)  # why left out -> views
+
+    @property
+    def kept(self) -> tuple[RuleVerdict, ...]:
+        """The views that the forms have."""
+        return tuple(verdict for verdict in self.verdicts if not verdict.reason)
+
+
+def claim_folder(out: Path, data_set: DataSet) -> None:
+    """Say whose folder it is: write the set's file into it, where it holds nothing else.
+
+    Rendered parts may lie there already, as a farm made them. Raises BadInput where the folder
+    holds another set, or something else.
+    """
+    file = out / data_set.file
+    if file.is_file():
+        if read_regular(file) != data_set.data:
+            hint = f"name a new folder; OUT/{_PARTS} may be moved there, and is not rendered again"
+            raise BadInput(out, data_set.file, "holds another set: the file differs", hint=hint)
+        return
+    if out.exists() and not out.is_dir():
+        raise BadInput(out, "", "is no folder")
+    others = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
+    others = [name for name in others if name != _PARTS and not name.startswith(".")]
+    if others:
+        raise BadInput(out, others[0], "is no part of this set", hint="name a new folder")
+    FolderStore(out).put(data_set.file, data_set.data)
+
+
+def part_run(
+    part: SetPart, out: Path, shard: tuple[int, int], how: ProcessLimitOptions, store: StoreSettings
+) -> Run:
+    """The run that renders a part of a set into its folder, or the homes of one shard."""
+    return Run(
+        homes=part.homes_of(shard),
+        models=part.models,
+        store_url=str(root_of(part, out)),
+        recipe=part.recipe,
+        want=part.want,
+        n_jobs=how.jobs,
+        step_timeout_s=how.step_timeout,
+        silence_s=how.silence,
+        memory_mb=how.memory,
+        # Forms are written of files.
+        store=replace(store, layout="files"),
+        dress_seeds=part.dress_seeds,
+    )
+
+
+def root_of(part: SetPart, out: Path) -> Path:
+    """Where a part is rendered."""
+    return out / _PARTS / part.name
+
+
+def finish_set(
+    data_set: DataSet,
+    out: Path,
+    planned: Mapping[str, Planned],
+    tell: Callable[[str], None] = lambda _line: None,
+) -> int:
+    """Select, write the forms, the index, the card and the checksums of a set that is rendered whole.
+
+    planned: part's name -> its views. What is done already is left alone. tell: called with a line
+    as something is made. Returns how many steps were made now. Raises BadInput for houses in a
+    part's folder that are none of the set's, and as export and pack do.
+    """
+    steps = _Steps(out, tell)
+    made = [_judged_part(data_set, part, out, planned[part.name], steps) for part in data_set.parts]
+    by_name = {of.part.name: of for of in made}
+    for form in data_set.forms:
+        for name in form.parts:
+            _write_form(data_set, form, by_name[name], out, steps)
+    texts = {
+        _INDEX: _index_text(data_set, made),
+        _CARD: card_text(data_set, [(of.part, of.root, of.kept, of.reasons) for of in made]),
+    }
+    for file, text in texts.items():
+        steps.sums[file] = keys.sha256(text.encode())
+        steps.write(file, text.encode())
+    steps.sums[data_set.file] = keys.sha256(data_set.data)
+    for of in made:
+        steps.sums |= _root_sums(of, out)
+    # The order of the names, so that two lists can be compared line by line.
+    lines = (f"{digest}  {name}\n" for name, digest in sorted(steps.sums.items()))
+    steps.write(SUMS, "".join(lines).encode())
+    return steps.n_made
+
+
+class _Steps:
+    """The steps of one call, each made unless its marker says that it is done."""
+
+    def __init__(self, out: Path, tell: Callable[[str], None]) -> None:
+        self.out = out
+        self.store = FolderStore(out)
+        self.sums: dict[str, str] = {}  # file -> sha256, of all steps
+        self.n_made = 0
+        self._tell = tell
+
+    def unless_done(
+        self, name: str, digest: str, make: Callable[[], object], files: Callable[[], Sequence[str]]
+    ) -> None:
+        """Make a step of that name where its marker is of another digest or a file is gone.
+
+        files: what it wrote, below the set's folder.
+        """
+        key = f"done/{name}.json"
+        held = json.loads(get_or_none(self.store, key) or b"{}")
+        sums = held.get("files", {})
+        is_done = held.get("digest") == digest and all((self.out / f).is_file() for f in sums)
+        if not is_done:
+            make()
+            sums = {file: digest_of_regular(self.out / file) for file in sorted(files())}
+            row = {"digest": digest, "files": sums}
+            self.store.put(key, json.dumps(row, indent=1).encode())
+            self.n_made += 1
+            self._tell(f"{name}: {len(sums)} files")
+        self.sums |= sums
+
+    def write(self, file: str, data: bytes) -> None:
+        """Write a file of the set's folder where it is not there with these bytes."""
+        if get_or_none(self.store, file) != data:
+            self.store.put(file, data)
+            self.n_made += 1
+
+
+def _judged_part(
+    data_set: DataSet, part: SetPart, out: Path, planned: Planned, steps: _Steps
+) -> MadePart:
+    """Which views of a part the forms have, by its rules."""
+    root = root_of(part, out)
+    _check_nothing_else(root, planned)
+    files = [keys.SELECTION, keys.selection_key(data_set.name, "jsonl")]
+
+    def judge() -> None:
+        wanted = {(house, view) for house, views in planned.items() for view in views}
+        entries = [e for e in views_of(root) if (e.house.id, e.id) in wanted]
+        found = judged_by(entries, part.rules)
+        write_verdicts(FolderStore(root), data_set.name, part.rules, found)
+
+    digest = keys.digest("select", part.rules, _manifest_digest(root), pbrs_farm.__version__)
+    below = root.relative_to(out).as_posix()
+    steps.unless_done(
+        f"select.{part.name}", digest, judge, lambda: [f"{below}/{file}" for file in files]
+    )
+    rows = [json.loads(line) for line in FolderStore(root).get(files[1]).splitlines()]
+    verdicts = tuple(RuleVerdict(r["house"], r["view"], r["reason"], {}) for r in rows)
+    summary: dict[str, Any] = json.loads(FolderStore(root).get(files[0]))
+    return MadePart(part, root, verdicts, summary["reasons"])
+
+
+def _check_nothing_else(root: Path, planned: Planned) -> None:
+    """Raise BadInput where the root holds houses or views that the set does not name."""
+    folder = root / keys.FOLDERS[0]
+    for house in sorted(folder.iterdir()) if folder.is_dir() else ():
+        hint = "name a new folder, or remove it"
+        if house.name not in planned:
+            raise BadInput(root, house.name, "is none of the set's homes", hint=hint)
+        views = house / "views"
+        for view in sorted(views.iterdir()) if views.is_dir() else ():
+            if view.name not in planned[house.name]:
+                place = f"{house.name}/{view.name}"
+                raise BadInput(root, place, "is none of the set's views", hint=hint)
+
+
+def _manifest_digest(root: Path) -> str:
+    return digest_of_regular(root / keys.MANIFEST)
+
+
+def _write_form(data_set: DataSet, form: SetForm, made: MadePart, out: Path, steps: _Steps) -> None:
+    """Write the kept views of a part in a form."""
+    if not made.kept:
+        return
+    folder = out / _FORMS / form.name / made.part.name
+
+    def write() -> None:
+        # What a killed call left.
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        if form.packing is None:
+            export(
+                made.root, folder, form.to, selection=data_set.name, choice=form.choice,
+                shares=data_set.shares,
+            )  # fmt: skip
+        else:
+            views = open_views(str(made.root)).only(selection=data_set.name)
+            modes = form.packing.modes or tuple(map(str, made.part.want.modes))
+            pack(views, folder, replace(form.packing, modes=modes), form=form.to)
+
+    def files() -> list[str]:
+        return [p.relative_to(out).as_posix() for p in folder.rglob("*") if p.is_file()]
+
+    verdicts = [[v.house, v.view, v.reason] for v in made.verdicts]
+    choice = repr(form.packing or form.choice)
+    digest = keys.digest(
+        form.to, choice, repr(data_set.shares), verdicts, _manifest_digest(made.root),
+        pbrs_farm.__version__,
+    )  # fmt: skip
+    steps.unless_done(f"{form.name}.{made.part.name}", digest, write, files)
+
+
+def _index_text(data_set: DataSet, made: Sequence[MadePart]) -> str:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(("part", "house", "view", "split", "left_out"))
+    for of in made:
+        for verdict in of.verdicts:
+            split = split_of_house(verdict.house, data_set.shares) if data_set.shares else ""
+            rows.writerow((of.part.name, verdict.house, verdict.view, split, verdict.reason))
+    return text.getvalue()
+
+
+def _root_sums(made: MadePart, out: Path) -> Iterator[tuple[str, str]]:
+    """(file, sha256) of what was rendered: by the manifest, whose files are not read again."""
+    below = made.root.relative_to(out).as_posix()
+    manifest = FolderStore(made.root).get(keys.MANIFEST)
+    for house, lines in lines_by_house(manifest):
+        # A home's manifest is its lines.
+        yield f"{below}/{keys.house_key(house, keys.MANIFEST)}", keys.sha256(lines)
+        for key, digest in sha256_by_key(lines).items():
+            yield f"{below}/{key}", digest
+    for file in _ROOT_FILES:
+        if (made.root / file).is_file():
+            yield f"{below}/{file}", digest_of_regular(made.root / file)

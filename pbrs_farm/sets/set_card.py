@@ -1,0 +1,120 @@
+"""README.md of a made set: what it is, how many views, how it was made, how to check it. Effects: reads roots."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.house_split import SPLITS, home_of, split_of_house
+from pbrs_farm.curate.teaching_rules import RuleVerdict
+from pbrs_farm.sets.data_set import DataSet, SetPart
+
+MadeViews = tuple[SetPart, Path, Sequence[RuleVerdict], Mapping[str, int]]
+"""A part, its root, the views that the forms have, and how many are left out for which reason."""
+
+_COMMAND = """```sh
+pbrs-farm make {file} --out {name}   # the same files again: nothing is needed but this one
+sha256sum --check --quiet SHA256SUMS # nothing is printed where all files are as they were made
+```"""
+
+
+def card_text(data_set: DataSet, made: Sequence[MadeViews]) -> str:
+    """The card in Markdown; equal for equal sets."""
+    card = data_set.card
+    licence = card.licence and f"Licence: {card.licence}."
+    blocks = [
+        f"# {card.title}",
+        card.text.strip(),
+        licence,
+        _table(("part", "split", "homes", "houses", "views"), list(_split_rows(data_set, made))),
+        _split_text(data_set),
+        *(_part_text(*of) for of in made),
+        "## Forms",
+        _forms_text(data_set),
+        "## Made again, and checked",
+        _COMMAND.format(file=data_set.file, name=data_set.name),
+        f"The file has the digest `{keys.sha256(data_set.data)}` (SHA-256). Files are equal to the last bit by one version of "
+        "pbrs_farm on processors of one kind; another kind may round a last digit otherwise.",
+        _credits(made),
+    ]
+    return "\n\n".join(block for block in blocks if block) + "\n"
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
+
+
+def _split_rows(data_set: DataSet, made: Sequence[MadeViews]) -> Iterator[tuple[object, ...]]:
+    for part, _root, kept, _reasons in made:
+        of: dict[str, list[RuleVerdict]] = {}
+        for verdict in kept:
+            shares = data_set.shares
+            split = split_of_house(verdict.house, shares) if shares else "all"
+            of.setdefault(split, []).append(verdict)
+        for split in (*SPLITS, "all"):
+            if own := of.get(split):
+                houses = {verdict.house for verdict in own}
+                homes = {home_of(house) for house in houses}
+                yield part.name, split, len(homes), len(houses), len(own)
+
+
+def _split_text(data_set: DataSet) -> str:
+    shares = data_set.shares
+    if shares is None:
+        return (
+            "It is not split. Split it by home, not by view: rooms of a home share their furniture."
+        )
+    text = "/".join(f"{100 * share:g}" for share in (shares.train, shares.val, shares.test))
+    return f"Split {text} by home: all views of a home, however it is dressed, are in one part."
+
+
+def _part_text(
+    part: SetPart, _root: Path, kept: Sequence[RuleVerdict], reasons: Mapping[str, int]
+) -> str:
+    recipe, want = part.recipe, part.want
+    left_out = [f"{n} {reason}" for reason, n in sorted(Counter(reasons).items()) if n]
+    seeds = part.dress_seeds or ((recipe.dress.seed,) if recipe.dress.seed else ())
+    rows = [
+        f"Pictures: {', '.join(map(str, want.modes)) or 'none'}, {recipe.image.width_px}x{recipe.image.height_px}.",
+        f"Layers beside those of every view: {', '.join(want.layers) or 'none'}.",
+        f"Cameras: {recipe.cameras.source}, preset {recipe.cameras.preset}, lens {recipe.lens.model};"
+        f" pictures by the camera {recipe.tone.camera}, {recipe.tone.variants} more by one that is drawn.",
+        f"Light: {recipe.light.integrator}, {recipe.light.spp} samples a pixel; sky {recipe.sky.kind}, {recipe.sky.time}.",
+        f"Recipe: {recipe.name}, digest {recipe.digest()}, seed {recipe.seed}.",
+        f"Homes: {len(part.homes)}, {'dressed by ' + _shortened(seeds) if seeds else 'as they were drawn'}.",
+        f"Views left out of the forms: {', '.join(left_out) or 'none'}.",
+    ]
+    return "\n".join(
+        [
+            f"## {part.name}: {len(kept)} view{'s' * (len(kept) != 1)}",
+            "",
+            *(f"- {row}" for row in rows),
+        ]
+    )
+
+
+def _shortened(seeds: Sequence[int]) -> str:
+    many = f" and {len(seeds) - 8} more" if len(seeds) > 8 else ""
+    return ", ".join(map(str, seeds[:8])) + many
+
+
+def _forms_text(data_set: DataSet) -> str:
+    rows = ["- `parts/<part>`: everything that was rendered (docs/formats.md of pbrs_farm)"]
+    rows += [f"- `forms/{f.name}/<part>`: {f.to}, of {', '.join(f.parts)}" for f in data_set.forms]
+    return "\n".join([*rows, "- `index.csv`: each view, its split, and why it is left out"])
+
+
+def _credits(made: Sequence[MadeViews]) -> str:
+    files = [
+        f"`parts/{part.name}/{keys.ATTRIBUTION}`"
+        for part, root, _kept, _reasons in made
+        if (root / keys.ATTRIBUTION).is_file()
+    ]
+    if not files:
+        return ""
+    return (
+        f"## Credits\n\nThe pictures show works of others, which must be named: {', '.join(files)}."
+    )
