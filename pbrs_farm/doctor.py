@@ -17,8 +17,11 @@ from typing import Final, Literal
 
 from pbrs_farm.installation import (
     EXTRA_OF,
+    GIVES,
     install_command,
     is_installed,
+    llvm_command,
+    missing_extras,
     mitsuba_command,
     system_command,
 )
@@ -33,6 +36,13 @@ _PACKAGES: Final = (
     "numpy", "pydantic", "mitsuba", "drjit", "moderngl", "trimesh", "manifold3d", "pyoidn",
     "OpenImageIO", "shapely",
 )  # fmt: skip
+_GIVES: Final = {
+    "LLVM": GIVES["llvm"],
+    "mitsuba cuda_ad_rgb": "light of a view in a second or two",
+    "mitsuba llvm_ad_rgb": "light and labels several times faster",
+    "GL": "the pictures opengl_dl and opengl_il; without it they are left out",
+    "redis": GIVES["workers"],
+}
 _VARIANTS: Final = ("cuda_ad_rgb", "llvm_ad_rgb", "scalar_rgb")
 
 
@@ -45,6 +55,11 @@ class Finding:
     text: str
     remedy: str = ""
     needed: bool = False  # the main job cannot run without it
+
+    @property
+    def gives(self) -> str:
+        """What the part would give where it is not there and the main job does without; "" else."""
+        return "" if self.state == "ok" else _GIVES.get(self.part, "")
 
 
 def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
@@ -63,6 +78,7 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
         _probe(GL, check_gl, _gl_remedy(), state="degraded"),
         _probe("denoiser", check_denoiser, again, needed=True),
         _probe("pictures", check_pictures, again, needed=True),
+        _extras(),
         _redis(redis_url),
         _store(store_url),
     ]
@@ -95,6 +111,14 @@ def _packages() -> Finding:
     return Finding("packages", "ok", ", ".join(found))
 
 
+def _extras() -> Finding:
+    missing = missing_extras()
+    if not missing:
+        return Finding("extras", "ok", "all installed")
+    given = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
+    return Finding("extras", "degraded", f"not installed: {given}", install_command(*missing))
+
+
 def _llvm() -> Finding:
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm, llvm_libraries
 
@@ -105,7 +129,7 @@ def _llvm() -> Finding:
     old = ", ".join(".".join(map(str, v)) for v, _path in llvm_libraries())
     text = f"only {old}; 14 to 16 crash inside Dr.Jit" if old else "no libLLVM found"
     text += f"; {MIN_LLVM} or later is needed (19 is what we test); running with scalar_rgb, several times slower"
-    return Finding("LLVM", "degraded", text, system_command("llvm"))
+    return Finding("LLVM", "degraded", text, llvm_command())
 
 
 def _variants() -> list[Finding]:
@@ -124,7 +148,7 @@ def _variant_remedy(name: str) -> str:
     """What to do where a variant of Mitsuba does not work."""
     if name == "cuda_ad_rgb":
         return "only with an NVIDIA GPU and its driver; not needed"
-    return system_command("llvm") if name == "llvm_ad_rgb" else mitsuba_command()
+    return llvm_command() if name == "llvm_ad_rgb" else mitsuba_command()
 
 
 def _gl_remedy() -> str:

@@ -6,6 +6,7 @@ A wheel takes its extras by name, a checkout from its own folder; each system ha
 from __future__ import annotations
 
 import ctypes
+import platform
 import shutil
 import sys
 from importlib.util import find_spec
@@ -22,6 +23,15 @@ EXTRA_OF: Final = {
     "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
 }  # fmt: skip
 """Module -> the extra of pyproject.toml that installs it; "" where every installation has it."""
+
+GIVES: Final = {
+    "llvm": "light and labels several times faster, where the system has no LLVM",
+    "s3": "stores on S3", "workers": "a farm of many machines", "board": "a run in a browser",
+    "selection": "choosing views by photographs", "video": "films of walks",
+    "physics": "models that fall and lie", "usd": "homes from and to USD", "ifc": "homes from IFC",
+    "gltf": "packed meshes and textures of glTF",
+}  # fmt: skip
+"""Extra that a user may want -> what it gives."""
 
 # System -> what is needed -> the command that installs it.
 _COMMANDS: Final = {
@@ -103,6 +113,19 @@ def system_command(what: str, system: str = "") -> str:
     On a system that we know no command of, a sentence that says what to install.
     """
     return _COMMANDS.get(system or this_system(), _WHAT).get(what, _WHAT[what])
+
+
+def llvm_command() -> str:
+    """The command that adds LLVM: pip's, which needs no root, where there is a wheel of it."""
+    if sys.platform == "linux" and platform.machine() == "x86_64":
+        return install_command("llvm")
+    return system_command("llvm")
+
+
+def missing_extras() -> list[str]:
+    """The extras of GIVES that lack a module here; LLVM's is no module and never among them."""
+    lacking = {EXTRA_OF[name] for name in EXTRA_OF if not is_installed(name)}
+    return [extra for extra in GIVES if extra in lacking]
 
 
 def mitsuba_command() -> str:

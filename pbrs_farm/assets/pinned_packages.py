@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -55,6 +54,12 @@ PINS: Final = {
             31389128,
             "5ceaf56a49ba3ded95c751d739aeec3d19e7fad76fba5cb70666986af9303b0e",
         ),
+        Pin(
+            "libatomic1",
+            "pool/main/g/gcc-12/libatomic1_12.2.0-14+deb12u1_amd64.deb",
+            9376,
+            "fbd4e154a6b444229ea002cc209df099209c0adc09102e5fd21239a3d2b55e2d",
+        ),
     )
 }
 
@@ -65,6 +70,8 @@ def download_pinned(pin: Pin, folder: Path) -> Path:
     From PBRS_DEBIAN_MIRROR where it is set. Size and sha256 are compared, so no signature is
     needed; a file that differs is removed. One try, with a time limit.
     """
+    import urllib.request  # with all of HTTP, which most commands do without
+
     mirror = os.environ.get("PBRS_DEBIAN_MIRROR", "") or DEFAULT_MIRROR
     url, path = f"{mirror.rstrip('/')}/{pin.path}", folder / pin.file_name
     digest, size = hashlib.sha256(), 0

@@ -57,6 +57,8 @@ def _doctor(args: argparse.Namespace) -> int:
         echo(f"{mark}  {f.part:<20} {f.text}")
         if f.state != "ok" and f.remedy:
             echo(f"{'':<32}-> {f.remedy}")
+        if f.gives:
+            echo(f"{'':<32}   gives {f.gives}")
     echo()
     echo(_verdict(findings, is_fine=fine))
     return 0 if fine else 1
@@ -69,8 +71,7 @@ def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
     if not is_fine:
         return "This machine cannot render yet: see MISSING above."
     if any(f.part == GL and f.state != "ok" for f in findings):
-        modes = "--modes mlt_ol mlt_il_ol"
-        return f"This machine can render by path tracing alone: {modes}. See {GL} above."
+        return f"This machine can render by path tracing; OpenGL's pictures are left out. See {GL} above."
     return "This machine can render."
 
 

@@ -27,7 +27,7 @@ from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.core.shown_text import hint_of_choice
-from pbrs_farm.installation import need, system_command
+from pbrs_farm.installation import llvm_command, need
 
 if TYPE_CHECKING:
     from pbrs_farm.prepare.source import SourceRef
@@ -198,7 +198,7 @@ def _warn_of_slowness() -> None:
     if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
         warn(
             f"no LLVM of version {MIN_LLVM} or later: going on with Mitsuba's scalar_rgb, several"
-            f" times slower ({system_command('llvm')})"
+            f" times slower ({llvm_command()})"
         )
 
 
@@ -215,6 +215,9 @@ def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> Non
             f"{summary.n_kept} already there, {len(summary.failures)} failed; "
             f"{seconds:.1f} s, peak {summary.peak_mb:.0f} MB a process"
         )
+    for reason in dict.fromkeys(summary.lacking.values()):
+        steps = [step for step, why in summary.lacking.items() if why == reason]
+        warn(f"{' and '.join(steps)} left out: {reason}")
     for house, reason in summary.leaks:
         warn(f"{house}: LIGHT LEAKS IN: {reason}; see repair.json, or `pbrs-farm repair`")
     for house, reason in summary.walls_lost:
@@ -247,6 +250,7 @@ def _summary_line(summary: Summary, seconds: float) -> str:
         "dark": [list(pair) for pair in summary.dark], "failures": failures,
         "leaks": [list(pair) for pair in summary.leaks],
         "walls_lost": [list(pair) for pair in summary.walls_lost], "notes": dict(summary.notes),
+        "lacking": summary.lacking,
     }  # fmt: skip
     return json.dumps(row)
 

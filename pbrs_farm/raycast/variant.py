@@ -1,18 +1,23 @@
 """Choice of the Mitsuba variant that works on this machine, and of LLVM's library for it.
 
-Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process.
+Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process, and loads the libraries that
+Dr.Jit and LLVM are linked with where the system has none.
 """
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import functools
 import importlib
 import os
 import re
+import site
 import sys
 from pathlib import Path
 from typing import Any, Final
 
+from pbrs_farm.assets.libatomic import load_libatomic
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.installation import mitsuba_command
 
@@ -29,6 +34,8 @@ _LIBRARY_PLACES: Final = (
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
 )
+# Beside the LLVM of a wheel (karellen-llvm-core), as it needs them: each after those it is linked with.
+_BESIDE_LLVM: Final = ("libunwind.so.1.0", "libc++abi.so.1.0", "libc++.so.1.0")
 
 
 def _module(name: str) -> Any:
@@ -53,11 +60,12 @@ def llvm_version(library: Path) -> tuple[int, ...]:
 def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
     """(version, path) of every libLLVM in the usual places, newest first, one path per file.
 
-    For messages and for choosing: none is loaded. The places of Linux distributions, of Homebrew
-    and of the Python environment are looked into; DRJIT_LIBLLVM_PATH is `find_llvm`'s affair.
+    For messages and for choosing: none is loaded. The places of Linux distributions, of Homebrew,
+    of the Python environment and of the user's own packages (pip's --user) are looked into;
+    DRJIT_LIBLLVM_PATH is `find_llvm`'s affair.
     """
-    environment = Path(sys.prefix)
-    patterns = (*_LIBRARY_PLACES, str(environment / "lib" / "libLLVM*.so*"))
+    of_python = (sys.prefix, site.getuserbase())
+    patterns = (*_LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
     found: dict[Path, tuple[int, ...]] = {}
     for pattern in patterns:
         for path in Path("/").glob(pattern.lstrip("/")):
@@ -84,16 +92,33 @@ def find_llvm() -> Path | None:
 
 
 @functools.cache
-def choose_variant() -> str:
-    """cuda_ad_rgb if a GPU really works, else llvm_ad_rgb with LLVM >= 17, else scalar_rgb.
+def name_libraries() -> Path | None:
+    """Set DRJIT_LIBLLVM_PATH to what `find_llvm` finds, which is returned, and load what it needs.
 
-    Sets DRJIT_LIBLLVM_PATH before Dr.Jit loads LLVM. Each variant is tried with one ray.
-    Raises MachineFailed when Mitsuba is not installed or no variant works.
+    Must come before anything imports drjit, which loads LLVM then and never again: a package whose
+    modules begin with `import drjit` calls it. What cannot be loaded is told by what needs it.
     """
-    # Name the library first: Dr.Jit loads LLVM when it is imported.
+    with contextlib.suppress(MachineFailed):
+        load_libatomic()
     library = find_llvm()
     if library is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
+        # Their links have other names where the wheel was unpacked and Python not started since.
+        folder = library.parent / "x86_64-unknown-linux-gnu"
+        with contextlib.suppress(OSError):
+            for name in _BESIDE_LLVM if folder.is_dir() else ():
+                ctypes.CDLL(str(folder / name))
+    return library
+
+
+@functools.cache
+def choose_variant() -> str:
+    """cuda_ad_rgb if a GPU really works, else llvm_ad_rgb with LLVM >= 17, else scalar_rgb.
+
+    Each variant is tried with one ray. Raises MachineFailed when Mitsuba is not installed or no
+    variant works.
+    """
+    library = name_libraries()
     dr = _module("drjit")
     # Prefer the GPU, then LLVM, then Mitsuba without Dr.Jit's arrays.
     if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
@@ -125,6 +150,13 @@ def set_threads(n_threads: int) -> None:
     """
     choose_variant()
     importlib.import_module("drjit").set_thread_count(n_threads)
+
+
+def llvm_of_variant(variant: str) -> str:
+    """The version of LLVM that compiles a variant's kernels, such as "19.1.7"; "" where none does."""
+    if not variant.startswith("llvm"):
+        return ""
+    return ".".join(map(str, _module("drjit").detail.llvm_version()))
 
 
 def _has_good_llvm(dr: Any) -> bool:

@@ -52,4 +52,5 @@ class Summary:
     walls_lost: list[tuple[str, str]] = field(default_factory=list)  # house, walls repair lost
     notes: Counter[str] = field(default_factory=Counter)  # of the houses, by kind
     taken_out: Counter[str] = field(default_factory=Counter)  # "person", "plant": how many
+    lacking: dict[str, str] = field(default_factory=dict)  # step this machine cannot do -> why
     dark: list[tuple[str, str]] = field(default_factory=list)  # house/view, how dark it is

@@ -54,6 +54,8 @@ STEPS: Final = {
 }  # fmt: skip
 
 
+OPENGL_STEPS: Final = ("opengl_dl", "opengl_il")
+
 # Every recipe group that something stored depends on (selection judges, it makes nothing).
 PICTURE_GROUPS: Final = tuple(
     sorted({*passes.GROUPS, *(g for s in STEPS.values() for g in s.groups)})
@@ -92,7 +94,7 @@ def view_steps(want: Wanted) -> tuple[str, ...]:
     is.
     """
     names = ["truth"]
-    names += [m.value for m in (Mode.OPENGL_DL, Mode.OPENGL_IL) if m in want.modes]
+    names += [name for name in OPENGL_STEPS if Mode(name) in want.modes]
     if any(m.groups for m in want.modes):
         names += ["light", "develop"]
     return (*names, "view")

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Literal
 
-from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
@@ -119,10 +119,14 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     limit_threads(name, setting.n_threads)
     send(Message("step", name))
     started = time.perf_counter()
+    kind: Literal["failed", "lacking"] = "failed"
     try:
         outcome = run_step(name, work)
     except PbrsError as error:
         message = str(error)
+        # Without OpenGL here its pictures are left out, where there are others.
+        if isinstance(error, MachineFailed) and name in plan.OPENGL_STEPS:
+            kind = "lacking"
     except Exception as error:  # noqa: BLE001  any other fault costs this step, not the run
         message = shown(f"{type(error).__name__}: {error}", MAX_MESSAGE)
         traceback.print_exc()
@@ -134,7 +138,7 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
         send(Message("event", body=asdict(_event_of_outcome(work, name, outcome, seconds))))
         return True
     message += "\n" + traceback.format_exc() if setting.debug else ""
-    failed = Event("failed", work.house_id, work.view_id, name, message=message)
+    failed = Event(kind, work.house_id, work.view_id, name, message=message)
     send(Message("event", body=asdict(failed)))
     return False
 

@@ -137,8 +137,13 @@ class Schedule:
         summary = self._summary
         summary.peak_mb = max(summary.peak_mb, event.peak_mb)
         key = (event.house_id, event.view_id or "")
+        # What a machine lacks is a fault where nothing else was asked for.
+        if event.kind == "lacking" and not any(m.groups for m in self._run.want.modes):
+            event = replace(event, kind="failed")
         if event.kind in ("done", "kept"):
             self._take_done(event)
+        elif event.kind == "lacking":
+            summary.lacking[event.step] = event.message
         elif event.kind == "failed":
             what = "/".join(x for x in (event.house_id, event.view_id, event.step) if x)
             summary.failures.append((what, event.message, self._command(event)))

@@ -34,6 +34,7 @@ from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.prepare.finished_house import finished_house
+from pbrs_farm.raycast.variant import llvm_of_variant
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.house_cache import CachedHouse
@@ -265,7 +266,10 @@ def _facts_of_light(
     facts = {**result.facts, "noise": result.noise}
     if result.spp:  # Metropolis counts mutations instead
         facts["spp"] = result.spp
-    facts |= {"n_nonfinite": result.n_nonfinite, "variant": cached.light_scene.variant}
+    variant = cached.light_scene.variant
+    facts |= {"n_nonfinite": result.n_nonfinite, "variant": variant}
+    if llvm := llvm_of_variant(variant):
+        facts["llvm"] = llvm
     facts |= {"sky": cached.sky.facts()}
     # The transport knows a lamp's item, the house its name.
     items = cached.house.items

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm.assets import debian, furniture_package, homes_package, skies
+from pbrs_farm.assets import debian, furniture_package, homes_package, libatomic, skies
 from pbrs_farm.assets.debian import fetched_deb, version_of
 from pbrs_farm.assets.pinned_packages import PINS, Pin, download_pinned
 from pbrs_farm.core.errors import MachineFailed
@@ -97,7 +97,8 @@ def test_where_apt_has_no_lists_the_pinned_file_is_fetched(
 
 
 def test_what_is_pinned_is_what_is_tested() -> None:
-    tested = {m.PACKAGE: m.TESTED_VERSION for m in (homes_package, furniture_package, skies)}
+    modules = (homes_package, furniture_package, skies, libatomic)
+    tested = {m.PACKAGE: m.TESTED_VERSION for m in modules}
     assert {name: version_of(Path(pin.file_name)) for name, pin in PINS.items()} == tested
 
 

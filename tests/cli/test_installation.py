@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pbrs_farm import installation
+from pbrs_farm import doctor, installation
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.installation import (
     EXTRA_OF,
@@ -34,6 +34,45 @@ def test_every_extra_named_is_one_of_pyproject() -> None:
     assert set(of_all) == set(extras) - {
         "all", "bench", "dev", "docs", "notebooks", "release", "study", "study-peers", "tensorboard", "wandb",
     }  # fmt: skip
+
+
+def test_what_every_extra_of_all_gives_is_said() -> None:
+    extras = tomllib.loads((REPO / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
+    assert set(installation.GIVES) == set(extras["all"][0].partition("[")[2].strip("]").split(","))
+
+
+def test_what_is_missing_is_named_with_what_it_would_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "missing_extras", lambda: ["board", "usd"])
+    monkeypatch.setattr(doctor, "install_command", lambda *names: f"pip install {','.join(names)}")
+    found = doctor._extras()
+    assert (found.state, found.remedy) == ("degraded", "pip install board,usd")
+    assert "board: a run in a browser; usd: homes from and to USD" in found.text
+    assert doctor.can_run([found])
+    monkeypatch.setattr(installation, "is_installed", lambda name: name != "uvicorn")
+    assert installation.missing_extras() == ["board"]
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "command"),
+    [
+        ("linux", "x86_64", "pip install 'pbrs-farm[llvm]'"),
+        ("linux", "aarch64", "sudo apt-get install -y libllvm19"),
+        ("darwin", "arm64", "brew install llvm"),
+    ],
+)
+def test_llvm_comes_by_pip_where_it_has_a_wheel(
+    system: str, machine: str, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    monkeypatch.setattr(installation, "checkout_folder", lambda: None)
+    monkeypatch.setattr(installation, "pip_command", lambda: "pip")
+    monkeypatch.setattr(
+        installation, "this_system", lambda: "macos" if system == "darwin" else "debian"
+    )
+    assert installation.llvm_command() == command
 
 
 def test_a_checkout_and_a_wheel_are_told_apart(

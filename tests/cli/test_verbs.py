@@ -76,7 +76,8 @@ def test_a_machine_without_opengl_alone_can_render_by_path_tracing(monkeypatch, 
     monkeypatch.setattr(doctor, "examine", lambda *_: findings)
     assert main(["doctor"]) == 0
     text = capsys.readouterr().out
-    assert "can render by path tracing alone: --modes mlt_ol mlt_il_ol" in text
+    assert "can render by path tracing; OpenGL's pictures are left out" in text
+    assert "gives the pictures opengl_dl and opengl_il" in text
     assert "cannot render" not in text
 
 

@@ -1,6 +1,10 @@
 """Which LLVM is taken, and that the chosen variant traces rays."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,6 +37,7 @@ def test_the_newest_library_wins_over_an_old_one_named_by_the_environment(
         (tmp_path / name).touch()
     monkeypatch.setattr(variant, "_LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
     monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
+    monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM-14.so.1"))
     assert variant.find_llvm() == tmp_path / "libLLVM.so.19.1"
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(tmp_path / "libLLVM.so.18.1"))
@@ -46,8 +51,59 @@ def test_versions_that_crash_are_never_taken(
         (tmp_path / name).touch()
     monkeypatch.setattr(variant, "_LIBRARY_PLACES", (str(tmp_path / "libLLVM*.so*"),))
     monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
+    monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
     assert variant.find_llvm() is None
+
+
+@pytest.mark.parametrize("place", ["sys.prefix", "site.getuserbase"])
+def test_the_library_of_a_wheel_is_found_in_the_environment_and_in_the_users_packages(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib/libLLVM.so.23.1").touch()
+    monkeypatch.setattr(variant, "_LIBRARY_PLACES", ())
+    monkeypatch.setattr("sys.prefix", str(tmp_path / "none"))
+    monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
+    monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
+    assert variant.find_llvm() is None
+    there = str(tmp_path)
+    monkeypatch.setattr(place, there if place == "sys.prefix" else lambda: there)
+    assert variant.find_llvm() == tmp_path / "lib/libLLVM.so.23.1"
+
+
+# Says, when drjit is imported, what it would load, and stops there.
+_AT_DRJIT = """
+import os, sys
+class Stop:
+    def find_spec(self, name, *_):
+        if name == "drjit":
+            print(os.environ.get("DRJIT_LIBLLVM_PATH"))
+            os._exit(0)
+sys.meta_path.insert(0, Stop())
+import {module}
+"""
+
+
+@pytest.mark.parametrize(
+    "module", ["pbrs_farm.transport.kernels.outside", "pbrs_farm.transport.path_tracer"]
+)
+def test_llvm_is_named_before_any_module_of_ours_imports_drjit(module: str) -> None:
+    # Dr.Jit loads LLVM as it is imported: a module that comes first would leave the scalar variant.
+    environment = {k: v for k, v in os.environ.items() if k != "DRJIT_LIBLLVM_PATH"}
+    command = [sys.executable, "-c", _AT_DRJIT.format(module=module)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == str(variant.find_llvm())
+
+
+def test_the_version_that_compiles_is_told_of_variants_that_compile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drjit = SimpleNamespace(detail=SimpleNamespace(llvm_version=lambda: (19, 1, 7)))
+    monkeypatch.setattr(variant, "_module", lambda _name: drjit)
+    assert variant.llvm_of_variant("llvm_ad_rgb") == "19.1.7"
+    assert variant.llvm_of_variant("scalar_rgb") == ""
+    assert variant.llvm_of_variant("cuda_ad_rgb") == ""
 
 
 def test_the_chosen_variant_is_one_that_traces_rays() -> None:

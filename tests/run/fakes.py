@@ -6,7 +6,7 @@ import os
 import signal
 import time
 
-from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.run.plan import STEPS
 from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, run_unless_done
 
@@ -28,13 +28,15 @@ def _make(name: str, work: Work) -> StepOutput:
     word, _, place = work.recipe.name.partition(":")
     where, _, home = place.partition("@")  # of any house, or of one whose id begins so
     at = f"{name}.{work.view_id}" if STEPS[name].per_view else name
-    if at == where and work.house_id.startswith(home):
+    if where in (at, name) and work.house_id.startswith(home):
         if word == "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
         if word == "hang":
             time.sleep(60)
         if word == "refuse":
             raise BadHouse("some.sh3d", "wall w3", "is made of cheese")
+        if word == "bare":
+            raise MachineFailed("no OpenGL here", hint="install it")
         if word == "bug":
             raise ZeroDivisionError("a bug")
     if name == "illuminance" and word == "dark":

@@ -76,6 +76,22 @@ def test_a_failed_step_leaves_out_only_what_reads_it(tmp_path: Path) -> None:
     assert summary.n_done == N_STEPS - len(missing)
 
 
+def test_opengl_that_the_machine_lacks_is_left_out_and_told_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(making, "recipe_of", lambda _args: named("bare:opengl_dl"))
+    assert main(["run", "builtin", "--out", str(tmp_path / "all")]) == 0
+    told = capsys.readouterr()
+    assert told.err.count("opengl_dl left out: no OpenGL here (install it)") == 1
+    assert "0 failed" in told.out
+    made = markers(tmp_path / "all")
+    assert not [m for m in made if m.startswith("opengl_dl")]
+    assert {"light.0_0_0", "opengl_il.0_0_0", "view.0_0_0", "view.0_0_1"} <= made
+    # Where nothing else was asked for it is a fault.
+    assert main(["run", "builtin", "--out", str(tmp_path / "gl"), "--modes", "opengl_dl"]) == 1
+    assert "FAILED: no OpenGL here" in capsys.readouterr().err
+
+
 def test_illuminance_that_fails_is_told_once_and_costs_the_light_of_every_view(
     tmp_path: Path,
 ) -> None:

@@ -45,8 +45,8 @@ class Event:
 
     # done: made now; kept: was there already; end: of a task. planned: the views of a house that
     # will be made, known once its cameras are and the dark ones left out. under_way: facts hold the
-    # "share" of a long step that is done.
-    kind: Literal["begin", "done", "kept", "failed", "end", "planned", "under_way"]
+    # "share" of a long step that is done. lacking: the machine cannot do the step, message says why.
+    kind: Literal["begin", "done", "kept", "failed", "lacking", "end", "planned", "under_way"]
     house_id: str
     view_id: str | None
     step: str

@@ -1,0 +1,61 @@
+"""GCC's libatomic, which Dr.Jit and LLVM's wheel are linked with and bare systems lack.
+
+Effects: loads it into this process: the system's, else that of Debian's package, which is downloaded once
+(9 KB) as debian.py does and kept, unpacked, in the cache folder.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import platform
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from pbrs_farm.core.errors import MachineFailed
+
+if TYPE_CHECKING:
+    from pbrs_farm.assets.debian import Deb
+
+NAME: Final = "libatomic.so.1"
+PACKAGE: Final = "libatomic1"
+TESTED_VERSION: Final = "12.2.0-14+deb12u1"
+
+
+def load_libatomic() -> None:
+    """Load libatomic, so that libraries loaded afterwards find it by its name.
+
+    Nothing on systems that are not Linux. Raises MachineFailed, saying what to do, where neither the
+    system nor Debian has it.
+    """
+    if sys.platform != "linux":
+        return
+    try:
+        ctypes.CDLL(NAME)
+    except OSError:
+        from pbrs_farm.assets.debian import fetched_deb
+
+        _load(unpacked_library(fetched_deb(PACKAGE, TESTED_VERSION)))
+
+
+def unpacked_library(deb: Deb) -> Path:
+    """The library of a package, beside it in the cache; MachineFailed where the package has none."""
+    from pbrs_farm.assets.debian import write_whole
+
+    library = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}" / NAME
+    if not library.exists():
+        files = deb.members(lambda name: name.rpartition("/")[2].startswith(f"{NAME}."))
+        if not files:
+            raise deb.damaged(f"holds no {NAME}")
+        library.parent.mkdir(exist_ok=True)
+        write_whole(library, next(iter(files.values())))
+    return library
+
+
+def _load(library: Path) -> None:
+    # Once it is loaded, the linker finds it by the name that it has itself.
+    try:
+        ctypes.CDLL(str(library))
+    except OSError as error:
+        text = f"{error}; Debian's file is for x86-64, this machine is {platform.machine()}"
+        raise MachineFailed(text, hint="install libatomic (of GCC)") from None
