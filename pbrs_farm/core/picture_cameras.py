@@ -110,6 +110,6 @@ def picture_camera(name: str, tone: ToneFields, sensor: SensorFields, seed: int)
         z = deviation * float(rng.normal())
         held = values.get(f, getattr(tone, f))
         values[f] = round(held * 2**z if f == "contrast" else held + z, 4)
-    if sensor == SensorFields() and row.sensor != "none":
-        sensor = SensorFields(preset=row.sensor)
+    if not sensor.is_on and row.sensor != "none":
+        sensor = SensorFields(preset=row.sensor, **sensor.model_dump(exclude_defaults=True))
     return PictureCamera(name, tone.model_copy(update={**values, "camera": name}), sensor)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.optics_fields import SENSOR_PRESETS
 from pbrs_farm.core.picture_cameras import CAMERAS, ERRING
 from pbrs_farm.core.recipe import ToneFields, recipe_from_name
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs, wanted_exposures
@@ -148,6 +149,14 @@ def test_what_the_recipe_sets_is_kept_whatever_the_camera() -> None:
     words = {"tone.camera": "phone", "tone.sharpening": "0.1", "sensor.preset": "webcam"}
     camera = recipe_from_name("fast", words).camera_of("h", "0_0_1")
     assert (camera.tone.sharpening, camera.sensor.preset) == (0.1, "webcam")
+    words = {"tone.camera": "phone", "sensor.jpeg_quality": "50", "sensor.lag_s": "0.3"}
+    own, phone = (
+        recipe_from_name("fast", words).camera_of("h", "0_0_1").sensor,
+        SENSOR_PRESETS["phone"],
+    )
+    assert (own.jpeg_quality, own.lag_s) == (50, 0.3)
+    assert own.is_on
+    assert own.full_well_e == phone["full_well_e"]
 
 
 def test_drawn_cameras_are_of_all_kinds_and_of_a_variant_another_each() -> None:
