@@ -45,7 +45,7 @@ STEPS: Final = {
         Step("illuminance", 9, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 24, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
+            "light", 25, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
         Step("develop", 8, ("tone", "light", "sensor"), ("light",), needs=("light",)),

@@ -41,7 +41,7 @@ from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
 _NULLS_APART: Final = (
-    12  # random dimensions, in vertices, of what a pane mirrors from what is behind it
+    12  # random dimensions, in vertices, of what glass mirrors from what is behind it
 )
 
 
@@ -123,7 +123,7 @@ class _LampSums(NamedTuple):
 
 @dataclass
 class _MirroredPath:
-    """What the first pane on a sample's way mirrors: followed when the path through it has ended."""
+    """What the first glass on a sample's way mirrors: followed when the path through it has ended."""
 
     o: mi.Point3f
     d: mi.Vector3f
@@ -133,7 +133,7 @@ class _MirroredPath:
     rest: mi.Float  # share in the guides of this path
     share: mi.Float  # of the path under way
     waits: mi.Bool
-    met: mi.Bool  # a pane was met by this sample
+    met: mi.Bool  # such glass was met by this sample
 
     def start(self, fresh: Any) -> None:
         """Begin a sample."""
@@ -141,7 +141,7 @@ class _MirroredPath:
         self.met = self.met & ~fresh
 
     def keep(self, ray: MirroredRay | None, path: PathState) -> None:
-        """Keep the ray of the first pane that a sample meets; path: behind it."""
+        """Keep the ray of the first glass that a sample meets; path: behind it."""
         if ray is None:
             return
         first = ray.is_there & ~self.met
@@ -149,7 +149,7 @@ class _MirroredPath:
         self.d = dr.select(first, ray.d, self.d)
         self.beta = dr.select(first, ray.beta, self.beta)
         self.depth = dr.select(first, path.depth, self.depth)
-        # Its vertices take other random dimensions than those behind the pane.
+        # Its vertices take other random dimensions than those behind the glass.
         self.n_nulls = dr.select(first, path.n_nulls + _NULLS_APART, self.n_nulls)
         self.rest = dr.select(first, ray.own_share, self.rest)
         self.share = dr.select(first, 1 - ray.share, self.share)
@@ -256,7 +256,7 @@ def trace(
     depth_fields = device_fields(light, max_depth=max_depth)
     total = _trace(
         PathContext(
-            scene, emitters, depth_fields, emitter_filter, sunlit, may_guide, splits_panes=True
+            scene, emitters, depth_fields, emitter_filter, sunlit, may_guide, splits_glass=True
         ),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
@@ -347,7 +347,7 @@ def _trace(
         sums.add_guides(result, seen, first_rough, pane.share)
         seen = seen | first_rough
 
-        # Where the path ends, follow what a pane has mirrored; close the sample where it has not.
+        # Where the path ends, follow what glass has mirrored; close the sample where it has not.
         done = active & ~alive
         if dr.hint(result.mirrored is not None, mode="scalar"):
             pane.keep(result.mirrored, path)

@@ -54,6 +54,26 @@ def test_a_pane_before_a_black_wall_mirrors_the_sky_by_fresnels_law(cos: float) 
     np.testing.assert_allclose(found, fresnel(cos) * np.array([1.0, 2.0, 3.0]), rtol=0.03)
 
 
+@pytest.mark.parametrize("n_faces", [1, 2, 4])
+@pytest.mark.parametrize(("has_board", "expected"), [(True, fresnel(1.0)), (False, 1.0)])
+def test_a_thing_of_glass_mirrors_by_its_first_face_and_without_noise(
+    n_faces: int, has_board: bool, expected: float
+) -> None:
+    def sheet(z: float, material: int, *, x: float = 0.0, half: float = 9.0):  # type: ignore[no-untyped-def]
+        corners = [(x - half, -half, z), (x + half, -half, z), (x + half, half, z), (x - half, half, z)]  # fmt: skip
+        return rooms.quad(corners, material)
+
+    clear = Material("glass", kind=MaterialKind.GLASS, opacity=0.0)
+    pane = Material("pane", kind=MaterialKind.PANE, opacity=0.3)
+    surfaces = [sheet(-0.01 * k, 2) for k in range(n_faces)] + [sheet(9.0, 1, x=40.0, half=1.0)]
+    surfaces += [sheet(-1.0, 0)] if has_board else []
+    home = rooms.house(surfaces, [rooms.matte("black", 0.0), pane, clear])
+    camera = rooms.camera((0, 0, 2), (0, 0, 0), 8, 8, 0.01)
+    scene = LightScene.load(home, {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
+    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
+    np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
 def test_only_the_first_of_two_panes_mirrors() -> None:
     camera = rooms.camera((0, 0, 2), (0, 0, 0), 4, 4, 0.01)
     scene = LightScene.load(pane_before_black(n_panes=2), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))

@@ -53,7 +53,7 @@ class PathContext(NamedTuple):
     emitter_filter: EmitterFilter
     sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
     may_guide: Any = None  # Bool: lanes whose rays are guided where the view's are; None = all
-    splits_panes: bool = False  # rays at panes go through, and the caller follows what they mirror
+    splits_glass: bool = False  # rays at glass go through, and the caller follows what it mirrors
 
 
 @dataclass
@@ -84,6 +84,8 @@ class Vertex(NamedTuple):
     dim: Any  # its first random dimension
     near: NearbyLamps | None  # None: lamps do not count
     is_pane: Any = None  # Bool: glass of a window; None: the scene has none
+    splits: Any = None  # Bool: glass at which rays go through and the caller follows the others
+    is_behind: Any = None  # Bool: glass behind such, which neither mirrors nor dims
 
 
 class ScatteredRay(NamedTuple):
@@ -122,14 +124,14 @@ class DirectionPdfs:
 
 
 class MirroredRay(NamedTuple):
-    """The ray that a pane sends back, where the path itself has gone through."""
+    """The ray that glass sends back, where the path itself has gone through."""
 
-    is_there: Any  # Bool: the path is at a pane
+    is_there: Any  # Bool: the path is at such glass
     is_followed: Any  # Bool
     o: Any
     d: Any
     beta: Any  # throughput
-    share: Any  # about, of the light that comes by the pane
+    share: Any  # about, of the light that comes by the glass
     own_share: Any  # the same, over the chance that it is followed
 
 
@@ -155,7 +157,7 @@ class StepResult(NamedTuple):
     indoor_sample: DirectLightSample
     sunlit_sample: DirectLightSample
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
-    mirrored: MirroredRay | None = None  # where panes are split
+    mirrored: MirroredRay | None = None  # where rays at glass are split
 
 
 def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:

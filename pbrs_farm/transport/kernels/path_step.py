@@ -92,8 +92,8 @@ def advance(
     vertex = _next_vertex(context, path, active)
     si, bsdf = vertex.si, vertex.si.bsdf
     missed = active & ~si.valid
-    u, splits = sampler.get_1d(vertex.dim + _LOBE), context.splits_panes
-    lobe = _choose_lobe(context.emitters, vertex, path, u, splits=splits)
+    u = sampler.get_1d(vertex.dim + _LOBE)
+    lobe = _choose_lobe(context.emitters, vertex, path, u)
 
     # Weigh what a guided ray has met; add the light of an emitter there.
     weight: Any = mi.Float(1)
@@ -129,7 +129,7 @@ def advance(
         sunlit_sample=direct.sunlit,
         is_view_independent=strategy.is_view_independent,
     )
-    if context.splits_panes and vertex.is_pane is not None:
+    if vertex.splits is not None:
         mirrored = _mirrored_ray(context.emitters, vertex, path, lobe.u, active)
         result = result._replace(mirrored=mirrored)
     return following, result, alive
@@ -162,12 +162,18 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
         if context.may_guide is not None:
             near = near._replace(is_guided=near.is_guided & context.may_guide)
     is_rough = is_solid & ~is_glass & ~is_mirror
-    return Vertex(si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near, is_pane)
+    splits, is_behind = None, None
+    if context.splits_glass and is_pane is not None:
+        # Of things the first face mirrors, for both of their wall: to draw at each would be speckle.
+        straight = is_glass & (path.bsdf_pdf <= 0)
+        splits = is_pane | (straight & (path.n_nulls == 0))
+        is_behind = straight & ~splits
+    return Vertex(
+        si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near, is_pane, splits, is_behind
+    )
 
 
-def _choose_lobe(
-    emitters: Emitters, vertex: Vertex, path: PathState, u: Any, *, splits: bool
-) -> _Lobe:
+def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) -> _Lobe:
     """Reflect more of the rays at glass near lamps, and at panes before the dark or fewer before the day.
 
     _throughput makes up for it.
@@ -178,8 +184,11 @@ def _choose_lobe(
         often = reflection_probability(reflectance, survival_boost(vertex.near))
         probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
     if vertex.is_pane is not None:
-        mirrored = 0 if splits else _mirrored_share(emitters, reflectance)
+        mirrored = _mirrored_share(emitters, reflectance)
         probability = dr.select(vertex.is_pane, mirrored, probability)
+    if vertex.splits is not None:
+        probability = dr.select(vertex.splits | vertex.is_behind, 0, probability)
+        reflectance = dr.select(vertex.is_behind, 0, reflectance)
     reflected = vertex.is_mirror | (vertex.is_glass & (u < probability))
     return _Lobe(u, reflectance, probability, reflected)
 
@@ -193,14 +202,16 @@ def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
 def _mirrored_ray(
     emitters: Emitters, vertex: Vertex, path: PathState, u: Any, active: Any
 ) -> MirroredRay:
-    """What a pane sends back of a path that goes through it: by chance where that is faint."""
+    """What glass sends back of a path that goes through it: of a pane by chance where that is faint."""
     si, reflectance = vertex.si, thin_glass_reflectance(vertex.wi.z)
     d = path.d - 2 * dr.dot(si.n, path.d) * si.n
-    share = _mirrored_share(emitters, reflectance)
-    chance = dr.minimum(_LEAST_FOLLOWED + _FOLLOWED * share, 1)
+    is_pane, of_pane = vertex.is_pane, _mirrored_share(emitters, reflectance)
+    share = dr.select(is_pane, of_pane, reflectance)
+    chance = dr.select(is_pane, dr.minimum(_LEAST_FOLLOWED + _FOLLOWED * of_pane, 1), 1)
     beta = path.beta * (reflectance / chance)
     o = offset_ray_origin(si.p, si.ng)
-    return MirroredRay(active & vertex.is_pane, u < chance, o, d, beta, share, share / chance)
+    is_followed = (u < chance) & (dr.dot(d, si.ng) > 0)
+    return MirroredRay(active & vertex.splits, is_followed, o, d, beta, share, share / chance)
 
 
 def _strategy(
