@@ -19,6 +19,7 @@ from pbrs_farm.core import keys
 
 COUNT_SHARE = 0.02  # of an item's pixels: those on its outline fall either way
 COUNT_PX = 6  # the same of a small one
+_EYE_M = 2.0  # above a floor, below which an eye stands though there is no ceiling
 HOME_RULES = ("near_duplicate",)  # that refuse a view for others of the home
 
 
@@ -102,7 +103,8 @@ def _check_choice_row(
         tally.expect("choice", place, room is not None or not row["room"], "is of no room")
     if room is not None and row["origin"] in ("sampled", "walk"):
         eye = pose[:3, 3]
-        same = room["floor_y"] < eye[1] < room["ceiling_y"] + 0.5
+        # A balcony ends at its rail.
+        same = room["floor_y"] < eye[1] < max(room["ceiling_y"] + 0.5, room["floor_y"] + _EYE_M)
         same &= (
             row["origin"] == "walk"
             or bool(row.get("left"))

@@ -22,7 +22,8 @@ from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
 from pbrs_farm.check.fact_checks import lamp_names
 from pbrs_farm.check.lamp_checks import flux_lm
-from pbrs_farm.check.radiance_checks import LUMINANCE, Channels
+from pbrs_farm.check.radiance_checks import LUMINANCE, Channels, matte_items
+from pbrs_farm.check.solid_checks import is_within
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
@@ -33,11 +34,12 @@ _PLACES = 400  # of a view
 _LEAST_COSINE = 0.25  # to a light: slanting light is of the shading normal's making
 _LEAST_ALBEDO = 0.04
 _HALF = 0.5  # of what the sun brings by itself: noise, and colours that albedo's luminance averages
-_LAMP = 0.75  # of what a bulb brings by itself: bounced light adds as much again
+_LAMP = 0.6  # of what a bulb brings by itself: noise, and clamped bounces
 _LEVEL = (
     5.0  # between the floor that a view sees and that of its room: furniture shades, lamps are near
 )
 _LEAST_FLOOR_LX = 1.0  # of a floor, below which noise decides
+_FLOOR_GRID = 40  # points a side, from which the sun is looked for
 _UPRIGHT = 0.9  # least cosine of a floor's normal
 _BULB_SHARE = 0.05  # of a bulb's radiance
 _GREY = 0.02  # between the colours of a light that names none
@@ -166,7 +168,8 @@ def _places(
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
     kinds = scene.triangles.kinds_of(face)
-    keep = (face >= 0) & np.isin(kinds, ("opaque",)) & ~scene.is_outside[face]
+    keep = (face >= 0) & np.isin(kinds, ("opaque",))
+    keep &= np.isin(scene.triangles.instance[face], matte_items(scene.house))
     rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
     normal = rays.normal(face, directions)
     points = []
@@ -283,6 +286,23 @@ def _expect_lit(place: str, name: str, lux: Floats, direct: Floats, tally: Tally
         tally.expect("lamplight", place, share >= _SHARE, what)
 
 
+def _sun_on_floor(view: StoredView, room: Mapping[str, Any], scene: LitScene) -> float:
+    """lx that the sun brings to a level floor of which it sees any part, else 0."""
+    sky = view.table.get("modes", {}).get("light", {}).get("sky", {})
+    if not sky.get("sun_lx") or sky["sun_direction"][1] <= 0:
+        return 0.0
+    corners = np.array(room["polygon"], np.float64)
+    low, high = corners.min(0), corners.max(0)
+    x, z = np.meshgrid(*(np.linspace(a, b, _FLOOR_GRID) for a, b in zip(low, high, strict=True)))
+    start = np.stack([x.ravel(), np.full(x.size, room["floor_y"] + 0.1), z.ravel()], axis=1)
+    inside = np.array([is_within(room["polygon"], p) for p in start[:, [0, 2]]], bool)
+    start = start[inside]
+    to_sun = np.broadcast_to(np.array(sky["sun_direction"], np.float64), start.shape)
+    met = scene.inside.first(start, to_sun)
+    free = (met < 0) | scene.is_unsure[met]
+    return float(sky["sun_lx"]) if free.any() else 0.0
+
+
 def _check_level(
     view: StoredView, channels: Channels, places: _Places, scene: LitScene, tally: Tally
 ) -> None:
@@ -293,14 +313,22 @@ def _check_level(
         return
     floor = (places.normals[:, 1] > _UPRIGHT) & (places.points[:, 1] < room["floor_y"] + 0.1)
     floor &= places.points[:, 1] > room["floor_y"] - 0.1
-    if floor.sum() < _FEW:
-        return
+    # Through an open plan one sees the floors of others.
+    floor &= [is_within(room["polygon"], point) for point in places.points[:, [0, 2]]]
+    # A patch of sun that this view does not show may bring most of what is told, and one that it
+    # shows may bring more.
+    sun_lx = _sun_on_floor(view, room, scene)
     for group in ("outdoor", "indoor"):
         told = float(row[f"{group}_lx"])
-        lux = float(np.mean(_lux(channels, group, places)[floor]))
-        if max(told, lux) >= _LEAST_FLOOR_LX:
-            same = told / _LEVEL <= lux <= told * _LEVEL
-            what = f"{group} light brings {lux:.3g} lx to the floor that it shows, told {told:.3g}"
+        lux = _lux(channels, group, places)
+        chosen = floor & (lux < sun_lx / 2) if group == "outdoor" and sun_lx else floor
+        if chosen.sum() < _FEW:
+            continue
+        seen = float(np.mean(lux[chosen]))
+        if max(told, seen) >= _LEAST_FLOOR_LX:
+            most = seen * _LEVEL + (sun_lx if group == "outdoor" else 0.0)
+            same = seen / _LEVEL <= told <= most
+            what = f"{group} light brings {seen:.3g} lx to the floor that it shows, told {told:.3g}"
             tally.expect("levels", f"{view.place}/radiance.exr", same, what)
 
 

@@ -279,7 +279,10 @@ def normal_is_right(
 def _coincident(
     labels: Labels, face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
 ) -> Faces:
-    """(N,) triangle of the stored instance that the ray pierces at the first hit's depth, or -1."""
+    """(N,) another triangle of the stored instance that the ray pierces at the first hit's depth, or -1.
+
+    A model may have a face twice, with other texture coordinates.
+    """
     triangles, rays = scene
     found = np.full(len(face), -1, np.int64)
     if "instance" not in labels:
@@ -293,6 +296,7 @@ def _coincident(
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
             t = _distances_pierced(triangles, own, origin, directions[pixel])
             gap = np.abs(t - first[pixel]) * across[pixel]
+            gap[own == face[pixel]] = np.inf
             if len(own) and gap.min() <= TIE_DEPTH_M:
                 found[pixel] = own[gap.argmin()]
     return rays.without_holes(found, origin, directions)

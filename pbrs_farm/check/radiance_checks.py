@@ -17,6 +17,7 @@ from scipy import ndimage
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
 from pbrs_farm.check.pixel_checks import albedo_of_faces
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
@@ -25,6 +26,7 @@ Channels = Mapping[str, NDArray[np.float32]]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 _GUIDE_DEG = 25.0  # a normal map may bend a guide, and a pixel is not flat
 _GUIDE_ALBEDO = 0.1  # of 1, in linear light: a texture's mean over the pixel against its middle
+_VARNISH = 0.3  # of 1, as stored: .07 in linear light
 _GUIDE_SHARE = 0.8  # of pixels amid one surface; blur and depth of field cost the rest
 _GUIDE_PX = 1  # by which the guides' edges may lie beside the labels': a few samples against one
 _FEW_GUIDES = 50  # pixels amid surfaces that tell nothing
@@ -33,11 +35,11 @@ _MOST_STEP = 1.0  # of a logarithm: one firefly is not a picture
 _EDGE = 0.1  # step of albedo's logarithm that counts as an edge
 _FEW_EDGES = 300  # pixels with one that tell nothing
 _BLUR_PX = 0.7  # of both before they are compared: noise goes, edges stay within a pixel
-_BRIGHT = (0, 9, 19, 35)  # outside, windows, mirrors, lamps
+_BRIGHT_KINDS = {"bulb", "glass", "mirror", "pane", "shade"}  # whose light is not their albedo's
 _BRIGHT_PX = 2  # beside them, which the blur reaches
 _NOISY = 0.09  # error of the slope above which noise hides all
 _LEAST_SLOPE = 0.15  # of steps of light over those of albedo, whose logarithms rise alike
-_LEAST_SIGMAS = 5.0  # of the slope where the picture stands
+_LEAST_SIGMAS = 3.0  # of the slope where the picture stands
 _TIE_SIGMAS = 2.0  # by which another place may fit better by chance
 _GROUP_SIGMAS = 5.0  # the same of a light group alone, which may reach few of the edges
 
@@ -48,11 +50,13 @@ def check_guides(
     pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
     arrays: Mapping[str, NDArray[Any]],
     scene: tuple[Triangles, Rays],
+    house: StoredHouse,
     tally: Tally,
 ) -> None:
     """The guides that radiance.exr holds, mean albedo and normal, are those of the surfaces seen there.
 
-    pixels: rows and columns to look at; only those amid one surface count, of no glass and no mirror.
+    pixels: rows and columns to look at; only those amid one surface count, of no glass and no mirror,
+    nor of things that shine like varnish: their guide holds what they mirror, too.
     """
     names = [*(f"albedo.{c}" for c in "RGB"), *(f"normal.{c}" for c in "XYZ")]
     if not all(name in channels and channels[name].shape == view.size for name in names):
@@ -65,7 +69,8 @@ def check_guides(
     kinds = triangles.kinds_of(face)
     flat = _is_amid(arrays["instance"], arrays["normal"])[rows, columns]
     keep = (face >= 0) & flat & ~np.isin(kinds, ("glass", "pane", "mirror", "bulb"))
-    # What lies outside is seen through a pane, or not at all.
+    # What lies outside is a picture of its own, and no surface of the home.
+    keep &= np.isin(triangles.instance[face], matte_items(house))
     if keep.sum() < _FEW_GUIDES:
         return
     rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
@@ -82,6 +87,19 @@ def check_guides(
         share = float(right.mean())
         what = f"its {name} is that of the surface at {share:.0%} of {len(right)} pixels"
         tally.expect("light guides", f"{view.place}/radiance.exr", share >= _GUIDE_SHARE, what)
+
+
+def matte_items(house: StoredHouse) -> list[int]:
+    """Instances of the home, not of what lies outside, whose guides hold their albedo and no more.
+
+    The guide of what shines like varnish holds what it mirrors, too.
+    """
+    colours = [material["specular"] or (0.0,) for material in house.house["materials"]]
+    return [
+        n
+        for n, row in house.items.items()
+        if row["nyu40"] and all(max(colours[s["material"]]) <= _VARNISH for s in row["surfaces"])
+    ]
 
 
 def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tally: Tally) -> None:
@@ -116,12 +134,15 @@ def _is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
     return np.asarray(flat, bool)
 
 
-def check_fit(view: StoredView, channels: Channels, semantic: NDArray[Any], tally: Tally) -> None:
+def check_fit(
+    view: StoredView, channels: Channels, bright: NDArray[np.bool_], tally: Tally
+) -> None:
     """The light of radiance.exr fits its albedo as it stands, and mirrored, turned or moved no better.
 
     All light together must fit; a light group alone may reach few edges, and must not fit another
-    place much better. Steps at what shines, mirrors or lies outside, by semantic, do not count: a
-    bright window is no bright wall. Pictures with few edges, or more noise than light, are a note.
+    place much better. bright: (H, W) pixels of what shines, mirrors or lies outside, whose steps do
+    not count: a bright window is no bright wall. Pictures with few edges, or more noise than light,
+    are a note.
     """
     needed = [f"{name}.{c}" for name in ("outdoor", "indoor", "albedo") for c in "RGB"]
     if not all(n in channels and channels[n].shape == view.size for n in needed):
@@ -133,7 +154,7 @@ def check_fit(view: StoredView, channels: Channels, semantic: NDArray[Any], tall
         )
         for name in ("outdoor", "indoor", "albedo")
     }
-    bright = ndimage.binary_dilation(np.isin(semantic, _BRIGHT), iterations=_BRIGHT_PX)
+    bright = ndimage.binary_dilation(bright, iterations=_BRIGHT_PX)
     logs_of_albedo = _filled(np.log(level.pop("albedo") + _FAINT), bright)
     across, down = _steps(logs_of_albedo)
     if int((np.hypot(across, down) > _EDGE).sum()) < _FEW_EDGES:
@@ -166,6 +187,18 @@ def check_fit(view: StoredView, channels: Channels, semantic: NDArray[Any], tall
             text = f"{name} does not follow the albedo: {own:.2f} +- {error:.2f}"
             least = max(_LEAST_SIGMAS * error, _LEAST_SLOPE)
             tally.expect("light edges", place, own >= least, text)
+
+
+def bright_pixels(instance: NDArray[Any], house: StoredHouse) -> NDArray[np.bool_]:
+    """(H, W) pixels of things that have a surface which shines, mirrors or is seen through, and of no thing."""
+    kinds = [material["kind"] for material in house.house["materials"]]
+    dull = [
+        n
+        for n, row in house.items.items()
+        if "outside" not in row["tags"]
+        and _BRIGHT_KINDS.isdisjoint(kinds[s["material"]] for s in row["surfaces"])
+    ]
+    return ~np.isin(instance, dull)
 
 
 def _filled(picture: NDArray[Any], hole: NDArray[np.bool_]) -> NDArray[Any]:

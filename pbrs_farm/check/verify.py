@@ -35,7 +35,7 @@ from pbrs_farm.check.picture_checks import check_edges, check_histogram
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, PixelChecks, judge, of_another_colour
 from pbrs_farm.check.pose_checks import SeenView, check_pose, check_reprojection
 from pbrs_farm.check.projector_checks import check_projector
-from pbrs_farm.check.radiance_checks import check_fit, check_guides
+from pbrs_farm.check.radiance_checks import bright_pixels, check_fit, check_guides
 from pbrs_farm.check.sensor_checks import check_derived
 from pbrs_farm.check.sky_checks import check_illuminance
 from pbrs_farm.check.solid_checks import check_models, check_solids
@@ -192,8 +192,9 @@ def _check_view(
     if channels is not None:
         check_radiance(view, scenes.house, channels, arrays["valid"], tally)
         check_developed(view, channels, arrays, tally, denoise=is_denoised_again(view, n_pixels))
-        check_guides(view, channels, _chosen(view, SAMPLE), arrays, scenes.all, tally)
-        check_fit(view, channels, arrays["semantic"], tally)
+        pixels = _chosen(view, SAMPLE)
+        check_guides(view, channels, pixels, arrays, scenes.all, scenes.house, tally)
+        check_fit(view, channels, bright_pixels(arrays["instance"], scenes.house), tally)
         check_lit(view, channels, arrays, scenes.lit, scenes.all[1], tally)
     check_edges(view, arrays, tally)
     check_histogram(view, arrays, scenes.house.house, tally)

@@ -77,5 +77,6 @@ ROOTS: dict[str, Make] = {
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
     "edited": _edited,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),
+    "generated, with a balcony, mirrors and sun": rendered("made:11", {"light.denoise": "true", "light.spp": "16"}, n_views=4, layers=("albedo",)),
     **{f"read from {title}": _read(title) for title in _READ},
 }  # fmt: skip
