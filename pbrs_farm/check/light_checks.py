@@ -27,15 +27,12 @@ _GROUPS = {"mlt_ol": ("outdoor",), "mlt_il_ol": ("outdoor", "indoor")}
 # What a picture may differ by from the one developed here, in steps of 255.
 _EXACT_STEPS, _EXACT_SHARE = 1, 0.002  # by one step at most, in so few values
 _DENOISED_STEPS, _DENOISED_SHARE = 2, 0.01  # another processor's denoiser
-_TILE_PX = 16  # over which a sensor's noise is averaged
-_SENSOR_STEPS, _SENSOR_TILES = 14, 0.9  # mean of a tile, share of tiles
-_LEAST_HALVED_PX = 160  # the shorter side of a picture that is denoised at half its size
-_HALVED_STEPS, _HALVED_TILES = (
-    16,
-    0.7,
-)  # mean of a tile, share of tiles: half the size has half the noise
+_TILE_PX = 16  # over which noise is averaged, of a sensor or of light at half its size
+_TILE_STEPS, _TILES = 10, 0.9  # mean of a tile, share of tiles
+_LEAST_HALVED_PX = 160  # a shorter side has few tiles at half the size, and costs little
 _FACTOR = 0.002  # of exposure and gains that view.json tells
-_TIE = 1e-6  # of a level: what single precision keeps of it
+_TIE, _HALVED_TIE = 1e-6, 0.02  # of a level: what single precision, or half the size, keeps of it
+_HALVED_FACTOR = 0.2  # of those at half the size: of 2 samples a pixel it is up to 0.08
 
 
 def check_developed(
@@ -44,12 +41,12 @@ def check_developed(
     arrays: Mapping[str, NDArray[Any]],
     tally: Tally,
     *,
-    denoise: bool = True,
+    is_halved: bool = False,
 ) -> None:
     """Develop radiance.exr (its channels) again, and compare with the stored pictures of the light modes.
 
-    denoise: whether light that was denoised is denoised again as it stands, which costs most of the
-    time; else its pictures are compared by tiles at half their size.
+    is_halved: light that was denoised is denoised again at half its size, and its pictures are
+    compared by tiles; as it stands costs most of the time. Only where `may_be_halved` says so.
 
     Does nothing where the view has no picture of a light mode, no radiance.exr or no recipe:
     `methods.not_looked_at` says so. arrays has the layers by name.
@@ -57,19 +54,25 @@ def check_developed(
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None:
         return
-    # A small picture at half its size has few tiles, and costs little as it stands.
-    is_large = min(view.table["width_px"], view.table["height_px"]) >= _LEAST_HALVED_PX
-    is_halved = view.recipe.light.denoise and not denoise and is_large
     light = _stored_light(view, channels, is_halved, tally)
     if light is None:
         return
     stated = view.table.get("modes", {}).get("develop", {})
     camera = _camera_of(view, view.recipe, 0)
     for mode in modes:
-        shot = _Shot(f"{view.place}/{mode}.png", mode, stated.get(mode, {}), camera, is_halved)
+        place, told = f"{view.place}/{mode}.png", stated.get(mode, {})
+        shot = _Shot(place, mode, told, camera, is_halved, _follows(view, camera))
         _check_picture(shot, arrays[mode], light, view.recipe, tally)
     _check_errors(view, stated, camera, tally)
-    _check_variants(view, stated.get("variants", []), light, is_halved, tally)
+    _check_variants(view, stated.get("variants", []), arrays, light, is_halved, tally)
+
+
+def may_be_halved(view: StoredView) -> bool:
+    """Whether a view's light was denoised, and its pictures are large enough for tiles at half their size."""
+    if view.recipe is None or not view.recipe.light.denoise or not view.has("radiance.exr"):
+        return False
+    is_lit = any(view.has(f"{mode}.png") for mode in _GROUPS)
+    return is_lit and min(view.size) >= _LEAST_HALVED_PX
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,15 +84,21 @@ class _Shot:
     stated: Mapping[str, Any]
     camera: PictureCamera
     is_halved: bool  # its light is denoised at half its size
+    follows: bool  # its exposure lags behind that of frames before
 
 
 def _camera_of(view: StoredView, recipe: Recipe, variant: int) -> PictureCamera:
     return recipe.camera_of(view.folder.parent.parent.name, view.folder.name, variant)
 
 
+def _follows(view: StoredView, camera: PictureCamera) -> bool:
+    return camera.sensor.lag_s > 0 and view.table.get("time_s") is not None
+
+
 def _check_variants(
     view: StoredView,
     rows: Any,
+    arrays: Mapping[str, NDArray[Any]],
     light: Mapping[str, NDArray[np.float32]],
     is_halved: bool,
     tally: Tally,
@@ -107,25 +116,23 @@ def _check_variants(
         return
     for n, row in enumerate(rows, 1):
         camera = _camera_of(view, recipe, n)
-        what = f"variant {n} is told to be of a {row.get('camera')}, the recipe draws {camera.name}"
-        tally.expect("light developed", view.place, row.get("camera") == camera.name, what)
         _check_errors(view, row, camera, tally)
         place = f"{view.place}/{row['file']}"
-        stored = view.png(row["file"])
-        shot = _Shot(place, "mlt_il_ol", row, camera, is_halved)
-        _check_picture(shot, stored, light, recipe, tally)
+        shot = _Shot(place, "mlt_il_ol", row, camera, is_halved, _follows(view, camera))
+        if f"mlt_il_ol.{n}" in arrays:  # else it is damaged, and the check of layers says so
+            _check_picture(shot, arrays[f"mlt_il_ol.{n}"], light, recipe, tally)
 
 
 def _check_errors(
     view: StoredView, stated: Mapping[str, Any], camera: PictureCamera, tally: Tally
 ) -> None:
-    """What view.json tells of the errors drawn for the camera is what the recipe draws."""
-    told = stated.get("tone")
+    """What view.json tells of a camera that errs, and of its errors, is what the recipe draws."""
+    told = {name: stated.get(name) for name in ("camera", "tone")}
     names = ("exposure_ev", "warmth_ev", "tint_ev", "contrast")
-    drawn: dict[str, float] | None = {name: getattr(camera.tone, name) for name in names}
-    if camera.name == "neutral":
-        drawn = None
-    what = f"view.json tells of its tone {told}, the recipe draws {drawn}"
+    drawn: dict[str, Any] = {"camera": None, "tone": None}
+    if camera.name != "neutral":
+        drawn = {"camera": camera.name, "tone": {n: getattr(camera.tone, n) for n in names}}
+    what = f"view.json tells of its camera {told}, the recipe draws {drawn}"
     tally.expect("light developed", view.place, told == drawn, what)
 
 
@@ -136,46 +143,79 @@ def _check_picture(
     recipe: Recipe,
     tally: Tally,
 ) -> None:
-    place, stated = shot.place, shot.stated
     tone, sensor = shot.camera.tone, shot.camera.sensor
     total = sum((light[g] for g in _GROUPS[shot.mode]), np.zeros_like(light["outdoor"]))
     total = _add_glare(total, tone.glare)
-    told_gains = stated.get("gains")
-    gains = _white_balance(total, light["albedo"], tone)
-    if told_gains is not None and np.abs(told_gains - gains).max() > _FACTOR:
-        # Half the picture may be a sky of one level, of which a last bit decides what counts.
-        either = [_white_balance(total, light["albedo"], tone, least=1 + s) for s in (-_TIE, _TIE)]
-        gains = min(either, key=lambda found: float(np.abs(told_gains - found).max()))
+    gains, exposure = _check_factors(shot, total, light["albedo"], tally)
     balanced = np.maximum(np.nan_to_num((total * gains).astype(np.float64), posinf=0.0), 0)
-    exposure = _exposure(balanced, tone)
-    # A sensor's exposure is what its shutter and speed gave.
-    if sensor.is_on:
-        exposure = float(stated.get("exposure", exposure))
-    elif shot.is_halved:
-        _check_halved(shot, stored, total, tally)
-        return
+    expected = _tone(balanced, exposure, shot.camera, gains, float(shot.stated.get("iso", 0.0)))
+    if shot.is_halved:
+        _compare_tiles("light by tiles", shot.place, _halved(stored), expected, tally)
+    elif sensor.is_on:
+        _compare_tiles("light developed", shot.place, stored, expected, tally)
     else:
-        off = abs(float(stated.get("exposure", exposure)) / exposure - 1)
-        told = np.array(gains if told_gains is None else told_gains, np.float64)
-        off = max(off, float(np.abs(told - gains).max()))
-        what = f"view.json tells other factors, by {off:.4f}"
-        if tally.expect("light developed", place, off <= _FACTOR, what):
-            # Whether a pixel lies above a percentile hangs on its last bit: go on with what is told.
-            exposure = float(stated.get("exposure", exposure))
-            balanced = np.maximum(np.nan_to_num((total * told).astype(np.float64), posinf=0.0), 0)
-    expected = _tone(balanced, exposure, tone, sensor)
-    if sensor.is_on:
-        _compare_tiles(place, stored, expected, tally)
-        return
+        is_denoised = recipe.light.denoise
+        _compare_pixels(shot.place, stored, expected, tally, is_denoised=is_denoised)
+
+
+def _check_factors(
+    shot: _Shot, total: NDArray[np.float32], albedo: NDArray[np.float32], tally: Tally
+) -> tuple[NDArray[Any], float]:
+    """(gains (3,), exposure) that view.json tells, where they are near those of the light; else these.
+
+    Whether a pixel lies above a percentile hangs on its last bit: what is told goes on.
+    """
+    tone, stated = shot.camera.tone, shot.stated
+    slack, tie = (_HALVED_FACTOR, _HALVED_TIE) if shot.is_halved else (_FACTOR, _TIE)
+    told = np.array(stated.get("gains", ()), np.float64)
+    own_gains = _white_balance(total, albedo, tone)
+    is_told = told.shape == (3,) and "exposure" in stated
+    if is_told and np.abs(told - own_gains).max() > slack:
+        # Half the picture may be a sky of one level, of which a last bit decides what counts.
+        either = [_white_balance(total, albedo, tone, least=1 + s) for s in (-tie, tie)]
+        own_gains = min(either, key=lambda found: float(np.abs(told - found).max()))
+    balanced = np.maximum(np.nan_to_num((total * own_gains).astype(np.float64), posinf=0.0), 0)
+    own = _exposure(balanced, tone)
+    what = "view.json does not tell three gains and an exposure"
+    if not tally.expect("light developed", shot.place, is_told, what):
+        return own_gains, own
+    exposure = float(stated["exposure"])
+    by_sensor = shot.camera.sensor.is_on
+    off_exposure = _off_sensor(shot, own) if by_sensor else abs(exposure / own - 1)
+    off = float(np.max([np.abs(told - own_gains).max(), off_exposure]))
+    what = f"view.json tells other factors, by {off:.4f}"
+    same = tally.expect("light developed", shot.place, off <= slack, what)
+    return (told, exposure) if same else (own_gains, own)
+
+
+def _off_sensor(shot: _Shot, wanted: float) -> float:
+    """By what share shutter, ISO and exposure are off those that the sensor chooses for a wanted factor."""
+    sensor, stated = shot.camera.sensor, shot.stated
+    # The factor of a second at ISO 1, by ISO 12232's saturation: docs/lenses.md.
+    unit = 179 * np.pi / 4 / sensor.f_number**2 / 78 * sensor.headroom
+    shutter, iso = (float(stated.get(name, 0.0)) for name in ("shutter_s", "iso"))
+    off = abs(float(stated["exposure"]) - shutter * iso * unit) / max(shutter * iso * unit, 1e-9)
+    if shot.follows:
+        return off
+    product = wanted * 2**sensor.compensation_ev / unit
+    longest = max(sensor.shutter_max_s, sensor.shutter_min_s)
+    own = sensor.shutter_s or np.clip(product / sensor.iso_min, sensor.shutter_min_s, longest)
+    own_iso = np.clip(product / own, sensor.iso_min, max(sensor.iso_max, sensor.iso_min))
+    return float(np.max([off, abs(shutter / own - 1), abs(iso / own_iso - 1)]))
+
+
+def _compare_pixels(
+    place: str, stored: NDArray[Any], expected: NDArray[Any], tally: Tally, *, is_denoised: bool
+) -> None:
     steps, share = _EXACT_STEPS, _EXACT_SHARE
-    if recipe.light.denoise:
+    if is_denoised:
         steps, share = _DENOISED_STEPS, _DENOISED_SHARE
     difference = np.abs(stored.astype(int) - expected.astype(int))
     wrong = (difference > steps).any(axis=-1)
     n_wrong = int(wrong.sum())
-    off_by_one = float((difference > 0).mean()) if not recipe.light.denoise else 0.0
+    off_by_one = float((difference > 0).mean()) if not is_denoised else 0.0
     # The network's last bits differ between processors; a patch does not hide among so few.
-    allowed = n_wrong <= (share * wrong.size if recipe.light.denoise else 0)
+    allowed = n_wrong <= (share * wrong.size if is_denoised else 0)
     is_patch = allowed and bool(ndimage.uniform_filter(wrong.astype(float), 5).max() > 0.5)
     good = allowed and not is_patch and off_by_one <= share
     tally.add("light developed", wrong.size, ties=n_wrong if good else 0)
@@ -183,22 +223,6 @@ def _check_picture(
         row, column = np.argwhere(difference.any(axis=-1))[0]
         what = f"differs from radiance.exr at row {row}, column {column}"
         tally.fail("light developed", place, what, max(n_wrong, 1))
-
-
-def _check_halved(
-    shot: _Shot, stored: NDArray[Any], total: NDArray[np.float32], tally: Tally
-) -> None:
-    """A picture at half its size against light that was denoised at that size, by the factors that are told."""
-    told = shot.stated
-    what = "view.json tells no factors"
-    if not tally.expect("light by tiles", shot.place, {"exposure", "gains"} <= told.keys(), what):
-        return
-    light = np.maximum(np.nan_to_num(total * np.array(told["gains"], np.float64), posinf=0.0), 0)
-    expected = _tone(light, float(told["exposure"]), shot.camera.tone, shot.camera.sensor)
-    difference = np.abs(_tiles(_halved(stored)) - _tiles(expected)).mean(axis=-1)
-    share = float((difference <= _HALVED_STEPS).mean())
-    what = f"{1 - share:.0%} of its tiles differ from radiance.exr"
-    tally.expect("light by tiles", shot.place, share >= _HALVED_TILES, what)
 
 
 def _halved(picture: NDArray[Any]) -> NDArray[np.float32]:
@@ -209,12 +233,14 @@ def _halved(picture: NDArray[Any]) -> NDArray[np.float32]:
     return np.ascontiguousarray(parts.mean(axis=(1, 3)))
 
 
-def _compare_tiles(place: str, stored: NDArray[Any], expected: NDArray[Any], tally: Tally) -> None:
-    """A sensor's noise goes in the mean of a tile; what is left is its lens, mosaic and JPEG."""
+def _compare_tiles(
+    check: str, place: str, stored: NDArray[Any], expected: NDArray[Any], tally: Tally
+) -> None:
+    """Means of tiles: noise goes in them; what is left of a sensor is its lens, mosaic and JPEG."""
     difference = np.abs(_tiles(stored) - _tiles(expected)).mean(axis=-1)
-    share = float((difference <= _SENSOR_STEPS).mean())
+    share = float((difference <= _TILE_STEPS).mean())
     what = f"{1 - share:.0%} of its tiles differ from radiance.exr"
-    tally.expect("light developed", place, share >= _SENSOR_TILES, what)
+    tally.expect(check, place, share >= _TILES, what)
 
 
 def _tiles(picture: NDArray[Any]) -> Floats:
@@ -345,10 +371,15 @@ def _exposure(balanced: Floats, tone: ToneFields) -> float:
 
 
 def _tone(
-    balanced: Floats, exposure: float, tone: ToneFields, sensor: SensorFields
+    balanced: Floats, exposure: float, camera: PictureCamera, gains: NDArray[Any], iso: float
 ) -> NDArray[np.uint8]:
-    """8 bits by Reinhard's operator (`released`), else by a line and a logarithm that ends at white."""
-    if tone.preset == "released":
+    """8 bits by Reinhard's operator (`released`), else by a line and a logarithm that ends at white.
+
+    balanced: light times gains (3,), of which a sensor at that ISO sees what it was before.
+    """
+    tone, sensor = camera.tone, camera.sensor
+    is_released = tone.preset == "released" and not sensor.is_on
+    if is_released:
         level = balanced @ _MITSUBA_LUMINANCE * exposure
         white = float(level.max()) * 0.64
         linear = balanced
@@ -360,17 +391,27 @@ def _tone(
         light = light + tone.flare * np.minimum(light, tone.white).mean(axis=(0, 1))
         if sensor.is_on:
             white = sensor.headroom
-            light = np.minimum(light * _vignette(light, sensor), white)
+            light = _read(light * _vignette(light, sensor), gains / gains.min(), iso, sensor)
         linear = _roll_off(_flattened(light, tone), white)
     linear = np.clip(linear, 0, 1)
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * np.clip(_respond(srgb, tone), 0, 1)), np.uint8)
+    response = srgb if is_released else _respond(srgb, tone)
+    return np.asarray(np.rint(255 * np.clip(response, 0, 1)), np.uint8)
+
+
+def _read(light: Floats, gains: NDArray[Any], iso: float, sensor: SensorFields) -> Floats:
+    """Light (H, W, 3) with a sensor's noise drawn anew: what it makes of darkness is brighter in the mean."""
+    rng = np.random.default_rng(0)
+    well = sensor.full_well_e * sensor.iso_min / max(iso, sensor.iso_min)
+    electrons = rng.poisson(np.clip(light / gains / sensor.headroom * well, 0, 1e9)).astype(float)
+    electrons += rng.normal(0, sensor.read_noise_e, light.shape)
+    lowest = -sensor.black_level / (1 - sensor.black_level)
+    raw = np.clip(electrons / well, lowest, 1) * sensor.headroom
+    return np.asarray(np.clip(raw * gains, 0, sensor.headroom))
 
 
 def _respond(srgb: Floats, tone: ToneFields) -> Floats:
     """Luma by an S whose odds go to a power, then sharpened by its difference to a blurred one."""
-    if tone.preset == "released":
-        return srgb
     luma = srgb @ [0.299, 0.587, 0.114]
     with np.errstate(divide="ignore"):
         s_shaped = 1 / (1 + (np.maximum(1 / luma - 1, 0)) ** tone.contrast)

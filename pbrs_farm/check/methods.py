@@ -75,12 +75,12 @@ def not_looked_at(
     houses: list[Path],
     views: list[StoredView],
     fields: Counter[tuple[str, str]],
-    n_by_tiles: int = 0,
+    n_halved: int = 0,
 ) -> tuple[str, ...]:
     """A line for each kind of file that a hash alone speaks for, or little more, and for each field without a check.
 
-    With each view whose light could not be developed again and why, and the lines that hold for
-    every root.
+    With each view whose light could not be developed again and why, of how many it was denoised
+    at half its size, and the lines that hold for every root.
     """
     counts = _file_counts(views)
     layers = {layer.file for layer in LAYERS}
@@ -92,10 +92,9 @@ def not_looked_at(
     lines += unknown_files(root, houses)
     lines += field_lines(fields)[1]
     lines += [f"light of {view.place}: {why}" for view in views if (why := _light_fault(view))]
-    denoised = [v for v in views if v.recipe is not None and v.recipe.light.denoise]
-    if n_by_tiles and denoised:
+    if n_halved:
         lines.append(
-            f"light of {n_by_tiles} views was denoised again at half its size: compared by tiles of 32 px; "
+            f"light of {n_halved} views was denoised again at half its size: compared by tiles of 32 px; "
             "--all denoises it as it stands"
         )
     return (*lines, *_NEVER)
@@ -137,4 +136,6 @@ def _light_fault(view: StoredView) -> str:
         return "no radiance.exr to develop"
     if view.recipe.sensor.is_on or view.recipe.tone.camera != "neutral":
         return "taken by a sensor: compared by tiles of 16 px, not by pixels"
+    if view.recipe.tone.variants:
+        return "its variants are taken by sensors: compared by tiles of 16 px, not by pixels"
     return ""

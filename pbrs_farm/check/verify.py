@@ -26,7 +26,7 @@ from pbrs_farm.check.fact_checks import check_facts
 from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.house_checks import check_house
-from pbrs_farm.check.light_checks import check_developed
+from pbrs_farm.check.light_checks import check_developed, may_be_halved
 from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
@@ -91,7 +91,7 @@ def verify(
     houses = sorted(found, key=lambda p: p.name)
     if not houses:
         raise BadInput(folder, "houses/", "no houses here", hint="give the folder of --out")
-    tally, views = Tally(), list[StoredView]()
+    tally, views, n_halved = Tally(), list[StoredView](), 0
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
     n_views = sum(1 for house in houses for _file in house.glob("views/*/view.json"))
@@ -101,20 +101,25 @@ def verify(
     check_credits(folder, [StoredHouse(house) for house in houses], tally)
     for house in houses:
         check_files(folder, house, tally)
-        views += _check_house(house, n_pixels, tally, lambda: tell(next(checked), n_views))
+        found_views, halved = _check_house(
+            house, n_pixels, tally, lambda: tell(next(checked), n_views)
+        )
+        views, n_halved = views + found_views, n_halved + halved
     _judge_ties(tally)
     fields = stored_fields(folder, houses)
-    by_tiles = sum(not is_denoised_again(view, n_pixels) for view in views)
     return tally.certificate(
         str(folder), len(houses), len(views), all_pixels=all_pixels,
-        looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, by_tiles),
+        looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved),
     )  # fmt: skip
 
 
 def _check_house(
     house: Path, n_pixels: int | None, tally: Tally, tell: Callable[[], None]
-) -> list[StoredView]:
-    """Check the house's views; those that could be read. tell: called as a view is done."""
+) -> tuple[list[StoredView], int]:
+    """Check the house's views; those that could be read, and of how many the light is halved.
+
+    tell: called as a view is done.
+    """
     views, faults = views_of_house(house)
     for file, fault in faults.items():
         place = f"{house.name}/{file.parent.name}/view.json"
@@ -125,7 +130,7 @@ def _check_house(
         triangles = triangles_from_glb(glb)
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.name, False, f"house.glb {error}")
-        return []
+        return [], 0
     opaque = Rays(triangles, ~triangles.see_through)
     scenes = Scenes(
         (triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles), stored,
@@ -134,9 +139,11 @@ def _check_house(
     _check_documents(stored, glb, scenes, tally)
     # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
+    halved = {view.place for view in views[1:] if _is_halved(view, n_pixels)}
     for view in views:
         try:
-            arrays = _check_view(view, scenes, n_pixels, tally)
+            is_halved = view.place in halved
+            arrays = _check_view(view, scenes, n_pixels, tally, is_halved=is_halved)
         except FAULTS as error:
             tally.expect("layers", f"{view.place}/view.json", False, _fault(error))
             arrays = None
@@ -146,7 +153,7 @@ def _check_house(
     check_reprojection(seen, tally)
     check_partners([one.view for one in seen], tally)
     check_pairs(house, scenes.all[1], tally)
-    return views
+    return views, len(halved)
 
 
 def _check_documents(house: StoredHouse, glb: bytes, scenes: Scenes, tally: Tally) -> None:
@@ -172,7 +179,7 @@ def _fault(error: Exception) -> str:
 
 
 def _check_view(
-    view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally
+    view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally, *, is_halved: bool
 ) -> dict[str, NDArray[Any]] | None:
     """Check one view; its layers by name, None when its labels cannot be read."""
     check_pose(view, tally)
@@ -191,7 +198,7 @@ def _check_view(
     channels = read_radiance(view, tally)
     if channels is not None:
         check_radiance(view, scenes.house, channels, arrays["valid"], tally)
-        check_developed(view, channels, arrays, tally, denoise=is_denoised_again(view, n_pixels))
+        check_developed(view, channels, arrays, tally, is_halved=is_halved)
         pixels = _chosen(view, SAMPLE)
         check_guides(view, channels, pixels, arrays, scenes.all, scenes.house, tally)
         check_fit(view, channels, bright_pixels(arrays["instance"], scenes.house), tally)
@@ -205,15 +212,17 @@ def _check_view(
     return arrays
 
 
-def is_denoised_again(view: StoredView, n_pixels: int | None) -> bool:
-    """Whether a view's light is denoised again: always with every pixel, else of some that names choose.
+def _is_halved(view: StoredView, n_pixels: int | None) -> bool:
+    """Whether a view's light is denoised again at half its size, which costs least: never with every pixel.
 
-    The first view of a house is, and one in DENOISED of the others.
+    Names choose one in DENOISED that is denoised as it stands; the first view of a house is, anyway.
     """
-    if n_pixels is None:
-        return True
-    first = min(p.parent.name for p in view.folder.parent.glob("*/view.json"))
-    return view.folder.name == first or zlib.crc32(view.place.encode()) % DENOISED == 0
+    if n_pixels is None or zlib.crc32(view.place.encode()) % DENOISED == 0:
+        return False
+    try:
+        return may_be_halved(view)
+    except FAULTS:
+        return False  # a view that is damaged; its checks say so
 
 
 def _check_rays(

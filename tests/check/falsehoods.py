@@ -662,9 +662,17 @@ _SUN: dict[str, tuple[Plant, str]] = {
     ),
 }  # fmt: skip
 
+_SENSOR: dict[str, tuple[Plant, str]] = {
+    "another camera told of a picture": (table(lambda t: t["modes"]["develop"].update(camera="none")), "light developed"),
+    "gains of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(gains=[1.0, 1.0, 1.0])), "light developed"),
+    "ISO of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(iso=12345.0)), "light developed"),
+    "shutter of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(shutter_s=7.0)), "light developed"),
+    "exposure of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_il_ol"].update(exposure=0.001)), "light developed"),
+}  # fmt: skip
+
 FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
     "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED,
-    "sun": _SUN,
+    "sun": _SUN, "sensor": _SENSOR,
 }  # fmt: skip
 
 

@@ -75,6 +75,8 @@ ROOTS: dict[str, Make] = {
     "cameras": rendered("builtin", {"light.denoise": "true", "light.spp": "16", "tone.variants": "3"}, layers=()),
     "sun": rendered("builtin", {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "345", "light.spp": "16"}, layers=()),
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
+    "dark": rendered("builtin", {"light.denoise": "true", "light.spp": "8", "sky.time": "night", "tone.camera": "webcam",
+                                 "tone.variants": "1", "image.width_px": "216", "image.height_px": "162"}, n_views=2, layers=()),
     "edited": _edited,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),
     "generated, with a balcony, mirrors and sun": rendered("made:11", {"light.denoise": "true", "light.spp": "16"}, n_views=4, layers=("albedo",)),

@@ -12,6 +12,7 @@ import pytest
 from pbrs_farm.check import fields, methods, verify
 from pbrs_farm.core import layers
 from pbrs_farm.core.layers import optional_layer
+from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.views.open_views import open_views
 from tests.check.falsehoods import FALSEHOODS, planted, view_of
 from tests.check.roots import house_of, sign
@@ -90,6 +91,43 @@ def test_further_pictures_by_other_cameras_are_developed_again(finished_root: Ro
     (frame,) = open_views(str(root))
     assert len(frame.variants) == 3
     assert all((picture != frame.colour).any() for picture in frame.variants)
+
+
+def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root) -> None:
+    certificate = verify(finished_root("dark"), sample=10)
+    assert certificate.is_clean, certificate.text()
+    # The first view is denoised as it stands, the second at half its size: both modes and a variant.
+    assert certificate.counts["light by tiles"].checked == 3
+    assert any(
+        line.startswith("light of 1 views was denoised again") for line in certificate.not_looked_at
+    )
+
+
+@pytest.mark.parametrize("file", ["mlt_ol.png", "mlt_il_ol.png", "mlt_il_ol.1.png"])
+def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
+    finished_root: Root, tmp_path: Path, file: str
+) -> None:
+    root = Path(shutil.copytree(finished_root("dark"), tmp_path / "root"))
+    view = max((house_of(root) / "views").iterdir())
+    picture = array_from_png((view / file).read_bytes()).copy()
+    picture[:81, :108] = 255 - picture[:81, :108]
+    (view / file).write_bytes(png_from_array(picture))
+    sign(root, house_of(root))
+    counts = verify(root, sample=10).counts
+    assert counts["light by tiles"].failed == 1
+
+
+def test_a_damaged_variant_is_one_fault_and_the_rest_goes_on(
+    finished_root: Root, tmp_path: Path
+) -> None:
+    root = Path(shutil.copytree(finished_root("dark"), tmp_path / "root"))
+    file = max((house_of(root) / "views").iterdir()) / "mlt_il_ol.1.png"
+    file.write_bytes(file.read_bytes()[:300])
+    sign(root, house_of(root))
+    certificate = verify(root, sample=10)
+    assert certificate.n_views == 2
+    (fault,) = certificate.failures
+    assert "mlt_il_ol.1.png" in fault
 
 
 @pytest.mark.parametrize("sort", FALSEHOODS)
