@@ -127,7 +127,7 @@ def _wall(rng: np.random.Generator, kind: str, rgb: Rgb) -> tuple[F32, tuple[flo
             mortar = tuple(0.62 * c for c in rgb)
             return _laid(rng, picture, 6, 4, joint=1.2, spread=0.07, mortar=mortar), (2.4, 2.0)  # type: ignore[arg-type]
         case "panels":
-            picture[(y % (_PX // 2) < 2) | (x % (_PX // 2) < 2) & (y >= 0)] *= 0.45
+            picture[(y % (_PX // 2) < 2) | (x % (_PX // 2) < 2)] *= 0.45
             return np.asarray(picture, np.float32), (6.0, 6.0)
         case "boards":
             board = y * 16 // _PX

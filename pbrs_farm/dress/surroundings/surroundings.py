@@ -115,8 +115,8 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
     place = _Place(
         scenery=Scenery(), rng=rng, leaves=Drawn(looks, len(SPECIES), leaves_of),
         street_tree=int(rng.choice(_TOWN_TREES)),
-        facades=Drawn(looks + 1, 5, lambda own, k: facade(own, k, town)),
-        cottages=Drawn(looks + 2, 3, lambda own, k: facade(own, k, HOUSES)),
+        facades=Drawn(looks + 1, len(TOWN), lambda own, k: facade(own, k, town)),
+        cottages=Drawn(looks + 2, len(HOUSES), lambda own, k: facade(own, k, HOUSES)),
         rooms=lit("rooms", picture=lit_rooms(rng)), ground=ground_looks(rng),
         eye_m=max(top - ground_y - 0.5, 1.6),
     )  # fmt: skip
@@ -337,8 +337,8 @@ def _trees(
     for _ in range(n):
         kind = int(rng.choice(_GARDEN_TREES, p=_SHARES))
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(*away))
-        own, n = place.leaves[kind], 360 if away[0] < 8.0 else 200
-        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), own, n=n)
+        own, n_sprays = place.leaves[kind], 360 if away[0] < 8.0 else 200
+        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), own, n=n_sprays)
 
 
 def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: list[str]) -> None:
