@@ -56,6 +56,7 @@ OWN_TARGET: Final = {
     "inputs": "inputs",
     "docs": "docs_figures",
     "release": "release",
+    "startup": "startup",
 }
 
 

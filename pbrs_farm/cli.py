@@ -10,39 +10,24 @@ import argparse
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Final
 
 import pbrs_farm
-from pbrs_farm.commands.arguments import Handler, warn
-from pbrs_farm.commands.command_line import Parser, unknown_words, verb_first
+from pbrs_farm.commands.arguments import Handler, echo, warn
+from pbrs_farm.commands.command_line import VERBS, Parser, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.installation import EXTRA_OF, install_command
 
-# Module of pbrs_farm.commands -> the verbs it adds.
+# Module of pbrs_farm.commands -> the verbs it adds, in the order of the help.
 MODULES: Final = {
-    "looking": ("doctor", "inputs", "skies", "recipes", "layers", "completion"),
-    "homes": ("homes",),
-    "making": ("demo", "run", "objects", "step"),
-    "data_sets": ("make",),
-    "scattering": ("scatter",),
-    "explaining": ("dress", "catalogue", "repair", "cameras"),
-    "using": ("sheet", "verify", "relight", "pull"),
-    "labelling": ("export", "pack", "classes", "label-sheet"),
-    "selecting": ("reference", "select"),
-    "studying": ("train", "evaluate", "predict", "ablation"),
-    "showing": ("board",),
-    "submitting": ("submit",),
-    "steering": (
-        "status", "jobs", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel", "reduce",
-        "priority", "limit", "gc", "drain", "workers", "users", "audit", "recover", "adopt", "coordinator", "worker",
-    ),
-}  # fmt: skip
-
+    module: tuple(row.verb for row in VERBS.values() if row.module == module)
+    for module in dict.fromkeys(row.module for row in VERBS.values())
+}
 _OF_THE_FARM: Final = ("submitting", "steering")  # modules that need celery and redis
 # Modules whose verbs read files of others: the command runs them in a process that may die.
 _OF_STRANGERS: Final = (
@@ -71,17 +56,15 @@ def command() -> int:
 
 
 def _module_of(words: Sequence[str]) -> str | None:
-    return next((name for name, verbs in MODULES.items() if words[:1] and words[0] in verbs), None)
+    return VERBS[words[0]].module if words and words[0] in VERBS else None
 
 
 def _verb_first(words: Sequence[str]) -> list[str]:
-    every = [verb for verbs in MODULES.values() for verb in verbs]
-
     def parser_of(verb: str) -> argparse.ArgumentParser:
         # A verb whose packages are not installed takes no option.
         return build_parser(_module_of([verb])).verbs().get(verb, Parser())
 
-    return verb_first(words, every, parser_of)
+    return verb_first(words, list(VERBS), parser_of)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -98,7 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         warn(f"{verb} needs celery and redis: {install_command('workers')}")
         return 1
     if verb and module is None and not verb.startswith("-"):
-        offer = did_you_mean(verb, [v for verbs in MODULES.values() for v in verbs])
+        offer = did_you_mean(verb, list(VERBS))
         warn(f"no verb {verb!r}{f', {offer}' if offer else ''} (pbrs-farm --help lists them)")
         return 2
     try:
@@ -115,7 +98,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
     """Read the options of a verb and run it."""
-    parser = build_parser(module)
+    parser = build_parser(module) if module else first_screen()
     args, unknown = parser.parse_known_args(words)
     if unknown:
         of_verb = parser.verbs().get(verb, parser)
@@ -176,27 +159,52 @@ def build_parser(module: str | None = None) -> Parser:
     # Every verb takes --debug, before or after its own options.
     common = Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show tracebacks")
-    parser = Parser(
-        prog="pbrs-farm",
-        description="Houses designed by people in, physically-based training images with exact labels out.",
-    )
-    parser.add_argument("--version", action="version", version=pbrs_farm.__version__)
-    parser.set_defaults(debug=False, every_verb=build_parser)
-    verbs = parser.add_subparsers(title="verbs", metavar="VERB")
+    parser, add_parser = _bare_parser()
 
-    def verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:
-        sub = verbs.add_parser(name, help=text, description=text, parents=[common])
+    def verb(name: str, handler: Handler) -> argparse.ArgumentParser:
+        text = VERBS[name].help
+        sub = add_parser(name, help=text, description=text, parents=[common])
         sub.set_defaults(handler=handler)
         return sub
 
-    # A base installation has no verb of the farm, and says how to get them.
-    if not _has_farm():
-        farm = "submit, status, workers and the other verbs of a farm need celery and redis"
-        parser.epilog = f"{farm}: {install_command('workers')}"
     for name in [module] if module else MODULES:
         if name not in _OF_THE_FARM or _has_farm():
             import_module(f"pbrs_farm.commands.{name}").add_verbs(verb)
     return parser
+
+
+def first_screen() -> Parser:
+    """The parser of a command without a verb: it knows their names and help, and imports none of them."""
+    parser, add_parser = _bare_parser()
+    for row in VERBS.values():
+        if row.module not in _OF_THE_FARM or _has_farm():
+            add_parser(row.verb, help=row.help, add_help=False)
+    return parser
+
+
+def _bare_parser() -> tuple[Parser, Callable[..., argparse.ArgumentParser]]:
+    """The parser without verbs, and what adds one."""
+    parser = Parser(
+        prog="pbrs-farm",
+        description="Houses designed by people in, physically-based training images with exact labels out.",
+    )
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="show program's version number and exit"
+    )
+    parser.set_defaults(debug=False, every_verb=build_parser)
+    # A base installation has no verb of the farm, and says how to get them.
+    if not _has_farm():
+        farm = "submit, status, workers and the other verbs of a farm need celery and redis"
+        parser.epilog = f"{farm}: {install_command('workers')}"
+    return parser, parser.add_subparsers(title="verbs", metavar="VERB").add_parser
+
+
+class _Version(argparse.Action):
+    """Prints the version, which is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_parsed: object) -> None:
+        echo(pbrs_farm.__version__)
+        parser.exit()
 
 
 def _has_farm() -> bool:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from workers.client.farm_client import Farm
 
 Handler = Callable[[argparse.Namespace], int]
-# (name, handler, help) -> the verb's parser.
-Verb = Callable[[str, Handler, str], argparse.ArgumentParser]
+# (name, handler) -> the verb's parser; its help stands in verbs.csv.
+Verb = Callable[[str, Handler], argparse.ArgumentParser]
 
 # Help of arguments that name a home, and a view.
 HOME: Final = (

@@ -6,24 +6,34 @@ Options may stand before the verb or after it.
 from __future__ import annotations
 
 import argparse
+import csv
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.shown_text import did_you_mean
 
-# What a user wants -> the verbs for it, in the order of the help.
-GROUPS: Final = {
-    "start here": ("demo", "doctor", "homes", "run", "board", "export"),
-    "make pictures and labels": ("make", "scatter", "objects", "step", "recipes", "layers", "inputs", "skies"),
-    "look into one home": ("dress", "catalogue", "repair", "cameras"),
-    "look at what was made": ("sheet", "label-sheet", "classes", "verify", "relight"),
-    "choose and pack": ("reference", "select", "pack", "pull"),
-    "train and judge": ("train", "evaluate", "predict", "ablation"),
-    "run on many machines": (
-        "submit", "jobs", "status", "why", "logs", "failures", "retry", "rerun", "pause", "resume", "cancel",
-        "priority", "limit", "reduce", "gc", "workers", "drain", "users", "audit", "recover", "adopt", "coordinator", "worker",
-    ),
-}  # fmt: skip
+_TABLE: Final = Path(__file__).with_name("verbs.csv")
+
+
+@dataclass(frozen=True, slots=True)
+class VerbRow:
+    """A verb of verbs.csv. group: what a user wants who takes it; module: of pbrs_farm.commands."""
+
+    verb: str
+    group: str
+    module: str
+    help: str
+
+
+def _rows() -> tuple[VerbRow, ...]:
+    lines = _TABLE.read_text(encoding="utf-8").splitlines()
+    return tuple(VerbRow(*row) for row in csv.reader(lines[2:]))
+
+
+VERBS: Final = {row.verb: row for row in _rows()}
+"""Every verb, in the order of the help."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -46,14 +56,11 @@ class Parser(argparse.ArgumentParser):
         formatter = self._get_formatter()
         formatter.add_usage(self.usage, self._actions, self._mutually_exclusive_groups)
         formatter.add_text(self.description)
-        # A verb that stands in no group is listed all the same.
-        grouped = {verb for verbs in GROUPS.values() for verb in verbs}
-        others = tuple(verb for verb in lines if verb not in grouped)
-        for title, verbs in {**GROUPS, "more": others}.items():
-            if known := [lines[verb] for verb in verbs if verb in lines]:
-                formatter.start_section(title)
-                formatter.add_arguments(known)
-                formatter.end_section()
+        known = [row for row in VERBS.values() if row.verb in lines]
+        for group in dict.fromkeys(row.group for row in known):
+            formatter.start_section(group)
+            formatter.add_arguments([lines[row.verb] for row in known if row.group == group])
+            formatter.end_section()
         formatter.add_text(self.epilog)
         formatter.add_text("`pbrs-farm VERB --help` lists a verb's options.")
         return formatter.format_help()

@@ -15,7 +15,7 @@ def add_verbs(verb: Verb) -> None:
     """Add make."""
     from pbrs_farm.run.request import ProcessLimitOptions
 
-    p = verb("make", _make, "make a data set from its file: render, select, split, export, sum")
+    p = verb("make", _make)
     p.add_argument("set", metavar="SET", help=SET)
     p.add_argument("--out", required=True, help="the set's folder")
     text = "render every N-th home alone; then, with all in OUT, without it: the forms and the rest"

@@ -48,8 +48,7 @@ def add_verbs(verb: Verb) -> None:
         SeededRecipeOptions,
     )
 
-    text = "make a home look lived in; write before and after, the bundle and a report"
-    p = verb("dress", _dress, text)
+    p = verb("dress", _dress)
     add_home(p)
     add = p.add_argument
     text = "what is chosen: another seed, another home (default 1)"
@@ -61,22 +60,20 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, LibraryOptions)
     add_options(p, RecipeOptions)
 
-    text = "report how your own furniture is used, and why pieces are refused"
-    p = verb("catalogue", _catalogue, text)
+    p = verb("catalogue", _catalogue)
     text = "as --catalogue takes it: 3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, .sh3f"
     p.add_argument("libraries", nargs="+", type=Path, metavar="LIBRARY", help=text)
     text = "write what was refused: a CSV of kind, model, reason"
     p.add_argument("--refused", type=Path, metavar="FILE.csv", help=text)
     p.add_argument("--json", action="store_true", help="for machines")
 
-    text = "read and repair a home; write the bundle, a report and a cut through the walls"
-    p = verb("repair", _repair, text)
+    p = verb("repair", _repair)
     add_home(p)
     text = "folder for house.glb, house.json, repair.json, cut_<level>.svg"
     p.add_argument("--out", type=Path, required=True, help=text)
     add_options(p, SeededRecipeOptions)
 
-    p = verb("cameras", _cameras, "choose views, and say why each other candidate was rejected")
+    p = verb("cameras", _cameras)
     add_home(p)
     add = p.add_argument
     text = "floor plan with candidates, rejections and winners: FILE.png and FILE.svg"

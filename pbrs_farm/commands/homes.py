@@ -21,8 +21,7 @@ _SAY_EVERY_S: Final = 5.0
 
 def add_verbs(verb: Verb) -> None:
     """Add homes, and below it make."""
-    text = "list the example homes; fetch them from the Debian package; make new homes"
-    p = verb("homes", _homes, text)
+    p = verb("homes", _homes)
     p.add_argument("--fetch", action="store_true", help="download the package now")
     text = "download the furniture to dress and to make homes with (120 MB), too"
     p.add_argument("--furniture", action="store_true", help=text)

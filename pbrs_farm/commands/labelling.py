@@ -23,8 +23,7 @@ def add_verbs(verb: Verb) -> None:
     from pbrs_farm.export.export_options import ExportOptions
     from pbrs_farm.run.request import ModelsOption
 
-    text = "export finished views to other tools' formats, or homes to simulators"
-    p = verb("export", _export, text)
+    p = verb("export", _export)
     add = p.add_argument
     add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--to", required=True, choices=form_names(), help="docs/formats.md describes the forms")
@@ -33,7 +32,7 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, ExportOptions)
     add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
 
-    p = verb("pack", _pack_views, "pack finished views into shards to train from, or into Parquet")
+    p = verb("pack", _pack_views)
     add = p.add_argument
     add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
     add("--out", type=Path, required=True, help="new folder")
@@ -50,18 +49,12 @@ def add_verbs(verb: Verb) -> None:
     add("--colour", default="png", metavar="FORM", help=text)
     add("--seed", type=int, default=0, help="of the order of views (default 0)")
 
-    p = verb(
-        "classes", _count_classes, "count how often each class is seen, and say which rule chose it"
-    )
+    p = verb("classes", _count_classes)
     p.add_argument("folder", metavar="FOLDER|HOME", help="an output folder, or a home to read")
     add_options(p, ModelsOption)
     p.add_argument("--json", action="store_true", help="as JSON")
 
-    p = verb(
-        "label-sheet",
-        _label_sheet,
-        "draw a view's labels over its picture, with one edge magnified",
-    )
+    p = verb("label-sheet", _label_sheet)
     p.add_argument("view", type=Path, help=VIEW)
     p.add_argument("--out", type=Path, help="PNG (default VIEW_labels.png here)")
 

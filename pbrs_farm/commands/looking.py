@@ -24,22 +24,18 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add doctor, inputs, skies, recipes, layers and completion."""
-    p = verb(
-        "doctor", _doctor, "check this machine: what works, what is missing, how to install it"
-    )
+    p = verb("doctor", _doctor)
     p.add_argument("--json", action="store_true", help="for machines")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to try")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to try")
-    text = "list the house formats: what each brings, where to get it, its licence"
-    p = verb("inputs", _inputs, text)
+    p = verb("inputs", _inputs)
     p.add_argument("--json", action="store_true", help="for machines")
-    p = verb("skies", _skies, "fetch four outdoor panoramas (CC0) from Debian's blender-data")
-    p = verb("recipes", _recipes, "print every field of a recipe with its value")
+    p = verb("skies", _skies)
+    p = verb("recipes", _recipes)
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES, help="default fast")
     p.add_argument("--toml", action="store_true", help="as a file for --recipe FILE.toml")
-    p = verb("layers", _layers, "print the table of a view's files")
-    text = 'print a shell completion script: eval "$(pbrs-farm completion bash)"'
-    p = verb("completion", _completion, text)
+    p = verb("layers", _layers)
+    p = verb("completion", _completion)
     p.add_argument("shell", choices=SHELLS, help="the shell that reads it")
 
 

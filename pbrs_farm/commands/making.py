@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import closing
@@ -40,7 +41,7 @@ def add_verbs(verb: Verb) -> None:
     """Add demo, run, objects and step."""
     from pbrs_farm.run.request import CameraOptions, ModelsOption, ObjectsRequest, RunRequest
 
-    p = verb("demo", _demo, "render an example home and lay out a sheet: out/demo/sheet.png")
+    p = verb("demo", _demo)
     text = "example home, `builtin`, or a file (default Studio)"
     p.add_argument("--home", default="Studio", help=text)
     p.add_argument("--out", default="out/demo", help="output folder")
@@ -50,7 +51,7 @@ def add_verbs(verb: Verb) -> None:
     p.set_defaults(views=6)
     p.epilog = "six views unless --views asks for others"
 
-    p = verb("run", _run, "render homes: repair them, choose cameras, write pictures and labels")
+    p = verb("run", _run)
     add = p.add_argument
     add("homes", nargs="*", metavar="HOME", help=HOME)
     add("--home", action="append", default=[], metavar="PATH", help="the same, repeatable")
@@ -67,8 +68,7 @@ def add_verbs(verb: Verb) -> None:
         "example: pbrs-farm run Studio --dress 1 --recipe preview --views 4 --layers albedo depth_z"
     )
 
-    text = "render single models without context, 20 views each (paper section 4.1)"
-    p = verb("objects", _objects, text)
+    p = verb("objects", _objects)
     add = p.add_argument
     text = "folders of OBJ or GLB (ShapeNet's layout too), .sh3f libraries"
     add("models", nargs="+", type=Path, metavar="MODELS", help=text)
@@ -79,7 +79,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", required=True, help="output folder or store URL")
     add_options(p, ObjectsRequest)
 
-    p = verb("step", _step, "run one step in this process, to reproduce a failure")
+    p = verb("step", _step)
     add = p.add_argument
     add("step", help="as a failure names it, e.g. light")
     add("home", help=HOME)
@@ -192,9 +192,12 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
 
 
 def _warn_of_slowness() -> None:
-    """Warn where only Mitsuba's scalar variant is left."""
+    """Warn where only Mitsuba's scalar variant is left, and before kernels are compiled."""
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm
 
+    is_first = not any((Path.home() / ".drjit").glob("*"))
+    if is_first and sys.stderr.isatty():
+        warn("the first run on this machine compiles what renders: ten seconds more, once")
     if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
         warn(
             f"no LLVM of version {MIN_LLVM} or later: going on with Mitsuba's scalar_rgb, several"

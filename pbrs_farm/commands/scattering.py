@@ -33,7 +33,7 @@ def add_verbs(verb: Verb) -> None:
     """Add scatter."""
     from pbrs_farm.run.request import SeededRecipeOptions
 
-    p = verb("scatter", _scatter, "put models of your own into a home and look at them")
+    p = verb("scatter", _scatter)
     add = p.add_argument
     add("homes", nargs="+", metavar="HOME", help=HOME)
     text = "a folder, a file or a pattern of GLB, glTF, OBJ, PLY, STL, OFF; repeatable"

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
-    p = verb("reference", _reference, "make a small reference file of histograms from photographs")
+    p = verb("reference", _reference)
     add = p.add_argument
     add("action", choices=("build",), help="the one thing to do")
     add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
@@ -32,7 +32,7 @@ def add_verbs(verb: Verb) -> None:
     add_set(p, "FIELD=VALUE", "histogram.FIELD or selection.FIELD")
     _add_photographs(p)
 
-    p = verb("select", _select, "keep the views that look like photographs (paper section 3.3)")
+    p = verb("select", _select)
     add = p.add_argument
     add("folder", help="output folder or store URL")
     text = "a reference file, a folder of RGB-D pairs, or a .mat"

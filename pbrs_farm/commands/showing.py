@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add board."""
-    p = verb(
-        "board", _board, "open a page in the browser: look at views, relight them, watch a farm"
-    )
+    p = verb("board", _board)
     add = p.add_argument
     add("root", nargs="?", default="", help="output folder or store URL (default $PBRS_STORE)")
     add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")

@@ -43,72 +43,69 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add status, why, logs, failures, retry, pause ... reduce, drain, workers, recover, adopt; services."""
 
-    def farm_verb(name: str, handler: Handler, text: str) -> argparse.ArgumentParser:
-        p = verb(name, handler, text)
+    def farm_verb(name: str, handler: Handler) -> argparse.ArgumentParser:
+        p = verb(name, handler)
         add_farm(p)
         return p
 
-    p = farm_verb("status", _status, "show a job's progress: stages, rate, time left, workers")
+    p = farm_verb("status", _status)
     _add_job(p)
     text = "again every two seconds, to the end (--json: a line each)"
     p.add_argument("--watch", action="store_true", help=text)
-    farm_verb("jobs", _jobs, "list the farm's jobs: state, views an hour, time left, slot-hours")
-    p = farm_verb("why", _why, "explain what a task, a house or a view is waiting for")
+    farm_verb("jobs", _jobs)
+    p = farm_verb("why", _why)
     p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
-    p = farm_verb("logs", _logs, "print the log of a failed or long-running task")
+    p = farm_verb("logs", _logs)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     p.add_argument("--attempt", type=int, metavar="N", help="which one (default the last)")
     _add_job(p, flag=True)
-    _add_job(farm_verb("failures", _failures, "list permanent failures, similar ones together"))
-    p = farm_verb("retry", _retry, "retry failed tasks: those named, or all")
+    _add_job(farm_verb("failures", _failures))
+    p = farm_verb("retry", _retry)
     p.add_argument("tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default all)")
     _add_job(p, flag=True)
-    p = farm_verb("rerun", _rerun, "run a task again in this process, to reproduce a failure")
+    p = farm_verb("rerun", _rerun)
     p.add_argument("task", help="HOUSE/UNIT/STAGE")
     _add_job(p, flag=True)
     # Verbs that change a job's state take the job alone.
-    for name, text in _STEERING.items():
-        p = farm_verb(name, _steer, text)
+    for name in ("pause", "resume", "cancel", "reduce"):
+        p = farm_verb(name, _steer)
         p.set_defaults(what=name)
         _add_job(p)
-    p = farm_verb("priority", _priority, "change a running job's priority: 0 is first, 9 is last")
+    p = farm_verb("priority", _priority)
     text = f"0 to {LEAST_URGENT}"
     p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER", help=text)
     _add_job(p)
-    p = farm_verb(
-        "limit", _limit, "limit a job's tasks in flight or its slot-hours; 0 removes the limit"
-    )
+    p = farm_verb("limit", _limit)
     text = "tasks of the job in flight at once; 0 = any"
     p.add_argument("--max-slots", type=int, metavar="N", help=text)
     text = "slot-hours after which it pauses itself; 0 = none"
     p.add_argument("--budget", type=float, metavar="HOURS", help=text)
     _add_job(p)
-    p = farm_verb("gc", _gc, "list what the store no longer needs; remove it with --yes")
+    p = farm_verb("gc", _gc)
     p.add_argument(
         "--keep", default="30d", metavar="TIME", help="younger things stay (default 30d)"
     )
     p.add_argument("--yes", action="store_true", help="remove it")
-    p = farm_verb("drain", _drain, "let a worker finish its tasks and stop")
+    p = farm_verb("drain", _drain)
     p.add_argument("worker", help="its name, as `workers` lists it")
     p.add_argument("--undo", action="store_true", help="let it stay")
-    farm_verb("workers", _workers, "list the farm's workers")
+    farm_verb("workers", _workers)
     _add_users(farm_verb)
-    p = farm_verb("recover", _recover, "rebuild the ledger of a job from storage")
+    p = farm_verb("recover", _recover)
     p.set_defaults(what="recover")
     p.add_argument("job", help="job id")
-    text = "continue a job of another version; keep what this version would make alike"
-    p = farm_verb("adopt", _recover, text)
+    p = farm_verb("adopt", _recover)
     p.set_defaults(what="adopt")
     p.add_argument("job", help="job id")
     # The two services of the farm.
-    verb("coordinator", _coordinator, "run the coordinator, or stand by for it")
-    p = verb("worker", _worker, "run farm tasks until told to stop")
+    verb("coordinator", _coordinator)
+    p = verb("worker", _worker)
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
 
 
-def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]) -> None:
-    p = farm_verb("users", _users, "list, add and limit users; `users add NAME` makes one")
+def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> None:
+    p = farm_verb("users", _users)
     verbs = ("list", "add", "limit", "remove")
     p.add_argument("what", nargs="?", default="list", choices=verbs, help="default list")
     p.add_argument("name", nargs="?", default="", metavar="NAME", help="the user's")
@@ -121,19 +118,11 @@ def _add_users(farm_verb: Callable[[str, Handler, str], argparse.ArgumentParser]
     yes_no = ("yes", "no")
     p.add_argument("--admin", choices=yes_no, help="may steer every job, workers and users")
     p.add_argument("--may-preempt", choices=yes_no, help="may submit urgent jobs (--preempt)")
-    p = farm_verb("audit", _audit, "list who changed what on the farm, newest first")
+    p = farm_verb("audit", _audit)
     p.add_argument("--last", type=int, default=20, metavar="N", help="lines (default 20)")
 
 
 # Verbs that change a job's state -> what they do.
-_STEERING = {
-    "pause": "pause a job: running tasks finish, no new ones start",
-    "resume": "resume a paused job",
-    "cancel": "cancel a job; stored results stay",
-    "reduce": "merge the results of a finished or running job",
-}
-
-
 def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
     text = "job id (default: the newest)"
     if flag:  # of a verb whose positional arguments name tasks

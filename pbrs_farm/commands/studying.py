@@ -34,7 +34,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 
 def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict and ablation."""
-    p = verb("train", _train, "train a network on finished views; run it again to resume")
+    p = verb("train", _train)
     p.add_argument("task", choices=TASKS, help="what the network learns to see")
     roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
@@ -54,11 +54,7 @@ def add_verbs(verb: Verb) -> None:
     export = "onnx: RUN/model.onnx, for pictures of the plan's size; weights: RUN/packed, half floats and a model card; of a finished run, too"
     p.add_argument("--export", choices=("onnx", "weights"), help=export)
 
-    p = verb(
-        "evaluate",
-        _evaluate,
-        "judge a run: a table beside baseline and paper, worst and best views",
-    )
+    p = verb("evaluate", _evaluate)
     p.add_argument("run", type=Path, metavar="RUN", help="the folder of `train --out`")
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
     p.add_argument(
@@ -72,11 +68,7 @@ def add_verbs(verb: Verb) -> None:
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")
 
-    p = verb(
-        "predict",
-        _predict,
-        "run a trained network on photographs; write files and a comparison page",
-    )
+    p = verb("predict", _predict)
     photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
     p.usage = (
         "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--json]\n"
@@ -88,8 +80,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
     p.add_argument("--json", action="store_true", help="a JSON line a photograph")
 
-    text = "compare lights or sets of homes by training one network on each, with several seeds"
-    p = verb("ablation", _ablation, text)
+    p = verb("ablation", _ablation)
     rows = "[NAME=]ROOT[+ROOT][@MODE]: a row a mode, or one where a mode is named"
     p.add_argument("root", metavar="ROOT", nargs="+", help=rows)
     text = "what the network learns to see (default normals)"

@@ -34,7 +34,7 @@ def add_verbs(verb: Verb) -> None:
     """Add submit."""
     from workers.job import SubmitRequest
 
-    p = verb("submit", _submit, "submit homes to the farm")
+    p = verb("submit", _submit)
     p.set_defaults(parser=p)
     text = "files, folders, example homes; or one job.toml that says all (docs/farm.md)"
     p.add_argument("homes", nargs="+", metavar="HOME", help=text)

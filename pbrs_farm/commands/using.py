@@ -20,19 +20,13 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add sheet, verify, relight and pull."""
-    text = "lay out an output folder: contact sheet (sheet.png) and gallery (index.html)"
-    p = verb("sheet", _sheet, text)
+    p = verb("sheet", _sheet)
     p.add_argument("folder", type=Path, help="the folder of --out")
     p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
     text = "films of the sequences too: <house>.mp4, and <house>_labels.mp4 with labels beside it"
     p.add_argument("--video", action="store_true", help=text)
 
-    p = verb(
-        "verify",
-        _verify,
-        "recompute labels from the stored files by another caster: a certificate; --light: prove"
-        " the light transport on rooms with known answers",
-    )
+    p = verb("verify", _verify)
     add = p.add_argument
     add("folder", metavar="ROOT", nargs="?", help="the folder of --out, or s3://bucket/prefix")
     text = "no files: furnace rooms, Metropolis against path, exact facts; under a minute"
@@ -41,8 +35,7 @@ def add_verbs(verb: Verb) -> None:
     add("--sample", type=int, metavar="N", help="pixels a view")
     add("--json", action="store_true", help="certificate or claims as JSON")
 
-    text = "change lamps and daylight of a stored view without rendering"
-    p = verb("relight", _relight, text)
+    p = verb("relight", _relight)
     add = p.add_argument
     add("view", help=f"{VIEW}, or a store's URL of one")
     add("--indoor", default="1", metavar="F", help="factor of the lamps, F or R,G,B (default 1)")
@@ -56,7 +49,7 @@ def add_verbs(verb: Verb) -> None:
     add("--out", type=Path, help="PNG to write (default VIEW_relit.png here)")
     add("--no-denoise", action="store_true", help="develop the raw radiance")
 
-    p = verb("pull", _pull, "copy a store's views into a folder; files already there stay")
+    p = verb("pull", _pull)
     p.add_argument("root", metavar="ROOT", help="s3://bucket/prefix, or a folder")
     p.add_argument("--out", type=Path, required=True, help="the folder")
 

@@ -12,7 +12,7 @@ import pytest
 
 from pbrs_farm.cli import MODULES, build_parser, main
 from pbrs_farm.commands.arguments import recipe_of
-from pbrs_farm.commands.command_line import GROUPS, verb_first
+from pbrs_farm.commands.command_line import VERBS, verb_first
 from pbrs_farm.commands.completion_scripts import SHELLS, completion_script
 from pbrs_farm.core.recipe import RECIPE_NAMES, recipe_from_name
 from pbrs_farm.formats.recipe_toml import recipe_from_toml, toml_from_recipe
@@ -96,7 +96,7 @@ def test_an_option_before_the_verb_works_as_behind_it(capsys: pytest.CaptureFixt
 
 def test_the_help_lists_each_verb_once_below_what_it_is_for() -> None:
     text = build_parser().format_help()
-    for title in GROUPS:
+    for title in {row.group for row in VERBS.values()}:
         assert f"\n{title}:" in text
     for verb in EVERY_VERB:
         assert len(re.findall(rf"^  {verb}\b", text, re.MULTILINE)) == 1, verb

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from pbrs_farm.cli import MODULES, build_parser
+from pbrs_farm.cli import MODULES, build_parser, first_screen
+from pbrs_farm.commands.command_line import VERBS
 
 HEAVY = "mitsuba drjit moderngl OpenImageIO celery kombu numpy scipy pydantic obstore"
 
@@ -22,14 +23,34 @@ def verbs_of(parser: argparse.ArgumentParser) -> list[str]:
 
 @pytest.mark.parametrize("module", MODULES)
 def test_the_table_names_the_verbs_each_module_adds(module: str) -> None:
-    assert verbs_of(build_parser(module)) == list(MODULES[module])
+    assert sorted(verbs_of(build_parser(module))) == sorted(MODULES[module])
 
 
 def test_the_help_names_every_verb() -> None:
-    every = [verb for verbs in MODULES.values() for verb in verbs]
-    assert verbs_of(build_parser()) == every
+    assert sorted(verbs_of(build_parser())) == sorted(VERBS)
     text = build_parser().format_help()
-    assert all(f"\n  {verb}" in text for verb in every)
+    assert all(f"\n  {verb}" in text for verb in VERBS)
+    # The first screen knows the verbs without their modules.
+    assert first_screen().format_help() == text
+
+
+def test_the_first_screen_and_the_package_import_nothing_heavy() -> None:
+    code = f"""
+import sys
+import pbrs_farm
+after_import = set(sys.modules)
+from pbrs_farm.cli import main
+try:
+    main(["--help"])
+except SystemExit:
+    pass
+heavy = set({HEAVY.split()!r}) | {{"urllib.request", "importlib.metadata"}}
+print("last:", sorted(heavy & set(sys.modules)), "pathlib" in after_import)
+"""
+    # Without what the interpreter loads for this environment (-S: no site).
+    words = [sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}" + code]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "last: [] False"
 
 
 def test_the_help_says_what_the_farms_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
