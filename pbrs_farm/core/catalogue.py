@@ -15,6 +15,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.core.joints import Joint
 from pbrs_farm.core.mesh import points_bounds
 
 
@@ -65,6 +66,7 @@ class Shape:
     materials: tuple[Material, ...]
     textures: Mapping[str, Texture] = field(default_factory=dict)  # by Material.texture_id
     lights: tuple[LightPart, ...] = ()  # positions in the piece's frame
+    joints: tuple[Joint, ...] = ()  # in the piece's frame
 
     @property
     def bounds(self) -> F64:

@@ -60,6 +60,14 @@ class MoveItems(Record):
     world_from_world: Rows
 
 
+class OpenJoints(Record):
+    """Open doors, drawers and lids, or shut them, as far as nothing stands in their way."""
+
+    do: Literal["open"] = "open"
+    joints: tuple[tuple[str, str], ...]  # (item, part)
+    share: Annotated[float, Field(ge=0, le=1)]  # of the way to the joint's upper limit
+
+
 class PaintItems(Record):
     """Give items one plain colour."""
 
@@ -102,7 +110,14 @@ class AddLight(Record):
 
 
 Edit = Annotated[
-    PlaceModel | RemoveItems | MoveItems | PaintItems | CoverItems | SetLight | AddLight,
+    PlaceModel
+    | RemoveItems
+    | MoveItems
+    | OpenJoints
+    | PaintItems
+    | CoverItems
+    | SetLight
+    | AddLight,
     Field(discriminator="do"),
 ]
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I32, Points, Points2
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
+from pbrs_farm.core.joints import Joint
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.mesh import points_bounds, triangle_corners
 
@@ -134,6 +135,7 @@ class Surface:
     material: int  # index into House.materials
     uvs: F32 | None = None  # (V, 2) v up, repeat wrap
     normals: F32 | None = None  # (V, 3) unit shading normals; None = flat
+    part: str = ""  # of its item that it moves with (Joint.part); "" = the body, which stands still
 
     def __repr__(self) -> str:
         return f"Surface({self.name!r}, {len(self.faces):,} triangles, material {self.material})"
@@ -164,6 +166,7 @@ def part_of(surface: Surface, faces: I32, name: str) -> Surface:
         material=surface.material,
         uvs=None if surface.uvs is None else surface.uvs[used],
         normals=None if surface.normals is None else surface.normals[used],
+        part=surface.part,
     )
 
 
@@ -258,6 +261,7 @@ class Item:
     )
     tags: tuple[str, ...] = ()  # words of the source: "mirrored", "unmapped", "boundary_of:0_1"
     pose: ModelPose | None = None  # of what an edit placed
+    joints: tuple[Joint, ...] = ()  # of its doors, drawers, lids; each moves the part it names
 
     @property
     def bounds(self) -> F64:

@@ -13,8 +13,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import Surface
-from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.core.house import Item, Surface
+from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 
 _WELD_M = 1e-4  # vertices no farther apart are one
 _GOLDEN = 0.6180339887498949  # how far each board's picture is shifted against the one before it
@@ -60,6 +60,17 @@ def box_mapped(
         uvs=uvs.astype(np.float32),
         normals=None if surface.normals is None else surface.normals[vertex],
     )
+
+
+def area_of_look(item: Item, surface: Surface) -> float:
+    """m2 of what looks like a surface of an item: of a thing that opens, all of one material.
+
+    Its doors and drawers are surfaces apart, and small ones must not look other than large ones.
+    """
+    alike = (
+        [s for s in item.surfaces if s.material == surface.material] if item.joints else [surface]
+    )
+    return sum(float(face_areas(triangle_corners(s.positions, s.faces)).sum()) for s in alike)
 
 
 def connected_parts(surface: Surface, axes: F64) -> Int:

@@ -156,10 +156,10 @@ def _connected_surfaces(surface: Surface, axes: F64) -> Iterator[tuple[Surface, 
 
 
 def _merge_surfaces(surfaces: list[Surface]) -> list[Surface]:
-    """Surfaces of one name and material as one, in the order they are first met."""
-    groups: dict[tuple[str, int], list[Surface]] = {}
+    """Surfaces of one name, material and part as one, in the order they are first met."""
+    groups: dict[tuple[str, int, str], list[Surface]] = {}
     for surface in surfaces:
-        groups.setdefault((surface.name, surface.material), []).append(surface)
+        groups.setdefault((surface.name, surface.material, surface.part), []).append(surface)
     return [_join_surfaces(some) for some in groups.values()]
 
 

@@ -18,8 +18,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
-from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
-from pbrs_farm.dress.box_mapping import box_mapped
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.dress.box_mapping import area_of_look, box_mapped
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.part_kinds import (
     PartKind,
@@ -125,7 +125,7 @@ def _kinds_of_surfaces(house: MutableHouse, item: Item, group: str) -> list[Part
 def _may_be_board(surface: Surface, material: Material, item: Item, group: str) -> bool:
     is_plain = material.texture_id is None and material.kind is MaterialKind.OPAQUE
     is_free = is_plain and kind_by_name(material.name) is None and not is_white(material.diffuse)
-    return is_free and is_furniture(item, group) and _area_of_surface(surface) >= _LEAST_BOARD_M2
+    return is_free and is_furniture(item, group) and area_of_look(item, surface) >= _LEAST_BOARD_M2
 
 
 def _finish_surface(
@@ -256,10 +256,6 @@ def tinted(house: MutableHouse, pattern: Pattern, wanted: F64, *, is_grained: bo
     r, g, b = (round(float(c), 4) for c in srgb_from_linear(ratio))
     tinted = replace(house.materials[made.number], diffuse=(r, g, b))
     return LaidMaterial(house.material(tinted), made.size_m, is_grained)
-
-
-def _area_of_surface(surface: Surface) -> float:
-    return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())
 
 
 def _upward_area(surface: Surface) -> float:

@@ -101,11 +101,13 @@ class MutableHouse:
             self._placed_surface(s, shape, moved, normal_matrix) for s in shape.surfaces
         )
         lights = tuple(_moved_light(light, moved, turn) for light in shape.lights)
+        matrix = _affine(turn * factor, at)
         return Item(
             id=item_id, name=piece.name, kind=piece.kind, level_id=level_id, surfaces=surfaces,
             nyu40=piece.nyu40, source_class=piece.id, room_id=room_id, lights=lights,
             tags=(f"{ADDED_TAG}{piece.id}", f"seed:{self.seed}", *tags),
             box=_placed_box(shape, turn, factor, at),
+            joints=tuple(joint.placed(matrix) for joint in shape.joints),
         )  # fmt: skip
 
     def add(self, item: Item, pass_name: str, piece: Piece | None = None) -> None:
@@ -183,10 +185,19 @@ def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None
         return replace(s, positions=points.astype(np.float32), normals=normals)
 
     box = item.box and Box(moved(item.box.centre), item.box.half, turn @ item.box.axes)
+    matrix = _affine(turn, pivot - turn @ pivot + step)
     return replace(
         item, surfaces=tuple(surface(s) for s in item.surfaces), box=box,
         lights=tuple(_moved_light(light, moved, turn) for light in item.lights),
+        joints=tuple(joint.placed(matrix) for joint in item.joints),
     )  # fmt: skip
+
+
+def _affine(linear: F64, offset: F64) -> F64:
+    """(4, 4) that turns and scales by (3, 3), then moves by (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, offset
+    return matrix
 
 
 def _moved_light(light: LightPart, moved: Callable[[F64], F64], turn: F64) -> LightPart:

@@ -13,9 +13,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.catalogue import Catalogue
-from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface, Texture
-from pbrs_farm.core.mesh import face_areas, triangle_corners
-from pbrs_farm.dress.box_mapping import box_mapped
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Texture
+from pbrs_farm.dress.box_mapping import area_of_look, box_mapped
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.textures.maps import normals_from_height, roughness_bytes, texture_from_pixels
@@ -41,7 +40,7 @@ def add_wear(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: f
         surfaces = []
         for surface in item.surfaces:
             material = house.materials[surface.material]
-            if not _is_smooth(material) or _area_of_surface(surface) < _LEAST_M2:
+            if not _is_smooth(material) or area_of_look(item, surface) < _LEAST_M2:
                 surfaces.append(surface)
                 continue
             axes = np.eye(3) if item.box is None else item.box.axes
@@ -139,7 +138,3 @@ def _is_smooth(material: Material) -> bool:
         and low <= material.roughness <= high
         and max(material.specular) > 0
     )
-
-
-def _area_of_surface(surface: Surface) -> float:
-    return float(face_areas(triangle_corners(surface.positions, surface.faces)).sum())

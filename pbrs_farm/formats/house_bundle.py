@@ -66,12 +66,16 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
     data = {
         name: json_from_value(getattr(item, name)) for name in Item.__slots__ if name != "surfaces"
     }
+    # What does not move says nothing of it.
+    if not item.joints:
+        del data["joints"]
     data["surfaces"] = [
         {
             "name": s.name,
             "material": int(s.material),
             "n_vertices": len(s.positions),
             "n_faces": len(s.faces),
+            **({"part": s.part} if s.part else {}),
         }
         for s in item.surfaces
     ]

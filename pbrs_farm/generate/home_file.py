@@ -32,8 +32,11 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Place, Shape
 from pbrs_farm.core.house import MaterialKind
+from pbrs_farm.core.joints import JOINTS_PROPERTY
+from pbrs_farm.formats.serialise import json_from_value
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     PlacedPiece,
@@ -304,7 +307,7 @@ def _add_opening(
     key = (
         f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
     )
-    return ET.SubElement(home, "doorOrWindow", {
+    element = ET.SubElement(home, "doorOrWindow", {
         "id": f"doorOrWindow-{len(home)}", "name": _DOOR_NAMES[opening.kind],
         "catalogId": f"pbrs_farm#{opening.kind.value}", "creator": AUTHOR,
         "icon": contents.icon, "model": contents.model(key, shape),
@@ -313,6 +316,15 @@ def _add_opening(
         "height": _cm(opening.height), "movable": "false",
         "wallThickness": "1", "wallDistance": "0", "boundToWall": "true",
     })  # fmt: skip
+    _add_joints(element, shape)
+    return element
+
+
+def _add_joints(element: ET.Element, shape: Shape) -> None:
+    """The joints of a model in its own frame, for readers that open its doors and drawers."""
+    if shape.joints:
+        value = keys.canonical_json(json_from_value(shape.joints))
+        ET.SubElement(element, "property", {"name": JOINTS_PROPERTY, "value": value})
 
 
 def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
@@ -343,6 +355,7 @@ def _add_piece(
         "elevation": _cm(min(placed.elevation, height - placed.height)),
         "width": _cm(placed.width), "depth": _cm(placed.depth), "height": _cm(placed.height),
     } | level)  # fmt: skip
+    _add_joints(element, shape)
     if placed.mirrored:
         element.set("modelMirrored", "true")
     if placed.colour:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import face_areas
 
 MTL: Final = "model.mtl"
@@ -22,11 +23,13 @@ _UV_DIGITS: Final = 5
 _MOST_DECIMALS: Final = 12  # a float32 times 10^12 is still exact in double precision
 _POWERS: Final = np.array([float(f"1e{n}") for n in range(-_MOST_DECIMALS, 16)])
 _ENDINGS: Final = {"image/png": "png", "image/jpeg": "jpg"}
-# What Sweet Home 3D makes of a group by its name.
+# What Sweet Home 3D makes of a group by its name: seen through, a mirror, or what turns or slides.
 _GROUPS: Final = {
     MaterialKind.PANE: "sweethome3d_window_pane",
     MaterialKind.MIRROR: "sweethome3d_window_mirror",
 }
+_OPENING: Final = "sweethome3d_opening"
+_HANGERS: Final = {JointKind.REVOLUTE: "hinge", JointKind.PRISMATIC: "rail"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +108,16 @@ def side_files(shape: Shape) -> dict[str, bytes]:
 
 
 def _group_name(shape: Shape, surface: Surface, number: int) -> str:
-    return f"{_GROUPS.get(shape.materials[surface.material].kind, 'part')}_{number}"
+    made_of = _GROUPS.get(shape.materials[surface.material].kind)
+    for k, joint in enumerate(shape.joints, 1):
+        if joint.part == surface.part:
+            return f"{made_of or _OPENING}_on_{hanger(joint, k)}_{number}"
+    return f"{made_of or 'part'}_{number}"
+
+
+def hanger(joint: Joint, number: int) -> str:
+    """What the k-th joint of a shape is called in the names of groups: "hinge_1", "rail_2"."""
+    return f"{_HANGERS[joint.kind]}_{number}"
 
 
 def _obj_lines(shape: Shape) -> Iterator[str]:

@@ -6,17 +6,20 @@ front (the room a door swings into) towards +z. A home has one design of doors a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.catalogue import Shape
-from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.house import Material, MaterialKind, Surface
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
 from pbrs_farm.geometry.solids import Triple, boxes_surface
+from pbrs_farm.home.masses import mass_kg
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
@@ -30,6 +33,7 @@ _SASH_DEPTH_M: Final = 0.03  # from its middle to either face
 _BAR_M: Final = 0.022  # width of the bars across a pane
 _PANE_M: Final = 0.006
 _WIDEST_SASH_M: Final = 0.95
+_WIDE_OPEN_RAD: Final = np.pi / 2
 _HANDLE_M: Final = 1.05  # above the floor
 
 LEAVES: Final = ("four", "flat", "two", "six", "one", "boards", "three", "five")
@@ -93,12 +97,38 @@ def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) ->
         frame += _stops(w, h, d, has_threshold=opening.kind is OpeningKind.ENTRANCE)
         leaf = _door_leaf_boxes(w, h, d, kind)
         handles = _handles(w, d, opening.hinge_at_start, design.handle)
-        surfaces = [boxes_surface("frame", [*frame, *leaf], 0), boxes_surface("handle", handles, 1)]
-        return Shape(tuple(surfaces), (paint, metal))
-    bars, panes, catches = _sashes(w, h, design)
-    surfaces = [boxes_surface("frame", [*frame, *bars], 0), boxes_surface("pane", panes, 1)]
-    surfaces.append(boxes_surface("catch", catches, 2))
-    return Shape(tuple(surfaces), (paint, glass, metal))
+        # It hangs at the front of its leaf, which swings into the room.
+        side = -1.0 if opening.hinge_at_start else 1.0
+        at = (side * (w / 2 - _FRAME_M - _GAP_M), 0.0, d / 2 - 0.005)
+        hung = Joint("leaf 1", JointKind.REVOLUTE, at, (0.0, side, 0.0), _WIDE_OPEN_RAD)
+        moving = [boxes_surface("leaf", leaf, 0), boxes_surface("handle", handles, 1)]
+        return _with_joints([boxes_surface("frame", frame, 0)], [(hung, moving)], (paint, metal))
+    hung_sashes = []
+    for k, (x, bars, panes, catches) in enumerate(_sashes(w, h, design)):
+        # Its catch is at the right of even sashes, the hinges at the other end, in front.
+        left = k % 2 == 0
+        at = (x[0] if left else x[1], 0.0, _SASH_DEPTH_M)
+        axis = (0.0, -1.0 if left else 1.0, 0.0)
+        hung = Joint(f"sash {k + 1}", JointKind.REVOLUTE, at, axis, _WIDE_OPEN_RAD)
+        boxes = [("bars", bars, 0), ("pane", panes, 1), ("catch", catches, 2)]
+        hung_sashes.append((hung, [boxes_surface(*row) for row in boxes]))
+    return _with_joints([boxes_surface("frame", frame, 0)], hung_sashes, (paint, glass, metal))
+
+
+def _with_joints(
+    body: Sequence[Surface],
+    hung: Sequence[tuple[Joint, Sequence[Surface]]],
+    materials: tuple[Material, ...],
+) -> Shape:
+    """A shape of what stands still and of what each joint moves, with its mass."""
+    surfaces, joints = list(body), []
+    for joint, moving in hung:
+        surfaces += [replace(s, part=joint.part) for s in moving]
+        masses = [
+            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in moving
+        ]
+        joints.append(replace(joint, mass_kg=sum(masses)))
+    return Shape(tuple(surfaces), materials, joints=tuple(joints))
 
 
 def _frame_boxes(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:
@@ -195,8 +225,13 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
     return boxes
 
 
-def _sashes(w: float, h: float, design: OpeningDesign) -> tuple[list[_Box], list[_Box], list[_Box]]:
-    """(bars, panes, catches): as many sashes side by side as keep each below a metre."""
+def _sashes(
+    w: float, h: float, design: OpeningDesign
+) -> Iterator[tuple[tuple[float, float], list[_Box], list[_Box], list[_Box]]]:
+    """(span of x, bars, panes, catches) of as many sashes side by side as keep each below a metre.
+
+    A light above a sash does not open by itself: it turns with the sash below it.
+    """
     n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
     inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M
     # Where an upper light begins, and what each of the two shows.
@@ -205,17 +240,16 @@ def _sashes(w: float, h: float, design: OpeningDesign) -> tuple[list[_Box], list
         "transom": (0.7, "plain", "plain"), "halves": (0.5, "plain", "plain"),
         "small_top": (0.72, "plain", "mullion"), "sash_grid": (0.5, "plain", "cross"),
     }.get(kind, (1.0, kind, kind))  # fmt: skip
-    bars: list[_Box] = []
-    panes: list[_Box] = []
-    catches: list[_Box] = []
     for k in range(n):
+        bars: list[_Box] = []
+        panes: list[_Box] = []
         left, right = -inner / 2 + k * inner / n + 0.002, -inner / 2 + (k + 1) * inner / n - 0.002
         middle = low + share * (high - low)
         _sash(bars, panes, (left, low, right, middle), lower)
         if share < 1:
             _sash(bars, panes, (left, middle, right, high), upper)
-        catches += _catch(left if k % 2 else right - _SASH_M, (low + middle) / 2, design.handle)
-    return bars, panes, catches
+        catches = _catch(left if k % 2 else right - _SASH_M, (low + middle) / 2, design.handle)
+        yield (left, right), bars, panes, catches
 
 
 def _catch(x: float, y: float, kind: str) -> list[_Box]:

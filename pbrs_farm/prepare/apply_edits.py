@@ -17,6 +17,7 @@ from pbrs_farm.core.edits import (
     AddLight,
     CoverItems,
     MoveItems,
+    OpenJoints,
     PaintItems,
     PlaceModel,
     RemoveItems,
@@ -42,7 +43,9 @@ from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.geometry.solids import sphere
+from pbrs_farm.prepare.open_joints import opened
 from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.objects.own_model import model_shape
@@ -70,7 +73,7 @@ def _place(house: House, edit: PlaceModel, fields: ReadFields) -> House:
     world_from_model = np.array(edit.world_from_model)
     first = len(house.materials)
     surfaces = tuple(
-        _moved_surface(replace(s, material=s.material + first), world_from_model)
+        moved_surface(replace(s, material=s.material + first), world_from_model)
         for s in shape.surfaces
     )
     low, high = shape.bounds
@@ -154,19 +157,12 @@ def _moved(item: Item, matrix: F64) -> Item:
         )
     return replace(
         item,
-        surfaces=tuple(_moved_surface(s, matrix) for s in item.surfaces),
+        surfaces=tuple(moved_surface(s, matrix) for s in item.surfaces),
         lights=tuple(_moved_light(light, matrix) for light in item.lights),
         box=Box(transform_points(matrix, box.centre[None])[0], box.half, turn @ box.axes),
         pose=pose,
+        joints=tuple(joint.placed(matrix) for joint in item.joints),
     )
-
-
-def _moved_surface(surface: Surface, matrix: F64) -> Surface:
-    normals = surface.normals
-    if normals is not None:
-        normals = (normals.astype(np.float64) @ matrix[:3, :3].T).astype(np.float32)
-    positions = transform_points(matrix, surface.positions).astype(np.float32)
-    return replace(surface, positions=positions, normals=normals)
 
 
 def _moved_light(light: LightPart, matrix: F64) -> LightPart:
@@ -180,6 +176,19 @@ def _moved_light(light: LightPart, matrix: F64) -> LightPart:
         position_end=None if end is None else point(end),
         direction=triple(matrix[:3, :3] @ np.array(light.direction)),
     )
+
+
+def _open(house: House, edit: OpenJoints, _fields: ReadFields) -> House:
+    _found(house, {item for item, _part in edit.joints})
+    for item_id, part in edit.joints:
+        index = next(k for k, item in enumerate(house.items) if item.id == item_id)
+        parts = [joint.part for joint in house.items[index].joints]
+        if part not in parts:
+            raise BadInput(
+                house.id, f"{item_id}/{part}", "no such joint", hint=did_you_mean(part, parts)
+            )
+        house = opened(house, index, part, edit.share)
+    return house
 
 
 def _paint(house: House, edit: PaintItems, _fields: ReadFields) -> House:
@@ -329,6 +338,7 @@ _ONE: Final[dict[str, Callable[[House, Any, ReadFields], House]]] = {
     "place": _place,
     "remove": _remove,
     "move": _move,
+    "open": _open,
     "paint": _paint,
     "cover": _cover,
     "light": _set_light,

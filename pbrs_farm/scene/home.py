@@ -40,6 +40,7 @@ from pbrs_farm.core.edits import (
     CoverItems,
     Edit,
     MoveItems,
+    OpenJoints,
     PaintItems,
     PlaceModel,
     RemoveItems,
@@ -153,6 +154,15 @@ class Home:
         True
         """
         return Items(self.house)
+
+    @property
+    def joints(self) -> Joints:
+        """Its doors, drawers and lids as a table: what each is part of, how it moves, how far it is open.
+
+        >>> home.joints.columns[:4]
+        ('item', 'name', 'part', 'kind')
+        """
+        return Joints(self.house)
 
     def __repr__(self) -> str:
         edits = f", {len(self.source.edits)} edits" if self.source.edits else ""
@@ -349,6 +359,37 @@ class Home:
         matrix[:3, :3] = rotation_y(math.radians(turn_deg))
         matrix[:3, 3] = middle - matrix[:3, :3] @ middle + np.asarray(by, np.float64)
         return self._edited(MoveItems(items=ids, world_from_world=rows_of_matrix(matrix)))
+
+    @checked_call
+    def open(self, items: ItemLike, share: Share = 1.0, part: str = "*") -> Home:
+        """The home with doors, drawers and lids of items open by a share of their way; 0 shuts them.
+
+        items: as of `without`; part: those of `home.joints` that are meant, "drawer*" for instance.
+        What a wall or a thing stands in the way of opens as far as it can, and is a warning. Raises
+        BadInput where nothing of the items opens.
+
+            >>> max(home.open("door*", 0.7).joints.column("open"))
+            0.7
+        """
+        ids = frozenset(self._ids(items))
+        joints = tuple(
+            (item.id, joint.part)
+            for item in self.house.items
+            if item.id in ids
+            for joint in item.joints
+            if fnmatchcase(joint.part, part)
+        )
+        if not joints:
+            known = sorted(
+                {joint.part for i in self.house.items if i.id in ids for joint in i.joints}
+            )
+            text = f"no {part!r} of it opens" if known else "nothing of it opens"
+            raise BadInput(self.id, shown(sorted(ids)[0]), text, hint=", ".join(known[:5]))
+        home = self._edited(OpenJoints(joints=joints, share=float(share)))
+        before = len(self.house.notes)
+        for note in home.house.notes[before:]:
+            warn_caller(f"{home.id}: {note.place} {note.text}")
+        return home
 
     @checked_call
     def paint(self, items: ItemLike, colour: Colour, roughness: Share | None = None) -> Home:
@@ -637,6 +678,31 @@ class Rooms(Table):
         (True, False)
         """
         return any(name in (r.id, r.name) for r in self._house.rooms)
+
+
+class Joints(Table):
+    """What of a home opens: rows of item id, its name, part, kind, value, upper limit, share that it is
+    open, mass; a row has the axis and a point on it (world, metres), lower limit and instance id, too.
+
+    Values are radians (revolute) or metres (prismatic) from shut.
+    """
+
+    def __init__(self, house: House) -> None:
+        """house: finished."""
+        rows = [
+            {
+                "instance": k, "item": item.id, "name": item.name, "part": joint.part,
+                "kind": str(joint.kind), "value": joint.value, "lower": joint.lower,
+                "upper": joint.upper, "open": round(joint.share, 4),
+                "mass_kg": round(joint.mass_kg, 3), "axis": joint.axis, "point": joint.point,
+            }
+            for k, item in enumerate(house.items, 1)
+            if not item.is_outside
+            for joint in item.joints
+        ]  # fmt: skip
+        super().__init__(
+            ("item", "name", "part", "kind", "value", "upper", "open", "mass_kg"), rows
+        )
 
 
 class Items(Table):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -198,3 +200,46 @@ def test_rows_of_items_name_the_items_they_are_of(home: pf.Home) -> None:
     row = home.items[len(home.items) - 1]
     assert home.without(row).id == home.without(row["id"]).id
     assert row["id"] not in {item["id"] for item in home.without([row]).items}
+
+
+def joint_row(home: pf.Home) -> Mapping[str, Any]:
+    return next(row for row in home.joints if row["item"] == "door_inner")
+
+
+def test_a_door_opens_and_shuts_and_the_old_home_stays(home: pf.Home) -> None:
+    row = joint_row(home)
+    assert (row["name"], row["part"], row["kind"], row["open"]) == ("door", "leaf 1", "revolute", 0)
+    opened = home.open("door_inner", 0.5)
+    assert joint_row(opened)["value"] == pytest.approx(np.pi / 4)
+    assert joint_row(home)["value"] == 0
+    shut, wide = item(home, "door_inner"), item(opened, "door_inner")
+    np.testing.assert_array_equal(wide.surfaces[0].positions, shut.surfaces[0].positions)
+    # The leaf's knob goes round the hinge at its own distance, by 45 degrees.
+    at = np.array(row["point"])[[0, 2]]
+    was, now = (s.surfaces[2].positions[:, [0, 2]].mean(0) - at for s in (shut, wide))
+    assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(was), abs=1e-5)
+    assert was @ now == pytest.approx(was @ was * np.sqrt(0.5), abs=1e-4)
+    again = item(opened.open("door_inner", 0.0), "door_inner")
+    assert again.surfaces[1].positions == pytest.approx(shut.surfaces[1].positions, abs=1e-5)
+
+
+def test_a_door_stops_before_what_stands_there_and_says_so(home: pf.Home, tmp_path: Path) -> None:
+    row = joint_row(home)
+    leaf = item(home, "door_inner").surfaces[1]
+    points = leaf.positions.astype(np.float64)
+    far = points[
+        np.argmax(np.linalg.norm(points[:, [0, 2]] - np.array(row["point"])[[0, 2]], axis=1))
+    ]
+    (joint,) = item(home, "door_inner").joints
+    matrix = joint.motion(0.8)
+    x, _y, z = matrix[:3, :3] @ far + matrix[:3, 3]
+    with pytest.warns(UserWarning, match="crate 1 is in its way"):
+        opened = home.place(crate(tmp_path), at=(x, 0.0, z)).open("door_inner")
+    assert 0.4 < joint_row(opened)["value"] < 0.85
+
+
+def test_what_does_not_open_is_told(home: pf.Home) -> None:
+    with pytest.raises(BadInput, match="nothing of it opens"):
+        home.open("sofa")
+    with pytest.raises(BadInput, match="leaf 1"):
+        home.open("door", part="drawer*")

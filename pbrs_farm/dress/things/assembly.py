@@ -11,6 +11,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.house import Material, Surface, Texture
+from pbrs_farm.core.joints import Joint
 
 Part = tuple[Surface, Material]
 Model = tuple[Piece, Shape]
@@ -20,17 +21,20 @@ GENERATED = "generated#"  # before the family, in the id of a generated piece
 
 def standing_piece(
     family: str, parts: Sequence[Part], *, group: str = "", nyu40: int = OTHERPROP,
-    place: Place = Place.SURFACE, textures: Iterable[Texture] = (),
+    place: Place = Place.SURFACE, textures: Iterable[Texture] = (), joints: Sequence[Joint] = (),
 ) -> Model:  # fmt: skip
-    """The parts as one piece, the middle of its base at the origin; one surface a material."""
+    """The parts as one piece, the middle of its base at the origin; one surface a material.
+
+    What moves has surfaces of its own; joints: in the frame of the parts.
+    """
     materials: list[Material] = []
-    gathered: dict[tuple[int, bool], list[Surface]] = {}
+    gathered: dict[tuple[int, bool, str], list[Surface]] = {}
     for surface, material in parts:
         if material not in materials:
             materials.append(material)
-        key = (materials.index(material), surface.normals is None)
+        key = (materials.index(material), surface.normals is None, surface.part)
         gathered.setdefault(key, []).append(surface)
-    joined = [_one_surface(surfaces, number) for (number, _), surfaces in gathered.items()]
+    joined = [_one_surface(surfaces, key[0]) for key, surfaces in gathered.items()]
     # Stand the whole on its base.
     points = np.concatenate([s.positions for s in joined]).astype(np.float64)
     low, high = points.min(0), points.max(0)
@@ -41,17 +45,23 @@ def standing_piece(
         f"{GENERATED}{family}", family.replace("_", " ").capitalize(), group or family, place,
         nyu40, (width, depth, height), library="generated",
     )  # fmt: skip
-    return piece, Shape(moved, tuple(materials), {t.id: t for t in textures})
+    to_base = np.eye(4)
+    to_base[:3, 3] = -base
+    shape = Shape(
+        moved, tuple(materials), {t.id: t for t in textures},
+        joints=tuple(joint.placed(to_base) for joint in joints),
+    )  # fmt: skip
+    return piece, shape
 
 
 def hanging_piece(
     family: str, group: str, nyu40: int, parts: Sequence[Part], textures: Sequence[Texture] = (),
-    place: Place = Place.WALL,
+    place: Place = Place.WALL, joints: Sequence[Joint] = (),
 ) -> Model:  # fmt: skip
     """A generated piece that hangs, and its shape: unlike what stands, it keeps its own origin."""
     materials = tuple(dict.fromkeys(m for _s, m in parts))
     surfaces = tuple(replace(s, material=materials.index(m)) for s, m in parts)
-    shape = Shape(surfaces, materials, {t.id: t for t in textures})
+    shape = Shape(surfaces, materials, {t.id: t for t in textures}, joints=tuple(joints))
     w, h, d = (float(x) for x in np.diff(shape.bounds, axis=0)[0])
     name = family.replace("_", " ").capitalize()
     return Piece(f"{GENERATED}{family}", name, group, place, nyu40, (w, d, h)), shape
@@ -81,4 +91,5 @@ def _one_surface(surfaces: list[Surface], material: int) -> Surface:
         material,
         np.concatenate(uvs).astype(np.float32),
         normals,
+        surfaces[0].part,
     )

@@ -23,7 +23,7 @@ from pbrs_farm.dress.things.bodies import (
     tube,
 )
 from pbrs_farm.dress.things.cloth import hanging
-from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of
+from pbrs_farm.dress.things.joints import Inside, Look, four_legs, fronts_of, hollow
 from pbrs_farm.dress.things.maker import Maker, Size, family
 from pbrs_farm.dress.things.materials import (
     BLACK_STEEL,
@@ -212,10 +212,7 @@ def vanity(m: Maker, size: Size) -> None:
     top = y - (0.12 if on_top else 0.088)
     legs = m.weighted(0.4, 0.3, 0.3)
     low = m.pick(0.25, 0.3) if legs == 0 else 0.14 if legs == 1 else 0.0
-    if legs == 0:
-        m.add(bevelled((-hw + 0.02, low, back), (hw - 0.02, top, hd - 0.05), 0.002), of=look.front)
-    else:
-        m.add(bevelled((-hw + 0.02, low, back), (hw - 0.02, top, hd - 0.05), 0.002), of=look.front)
+    hollow(m, (-hw + 0.02, hw - 0.02), (low, top), (back, hd - 0.05), 0.016, look.front)
     # What seems to float is held by a strip at the wall.
     match legs:
         case 0:
@@ -229,7 +226,8 @@ def vanity(m: Maker, size: Size) -> None:
     n = 2 if w > 0.62 else 1
     fronts_of(m, look, (-hw + 0.02, hw - 0.02), (low + (0.08 if legs == 2 else 0.0), top - 0.002),
         hd - 0.05, m.pick([("door",)] * n, [("drawer", "drawer")],
-        [("drawer",), ("drawer", "drawer")] if n > 1 else [("low", "drawer")]), False)  # fmt: skip
+        [("drawer",), ("drawer", "drawer")] if n > 1 else [("low", "drawer")]), False,
+        Inside(back + 0.008, top=top - (0.02 if on_top else 0.05)))  # fmt: skip
     if on_top:
         m.add(bevelled((-hw, top, back), (hw, top + 0.03, hd), 0.003), of=m.pick(m.timber,
             glossy("stone", (0.85, 0.84, 0.81), 0.3), glossy("stone", (0.2, 0.2, 0.21), 0.3)))  # fmt: skip

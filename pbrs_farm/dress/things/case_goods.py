@@ -27,9 +27,21 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb
 from pbrs_farm.dress.things.bodies import frustum, revolve, slab
 from pbrs_farm.dress.things.cloth import bulged
+from pbrs_farm.dress.things.joints import drawer_box, hollow, is_drawer, opens, shelves
 from pbrs_farm.dress.things.maker import Maker, Pair, Size, Thing, thing
 from pbrs_farm.dress.things.materials import plain
 from pbrs_farm.dress.things.outlines import spaced
+
+_BOARD_M: Final = 0.018
+
+
+class Space(NamedTuple):
+    """What is behind a column of fronts."""
+
+    x: Pair  # between its sides
+    back: float  # z of its back's inner face
+    rail: Material | None = None  # for clothes, where it is tall
+    is_filled: bool = False  # it has its shelves already
 
 
 class Boards(NamedTuple):
@@ -61,7 +73,7 @@ def bookcase(m: Maker, boards: Boards, size: Size) -> None:
         for low, high in pairwise(levels) if w > 0.95 else ():
             m.add(slab((-0.009, low + 0.018, -hd + 0.006), (0.009, high, hd - 0.004)))
     if has_doors:
-        doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1)
+        doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1, -hd)
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
@@ -150,7 +162,7 @@ def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
         for y in (0.06, low, (low + high) / 2, high, h - 0.018):
             m.add(slab((-hw + 0.018, y, -hd + 0.006), (hw - 0.018, y + 0.018, hd - 0.002)))
     for span in ((0.06, low + 0.018), (high, h)):
-        doors(m, boards, (-hw, hw), span, hd, 1)
+        doors(m, boards, (-hw, hw), span, hd, 1, -hd)
 
 
 @thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
@@ -181,9 +193,10 @@ def desk(m: Maker, boards: Boards, size: Size) -> None:
         side = m.pick(-1.0, 1.0)
         x0, x1 = sorted((side * (w / 2 - 0.06), side * (w / 2 - 0.44)))
         low, high = 0.06 if m.chance(0.5) else h - 0.24, h - 0.026
-        m.add(slab((x0, low, -d / 2 + 0.03), (x1, high, d / 2 - 0.04)), of=boards.body)
+        hollow(m, (x0, x1), (low, high), (-d / 2 + 0.03, d / 2 - 0.04), _BOARD_M, boards.body)
         column_of_fronts(m, boards, (x0, x1), (low, high), d / 2 - 0.04,
-            ("drawer",) * max(1, round((high - low) / 0.19)), m.chance(0.4), True)  # fmt: skip
+            ("drawer",) * max(1, round((high - low) / 0.19)), m.chance(0.4), True,
+            Space((x0 + _BOARD_M, x1 - _BOARD_M), -d / 2 + 0.038))  # fmt: skip
 
 
 @thing(group="chair", nyu40=CHAIR, place=Place.FLOOR)
@@ -238,11 +251,16 @@ def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
     """A closed box behind columns of fronts, which are named from the top downwards."""
     w, h, d = size
     foot = carcass(m, boards, size, may_have_legs)
-    step = w / len(columns)
+    step, back = w / len(columns), -d / 2 + 0.008
     has_knobs = bool(np.random.default_rng(m.integers(0, 1 << 30)).random() < 0.4)
     for k, kinds in enumerate(columns):
-        column_of_fronts(m, boards, (-w / 2 + k * step, -w / 2 + (k + 1) * step), (foot, h - 0.026),
-            d / 2 - 0.018, kinds, has_knobs, k % 2 == 0)  # fmt: skip
+        a, b, t = -w / 2 + k * step, -w / 2 + (k + 1) * step, _BOARD_M
+        space = (a + (t / 2 if k else t), b - (t / 2 if k < len(columns) - 1 else t))
+        if k:
+            m.add(slab((a - t / 2, foot + t, back), (a + t / 2, h - 0.026, d / 2 - 0.018)),
+                of=boards.body)  # fmt: skip
+        column_of_fronts(m, boards, (a, b), (foot, h - 0.026), d / 2 - 0.018, kinds, has_knobs,
+            k % 2 == 0, Space(space, back, rail=m.metal if k % 2 == 0 else None))  # fmt: skip
 
 
 def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
@@ -255,7 +273,7 @@ def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
     thick = m.pick(0.018, 0.025)
     has_legs = may_have_legs and m.chance(0.55)
     foot = m.uniform(0.09, 0.16) if has_legs else m.uniform(0.04, 0.07)
-    m.add(slab((-hw, foot, -hd), (hw, h - thick, hd - 0.018)), of=boards.body)
+    hollow(m, (-hw, hw), (foot, h - thick), (-hd, hd - 0.018), _BOARD_M, boards.body)
     m.add(slab((-hw - 0.004, h - thick, -hd), (hw + 0.004, h, hd + 0.006)), of=boards.top)
     if not has_legs:
         m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, foot, hd - 0.05)), of=boards.body)
@@ -266,7 +284,7 @@ def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
 
 
 def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds: Sequence[str],
-    has_knobs: bool, opens_left: bool) -> None:  # fmt: skip
+    has_knobs: bool, opens_left: bool, space: Space) -> None:  # fmt: skip
     """Fronts from the top downwards before z; a door is 3.2 times as high as a drawer."""
     total, below = 0.0, 0.0
     for kind in kinds:
@@ -275,20 +293,31 @@ def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds
         above = below
         below += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
         front(m, boards, x, (y[1] - (y[1] - y[0]) * (below / total),
-            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left)  # fmt: skip
+            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left, space)  # fmt: skip
 
 
-def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int) -> None:
-    """Doors side by side before z."""
-    has_knobs = m.chance(0.4)
+def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: float) -> None:
+    """Doors side by side before z, shelves behind them already; back: of what is behind."""
+    has_knobs, space = m.chance(0.4), Space(x, back, is_filled=True)
     for k in range(n):
         front(m, boards, (x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n), y, z,
-            "door", has_knobs, k % 2 == 0)  # fmt: skip
+            "door", has_knobs, k % 2 == 0, space)  # fmt: skip
 
 
 def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
+    opens_left: bool, space: Space) -> None:  # fmt: skip
+    """A door, drawer or flap that opens, with what is behind it."""
+    with opens(m, kind, x, y, z + 0.0165, space.back, opens_left):
+        face(m, boards, x, y, z, kind, has_knobs, opens_left)
+        if is_drawer(kind, y):
+            drawer_box(m, space.x, y, (space.back, z + 0.0005), boards.body)
+    if not space.is_filled and not is_drawer(kind, y):
+        shelves(m, space.x, y, (space.back, z), boards.body, space.rail)
+
+
+def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
     opens_left: bool) -> None:  # fmt: skip
-    """A door, drawer or flap 16 mm thick, 2 mm from its neighbours, and what opens it.
+    """A front 16 mm thick, 2 mm from its neighbours, and what opens it.
 
     That stands at the side of a door that has no hinges, and lies across a drawer.
     """

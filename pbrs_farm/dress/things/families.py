@@ -43,7 +43,7 @@ from pbrs_farm.dress.things import (
 from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.dress.things.maker import Family, described_in
 
-VERSION: Final = 5
+VERSION: Final = 6
 """Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
 # The order decides which piece a seed draws.
@@ -157,7 +157,13 @@ def _sized(shape: Shape, piece: Piece) -> Shape:
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     if piece.place is Place.WALL:
         base[2] = low[2]
-    return replace(shape, surfaces=tuple(_scaled(s, scale, base) for s in shape.surfaces))
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = np.diag(scale), -scale * base
+    return replace(
+        shape,
+        surfaces=tuple(_scaled(s, scale, base) for s in shape.surfaces),
+        joints=tuple(joint.placed(matrix) for joint in shape.joints),
+    )
 
 
 def _scaled(surface: Surface, scale: F64, base: F64) -> Surface:

@@ -19,7 +19,8 @@ from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.things.bodies import box, cylinder, revolve, slab, smooth
-from pbrs_farm.dress.things.maker import Maker, thing
+from pbrs_farm.dress.things.joints import hollow, opens, shelves
+from pbrs_farm.dress.things.maker import Maker, Pair, thing
 from pbrs_farm.dress.things.materials import MIRROR_GLASS, plain
 from pbrs_farm.dress.things.outlines import Profile, spaced
 from pbrs_farm.geometry.solids import lathe, quads_surface
@@ -50,7 +51,7 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
     # The last form leaves an open end with shelves.
     e = 0.22 if form == 5 and width > 0.75 else 0.0
     wide, step = width - e, (width - e) / n
-    m.add(slab((-w, 0.0, 0.0), (-w + wide, height, d)), of=body)
+    hollow(m, (-w, -w + wide), (0.0, height), (0.0, d), t, body)
     if e > 0:
         with m.of(body):
             m.add(slab((w - e, 0.0, 0.0), (w, height, t)))
@@ -61,41 +62,56 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
         # Flaps that open upwards, one above the other.
         rows = 2 if height > 0.5 else 1
         for r in range(rows):
-            low = r * height / rows
-            m.add(slab((-w + 0.002, low + 0.002, d + 0.0005),
-                (w - 0.002, low + height / rows - 0.002, d + 0.0185)), of=face)  # fmt: skip
-            m.add(slab((-0.08, low + 0.02, d + 0.0185), (0.08, low + 0.03, d + 0.03)), of=m.metal)
+            low, high = r * height / rows, (r + 1) * height / rows
+            with opens(m, "flap", (-w, w), (low, high), d + 0.0185, 0.0, is_high=True):
+                m.add(slab((-w + 0.002, low + 0.002, d + 0.0005), (w - 0.002, high - 0.002, d + 0.0185)),
+                    of=face)  # fmt: skip
+                m.add(slab((-0.08, low + 0.02, d + 0.0185), (0.08, low + 0.03, d + 0.03)),
+                    of=m.metal)  # fmt: skip
+        shelves(m, (-w + t, w - t), (0.0, height), (0.008, d), body)
+        return
     for k in range(n):
-        if form != 4:
-            x = -w + k * step
-            a = x + (step - 0.04 if k % 2 == 0 and n > 1 else 0.04)
-            m.add(slab((x + 0.002, 0.002 + (0.016 if form == 2 else 0.0), d + 0.0005),
-                (x + step - 0.002, height - 0.002, d + 0.0185)), of=face)  # fmt: skip
-            match form:
-                case 3 | 5:
-                    with m.of(face):
-                        # A frame stands out round a panel.
-                        for y in (0.002, height - 0.062):
-                            m.add(slab((x + 0.062, y, d + 0.0185),
-                                (x + step - 0.062, y + 0.06, d + 0.0235)))  # fmt: skip
-                        for q in (x + 0.002, x + step - 0.062):
-                            m.add(slab((q, 0.002, d + 0.0185),
-                                (q + 0.06, height - 0.002, d + 0.0235)))  # fmt: skip
-                case 0:  # bars
-                    with m.of(m.metal):
-                        m.add(slab((a - 0.005, 0.04, d + 0.0345), (a + 0.005, 0.2, d + 0.0425)))
-                        for y in (0.05, 0.185):
-                            m.add(slab((a - 0.004, y, d + 0.0185),
-                                (a + 0.004, y + 0.008, d + 0.0345)))  # fmt: skip
-            match form:
-                case 1 | 3:  # knobs
-                    with m.of(m.metal):
-                        m.add(revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
-                            (0.013, 0.028), (0.0, 0.03)], n=14), turn=LYING_ALONG_Z,
-                            at=(a, 0.07, d + (0.0235 if form == 3 else 0.0185)))  # fmt: skip
-                case 2:  # a grip edge
-                    m.add(slab((x + 0.002, 0.002, d + 0.0005),
-                        (x + step - 0.002, 0.012, d + 0.008)), of=m.metal)  # fmt: skip
+        x = -w + k * step
+        opens_left = k % 2 == 0 and n > 1
+        with opens(m, "door", (x, x + step), (0.0, height), d + 0.0185, 0.0, opens_left):
+            cupboard_door(m, face, (x, x + step), height, d, form, opens_left)
+        if k:
+            m.add(slab((x - t / 2, t, 0.008), (x + t / 2, height - t, d)), of=body)
+        shelves(m, (x + (t / 2 if k else t), x + step - (t / 2 if k < n - 1 else t)), (0.0, height),
+            (0.008, d), body)  # fmt: skip
+
+
+def cupboard_door(m: Maker, face: Material, span: Pair, height: float, d: float, form: int,
+    opens_left: bool) -> None:  # fmt: skip
+    """A door of a cupboard that hangs, before d, with what opens it at the end without hinges."""
+    x, step = span[0], span[1] - span[0]
+    a = x + (step - 0.04 if opens_left else 0.04)
+    m.add(slab((x + 0.002, 0.002 + (0.016 if form == 2 else 0.0), d + 0.0005),
+        (x + step - 0.002, height - 0.002, d + 0.0185)), of=face)  # fmt: skip
+    match form:
+        case 3 | 5:
+            with m.of(face):
+                # A frame stands out round a panel.
+                for y in (0.002, height - 0.062):
+                    m.add(
+                        slab((x + 0.062, y, d + 0.0185), (x + step - 0.062, y + 0.06, d + 0.0235))
+                    )
+                for q in (x + 0.002, x + step - 0.062):
+                    m.add(slab((q, 0.002, d + 0.0185), (q + 0.06, height - 0.002, d + 0.0235)))
+        case 0:  # bars
+            with m.of(m.metal):
+                m.add(slab((a - 0.005, 0.04, d + 0.0345), (a + 0.005, 0.2, d + 0.0425)))
+                for y in (0.05, 0.185):
+                    m.add(slab((a - 0.004, y, d + 0.0185), (a + 0.004, y + 0.008, d + 0.0345)))
+    match form:
+        case 1 | 3:  # knobs
+            with m.of(m.metal):
+                m.add(revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02),
+                    (0.013, 0.028), (0.0, 0.03)], n=14), turn=LYING_ALONG_Z,
+                    at=(a, 0.07, d + (0.0235 if form == 3 else 0.0185)))  # fmt: skip
+        case 2:  # a grip edge
+            m.add(slab((x + 0.002, 0.002, d + 0.0005), (x + step - 0.002, 0.012, d + 0.008)),
+                of=m.metal)  # fmt: skip
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.WALL)

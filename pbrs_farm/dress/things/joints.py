@@ -1,8 +1,9 @@
-"""What furniture is put together from: fronts, pulls, legs; no effects."""
+"""What furniture is put together from: carcasses, fronts that open, pulls, legs; no effects."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -13,9 +14,29 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.things.bodies import bevelled, loft, revolve, slab, tube
 from pbrs_farm.dress.things.maker import Maker, Pair
 from pbrs_farm.dress.things.materials import FROSTED
-from pbrs_farm.dress.things.outlines import bent, d_shape, ring_path, rings, scaled
+from pbrs_farm.dress.things.outlines import Outline, bent, d_shape, rect, ring_path, rings, scaled
 
 _HEIGHTS: Final = {"door": 3.4, "low": 0.7}  # of fronts in one column, against a drawer's
+_FRONT_M: Final = 0.019  # thickness of a front
+_BOARD_M: Final = 0.016  # of a carcass
+_BACK_M: Final = 0.008
+_DOOR_RAD: Final = 110 * pi / 180  # as far as cupboard hinges go
+_FLAP_RAD: Final = 95 * pi / 180
+_FLAP_M: Final = 0.2  # lower fronts are drawers, whatever they are called
+_DRAWN_OUT: Final = 0.75  # of the depth that a drawer comes out
+_SLIDE_M: Final = 0.013  # of a drawer's rail, at either side
+_LEAST_BOX_M: Final = 0.03  # a lower space behind a front holds no drawer
+_SHELF_STEP_M: Final = 0.36
+_HANGING_M: Final = 1.2  # from which a space has a rail for clothes
+
+
+class Inside(NamedTuple):
+    """What lies behind fronts."""
+
+    back: float  # z of the back's inner face
+    has_boards: bool = True  # uprights between columns, shelves behind doors
+    rail: Material | None = None  # of a rail for clothes
+    top: float = 10.0  # y that nothing of drawers reaches: of a sink's bowl
 
 
 class Look(NamedTuple):
@@ -27,6 +48,81 @@ class Look(NamedTuple):
     top: Material
     pull: str  # what opens them: bar, bow, square, knob, disc, ring, cup, edge, none
     pull_material: Material
+
+
+def hollow(m: Maker, x: Pair, y: Pair, z: Pair, t: float, material: Material) -> None:
+    """A box of boards t thick, open to the front: sides, bottom, top, back."""
+    with m.of(material):
+        for a in (x[0], x[1] - t):
+            m.add(slab((a, y[0], z[0]), (a + t, y[1], z[1])))
+        for b in (y[0], y[1] - t):
+            m.add(slab((x[0] + t, b, z[0]), (x[1] - t, b + t, z[1])))
+        m.add(slab((x[0] + t, y[0] + t, z[0]), (x[1] - t, y[1] - t, z[0] + min(_BACK_M, t))))
+
+
+def shell(m: Maker, x: Pair, y: Pair, z: Pair, wall: float, material: Material, r: float = 0.004,
+    liner: Material | None = None) -> None:  # fmt: skip
+    """A body of thick walls, open to the front, r: of its edges; liner: of its inside."""
+    middle, size = ((x[0] + x[1]) / 2, -(y[0] + y[1]) / 2), (x[1] - x[0], y[1] - y[0])
+
+    def ring(inset: float, at: float) -> tuple[Outline, float]:
+        return (rect(size[0] - 2 * inset, size[1] - 2 * inset, max(r - inset, 0.002),
+            x=middle[0], z=middle[1], n=3), at)  # fmt: skip
+
+    m.add(loft([ring(0.0, z[0]), ring(0.0, z[1]), ring(wall, z[1]), ring(wall, z[0] + wall)]),
+        turn=LYING_ALONG_Z, of=material)  # fmt: skip
+    if liner is not None:
+        m.add(loft([ring(wall + 0.0002, z[0] + wall + 0.0002), ring(wall + 0.0002, z[1] - 0.001),
+            ring(wall + 0.002, z[1] - 0.001), ring(wall + 0.002, z[0] + wall + 0.002)]),
+            turn=LYING_ALONG_Z, of=liner)  # fmt: skip
+
+
+def opens(m: Maker, kind: str, x: Pair, y: Pair, z: float, back: float, opens_left: bool = True,
+    is_high: bool = False) -> AbstractContextManager[None]:  # fmt: skip
+    """What is added inside opens as a front of its kind does: 'door', 'drawer', 'low', 'flap'.
+
+    z: of its outer face; back: where the space behind it ends. A door's hinges are at its left
+    where opens_left, a flap's above where is_high.
+    """
+    if kind == "door":
+        return m.hinged("door", at=(x[0] if opens_left else x[1], y[0], z),
+            axis=(0.0, -1.0 if opens_left else 1.0, 0.0), upper_rad=_DOOR_RAD)  # fmt: skip
+    if kind == "flap" and y[1] - y[0] > _FLAP_M:
+        return m.hinged("flap", at=(x[0], y[1] if is_high else y[0], z),
+            axis=(-1.0 if is_high else 1.0, 0.0, 0.0), upper_rad=_FLAP_RAD)  # fmt: skip
+    return m.sliding("drawer", along=(0.0, 0.0, 1.0), upper_m=_DRAWN_OUT * (z - back))
+
+
+def is_drawer(kind: str, y: Pair) -> bool:
+    """Whether a front of that kind and height is one of a drawer."""
+    return kind in ("drawer", "low") or (kind == "flap" and y[1] - y[0] <= _FLAP_M)
+
+
+def drawer_box(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, top: float = 10.0) -> None:
+    """A drawer without its front between two sides, in the space x, y, z."""
+    a, b = x[0] + _SLIDE_M, x[1] - _SLIDE_M
+    low, high = y[0] + 0.018, min(y[0] + 0.75 * (y[1] - y[0]), y[1] - 0.03, top - 0.01)
+    back, t = z[0] + 0.012, 0.012
+    if high - low < _LEAST_BOX_M:
+        return
+    with m.of(material):
+        for c in (a, b - t):
+            m.add(slab((c, low, back), (c + t, high, z[1])))
+        m.add(slab((a + t, low, back), (b - t, high, back + t)))
+        m.add(slab((a + t, low + 0.006, back + t), (b - t, low + 0.014, z[1])))
+
+
+def shelves(m: Maker, x: Pair, y: Pair, z: Pair, material: Material,
+    rail: Material | None = None) -> None:  # fmt: skip
+    """Shelves in the space x, y, z; rail: one shelf above, a rail for clothes under it."""
+    tall = y[1] - y[0]
+    levels = [y[0] + tall * k / n for n in (round(tall / _SHELF_STEP_M),) for k in range(1, n)]
+    if rail is not None and tall > _HANGING_M:
+        levels = [y[1] - 0.3]
+        m.add(tube([(x[0], y[1] - 0.36, (z[0] + z[1]) / 2), (x[1], y[1] - 0.36, (z[0] + z[1]) / 2)],
+            0.0125, n=8), of=rail)  # fmt: skip
+    for at in levels:
+        m.add(slab((x[0], at, z[0]), (x[1], at + _BOARD_M, z[1] - 0.02)), of=material)
 
 
 def panel(m: Maker, kind: str, x: Pair, y: Pair, z: float, material: Material) -> None:
@@ -141,24 +237,39 @@ def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
 
 
 def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequence[Sequence[str]],
-    is_high: bool) -> None:  # fmt: skip
-    """Columns of fronts before z, each column named from the top.
+    is_high: bool, inside: Inside, add_to: Callable[[int], None] | None = None) -> None:  # fmt: skip
+    """Columns of fronts before z that open, each column named from the top, and what is behind them.
 
-    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'.
+    'door', 'drawer', 'low' (a lower drawer), 'flap', 'open'. add_to: adds to a front of the column of
+    that number what moves with it.
     """
-    n = len(columns)
+    n, t = len(columns), _BOARD_M
     for k, kinds in enumerate(columns):
         a, b = x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n
+        space = (a + (t / 2 if k else t), b - (t / 2 if k < n - 1 else t))
+        if k and inside.has_boards:
+            m.add(slab((a - t / 2, y[0] + t, inside.back), (a + t / 2, min(y[1], inside.top), z)),
+                of=look.body)  # fmt: skip
         total, below = sum(_HEIGHTS.get(kind, 1.0) for kind in kinds), 0.0
         for kind in kinds:
             above = below
             below += _HEIGHTS.get(kind, 1.0)
             c, d = y[1] - (y[1] - y[0]) * below / total, y[1] - (y[1] - y[0]) * above / total
-            match kind:
-                case "door":
-                    door_front(m, look, (a, b), (c, d), z, k % 2 == 0 if n > 1 else True, is_high)
-                case "drawer" | "low" | "flap":
+            if kind == "open":
+                continue
+            left = k % 2 == 0 if n > 1 else True
+            with opens(m, kind, (a, b), (c, d), z + _FRONT_M, inside.back, left, is_high):
+                if kind == "door":
+                    door_front(m, look, (a, b), (c, d), z, left, is_high)
+                else:
                     drawer_front(m, look, (a, b), (c, d), z)
+                if is_drawer(kind, (c, d)):
+                    drawer_box(m, space, (c, d), (inside.back, z), look.body, inside.top)
+                if add_to is not None:
+                    add_to(k)
+            if inside.has_boards and not is_drawer(kind, (c, d)):
+                shelves(m, space, (c, min(d, inside.top)), (inside.back, z), look.body,
+                    inside.rail if k % 2 == 0 else None)  # fmt: skip
 
 
 def leg(m: Maker, kind: str, foot: Pair, top: Pair, high: float, thick: float,

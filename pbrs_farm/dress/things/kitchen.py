@@ -8,16 +8,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import radians
 from typing import Final
 
+import numpy as np
+
+from pbrs_farm.core.arrays import I32
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATOR, SINK
 from pbrs_farm.core.frames import LYING_ALONG_Z
-from pbrs_farm.core.house import Material
+from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.things.bodies import (
     bevelled,
     board,
+    creased,
     cylinder,
     frustum,
     loft,
@@ -25,8 +30,19 @@ from pbrs_farm.dress.things.bodies import (
     rounded,
     slab,
     tube,
+    vessel,
 )
-from pbrs_farm.dress.things.joints import Look, drawer_front, fronts_of, pull
+from pbrs_farm.dress.things.joints import (
+    Inside,
+    Look,
+    drawer_box,
+    drawer_front,
+    fronts_of,
+    hollow,
+    opens,
+    pull,
+    shell,
+)
 from pbrs_farm.dress.things.maker import Maker, Pair, Size, family
 from pbrs_farm.dress.things.materials import (
     BLACK_GLASS,
@@ -39,12 +55,19 @@ from pbrs_farm.dress.things.materials import (
     RUBBER,
     STEEL,
     WHITE,
+    WHITE_STEEL,
     glass,
     glossy,
     plain,
 )
 from pbrs_farm.dress.things.outlines import bent, d_shape, oval, rect, rings
 
+_OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
+CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
+_FALLING_RAD: Final = radians(88)  # of doors that fall open
+_FRIDGE_RAD: Final = radians(120)
+_MACHINE_RAD: Final = radians(150)  # of a washing machine's round door
+_BACK_M: Final = 0.008  # of a unit's back
 _HOB_M: Final = {"gas": 0.044, "ceramic": 0.006, "plates": 0.019}  # that a hob is high
 
 
@@ -86,11 +109,11 @@ def kitchen_set(m: Maker) -> KitchenSet:
 
 
 def unit_body(m: Maker, size: Size, top_h: float, k: KitchenSet) -> None:
-    """A unit's box and plinth; its worktop's upper side is to be at top_h."""
+    """A unit's carcass and plinth; its worktop's upper side is to be at top_h."""
     w, d, _h = size
     f = d / 2 - 0.049
-    m.add(slab((-w / 2 + 0.0005, k.plinth_h, -d / 2), (w / 2 - 0.0005, top_h - k.top_t, f)),
-        of=k.look.body)  # fmt: skip
+    hollow(m, (-w / 2 + 0.0005, w / 2 - 0.0005), (k.plinth_h, top_h - k.top_t), (-d / 2, f), 0.016,
+        k.look.body)  # fmt: skip
     m.add(slab((-w / 2, 0.0, -d / 2 + 0.02), (w / 2, k.plinth_h, f - 0.05)), of=k.plinth)
 
 
@@ -100,7 +123,7 @@ def unit(m: Maker, size: Size, k: KitchenSet, columns: Sequence[Sequence[str]]) 
     w, d, h = size
     m.add(slab((-w / 2, h - k.top_t, -d / 2), (w / 2, h, d / 2 - 0.012)), of=k.worktop)
     fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), d / 2 - 0.049, columns,
-        False)  # fmt: skip
+        False, Inside(-d / 2 + _BACK_M))  # fmt: skip
 
 
 @family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
@@ -134,7 +157,7 @@ def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
             m.add(slab((-hw + t, y, 0.008), (hw - t, y + t, f - 0.002)))
     if not m.chance(0.12):
         fronts_of(m, k.upper_look, (-hw, hw), (0.0, h), f, m.pick([("door",), ("door",)],
-            [("door",)], [("flap", "flap")]), True)  # fmt: skip
+            [("door",)], [("flap", "flap")]), True, Inside(_BACK_M, has_boards=False))  # fmt: skip
     else:
         m.add(slab((-hw, -0.0001, f), (-hw + t, h, d - 0.002)), of=k.upper_look.front)
         m.add(slab((hw - t, -0.0001, f), (hw, h, d - 0.002)), of=k.upper_look.front)
@@ -150,7 +173,8 @@ def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     hd = d / 2
     unit_body(m, size, k.top_h, k)
     fronts_of(m, k.look, (-w / 2, w / 2), (k.plinth_h, k.top_h - k.top_t - 0.003), hd - 0.049,
-        [("door",), ("door",)] if m.chance(0.7) else [("drawer", "drawer")], False)  # fmt: skip
+        [("door",), ("door",)] if m.chance(0.7) else [("drawer", "drawer")], False,
+        Inside(-hd + _BACK_M, has_boards=False, top=k.top_h - 0.2))  # fmt: skip
     # The bowl, and a worktop of four pieces around it.
     basin = m.pick(STEEL, STEEL, CERAMIC, glossy("granite", (0.12, 0.12, 0.13), 0.4))
     form = m.weighted(0.4, 0.25, 0.25, 0.1)
@@ -272,6 +296,27 @@ def hob_top(
                             (x + 0.005, y + 0.035, z + q + 0.005)))  # fmt: skip
 
 
+def oven(m: Maker, x: Pair, y: Pair, z: Pair) -> None:
+    """What is behind an oven's door: a cavity of dark enamel with a grid and a tray in it."""
+    wall = 0.035
+    shell(m, x, y, z, wall, _OVEN)
+    a, b, c = x[0] + wall, x[1] - wall, (z[0] + 0.06, z[1] - 0.03)
+    low, high = y[0] + wall, y[1] - wall
+    rack(m, (a, b), low + 0.55 * (high - low), c, STEEL)
+    m.add(bevelled((a, low + 0.25 * (high - low), c[0]), (b, low + 0.25 * (high - low) + 0.012, c[1]),
+        0.003), of=_OVEN)  # fmt: skip
+
+
+def rack(m: Maker, x: Pair, y: float, z: Pair, material: Material, n: int = 8) -> None:
+    """A grid of bars from front to back on two rails, at a height."""
+    with m.of(material):
+        for at in z:
+            m.add(slab((x[0], y, at - 0.004), (x[1], y + 0.006, at + 0.004)))
+        for k in range(n):
+            at = x[0] + (x[1] - x[0]) * (k + 0.5) / n
+            m.add(slab((at - 0.002, y + 0.001, z[0]), (at + 0.002, y + 0.005, z[1])))
+
+
 def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: Material, grip: str,
     has_knobs: bool, n: int) -> None:  # fmt: skip
     """An oven's door with its window and handle, in x and y before z.
@@ -281,13 +326,13 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: M
     a, b, c, d = x[0] + 0.002, x[1] - 0.002, y[0] + 0.002, y[1]
     w = b - a
     m.add(bevelled((a, d - panel_h, z), (b, d - 0.001, z + 0.02), 0.002), of=material)
-    m.add(bevelled((a, c, z), (b, d - panel_h - 0.004, z + 0.02), 0.003),
-        of=m.pick(BLACK_GLASS, material))  # fmt: skip
     e = d - panel_h - 0.004
-    m.add(bevelled((a + 0.06, c + 0.07, z + 0.0195), (b - 0.06, e - 0.1, z + 0.022), 0.001),
-        of=BLACK_GLASS)  # fmt: skip
-    pull(m, grip, (a + b) / 2, e - 0.04, z + 0.019, True, 0.8 * w,
-        m.pick(STEEL, CHROME, BLACK_STEEL))  # fmt: skip
+    with m.hinged("door", at=(a, c, z + 0.02), axis=(1.0, 0.0, 0.0), upper_rad=_FALLING_RAD):
+        m.add(bevelled((a, c, z), (b, e, z + 0.02), 0.003), of=m.pick(BLACK_GLASS, material))
+        m.add(bevelled((a + 0.06, c + 0.07, z + 0.0195), (b - 0.06, e - 0.1, z + 0.022), 0.001),
+            of=BLACK_GLASS)  # fmt: skip
+        pull(m, grip, (a + b) / 2, e - 0.04, z + 0.019, True, 0.8 * w,
+            m.pick(STEEL, CHROME, BLACK_STEEL))  # fmt: skip
     knob = m.pick(RUBBER, STEEL, CHROME, WHITE)
     if has_knobs:
         for k in range(n):
@@ -315,16 +360,26 @@ def cooker(m: Maker, size: Size) -> None:
         glossy("cream enamel", (0.9, 0.86, 0.74), 0.2))  # fmt: skip
     kind = m.pick("gas", "gas", "ceramic", "plates")
     y, f = h - _HOB_M[kind], d / 2 - 0.049
-    m.add(slab((-hw, 0.06, -d / 2), (hw, y - 0.012, f)), of=material)
+    box = (-d / 2, f)
     m.add(board(w, d - 0.02, y - 0.012, y + 0.0005, 0.008, 0.003, z=-0.01), of=material)
     hob_top(m, w - 0.02, d - 0.09, y, -0.02, kind, material)
     for x, z in product((-hw + 0.05, hw - 0.05), (-d / 2 + 0.06, f - 0.06)):
         m.add(frustum((0.02, 0.0), (0.016, 0.06), n=10), at=(x, 0.0, z), of=RUBBER)
     drawer = m.uniform(0.14, 0.2) if m.chance(0.7) else 0.0
     if drawer > 0:
-        m.add(bevelled((-hw + 0.002, 0.065, f), (hw - 0.002, 0.06 + drawer, f + 0.02), 0.003),
-            of=material)  # fmt: skip
-    oven_front(m, (-hw, hw), (0.064 + drawer, y - 0.016), f, m.pick(0.09, 0.1, 0.11), material,
+        hollow(m, (-hw, hw), (0.06, 0.062 + drawer), box, 0.012, material)
+        with opens(m, "drawer", (-hw, hw), (0.065, 0.06 + drawer), f + 0.02, box[0]):
+            m.add(bevelled((-hw + 0.002, 0.065, f), (hw - 0.002, 0.06 + drawer, f + 0.02), 0.003),
+                of=material)  # fmt: skip
+            drawer_box(m, (-hw + 0.012, hw - 0.012), (0.065, 0.06 + drawer), (box[0] + 0.012, f),
+                STEEL)  # fmt: skip
+    panel_h = m.pick(0.09, 0.1, 0.11)
+    # The oven in a body of its sheet, and what its knobs turn above it.
+    low, high = 0.06 + (drawer + 0.002 if drawer > 0 else 0.0), y - 0.016 - panel_h - 0.004
+    shell(m, (-hw, hw), (low, high), box, 0.004, material)
+    oven(m, (-hw + 0.004, hw - 0.004), (low + 0.004, high - 0.004), (box[0] + 0.004, f - 0.001))
+    m.add(slab((-hw, high, box[0]), (hw, y - 0.012, f)), of=material)
+    oven_front(m, (-hw, hw), (0.064 + drawer, y - 0.016), f, panel_h, material,
         m.pick("bar", "bow", "square"), m.chance(0.8), m.pick(5, 6))  # fmt: skip
 
 
@@ -342,11 +397,16 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     m.add(slab((-hw, y - k.top_t, -d / 2), (hw, y, d / 2 - 0.012)), of=k.worktop)
     hob_top(m, w - 0.02, 0.51, y - 0.001, -0.02, kind, m.pick(STEEL, ENAMEL, BLACK_GLASS))
     material = m.pick(STEEL, STEEL, BLACK_GLASS, ENAMEL)
-    low = y - k.top_t - 0.003 - 0.595
-    oven_front(m, (-hw, hw), (low, y - k.top_t - 0.003), f, m.pick(0.09, 0.12), material,
+    low, panel_h = y - k.top_t - 0.003 - 0.595, m.pick(0.09, 0.12)
+    high, inner = y - k.top_t - 0.003 - panel_h - 0.004, (-hw + 0.0166, hw - 0.0166)
+    oven(m, inner, (max(low, k.plinth_h + 0.017), high), (-d / 2 + 0.02, f - 0.001))
+    m.add(slab((inner[0], high, -d / 2 + 0.02), (inner[1], y - k.top_t - 0.017, f)), of=material)
+    oven_front(m, (-hw, hw), (low, y - k.top_t - 0.003), f, panel_h, material,
         m.pick("bar", "square", "bow"), m.chance(0.6), m.pick(2, 4))  # fmt: skip
     if low - k.plinth_h > 0.06:
-        drawer_front(m, k.look, (-hw, hw), (k.plinth_h, low), f)
+        with opens(m, "drawer", (-hw, hw), (k.plinth_h, low), f + 0.019, -d / 2):
+            drawer_front(m, k.look, (-hw, hw), (k.plinth_h, low), f)
+            drawer_box(m, inner, (k.plinth_h, low), (-d / 2 + _BACK_M, f), k.look.body)
 
 
 @family(group="dishwasher", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=32,
@@ -358,8 +418,23 @@ def dishwasher(m: Maker, size: Size, k: KitchenSet) -> None:
     f, y = d / 2 - 0.049, h - k.top_t - 0.003
     unit_body(m, size, k.top_h, k)
     m.add(slab((-hw, h - k.top_t, -d / 2), (hw, h, d / 2 - 0.012)), of=k.worktop)
+    # A tub of steel with two baskets behind the door, which falls open.
+    shell(m, (-hw + 0.0166, hw - 0.0166), (k.plinth_h + 0.0166, y - 0.014),
+        (-d / 2 + _BACK_M, f - 0.001), 0.02, STEEL)  # fmt: skip
+    for at in (k.plinth_h + 0.12, k.plinth_h + 0.42):
+        for rim in (0.0, 0.09):
+            rack(m, (-hw + 0.05, hw - 0.05), at + rim, (-d / 2 + 0.07, f - 0.03), WHITE_STEEL,
+                n=12 if rim == 0 else 2)  # fmt: skip
+    with m.hinged("door", at=(-hw, k.plinth_h, f + 0.02), axis=(1.0, 0.0, 0.0),
+        upper_rad=_FALLING_RAD):  # fmt: skip
+        dishwasher_front(m, k, (-hw, hw), y, f)
+
+
+def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float) -> None:
+    """A front of the kitchen, or one of its own with a panel, up to y before f."""
+    hw = x[1]
     if m.chance(0.45):
-        drawer_front(m, k.look, (-hw, hw), (k.plinth_h, y), f)
+        drawer_front(m, k.look, x, (k.plinth_h, y), f)
     else:
         material = m.pick(ENAMEL, STEEL, STEEL, BLACK_GLASS)
         m.add(bevelled((-hw + 0.002, k.plinth_h, f), (hw - 0.002, y - 0.12, f + 0.02), 0.003),
@@ -434,36 +509,108 @@ def fridge(m: Maker, size: Size) -> None:
     grip_material = m.pick(STEEL, CHROME, CHROME, material)
     cut = m.pick(0.38, 0.36, 0.68, 0.72, 1.0) * h
     left = m.chance(0.5)
-    with m.of(material):
-        if retro:
-            m.add(rounded((-hw, foot, -d / 2), (hw, h, f + 0.01), 0.06, n=3))
-        else:
-            m.add(bevelled((-hw, foot, -d / 2), (hw, h, f), 0.004))
-        if w > 0.8:
-            low = h * 0.4 if m.chance(0.5) else foot
-            for a, b, s in ((-hw, -0.002, -1.0), (0.002, hw, 1.0)):
-                m.add(rounded((a + 0.002, low + 0.003, f + 0.004), (b - 0.002, h, f + 0.07), 0.01,
+    # Its compartments from below: low, high, what is in them, how many doors they have.
+    if w > 0.8:
+        low = h * 0.4 if m.chance(0.5) else foot
+        spaces = [(low, h, "shelves", 2)]
+        if low > 0.1:
+            spaces.insert(0, (foot, low, "", 0))
+    else:
+        spaces = [(foot, cut, "drawers" if cut < 0.6 * h else "shelves", 1), (cut, h, "shelves", 1)]
+        spaces = spaces if cut < h else [(foot, h, "shelves", 1)]
+    shows_time = grip == "none" or m.chance(0.2)
+    for c, e, filling, n_doors in spaces:
+        fridge_space(m, (-hw, hw), (c, e), (-d / 2, f), material, 0.05 if retro else 0.006, filling)
+        if n_doors == 0:
+            with opens(m, "drawer", (-hw, hw), (c, e), f + 0.07, -d / 2), m.of(material):
+                m.add(rounded((-hw + 0.002, c, f + 0.004), (hw - 0.002, e - 0.002, f + 0.07), 0.01,
                     n=1))  # fmt: skip
-                pull(m, grip, s * 0.045, (low + h) / 2, f + 0.069, False, 0.5 * (h - low),
-                    grip_material)  # fmt: skip
-            if low > 0.1:
-                m.add(rounded((-hw + 0.002, foot, f + 0.004), (hw - 0.002, low - 0.002, f + 0.07),
-                    0.01, n=1))  # fmt: skip
-                pull(m, grip, 0.0, low - 0.06, f + 0.069, True, 0.5 * w, grip_material)
-        else:
-            for c, e in ((foot, cut), (cut, h)) if cut < h else ((foot, h),):
-                m.add(rounded((-hw + 0.001, c + 0.002, f + 0.006),
-                    (hw - 0.001, e - 0.002, f + 0.07), 0.05 if retro else 0.008,
-                    n=3 if retro else 1))  # fmt: skip
-                is_low = e < 0.6 * h
-                if grip != "none":
+                pull(m, grip, 0.0, e - 0.06, f + 0.069, True, 0.5 * w, grip_material)
+                drawer_box(m, (-hw + 0.05, hw - 0.05), (c + 0.05, e - 0.05),
+                    (-d / 2 + 0.08, f + 0.004), WHITE)  # fmt: skip
+        for k in range(n_doors):
+            is_left = left if n_doors == 1 else k == 0
+            a, b = (-hw, hw) if n_doors == 1 else ((-hw, -0.002), (0.002, hw))[k]
+            with m.hinged("door", at=(a if is_left else b, c, f + 0.07),
+                axis=(0.0, -1.0 if is_left else 1.0, 0.0), upper_rad=_FRIDGE_RAD):  # fmt: skip
+                door_racks(m, (a + 0.06, b - 0.06), (c, e), f)
+                if n_doors == 2:
+                    m.add(rounded((a + 0.002, c + 0.003, f + 0.004), (b - 0.002, e, f + 0.07), 0.01,
+                        n=1), of=material)  # fmt: skip
+                    pull(m, grip, 0.045 * (1 if k else -1), (c + e) / 2, f + 0.069, False,
+                        0.5 * (e - c), grip_material)  # fmt: skip
+                else:
+                    m.add(rounded((-hw + 0.001, c + 0.002, f + 0.006),
+                        (hw - 0.001, e - 0.002, f + 0.07), 0.05 if retro else 0.008,
+                        n=3 if retro else 1), of=material)  # fmt: skip
+                    at = c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28, 0.5 * (e - c))
                     pull(m, grip, (hw - 0.05) * (1 if left else -1),
-                        e - 0.2 if is_low else c + 0.52 * (e - c) if e - c > 1.2 else c + min(0.28,
-                        0.5 * (e - c)), f + 0.069, False, min(0.34, 0.6 * (e - c)), grip_material)  # fmt: skip
+                        e - 0.2 if e < 0.6 * h else at, f + 0.069, False, min(0.34, 0.6 * (e - c)),
+                        grip_material)  # fmt: skip
+                if shows_time and e == h and k == 0:
+                    at = -0.05 if n_doors == 1 else -0.112
+                    m.add(slab((at, h - 0.3, f + 0.0695), (at + 0.1, h - 0.2, f + 0.0708)),
+                        of=BLACK_GLASS)  # fmt: skip
     for x, z in product((-hw + 0.06, hw - 0.06), (-d / 2 + 0.06, f - 0.06)):
         m.add(frustum((0.022, 0.0), (0.018, foot + 0.01), n=10), at=(x, 0.0, z), of=RUBBER)
-    if grip == "none" or m.chance(0.2):
-        m.add(slab((-0.05, h - 0.3, f + 0.0695), (0.05, h - 0.2, f + 0.0708)), of=BLACK_GLASS)
+
+
+def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float,
+    filling: str) -> None:  # fmt: skip
+    """A compartment of a fridge: foam between sheet and a white liner; 'shelves' or 'drawers' in it."""
+    wall = 0.045
+    shell(m, x, y, z, wall, material, r, liner=WHITE)
+    a, b, c = x[0] + wall + 0.003, x[1] - wall - 0.003, (z[0] + wall + 0.003, z[1] - 0.1)
+    low, high = y[0] + wall + 0.003, y[1] - wall - 0.003
+    n = max(1, round((high - low) / 0.26))
+    if filling == "drawers":
+        for k in range(n):
+            m.add(bevelled((a + 0.004, low + (high - low) * k / n + 0.006, c[0]), (b - 0.004,
+                low + (high - low) * (k + 1) / n - 0.014, c[1] + 0.04), 0.006), of=CLEAR_PLASTIC)  # fmt: skip
+    for k in range(1, n) if filling == "shelves" else ():
+        at = low + (high - low) * k / n
+        m.add(slab((a, at, c[0]), (b, at + 0.005, c[1])), of=CLEAR_PLASTIC)
+        m.add(slab((a, at - 0.004, c[1] - 0.012), (b, at + 0.01, c[1])), of=WHITE)
+
+
+def door_racks(m: Maker, x: Pair, y: Pair, z: float) -> None:
+    """What bottles stand in, on the inside of a fridge's door at z."""
+    n = max(1, round((y[1] - y[0]) / 0.4))
+    for k in range(n):
+        at = y[0] + 0.08 + (y[1] - y[0] - 0.12) * k / n
+        with m.of(WHITE):
+            m.add(slab((x[0], at, z - 0.07), (x[1], at + 0.006, z + 0.006)))
+            m.add(slab((x[0], at + 0.006, z - 0.07), (x[1], at + 0.07, z - 0.066)))
+            for a in (x[0], x[1] - 0.004):
+                m.add(slab((a, at + 0.006, z - 0.066), (a + 0.004, at + 0.07, z + 0.006)))
+
+
+def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 36) -> Surface:
+    """A plate in x and y, from z[0] to its front z[1], with a round hole of radius r about a point."""
+    t = 2 * np.pi * (np.arange(n) + 0.5) / n
+    way = np.stack([np.cos(t), np.sin(t)], -1)
+    centre = np.array(middle)
+    # From the hole's rim straight out to the plate's edge; its corners go to the nearest of them.
+    low, high = np.array([x[0], y[0]]) - centre, np.array([x[1], y[1]]) - centre
+    with np.errstate(divide="ignore"):
+        reach = np.minimum(*np.where(way > 0, high / way, low / way).T)
+    edge = way * reach[:, None]
+    for corner in ((low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])):
+        edge[np.argmax(way @ np.array(corner))] = corner
+    flat = np.concatenate([edge, r * way]) + centre
+    points = np.concatenate([np.c_[flat, np.full(2 * n, at)] for at in z])
+    i, j = np.arange(n), (np.arange(n) + 1) % n
+    outer, inner, front = 0, n, 2 * n
+
+    def quads(a: int, b: int) -> I32:
+        """Two triangles from ring a to ring b, seen from where a is left of b going round."""
+        return np.concatenate([np.stack([a + i, a + j, b + j], -1), np.stack([a + i, b + j, b + i], -1)])  # fmt: skip
+
+    faces = np.concatenate([
+        quads(front + outer, front + inner), quads(inner, outer), quads(outer, front + outer),
+        quads(front + inner, inner),
+    ])  # fmt: skip
+    return creased("plate", points, faces, radians(40))
 
 
 @family(group="washer", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=28,
@@ -476,24 +623,34 @@ def washing_machine(m: Maker, size: Size) -> None:
         glossy("black", (0.1, 0.1, 0.105), 0.3))  # fmt: skip
     f, foot, strip = d / 2 - 0.045, 0.02, m.uniform(0.09, 0.13)
     with m.of(material):
-        m.add(bevelled((-hw, foot, -d / 2), (hw, h - 0.03, f), 0.004))
         m.add(board(w, d - 0.045, h - 0.028, h, 0.02, 0.006, z=-0.0225))
         m.add(bevelled((-hw + 0.003, h - 0.03 - strip, f), (hw - 0.003, h - 0.032, f + 0.012),
             0.003))  # fmt: skip
     y, r, x = (foot + (h - strip - foot) * m.uniform(0.5, 0.55), m.uniform(0.16, 0.2),
         m.pick(0.0, 0.0, 0.0, -0.02))  # fmt: skip
     frame = m.pick(CHROME, STEEL, material, glossy("dark hoop", (0.15, 0.15, 0.16), 0.3))
-    with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
-        m.add(revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),
-            (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36), of=frame)  # fmt: skip
-        m.add(revolve([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
-            (0.0, 0.036)], n=32), of=BLACK_GLASS)  # fmt: skip
-    if m.chance(0.7):
-        m.add(bevelled((x + r - 0.03, y - 0.04, f + 0.01), (x + r - 0.008, y + 0.04, f + 0.036),
-            0.004), of=frame)  # fmt: skip
+    # A body with a round hole in its front, and the drum behind it.
+    shell(m, (-hw, hw), (foot, h - 0.03), (-d / 2, f - 0.012), 0.008, material)
+    m.add(holed_plate((-hw, hw), (foot, h - 0.03), (f - 0.012, f), (x, y), r - 0.05), of=material)
+    drum = min(0.24, hw - 0.03, y - foot - 0.02, h - 0.05 - y)
+    m.add(vessel([(0.0, 0.0), (drum, 0.0), (drum, d - 0.12), (r - 0.052, d - 0.09)], 0.004, n=36),
+        turn=LYING_ALONG_Z, at=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)  # fmt: skip
+    with m.hinged("door", at=(x - r, y, f + 0.018), axis=(0.0, -1.0, 0.0), upper_rad=_MACHINE_RAD):
+        with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
+            m.add(revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03),
+                (r - 0.04, 0.026), (r - 0.045, 0.012), (r - 0.045, 0.0)], n=36), of=frame)  # fmt: skip
+            m.add(revolve([(0.0, 0.0), (r - 0.044, 0.0), (r - 0.044, 0.013), (r * 0.45, 0.03),
+                (0.0, 0.036)], n=32), of=BLACK_GLASS)  # fmt: skip
+        if m.chance(0.7):
+            m.add(bevelled((x + r - 0.03, y - 0.04, f + 0.01), (x + r - 0.008, y + 0.04, f + 0.036),
+                0.004), of=frame)  # fmt: skip
     # The drawer at the left, the dial in the middle or at the right, a display.
-    m.add(bevelled((-hw + 0.02, h - 0.03 - strip + 0.015, f + 0.0115),
-        (-hw + 0.18, h - 0.045, f + 0.016), 0.003), of=material)  # fmt: skip
+    drawer_y = (h - 0.03 - strip + 0.015, h - 0.045)
+    with m.sliding("drawer", along=(0.0, 0.0, 1.0), upper_m=0.18):
+        m.add(bevelled((-hw + 0.02, drawer_y[0], f + 0.0115), (-hw + 0.18, drawer_y[1], f + 0.016),
+            0.003), of=material)  # fmt: skip
+        drawer_box(m, (-hw + 0.01, -hw + 0.19), (drawer_y[0] - 0.01, drawer_y[1] + 0.02),
+            (f - 0.22, f + 0.0115), material)  # fmt: skip
     m.add(revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20),
         turn=LYING_ALONG_Z, at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
         of=m.pick(CHROME, material, RUBBER))  # fmt: skip

@@ -20,6 +20,7 @@ order of draws decides what a seed gives: a draw put in between changes all that
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -33,9 +34,12 @@ from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.style import COLOURS, Rgb, Style
 from pbrs_farm.dress.things.assembly import Model, Part, hanging_piece, standing_piece, transformed
 from pbrs_farm.dress.things.materials import any_colour, metal, plain
+from pbrs_farm.home.masses import mass_kg
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -59,6 +63,8 @@ class Maker:
         self.rng, self.style = rng, style
         self.name = ""  # of the piece where a form has its own: "elephant" for an ornament
         self._parts: list[tuple[Surface, Material | None]] = []
+        self._joints: list[Joint] = []
+        self._counted: Counter[str] = Counter()  # parts by what they are called
 
     def uniform(self, low: float, high: float) -> float:
         """A number between low and high."""
@@ -168,10 +174,53 @@ class Maker:
     def moved(self, *, at: Triple | None = None, turn: F64 | None = None) -> Iterator[None]:
         """What is added inside is turned and then moved together, as a solid is by `add`."""
         outer, self._parts = self._parts, []
+        known, self._joints = self._joints, []
         yield
         inner, self._parts = self._parts, outer
         for solid, own in inner:
             self.add(solid, of=own, at=at, turn=turn)
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.eye(3) if turn is None else turn
+        matrix[:3, 3] = at or (0.0, 0.0, 0.0)
+        self._joints = [*known, *(joint.placed(matrix) for joint in self._joints)]
+
+    @contextmanager
+    def hinged(self, name: str, *, at: Triple, axis: Triple, upper_rad: float) -> Iterator[None]:
+        """What is added inside is a part that turns about an axis, anticlockwise, shut as it is added.
+
+        name: what it is: "door", "lid"; a number tells it from others. at: a point of the axis.
+        """
+        with self._part(name, JointKind.REVOLUTE, at, axis, upper_rad):
+            yield
+
+    @contextmanager
+    def sliding(self, name: str, *, along: Triple, upper_m: float) -> Iterator[None]:
+        """What is added inside is a part that slides along an axis, shut as it is added."""
+        with self._part(name, JointKind.PRISMATIC, (0.0, 0.0, 0.0), along, upper_m):
+            yield
+
+    @contextmanager
+    def _part(
+        self, name: str, kind: JointKind, at: Triple, axis: Triple, upper: float
+    ) -> Iterator[None]:
+        outer, self._parts = self._parts, []
+        yield
+        inner, self._parts = self._parts, outer
+        self._counted[name] += 1
+        part = f"{name} {self._counted[name]}"
+        self._parts += [(replace(solid, part=part), own) for solid, own in inner]
+        self._joints.append(Joint(part, kind, at, axis, upper))
+
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints of what was added, by the names of their parts, with what the parts weigh."""
+        return tuple(replace(joint, mass_kg=self._mass_kg(joint.part)) for joint in self._joints)
+
+    def _mass_kg(self, part: str) -> float:
+        return sum(
+            mass_kg(triangle_corners(solid.positions, solid.faces), material)
+            for solid, material in self._parts
+            if solid.part == part and material is not None
+        )
 
     def finished(self, file: str, name: str) -> list[Part]:
         """All parts; BadInput where there is none, or one without a material."""
@@ -240,8 +289,10 @@ def put_together(m: Maker, of: Thing[...] | Family) -> Model:
     """What was added, as a piece and its shape."""
     parts, name = m.finished(of.build.__module__, of.name), m.name or of.called
     if of.place in (Place.WALL, Place.CEILING):
-        return hanging_piece(name, of.group, of.nyu40, parts, (), of.place)
-    return standing_piece(name, parts, group=of.group, nyu40=of.nyu40, place=of.place)
+        return hanging_piece(name, of.group, of.nyu40, parts, (), of.place, m.joints())
+    return standing_piece(
+        name, parts, group=of.group, nyu40=of.nyu40, place=of.place, joints=m.joints()
+    )
 
 
 def thing(

@@ -25,7 +25,7 @@ from pbrs_farm.dress.things.bodies import (
     tube,
 )
 from pbrs_farm.dress.things.cloth import bulged, chair_shell, tub
-from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of, leg
+from pbrs_farm.dress.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
 from pbrs_farm.dress.things.maker import Maker, Size, family, thing
 from pbrs_farm.dress.things.materials import (
     BLACK_STEEL,
@@ -467,10 +467,11 @@ def hall_bench(m: Maker, size: Size) -> None:
                 m.add(slab((-hw + 0.045, y, -hd + 0.02), (hw - 0.045, y + 0.018, hd - 0.02)),
                     of=material)  # fmt: skip
         case 2:  # a box with fronts
-            m.add(bevelled((-hw, 0.0, -hd), (hw, h - 0.05, hd - 0.02), 0.003), of=material)
+            m.add(slab((-hw, 0.0, -hd), (hw, 0.04, hd - 0.05)), of=material)
+            hollow(m, (-hw, hw), (0.04, h - 0.05), (-hd, hd - 0.05), 0.018, material)
             with m.moved(at=(0.0, 0.0, 0.0005)):
                 fronts_of(m, Look("flat", material, material, material,
                     m.pick("knob", "edge", "disc"), m.metal), (-hw, hw), (0.04, h - 0.055),
                     hd - 0.0495, m.pick([("drawer",), ("drawer",)], [("door",), ("door",)],
-                    [("flap",)]), False)  # fmt: skip
+                    [("flap",)]), False, Inside(-hd + 0.008))  # fmt: skip
             m.add(rounded((-hw, h - 0.05, -hd), (hw, h, hd), 0.02, n=2), of=soft)

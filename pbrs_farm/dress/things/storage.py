@@ -21,7 +21,7 @@ from pbrs_farm.dress.things.bodies import (
     square_tube,
     tube,
 )
-from pbrs_farm.dress.things.joints import Look, four_legs, fronts_of, panel
+from pbrs_farm.dress.things.joints import Inside, Look, four_legs, fronts_of, hollow, panel, shelves
 from pbrs_farm.dress.things.maker import Maker, Size, family
 from pbrs_farm.dress.things.materials import (
     BLACK_STEEL,
@@ -90,7 +90,8 @@ def open_bookcase(m: Maker, size: Size) -> None:
                 rows = m.pick(1, 2) if n > 3 else 1
                 fronts_of(m, look, (-hw, hw), (low, low + (h - low - t) * rows / n + t), hd - 0.05,
                     m.pick([("door",), ("door",)] if w > 0.5 else [("door",)],
-                    [("drawer", "drawer")] if rows > 1 else [("drawer",)]), False)  # fmt: skip
+                    [("drawer", "drawer")] if rows > 1 else [("drawer",)]), False,
+                    Inside(-hd + 0.006, has_boards=False))  # fmt: skip
         case 2:  # a crown and a plinth as of old
             with m.moved(at=(0.0, 0.0, -0.015)):
                 case(m, w - 0.05, h - 0.02, d - 0.03, 0.07, t, body, True)
@@ -225,7 +226,8 @@ def wardrobe(m: Maker, size: Size) -> None:
     low, f = m.pick(0.05, 0.07, 0.1), hd - 0.05
     crown = m.chance(0.2)
     top = h - (0.04 if crown else 0.0)
-    m.add(slab((-hw, low, -hd), (hw, top, f)), of=body)
+    hollow(m, (-hw, hw), (low, top), (-hd, f), 0.016, body)
+    inside = Inside(-hd + 0.008, rail=CHROME)
     if m.chance(0.7):
         m.add(slab((-hw + 0.01, 0.0, -hd), (hw - 0.01, low, f - 0.03)), of=body)
     else:
@@ -238,7 +240,7 @@ def wardrobe(m: Maker, size: Size) -> None:
     match form:
         case 0:  # doors on hinges
             fronts_of(m, look, (-hw, hw), (low, top), f, [m.pick(("door",), ("door",),
-                ("door", "drawer"), ("door", "low", "low"))] * n, False)  # fmt: skip
+                ("door", "drawer"), ("door", "low", "low"))] * n, False, inside)  # fmt: skip
         case 1:  # sliding: two or three leaves on rails, one before the other, with grips let in
             n, glassy = 2 if w < 1.6 else m.pick(2, 3), m.weighted(0.4, 0.35, 0.25)
             rail = m.pick(STEEL, BLACK_STEEL, WHITE_STEEL, body)
@@ -249,24 +251,38 @@ def wardrobe(m: Maker, size: Size) -> None:
                     -hw + (k + 1) * w / n + (0.02 if k < n - 1 else 0.0),
                     f + 0.004 + 0.02 * (k % 2))  # fmt: skip
                 is_mirror = (glassy == 1 and k == 0) or (glassy == 2 and k == 1)
-                m.add(bevelled((a + 0.003, low + 0.031, z), (b - 0.003, top - 0.031, z + 0.018),
-                    0.002), of=front)  # fmt: skip
-                if is_mirror:
-                    m.add(slab((a + 0.035, low + 0.06, z + 0.0181),
-                        (b - 0.035, top - 0.06, z + 0.0188)), of=SILVERED)  # fmt: skip
-                for x in (a + 0.003, b - 0.023):
-                    m.add(bevelled((x, low + 0.031, z + 0.0185), (x + 0.02, top - 0.031, z + 0.024),
-                        0.001), of=rail)  # fmt: skip
+                # A leaf slides before or behind its neighbour; the last goes back.
+                way = 1.0 if k < n - 1 else -1.0
+                with m.sliding("leaf", along=(way, 0.0, 0.0), upper_m=w / n - 0.02):
+                    m.add(bevelled((a + 0.003, low + 0.031, z), (b - 0.003, top - 0.031, z + 0.018),
+                        0.002), of=front)  # fmt: skip
+                    if is_mirror:
+                        m.add(slab((a + 0.035, low + 0.06, z + 0.0181),
+                            (b - 0.035, top - 0.06, z + 0.0188)), of=SILVERED)  # fmt: skip
+                    for x in (a + 0.003, b - 0.023):
+                        m.add(bevelled((x, low + 0.031, z + 0.0185),
+                            (x + 0.02, top - 0.031, z + 0.024), 0.001), of=rail)  # fmt: skip
+                space = (-hw + k * w / n + (0.008 if k else 0.016),
+                    -hw + (k + 1) * w / n - (0.008 if k < n - 1 else 0.016))  # fmt: skip
+                if k:
+                    m.add(slab((space[0] - 0.016, low + 0.016, inside.back), (space[0], top, f)),
+                        of=body)  # fmt: skip
+                shelves(
+                    m, space, (low, top), (inside.back, f), body, CHROME if k % 2 == 0 else None
+                )
         case 2:  # one part open or with a mirror on its door
-            fronts_of(m, look, (-hw, hw), (low, top), f, [("door",)] * n, False)
-            if m.chance(0.6):
-                m.add(slab((-hw + w / n * m.pick(0, 1) + 0.09, low + 0.3, f + 0.0195),
-                    (-hw + w / n * 1 - 0.09 if n > 4 else -hw + 0.09 + w / n * 0.6, top - 0.25,
-                    f + 0.021)), of=SILVERED)  # fmt: skip
-            else:
-                for k in range(n):
-                    m.add(bevelled((-hw + k * w / n + 0.07, low + 0.12, f + 0.0185),
-                        (-hw + (k + 1) * w / n - 0.07, low + 0.55, f + 0.026), 0.006), of=front)  # fmt: skip
+            at = m.pick(0, 1) if m.chance(0.6) else None
+
+            def add_panel(k: int) -> None:
+                a, b = -hw + k * w / n, -hw + (k + 1) * w / n
+                if at is None:
+                    m.add(bevelled((a + 0.07, low + 0.12, f + 0.0185),
+                        (b - 0.07, low + 0.55, f + 0.026), 0.006), of=front)  # fmt: skip
+                elif k == at:
+                    m.add(slab((a + 0.09, low + 0.3, f + 0.0195), (b - 0.09, top - 0.25, f + 0.021)),
+                        of=SILVERED)  # fmt: skip
+
+            fronts_of(m, look, (-hw, hw), (low, top), f, [("door",)] * n, False, inside, add_panel)
 
 
 @family(group="dresser", nyu40=DRESSER, place=Place.FLOOR, called="chest_of_drawers", variants=36,
@@ -283,7 +299,8 @@ def drawer_chest(m: Maker, size: Size) -> None:
     legs = m.pick("plinth", "plinth", "tapered", "square", "bun", "turned")
     low, f, t = (0.05 if legs == "plinth" else 0.07 if legs == "bun" else m.uniform(0.12, 0.2),
         d / 2 - 0.05, m.pick(0.018, 0.025, 0.03))  # fmt: skip
-    m.add(slab((-hw + 0.006, low, -d / 2), (hw - 0.006, h - t, f)), of=body)
+    hollow(m, (-hw + 0.006, hw - 0.006), (low, h - t), (-d / 2, f), 0.016, body)
+    inside = Inside(-d / 2 + 0.008)
     m.add(board(w, d - 0.012, h - t, h, 0.006, 0.005, z=-0.006, n=2),
         of=m.pick(body, body, m.timber))  # fmt: skip
     if legs == "plinth":
@@ -297,17 +314,17 @@ def drawer_chest(m: Maker, size: Size) -> None:
     match form:
         case 0:  # alike
             fronts_of(m, look, (-hw + 0.006, hw - 0.006), (y0, y1), f,
-                [("drawer",) * rows] * (2 if wide else 1), False)  # fmt: skip
+                [("drawer",) * rows] * (2 if wide else 1), False, inside)  # fmt: skip
         case 1:  # small ones above wide ones
             cut = y1 - (y1 - y0) / (rows + 0.3)
             fronts_of(m, look, (-hw + 0.006, hw - 0.006), (cut, y1), f,
-                [("drawer",)] * (3 if w > 0.85 else 2), False)  # fmt: skip
+                [("drawer",)] * (3 if w > 0.85 else 2), False, inside)  # fmt: skip
             fronts_of(m, look, (-hw + 0.006, hw - 0.006), (y0, cut), f,
-                [("drawer",) * (rows - 1)] * (2 if w > 1.15 else 1), False)  # fmt: skip
+                [("drawer",) * (rows - 1)] * (2 if w > 1.15 else 1), False, inside)  # fmt: skip
         case 2:  # drawers beside a door
             fronts_of(m, look, (-hw + 0.006, hw - 0.006), (y0, y1), f,
                 m.pick([("drawer",) * rows, ("door",)], [("door",), ("drawer",) * rows],
-                [("low", "door"), ("low", "door")]), False)  # fmt: skip
+                [("low", "door"), ("low", "door")]), False, inside)  # fmt: skip
 
 
 @family(group="cabinet", nyu40=CABINET, place=Place.FLOOR, called="cabinet", variants=32,
@@ -331,23 +348,23 @@ def sideboard_cabinet(m: Maker, size: Size) -> None:
     with m.moved(at=(0.0, 0.0, -0.025)):
         case(m, w, h, d - 0.05, low, t, body, True)
     n = max(1, round(w / 0.45))
-    # Shelves behind glass and in what is open.
-    for k in range(1, max(2, round((h - low) / 0.34))):
-        m.add(slab((-hw + t, low + (h - low) * k / max(2, round((h - low) / 0.34)) - 0.008,
-            -d / 2 + 0.006), (hw - t, low + (h - low) * k / max(2, round((h - low) / 0.34)) + 0.008,
-            f - 0.006)), of=body)  # fmt: skip
-    form = m.weighted(0.4, 0.35, 0.25) if h > 1.1 else 0
+    form, inside = m.weighted(0.4, 0.35, 0.25) if h > 1.1 else 0, Inside(-d / 2 + 0.006)
     if form == 0:
         fronts_of(m, look, (-hw, hw), (low, h), f, [m.pick(("door",), ("door",), ("low", "door"),
-            ("drawer", "drawer", "drawer"))] + [("door",)] * (n - 1), False)  # fmt: skip
+            ("drawer", "drawer", "drawer"))] + [("door",)] * (n - 1), False, inside)  # fmt: skip
     # Glass or open above, doors or drawers below.
     if form > 0:
         cut = low + (h - low) * m.uniform(0.36, 0.48)
         fronts_of(m, look, (-hw, hw), (low, cut), f, m.pick([("door",)] * n,
-            [("drawer", "drawer")] * max(1, n - 1)), False)  # fmt: skip
+            [("drawer", "drawer")] * max(1, n - 1)), False, inside)  # fmt: skip
+        # A board between, and shelves over it that show.
+        m.add(
+            slab((-hw + t, cut - 0.008, -d / 2 + 0.006), (hw - t, cut + 0.008, f - 0.006)), of=body
+        )
+        shelves(m, (-hw + t, hw - t), (cut, h), (-d / 2 + 0.006, f + 0.014), body)
         if form == 1:
             fronts_of(m, look._replace(kind="glazed"), (-hw, hw), (cut, h), f, [("door",)] * n,
-                False)  # fmt: skip
+                False, inside._replace(has_boards=False))  # fmt: skip
 
 
 @family(group="clothes_rack", nyu40=OTHERPROP, place=Place.FLOOR, called="coat_rack", variants=40,

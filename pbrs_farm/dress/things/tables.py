@@ -20,7 +20,7 @@ from pbrs_farm.dress.things.bodies import (
     square_tube,
     tube,
 )
-from pbrs_farm.dress.things.joints import Look, drawer_front, four_legs, fronts_of, leg
+from pbrs_farm.dress.things.joints import Inside, Look, four_legs, fronts_of, hollow, leg
 from pbrs_farm.dress.things.maker import Maker, Size, family
 from pbrs_farm.dress.things.materials import (
     BLACK_GLASS,
@@ -182,10 +182,10 @@ def coffee_table(m: Maker, size: Size) -> None:
                 m.pick("knob", "bar", "edge", "disc"), m.metal)  # fmt: skip
             top_of(m, "rect", w, d, h - t, h, body)
             if m.chance(0.6):
-                m.add(slab((-hw + 0.02, h - t - 0.16, -hd + 0.02), (hw - 0.02, h - t, hd - 0.045)),
-                    of=body)  # fmt: skip
+                hollow(m, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t), (-hd + 0.02, hd - 0.045),
+                    0.016, body)  # fmt: skip
                 fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.16, h - t - 0.002),
-                    hd - 0.045, [("flap",)] * m.pick(1, 2), False)  # fmt: skip
+                    hd - 0.045, [("flap",)] * m.pick(1, 2), False, Inside(-hd + 0.028))  # fmt: skip
                 four_legs(m, m.pick("tapered", "square", "round"), w, d, h - t - 0.158, 0.05, 0.06,
                     0.0, body)  # fmt: skip
             else:
@@ -250,11 +250,11 @@ def desk(m: Maker, size: Size) -> None:
             for s in (m.pick(-1.0, 1.0),) if form == 1 else (-1.0, 1.0):
                 a, b = (min(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))),
                     max(s * (hw - 0.01), s * (hw - 0.01 - (0.4 if form == 1 else 0.32))))  # fmt: skip
-                m.add(slab((a, 0.05, -hd + 0.02), (b, y, hd - 0.05)), of=body)
+                hollow(m, (a, b), (0.05, y), (-hd + 0.02, hd - 0.05), 0.016, body)
                 m.add(slab((a + 0.02, 0.0, -hd + 0.04), (b - 0.02, 0.05, hd - 0.09)), of=body)
                 fronts_of(m, look, (a, b), (0.06, h - t - 0.003), hd - 0.05,
                     [m.pick(("low", "drawer", "drawer"), ("drawer", "drawer", "drawer"),
-                    ("low", "door"), ("door",))], False)  # fmt: skip
+                    ("low", "door"), ("door",))], False, Inside(-hd + 0.028))  # fmt: skip
                 if form == 1:
                     for z in (-hd + 0.05, hd - 0.05):
                         leg(m, m.pick("square", "square", "round"), (-s * (hw - 0.05), z),
@@ -263,9 +263,10 @@ def desk(m: Maker, size: Size) -> None:
                 m.add(slab((-hw + 0.06, h - t - 0.3, -hd + 0.03), (hw - 0.06, y, -hd + 0.045)),
                     of=body)  # fmt: skip
         case 3:  # a drawer or two under the whole top
-            m.add(slab((-hw + 0.02, h - t - 0.11, -hd + 0.02), (hw - 0.02, y, hd - 0.05)), of=body)
+            hollow(m, (-hw + 0.02, hw - 0.02), (h - t - 0.11, y), (-hd + 0.02, hd - 0.05), 0.012,
+                body)  # fmt: skip
             fronts_of(m, look, (-hw + 0.02, hw - 0.02), (h - t - 0.11, h - t - 0.002), hd - 0.05,
-                [("flap",)] * m.pick(1, 2, 3), False)  # fmt: skip
+                [("flap",)] * m.pick(1, 2, 3), False, Inside(-hd + 0.028))  # fmt: skip
             four_legs(m, m.pick("tapered", "square", "turned", "round", "hairpin"), w, d,
                 h - t - 0.108, 0.05, 0.06, 0.0, m.pick(body, body, BLACK_STEEL))  # fmt: skip
         case 4:  # with a shelf below
@@ -299,10 +300,10 @@ def nightstand(m: Maker, size: Size) -> None:
                 0.02 if legs == "tapered" else 0.0, m.pick(body, body, BLACK_STEEL, m.metal))  # fmt: skip
         m.add(board(w, d - 0.012, h - t, h, 0.006, 0.004, z=-0.006, n=2), of=body)
         if form == 0:
-            m.add(slab((-hw + 0.005, low, -hd), (hw - 0.005, h - t, hd - 0.05)), of=body)
+            hollow(m, (-hw + 0.005, hw - 0.005), (low, h - t), (-hd, hd - 0.05), 0.016, body)
             fronts_of(m, look, (-hw + 0.005, hw - 0.005), (low, h - t - 0.002), hd - 0.05,
                 [m.pick(("drawer",), ("drawer", "drawer"), ("drawer", "drawer", "drawer"),
-                ("door",), ("low", "door"))], False)  # fmt: skip
+                ("door",), ("low", "door"))], False, Inside(-hd + 0.008))  # fmt: skip
         else:
             # A niche over a drawer, or under it.
             mid, is_low = low + (h - low) * m.uniform(0.4, 0.55), m.chance(0.5)
@@ -312,8 +313,9 @@ def nightstand(m: Maker, size: Size) -> None:
                     m.add(slab((x, low, -hd + 0.008), (x + 0.016, h - t, hd - 0.045)))
                 for y in (low, mid):
                     m.add(slab((-hw + 0.021, y, -hd + 0.008), (hw - 0.021, y + 0.016, hd - 0.05)))
-            drawer_front(m, look, (-hw + 0.006, hw - 0.006),
-                (low, mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), hd - 0.045)  # fmt: skip
+            fronts_of(m, look, (-hw + 0.006, hw - 0.006),
+                (low, mid + 0.008) if is_low else (mid + 0.008, h - t - 0.002), hd - 0.045,
+                [("drawer",)], False, Inside(-hd + 0.008))  # fmt: skip
     match form:
         case 2:  # round, with a rim
             m.add(disc(w, d, h - t, h, 0.004, n=32), of=body)
@@ -386,7 +388,7 @@ def tv_bench(m: Maker, size: Size) -> None:
                 (b - 0.012, (low + h) / 2 + 0.008, f - 0.01)), of=body)  # fmt: skip
         else:
             fronts_of(m, look, (a, b), (low, h - t - 0.002), f, [m.pick(("door",),
-                ("drawer", "drawer"), ("flap",), ("drawer",))], False)  # fmt: skip
+                ("drawer", "drawer"), ("flap",), ("drawer",))], False, Inside(-hd + 0.008))  # fmt: skip
 
 
 @family(group="tv", nyu40=TELEVISION, place=Place.SURFACE, called="television", variants=20,

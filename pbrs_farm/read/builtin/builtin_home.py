@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.arrays import Points2, triple
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import (
     House,
@@ -30,6 +30,7 @@ from pbrs_farm.core.house import (
     Source,
     StoredCamera,
 )
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
 from pbrs_farm.geometry.solids import box, wall_prism
@@ -193,6 +194,10 @@ def _plane_items(index: dict[str, int]) -> list[Item]:
     return items
 
 
+_LEAF: Final = "leaf 1"
+_LEAF_KG: Final = 42.0  # of wood, 40 mm thick
+
+
 def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
     openings, items = [], []
     for hole in _FILE.holes:
@@ -211,8 +216,23 @@ def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
         name, make = ("window", _window_piece) if hole.is_window else ("door", _door_piece)
         turn = 0.0 if hole.along == "x" else 90.0
         piece = make(width, y1 - y0)
-        items.append(place_piece(name, piece, hole.id, hole.room, (x, y0, z), turn, index))
+        item = place_piece(name, piece, hole.id, hole.room, (x, y0, z), turn, index)
+        items.append(item if hole.is_window else _hung(item, width))
     return tuple(openings), items
+
+
+def _hung(door: Item, width: float) -> Item:
+    """The door with its leaf on hinges, at the left seen from its front, to which it opens."""
+    box = door.oriented_box
+    foot = box.centre - box.half[1] * box.axes[:, 1]
+    at = foot + box.axes @ np.array([-width / 2 + 0.05, 0.0, 0.02])
+    surfaces = tuple(
+        replace(s, part=_LEAF) if s.name in ("wood", "metal") else s for s in door.surfaces
+    )
+    joint = Joint(
+        _LEAF, JointKind.REVOLUTE, triple(at), (0.0, -1.0, 0.0), np.pi / 2, mass_kg=_LEAF_KG
+    )
+    return replace(door, surfaces=surfaces, joints=(joint,))
 
 
 def _window_frame(w: float, h: float, t: float, d: float) -> Boxes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import shapely
 
@@ -18,6 +20,7 @@ from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
+from pbrs_farm.read.sweethome3d.piece_joints import joints_of_surfaces, piece_joints
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import PANE, PieceModel, PieceModels
 from pbrs_farm.read.sweethome3d.placement import (
@@ -52,9 +55,16 @@ def piece_item(
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
     # Keep the meshes that the home shows, with their materials.
     found = [piece_material(piece, mesh, model, materials) for mesh in model.meshes]
-    shown = [(m, p, at) for m, p, at in zip(model.meshes, found, points, strict=True) if p]
-    surfaces = [placed_surface(m, p, frame, at, matrix) for m, p, at in shown]
-    emitting = [k for k, (_, p, _) in enumerate(shown) if p.emits]
+    joints = piece_joints(piece, models.meshes(piece.model), matrix, frame)
+    shown = [
+        (m, p, at, joints[on].part if on in joints else "")
+        for m, p, at, on in zip(model.meshes, found, points, model.hangers, strict=True)
+        if p
+    ]
+    surfaces = [
+        replace(placed_surface(m, p, frame, at, matrix), part=part) for m, p, at, part in shown
+    ]
+    emitting = [k for k, (_, p, _, _) in enumerate(shown) if p.emits]
     by_rule = _piece_class(piece)
     nyu40, tags = _label_of_piece(piece, by_rule, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
@@ -76,6 +86,7 @@ def piece_item(
         lights=lights,
         box=frame.box,
         tags=tags,
+        joints=joints_of_surfaces(joints.values(), surfaces, materials.library.materials),
     )
     return item, frame
 

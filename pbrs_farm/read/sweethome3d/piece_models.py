@@ -55,6 +55,24 @@ def _move_joints(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
     return mesh
 
 
+def hanger_of(group: str) -> str:
+    """The joint that moves a group, "hinge_1"; "" for none, and for the hinge or rail itself."""
+    for word in group.split():
+        if word.startswith(_FIXED):
+            continue
+        if joint := joint_of(word):
+            return joint
+        if word.startswith("sweethome3d_") and "_on_rail" in word:
+            return "unique_rail"
+    return ""
+
+
+def fixed_joint_of(group: str) -> str:
+    """The joint that a group is the hinge or rail of: "hinge_1"; "" for none."""
+    found = [joint_of(w) for w in group.split() if w.startswith(_FIXED)]
+    return found[0] if found else ""
+
+
 def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
     """Whether a mesh is moved by one of some joints; the hinge or rail itself is not."""
     words = mesh.group.split()
@@ -80,6 +98,7 @@ class PieceModel:
     """A parsed model."""
 
     meshes: tuple[Mesh, ...]  # in the model's frame
+    hangers: tuple[str, ...]  # of each mesh, what it hangs on: "hinge_1", "" = nothing
     materials: dict[str, ObjMaterial]  # by name
     folder: str  # of its content, for its pictures
     low: F64  # corner of its box
@@ -194,10 +213,12 @@ class PieceModels:
             if material.unread:
                 text = f"{material.name[:60]}: {', '.join(material.unread)} not read"
                 note("unread-map", f"model {name}", text)
-        meshes = _merge_meshes(tuple(laid(m, materials.get(m.material)) for m in parsed.meshes))
+        meshes, hangers = _merge_meshes(
+            tuple(laid(m, materials.get(m.material)) for m in parsed.meshes)
+        )
         corners = [m.positions for m in meshes] or [np.zeros((1, 3))]
         points = np.concatenate(corners)
-        return PieceModel(meshes, materials, folder, points.min(0), points.max(0))
+        return PieceModel(meshes, hangers, materials, folder, points.min(0), points.max(0))
 
     def _content(self, folder: str, name: str) -> bytes | None:
         return self._materials.contents.read(content_name(folder, name))
@@ -228,14 +249,15 @@ def _model_format(data: bytes) -> str:
     return "obj" if b"\0" not in head else "of an unknown kind"
 
 
-def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
-    # One mesh per material, role and (having texture coordinates), in order of first use.
-    grouped: dict[tuple[str, str, bool], list[Mesh]] = {}
+def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[tuple[Mesh, ...], tuple[str, ...]]:
+    # One mesh per material, role, (having texture coordinates) and what it hangs on, in order of
+    # first use.
+    grouped: dict[tuple[str, str, bool, str], list[Mesh]] = {}
     for mesh in meshes:
-        key = (role_of(mesh.group), mesh.material, mesh.uvs is not None)
+        key = (role_of(mesh.group), mesh.material, mesh.uvs is not None, hanger_of(mesh.group))
         grouped.setdefault(key, []).append(mesh)
     merged = []
-    for (role, _, has_uvs), parts in grouped.items():
+    for (role, _, has_uvs, _), parts in grouped.items():
         # Number each part's vertices after those of the parts before it.
         first = np.cumsum([0, *(len(p.positions) for p in parts[:-1])])
         faces = np.concatenate([p.faces + n for p, n in zip(parts, first, strict=True)])
@@ -247,4 +269,4 @@ def _merge_meshes(meshes: tuple[Mesh, ...]) -> tuple[Mesh, ...]:
             uvs=np.concatenate(uvs) if has_uvs else None,
             normals=np.concatenate([p.normals for p in parts]),
         ))  # fmt: skip
-    return tuple(merged)
+    return tuple(merged), tuple(hanger for *_, hanger in grouped)

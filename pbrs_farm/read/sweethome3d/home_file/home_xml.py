@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.arrays import Points2
+from pbrs_farm.core.joints import Joint
 
 Rgb = tuple[float, float, float]
 Matrix3 = tuple[float, ...]
@@ -152,6 +153,7 @@ class PlanPiece:
     power: float = 0.0  # 0..1, 0 = off
     staircase_cut_out: str = ""  # SVG path
     group: str = ""  # name of the group that holds it
+    joints: tuple[Joint, ...] = ()  # in the model's frame, where the file tells them
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pbrs_farm.core.checked_json import json_from_bytes
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.joints import JOINTS_PROPERTY, Joint
+from pbrs_farm.formats.serialise import value_from_json
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
 from pbrs_farm.read.sweethome3d.home_file.parse_paints import piece_paint
 from pbrs_farm.read.sweethome3d.home_file.xml_attributes import Attributes
@@ -41,6 +45,7 @@ def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
         power=a.within("power", 0.5, 0.0, 10.0) if element.tag == "light" else 0.0,
         staircase_cut_out=a.text("staircaseCutOutShape"),
         group=group,
+        joints=_joints(a),
     )
 
 
@@ -66,6 +71,23 @@ def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]
         if matrix is not None:
             found.append((name, matrix))
     return tuple(found)
+
+
+def _joints(a: Attributes) -> tuple[Joint, ...]:
+    for element in a.element.findall("property"):
+        if element.get("name") == JOINTS_PROPERTY:
+            place = f"{a.file}, {a.place}, {JOINTS_PROPERTY}"
+            data = json_from_bytes(element.get("value", "").encode("utf-8", "replace"), place)
+            joints = value_from_json(tuple[Joint, ...], data, place)
+            for joint in joints:
+                if not _is_unit(joint.axis) or joint.lower > joint.upper:
+                    raise BadHouse(place, joint.part[:60], "its axis or its limits are none")
+            return joints
+    return ()
+
+
+def _is_unit(axis: tuple[float, float, float]) -> bool:
+    return abs(sum(v * v for v in axis) - 1.0) < 1e-6
 
 
 def _parse_door_frame(a: Attributes) -> DoorFrame:

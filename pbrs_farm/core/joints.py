@@ -1,0 +1,92 @@
+"""What of a thing moves, and how: a Joint turns or slides one part of it; frozen values, no effects.
+
+A part is the surfaces of an item that have its name (Surface.part); what has none is the body, which
+stands still. Geometry is flattened (ARCHITECTURE.md): surfaces stand where the joint's value says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, Matrix4, triple
+
+Triple = tuple[float, float, float]
+
+JOINTS_PROPERTY: Final = "pbrs_farm.joints"
+"""The property of a piece of a Sweet Home 3D file that tells the joints of its model, as JSON, in the
+model's frame. Its n-th joint moves the groups named `..._on_hinge_<n>` or `..._on_rail_<n>`.
+"""
+
+
+class JointKind(StrEnum):
+    """How a part moves; the words are URDF's."""
+
+    REVOLUTE = "revolute"  # it turns about its axis; values in radians
+    PRISMATIC = "prismatic"  # it slides along its axis; values in metres
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One part of an item that moves against the item's body.
+
+    Values are measured from the shut state, 0: radians, anticlockwise about the axis, or metres
+    along it. `upper` is as far as it opens.
+    """
+
+    part: str  # Surface.part of what moves; names the joint in its item
+    kind: JointKind
+    point: Triple  # on the axis, metres, in the frame of the surfaces: of an item, the world
+    axis: Triple  # unit
+    upper: float
+    lower: float = 0.0
+    value: float = 0.0  # where its surfaces stand
+    mass_kg: float = 0.0  # of the part; 0 = nobody knows
+
+    @property
+    def share(self) -> float:
+        """How far it is open, 0..1: its value as a share of `upper`."""
+        return self.value / self.upper if self.upper else 0.0
+
+    def motion(self, value: float) -> Matrix4:
+        """(4, 4) rigid: from where the part's surfaces stand to where they stand at a value.
+
+        The value is not held to the limits.
+        """
+        by, axis = value - self.value, np.array(self.axis)
+        matrix = np.eye(4)
+        if self.kind is JointKind.PRISMATIC:
+            matrix[:3, 3] = by * axis
+            return matrix
+        # Rodrigues' formula, about the point.
+        x, y, z = axis
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        matrix[:3, :3] = np.eye(3) + np.sin(by) * cross + (1 - np.cos(by)) * (cross @ cross)
+        point = np.array(self.point)
+        matrix[:3, 3] = point - matrix[:3, :3] @ point
+        return matrix
+
+    def placed(self, matrix: F64) -> Joint:
+        """The joint of an item whose surfaces are moved by a matrix (4, 4): turned, scaled, mirrored.
+
+        A scale must run along the axis and across it, as that of furniture's own axes does. Masses
+        grow with the volume.
+        """
+        linear = matrix[:3, :3]
+        axis = linear @ np.array(self.axis)
+        length = float(np.linalg.norm(axis))
+        # A mirror turns the sense of a rotation over.
+        is_turned = self.kind is JointKind.REVOLUTE and np.linalg.det(linear) < 0
+        reach = 1.0 if self.kind is JointKind.REVOLUTE else length
+        return replace(
+            self,
+            point=triple(linear @ np.array(self.point) + matrix[:3, 3]),
+            axis=triple(axis / length * (-1.0 if is_turned else 1.0)),
+            upper=self.upper * reach,
+            lower=self.lower * reach,
+            value=self.value * reach,
+            mass_kg=self.mass_kg * abs(float(np.linalg.det(linear))),
+        )

@@ -1,0 +1,133 @@
+"""What of a piece moves: by the joints that its file tells, else by the hinges and rails of its model; no effects.
+
+The program calls a model's groups by what they hang on: "sweethome3d_opening_on_hinge_1_door" turns about
+"sweethome3d_hinge_1", "sweethome3d_opening_on_rail_2" slides along "sweethome3d_rail_2". The longest side of a
+hinge or rail is its axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import triangle_corners
+from pbrs_farm.home.masses import mass_kg
+from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
+from pbrs_farm.read.sweethome3d.piece_models import fixed_joint_of, hanger_of, joint_of
+from pbrs_farm.read.sweethome3d.placement import PieceFrame
+
+_WIDE_OPEN_RAD: Final = np.pi / 2
+_SHUT: Final = 1.5  # times as wide as it reaches out of its plane: else it stands open already
+_LEAST_TRAVEL_M: Final = 0.02
+_HANGERS: Final = {JointKind.REVOLUTE: "hinge", JointKind.PRISMATIC: "rail"}
+
+
+def piece_joints(
+    piece: PlanPiece, meshes: Sequence[Mesh], matrix: F64, frame: PieceFrame
+) -> dict[str, Joint]:
+    """The joints of a piece in the world, by what its meshes hang on: "hinge_1".
+
+    meshes: of its model as the file has them, nothing moved. matrix: (4, 4) from the model's frame to
+    the piece's. A joint's value is what the home's transformations moved it by.
+    """
+    to_world = np.eye(4)
+    to_world[:3, :3], to_world[:3, 3] = frame.axes, frame.origin
+    if piece.joints:
+        return {
+            f"{_HANGERS[joint.kind]}_{k}": joint.placed(to_world @ matrix)
+            for k, joint in enumerate(piece.joints, 1)
+        }
+    hung, fixed = _points_by_joint(meshes, matrix)
+    moves: Mapping[str, tuple[float, ...]] = {joint_of(n): m for n, m in piece.transformations}
+    word = "leaf" if piece.frame is not None else "door"
+    found: dict[str, Joint] = {}
+    for name in sorted(hung.keys() & fixed.keys()):
+        move = moves.get(name)
+        if move == ():
+            continue  # its leaf was left out
+        part = f"{word} {len(found) + 1}"
+        joint = _joint(part, name, hung[name], fixed[name])
+        if joint is not None:
+            found[name] = (_moved(joint, move, matrix) if move else joint).placed(to_world)
+    return found
+
+
+def joints_of_surfaces(
+    joints: Iterable[Joint], surfaces: Sequence[Surface], materials: Sequence[Material]
+) -> tuple[Joint, ...]:
+    """The joints that move one of some surfaces at all, with the mass of what they move."""
+    found = []
+    for joint in joints:
+        own = [s for s in surfaces if s.part == joint.part]
+        mass = sum(
+            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in own
+        )
+        if own:
+            found.append(replace(joint, mass_kg=joint.mass_kg or mass))
+    return tuple(found)
+
+
+def _points_by_joint(meshes: Sequence[Mesh], matrix: F64) -> tuple[dict[str, F64], dict[str, F64]]:
+    """The points of what hangs on each joint, and those of the hinge or rail itself."""
+    hung: dict[str, list[F64]] = {}
+    fixed: dict[str, list[F64]] = {}
+    for mesh in meshes:
+        if len(mesh.positions):
+            points = transform_points(matrix, mesh.positions)
+            if name := hanger_of(mesh.group):
+                hung.setdefault(name, []).append(points)
+            elif name := fixed_joint_of(mesh.group):
+                fixed.setdefault(name, []).append(points)
+    return (
+        {name: np.concatenate(some) for name, some in hung.items()},
+        {name: np.concatenate(some) for name, some in fixed.items()},
+    )
+
+
+def _joint(part: str, name: str, hung: F64, fixed: F64) -> Joint | None:
+    """The joint of shut points (N, 3) on a hinge or rail, in the piece's frame, in which +z is its front."""
+    low, high = fixed.min(0), fixed.max(0)
+    along = int(np.argmax(high - low))
+    axis, middle = np.eye(3)[along], (low + high) / 2
+    least, most = hung.min(0), hung.max(0)
+    if not name.startswith("hinge"):
+        # It slides to the side on which its rail goes on.
+        ahead, back = high[along] - most[along], least[along] - low[along]
+        travel = float(max(ahead, back))
+        if travel < _LEAST_TRAVEL_M:
+            travel = float(most[along] - least[along])
+        sign = 1.0 if ahead >= back else -1.0
+        return Joint(part, JointKind.PRISMATIC, triple(middle), triple(sign * axis), travel)
+    wide, thin = sorted((k for k in range(3) if k != along), key=lambda k: least[k] - most[k])
+    if most[wide] - least[wide] < _SHUT * (most[thin] - least[thin]):
+        return None
+    # The far end goes to the side on which the hinge stands out of the leaf's plane.
+    away = np.sign((least + most)[wide] / 2 - middle[wide]) or 1.0
+    side = np.sign(middle[thin] - np.median(hung[:, thin])) or 1.0
+    turn = np.cross(axis, np.eye(3)[wide])[thin] * away * side
+    return Joint(part, JointKind.REVOLUTE, triple(middle), triple(turn * axis), _WIDE_OPEN_RAD)
+
+
+def _moved(joint: Joint, move: tuple[float, ...], matrix: F64) -> Joint:
+    """The joint at the value by which a transformation of the model's frame, 3 x 4, moved its part."""
+    own = np.eye(4)
+    own[:3] = np.array(move).reshape(3, 4)
+    local, axis = matrix @ own @ np.linalg.inv(matrix), np.array(joint.axis)
+    if joint.kind is JointKind.PRISMATIC:
+        value = float(local[:3, 3] @ axis)
+    else:
+        turn = local[:3, :3]
+        sine = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        value = float(np.arctan2(sine @ axis / 2, (np.trace(turn) - 1) / 2))
+    # Who opened it the other way, or further, knows better.
+    if value < 0:
+        joint, value = replace(joint, axis=triple(-axis)), -value
+    return replace(joint, upper=max(joint.upper, value), value=value)

@@ -1,0 +1,106 @@
+"""Doors and drawers at other values, and what stands in their way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import Box, Item, ItemKind
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import points_bounds
+from pbrs_farm.geometry.opened import free_value, item_at
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.geometry.solids import box
+
+WIDE, DEEP = 0.6, 0.02  # of a door and of a drawer's front
+
+
+def thing(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Item:
+    a, b = np.array(low), np.array(high)
+    return Item(name, name, ItemKind.OBJECT, "0", (box("box", (a + b) / 2, (b - a) / 2, 0),))
+
+
+def cupboard(kind: JointKind, x: float = 0.0, name: str = "cupboard") -> Item:
+    """A box of 60 cm with a front before z = 0: a door with its hinge at the left, or a drawer."""
+    body = thing("body", (x, 0, -0.5), (x + WIDE, 0.7, 0.0)).surfaces[0]
+    front = thing("front", (x + 0.0015, 0.002, 0), (x + WIDE - 0.0015, 0.698, DEEP)).surfaces[0]
+    joint = (
+        Joint("front", kind, (x + 0.0015, 0, DEEP), (0, -1, 0), np.radians(110))
+        if kind is JointKind.REVOLUTE
+        else Joint("front", kind, (0, 0, 0), (0, 0, 1), 0.4)
+    )
+    box_ = Box(np.array([x + 0.3, 0.35, -0.24]), np.array([0.3, 0.35, 0.26]), np.eye(3))
+    return Item(
+        name, name, ItemKind.OBJECT, "0", (body, replace(front, part="front")), box=box_,
+        joints=(joint,),
+    )  # fmt: skip
+
+
+def test_a_part_moves_and_the_body_stays_and_the_box_holds_both() -> None:
+    shut = cupboard(JointKind.PRISMATIC)
+    pulled = item_at(shut, "front", 0.3)
+    np.testing.assert_array_equal(pulled.surfaces[0].positions, shut.surfaces[0].positions)
+    assert pulled.surfaces[1].positions[:, 2] == pytest.approx(
+        shut.surfaces[1].positions[:, 2] + 0.3
+    )
+    assert pulled.joints[0].value == 0.3
+    assert pulled.oriented_box.half[2] * 2 == pytest.approx(0.5 + DEEP + 0.3, abs=1e-6)
+    again = item_at(pulled, "front", 0.0)
+    assert again.surfaces[1].positions == pytest.approx(shut.surfaces[1].positions, abs=1e-6)
+
+
+def test_a_door_swings_to_the_front_about_its_edge() -> None:
+    opened = item_at(cupboard(JointKind.REVOLUTE), "front", np.pi / 2)
+    low, high = points_bounds(opened.surfaces[1].positions)
+    # It stands along z now, its inner side to the right, as thick as it was.
+    assert low == pytest.approx([0.0015, 0.002, DEEP], abs=1e-6)
+    assert high == pytest.approx([0.0015 + DEEP, 0.698, DEEP + WIDE - 0.003], abs=1e-6)
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.2, 0.33])
+def test_a_drawer_stops_before_what_stands_there(gap: float) -> None:
+    drawer, chair = (
+        cupboard(JointKind.PRISMATIC),
+        thing("chair", (0.2, 0, DEEP + gap), (0.5, 0.4, 2)),
+    )
+    value, by = free_value(SceneTriangles([drawer, chair]), 0, "front", 0.4)
+    assert value == pytest.approx(gap - 0.004, abs=0.002)
+    assert by == "chair"
+
+
+@pytest.mark.parametrize("angle_deg", [20.0, 45.0, 80.0])
+def test_a_door_stops_at_the_angle_of_what_stands_there(angle_deg: float) -> None:
+    door, r, a = cupboard(JointKind.REVOLUTE), 0.4, np.radians(angle_deg)
+    # A thin post: the door's outer face, which the hinge lies in, meets it at its own angle.
+    at = np.array([0.0015 + r * np.cos(a), 0.0, DEEP + r * np.sin(a)])
+    x, _y, z = at
+    post = thing("post", (x - 0.002, 0, z - 0.002), (x + 0.002, 1, z + 0.002))
+    value, by = free_value(SceneTriangles([door, post]), 0, "front", np.radians(110))
+    assert by == "post"
+    assert np.degrees(value) == pytest.approx(angle_deg, abs=1.5)
+
+
+def test_what_nothing_stands_before_opens_all_the_way() -> None:
+    door = cupboard(JointKind.REVOLUTE)
+    beside = [
+        cupboard(JointKind.REVOLUTE, -WIDE, "left"), cupboard(JointKind.PRISMATIC, WIDE, "right"),
+        thing("top", (-1, 0.7, -0.5), (2, 0.74, 0.04)), thing("floor", (-2, -0.1, -1), (3, 0, 3)),
+        thing("behind", (-1, 0, -0.6), (2, 2, -0.5)),
+    ]  # fmt: skip
+    scene = SceneTriangles([door, *beside])
+    assert free_value(scene, 0, "front", np.radians(110)) == (np.radians(110), "")
+
+
+def test_a_door_at_a_side_wall_opens_by_ninety_degrees() -> None:
+    door, wall = cupboard(JointKind.REVOLUTE), thing("wall", (-0.1, 0, -1), (0, 2.5, 3))
+    value, by = free_value(SceneTriangles([door, wall]), 0, "front", np.radians(110))
+    assert 85 < np.degrees(value) <= 90.2
+    assert by == "wall"
+
+
+def test_shutting_is_never_stopped() -> None:
+    door = item_at(cupboard(JointKind.REVOLUTE), "front", 1.0)
+    wall = thing("wall", (0.1, 0, 0.1), (0.2, 1, 0.3))
+    assert free_value(SceneTriangles([door, wall]), 0, "front", 0.0) == (0.0, "")

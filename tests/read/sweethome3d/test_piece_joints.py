@@ -1,0 +1,91 @@
+"""Joints of pieces: by the hinges and rails of their models, or as the file tells them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import House
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.read.sweethome3d.home import read_home
+from tests.read.sweethome3d.sh3d_source import home_xml, piece, sh3d
+from tests.read.sweethome3d.test_open_doors import FRAME, HINGED, box, door_of, read
+
+
+def joint_of_door(house: House) -> Joint:
+    (joint,) = door_of(house).joints
+    return joint
+
+
+def leaf(house: House) -> np.ndarray:
+    own = [s for s in door_of(house).surfaces if s.part == "leaf 1"]
+    return np.concatenate([s.positions for s in own]).astype(np.float64)
+
+
+def test_a_leaf_turns_about_the_hinge_of_its_model() -> None:
+    house = read("drawn")
+    joint = joint_of_door(house)
+    assert (joint.kind, joint.value, joint.upper) == (JointKind.REVOLUTE, 0.0, np.pi / 2)
+    assert joint.point[0] == pytest.approx(1.59)
+    # Of a leaf of wood: 0.8 x 2 x 0.04 m.
+    assert joint.mass_kg == pytest.approx(0.8 * 2 * 0.04 * 650, rel=0.01)
+    wide = transform_points(joint.motion(np.pi / 2), leaf(house))
+    assert wide[:, 2].max() == pytest.approx(0.03 + 0.81, abs=0.01)
+
+
+@pytest.mark.parametrize("given", [{}, {"modelMirrored": "true"}, {"angle": "2.0"}])
+def test_a_door_that_was_read_open_shuts_to_where_it_is_drawn(given: dict[str, str]) -> None:
+    shut, opened = read("drawn", **given), read("open", **given)
+    joint = joint_of_door(opened)
+    if "angle" not in given:  # what leads into no room stays shut
+        assert joint.value == pytest.approx(np.radians(85))
+        assert not np.allclose(leaf(opened), leaf(shut), atol=0.1)
+    again = transform_points(joint.motion(0.0), leaf(opened))
+    assert again == pytest.approx(leaf(shut), abs=1e-5)
+
+
+def test_a_leaf_that_was_left_out_has_no_joint() -> None:
+    chest = piece("x='200' y='40' width='150' depth='40' height='100'")
+    assert door_of(read("open", more=chest)).joints == ()
+
+
+def test_what_hangs_on_a_rail_slides_to_where_the_rail_goes_on() -> None:
+    pane = box("sweethome3d_opening_on_rail_1_door", (-0.4, 0, -0.02), (0.0, 2, 0.02), 1)
+    rail = box("sweethome3d_rail_1", (-0.4, 2, -0.02), (0.4, 2.02, 0.02), 17)
+    joint = joint_of_door(read("drawn", obj=pane + FRAME + rail))
+    assert joint.kind is JointKind.PRISMATIC
+    assert joint.axis == pytest.approx((1, 0, 0))
+    assert joint.upper == pytest.approx(0.4, abs=1e-6)
+
+
+def told(value: str) -> House:
+    inner = f"<property name='pbrs_farm.joints' value='{value}'/>"
+    chest = piece("x='200' y='100' width='80' depth='40' height='200'", inner)
+    obj = HINGED.encode()
+    return read_home(sh3d(home_xml(chest), {"1": obj}), "test.sh3d")
+
+
+def row(**changes: object) -> str:
+    joint = {
+        "part": "door 1", "kind": "revolute", "point": [0, 0, 0], "axis": [0, 1, 0], "upper": 1.5,
+    } | changes  # fmt: skip
+    return json.dumps([joint])
+
+
+def test_what_the_file_tells_stands_before_what_the_model_names() -> None:
+    house = told(row(upper=1.25, mass_kg=3.0))
+    (joint,) = house.items[-1].joints
+    assert (joint.part, joint.upper) == ("door 1", 1.25)
+    assert {s.part for s in house.items[-1].surfaces} == {"", "door 1"}
+
+
+@pytest.mark.parametrize(
+    "value", ["", "[", "3", row(axis=[0, 2, 0]), row(kind="ball"), row(upper="far"), row(lower=2.0)]
+)
+def test_joints_that_are_none_are_refused_with_file_and_piece(value: str) -> None:
+    with pytest.raises(BadHouse, match=r"test\.sh3d.*Thing.*pbrs_farm\.joints"):
+        told(value)
