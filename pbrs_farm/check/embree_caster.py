@@ -6,7 +6,7 @@ out here in double precision.
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 import trimesh
@@ -19,6 +19,15 @@ Faces = NDArray[np.int64]
 
 _MOST_SHEETS: Final = 64  # with holes, that a ray passes: behind them it meets what is solid
 _STEP: Final = 1e-5  # behind a hole, of the largest coordinate plus 1 m: above float32's rounding
+
+
+class Hits(Protocol):
+    """What rays meet: see Rays."""
+
+    def first(self, origin: Floats, directions: Floats) -> Faces: ...
+    def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats: ...
+    def normal(self, face: Faces, directions: Floats) -> Floats: ...
+    def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces: ...
 
 
 class Rays:

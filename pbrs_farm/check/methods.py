@@ -17,6 +17,7 @@ RAYS = "recomputed by rays"
 FORMULA = "recomputed from other layers"
 _MOTION = "followed by rays from view to view"
 _BEHIND = "recomputed by rays without glass"
+_MIRRORED = "recomputed by rays that mirrors send on"
 _NOISE = "each value within its noise, mean and spread by their statistics"
 
 # File -> how it is looked at.
@@ -37,6 +38,8 @@ HOW: dict[str, str] = {
     "boundary_occlusion.png": FORMULA, "boundary_crease.png": FORMULA,
     "behind_glass/depth.png": _BEHIND, "behind_glass/normal.png": _BEHIND,
     "behind_glass/semantic.png": _BEHIND, "behind_glass/instance.png": _BEHIND,
+    "behind_mirror/depth.png": _MIRRORED, "behind_mirror/normal.png": _MIRRORED,
+    "behind_mirror/semantic.png": _MIRRORED, "behind_mirror/instance.png": _MIRRORED,
     "flow_forward.exr": _MOTION, "flow_forward_kitti.png": _MOTION, "occlusion_forward.png": _MOTION,
     "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,

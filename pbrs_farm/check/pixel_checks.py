@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.check.embree_caster import Faces, Floats, Rays
+from pbrs_farm.check.embree_caster import Faces, Floats, Hits, Rays
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
@@ -34,6 +34,7 @@ SHADING_TOLERANCE_DEG = (
 TIE_DEPTH_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 METRES = 2e-4  # tolerance of depths and positions stored as floats
 ALBEDO_STEPS = 2  # of 255, by which an albedo may differ
+ROUGHNESS_STEPS = 2  # of 255, by which a roughness of a map may differ
 PHYSICAL_ALBEDO = (
     0.9  # that light holds colour times texture to, materials of the recipe's `physical`
 )
@@ -70,7 +71,7 @@ def judge(
     labels: Labels,
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
-    scene: tuple[Triangles, Rays],
+    scene: tuple[Triangles, Hits],
 ) -> PixelChecks:
     """Compare labels at pixels (rows, columns) with rays through the scene.
 
@@ -117,7 +118,7 @@ def _fill_one_place(
     chosen: Bools,
     origin: Floats,
     directions: Floats,
-    scene: tuple[Triangles, Rays],
+    scene: tuple[Triangles, Hits],
 ) -> Bools:
     """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
     triangles, rays = scene
@@ -135,7 +136,7 @@ def _fill_one_place(
 
 
 def _explain(
-    view: StoredView, labels: Labels, face: Faces, directions: Floats, scene: tuple[Triangles, Rays]
+    view: StoredView, labels: Labels, face: Faces, directions: Floats, scene: tuple[Triangles, Hits]
 ) -> dict[str, Bools]:
     """Per layer whether hitting these faces explains what is stored."""
     triangles, rays = scene
@@ -213,6 +214,26 @@ def albedo_of_faces(view: StoredView, face: Faces, point: Floats, triangles: Tri
     return found
 
 
+def _roughness_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    expected = np.zeros(len(at.face))
+    hit = np.nonzero(at.hit)[0]
+    expected[hit] = 255 * np.sqrt(at.triangles.alpha_at(at.face[hit], at.point[hit]))
+    return np.asarray(np.abs(stored - expected) <= ROUGHNESS_STEPS + 0.5)
+
+
+def _f0_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    linear = np.zeros((len(at.face), 3))
+    linear[at.hit] = at.triangles.finishes.f0()[at.triangles.material[at.face[at.hit]]]
+    low = linear * 12.92
+    srgb = np.where(linear <= 0.0031308, low, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+    return np.asarray(np.abs(stored - 255 * srgb).max(axis=1) <= 0.51)
+
+
+def _metallic_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    metal = at.triangles.finishes.is_metal()[at.triangles.material]
+    return np.asarray(stored == np.where(at.hit & _of_face(metal, at.face), 255, 0))
+
+
 def _nocs_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
     """(N,) stored model coordinates are those of points (N, 3); of what is no placed model, 0."""
     triangles, instance, point = at.triangles, at.instance, at.point
@@ -277,7 +298,7 @@ def normal_is_right(
 
 
 def _coincident(
-    labels: Labels, face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
+    labels: Labels, face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Hits]
 ) -> Faces:
     """(N,) another triangle of the stored instance that the ray pierces at the first hit's depth, or -1.
 
@@ -375,6 +396,12 @@ _CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
     "glass": lambda stored, at: (
         stored == np.where(at.hit & _of_face(at.triangles.see_through, at.face), 255, 0)
     ),
+    "mirror": lambda stored, at: (
+        stored == np.where(at.hit & (at.triangles.kinds_of(at.face) == "mirror"), 255, 0)
+    ),
+    "roughness": _roughness_is_right,
+    "metallic": _metallic_is_right,
+    "f0": _f0_is_right,
     "normal_shading": _shading_is_right,
     "nocs": _nocs_is_right,
     "albedo": _albedo_is_right,

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.finish_checks import Finishes
 from pbrs_farm.check.shading_normals import NormalMaps, bent, between_corners, decoded
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import decode_texture
@@ -130,6 +132,25 @@ class Triangles:
     kinds: tuple[str, ...]  # of each material
     normals: NDArray[np.float32]  # (V, 3) of the corners; 0 where there are none
     maps: NormalMaps
+    rough_maps: tuple[tuple[str, bytes] | None, ...] = ()  # of each material
+    finishes: Finishes = field(default_factory=lambda: Finishes((), ()))
+
+    def with_finishes(self, rows: Sequence[Mapping[str, Any]]) -> Triangles:
+        """The same with the materials' rows of house.json, which say more of gloss than glTF does."""
+        return replace(self, finishes=Finishes(tuple(rows), self.rough_maps))
+
+    def alpha_at(self, face: NDArray[np.int64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N,) GGX roughness at points (N, 3) on faces (N,), with maps."""
+        material = self.material[face]
+        alpha = self.finishes.alpha()[material]
+        at = self.uv_at(face, points)
+        for number in np.unique(material):
+            green = self.finishes.green(int(number))
+            if green is not None:
+                own = material == number
+                share = _between_texels(green, at[own], _SHARE)[:, 0]
+                alpha[own] = np.maximum(alpha[own] * share**2, 0.05)
+        return alpha
 
     def shading_normals(
         self, face: NDArray[np.int64], points: NDArray[np.float64], facing: NDArray[np.float64]
@@ -281,6 +302,10 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         tuple(str(k) for k in kinds),
         np.concatenate(normals),
         _normal_maps(document, binary, tuple(str(k) for k in kinds)),
+        tuple(
+            _picture(document, binary, m["pbrMetallicRoughness"].get("metallicRoughnessTexture"))
+            for m in document.get("materials", [])
+        ),
     )
 
 

@@ -21,7 +21,7 @@ from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.choice_checks import check_choice
 from pbrs_farm.check.credit_checks import check_credits
 from pbrs_farm.check.edge_checks import check_typed_boundaries
-from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.embree_caster import Hits, Rays
 from pbrs_farm.check.fact_checks import check_facts
 from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
@@ -29,6 +29,7 @@ from pbrs_farm.check.house_checks import check_house
 from pbrs_farm.check.light_checks import check_developed, may_be_halved
 from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
+from pbrs_farm.check.mirror_rays import MirrorRays
 from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
 from pbrs_farm.check.pair_checks import check_pairs
 from pbrs_farm.check.picture_checks import check_edges, check_histogram
@@ -127,7 +128,7 @@ def _check_house(
     stored = StoredHouse(house)
     try:
         glb = stored_bytes(house / "house.glb")
-        triangles = triangles_from_glb(glb)
+        triangles = triangles_from_glb(glb).with_finishes(stored.house.get("materials", []))
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.name, False, f"house.glb {error}")
         return [], 0
@@ -233,11 +234,17 @@ def _check_rays(
     tally: Tally,
 ) -> None:
     rows, columns = _chosen(view, n_pixels)
-    behind = {name: f"behind_glass_{name}" for name in ("depth", "normal", "semantic", "instance")}
-    for scene, prefix, names in (
+    basic = ("depth", "normal", "semantic", "instance")
+    judged: list[tuple[tuple[Triangles, Hits], str, dict[str, str]]] = [
         (scenes.all, "ray: ", {name: name for name in RAY_LAYERS}),
-        (scenes.opaque, "ray: behind glass ", behind),
-    ):
+        (scenes.opaque, "ray: behind glass ", {name: f"behind_glass_{name}" for name in basic}),
+    ]
+    mirrored = {name: f"behind_mirror_{name}" for name in basic}
+    if any(file in arrays for file in mirrored.values()):
+        triangles, rays = scenes.all
+        sent_on = MirrorRays(triangles, rays, view.world_from_camera[:3, 3])
+        judged.append(((triangles, sent_on), "ray: behind mirror ", mirrored))
+    for scene, prefix, names in judged:
         # Judge the layers that the view has, as whole numbers where they are.
         present = {name: file for name, file in names.items() if file in arrays}
         if not present:
@@ -251,7 +258,7 @@ def _check_rays(
             pair = instance[verdict.first[k]], instance[verdict.face[k]]
             tally.coincide(view.place.partition("/")[0], (item[int(pair[0])], item[int(pair[1])]))
         if scene is scenes.all:
-            _note_glitter(view, verdict, rows, columns, scene, tally)
+            _note_glitter(view, verdict, rows, columns, scenes.all, tally)
         ties = int((verdict.tied & ~verdict.coincident).sum())
         for check, right in verdict.right.items():
             tally.add(f"{prefix}{check}", len(rows), ties=ties)

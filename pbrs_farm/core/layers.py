@@ -170,12 +170,21 @@ def _flow(name: str, partner: str) -> tuple[Layer, ...]:
 _SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hidden"
 
 
-def _behind_glass(
-    name: str, channels: str, dtype: str, nodata: str = "0", *, shown_as: ShownAs
-) -> Layer:
-    unit, file = f"as {name}, first hit that is no glass", f"behind_glass/{name}.png"
-    name = f"behind_glass_{name}"
-    return optional_layer(name, channels, dtype, unit, nodata, file, shown_as=shown_as)
+def _behind(what: str, of: str) -> tuple[Layer, ...]:
+    """Labels of what lies behind what is hit; of: the words of their unit."""
+
+    def layer(name: str, channels: str, dtype: str, nodata: str, shown_as: ShownAs) -> Layer:
+        file = f"behind_{what}/{name}.png"
+        unit = f"as {name}, {of}"
+        name = f"behind_{what}_{name}"
+        return optional_layer(name, channels, dtype, unit, nodata, file, shown_as=shown_as)
+
+    return (
+        layer("depth", "Y", "uint16", "0", "depth"),
+        layer("normal", "RGB", "uint16", "as normal", "high_byte"),
+        layer("semantic", "Y", "uint8", "0", "classes"),
+        layer("instance", "Y", "uint16", "0", "ids"),
+    )
 
 
 # Layers that every view has, and (optional) those written when --layers names them.
@@ -221,6 +230,12 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         shows_albedo=True,
     ),
     optional_layer(
+        "roughness", "Y", "uint8", "255 = matte, 0 = mirror, glass; root of GGX alpha (glTF's roughness)",
+        resized="area",
+    ),
+    optional_layer("metallic", "Y", "uint8", "255 = metal or mirror", shown_as="mask"),
+    optional_layer("f0", "RGB", "uint8", "sRGB, reflectance at right angles", resized="area"),
+    optional_layer(
         "nocs", "RGB", "uint16",
         "point of a placed model in its own box, round(65535 c), box centre .5, diagonal 1 (Wang et al. 2019)",
         "0 in all three", shown_as="high_byte",
@@ -230,10 +245,10 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json", shown_as="ids"),
     # What lies behind panes and glass objects.
     optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first", shown_as="mask"),
-    _behind_glass("depth", "Y", "uint16", shown_as="depth"),
-    _behind_glass("normal", "RGB", "uint16", "as normal", shown_as="high_byte"),
-    _behind_glass("semantic", "Y", "uint8", shown_as="classes"),
-    _behind_glass("instance", "Y", "uint16", shown_as="ids"),
+    *_behind("glass", "first hit that is no glass"),
+    # What mirrors show, where the picture shows it.
+    optional_layer("mirror", "Y", "uint8", "255 = mirror hit first", shown_as="mask"),
+    *_behind("mirror", "of the image behind the mirror"),
     # Boundaries by their kind.
     optional_layer(
         "boundary_occlusion", "Y", "uint8",

@@ -20,6 +20,7 @@ from pbrs_farm.core.lenses import Lens
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
+from pbrs_farm.truth.mirrored_hits import mirror_faces, mirrored_hits
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
     Relation,
@@ -37,7 +38,15 @@ from pbrs_farm.truth.standard_layers import (
     semantic_label,
 )
 from pbrs_farm.truth.stereo_sensor import D455, stereo_depth
-from pbrs_farm.truth.surface_layers import albedo_label, hha_label, nocs_label, shading_normals
+from pbrs_farm.truth.surface_layers import (
+    albedo_label,
+    f0_label,
+    hha_label,
+    metallic_label,
+    nocs_label,
+    roughness_label,
+    shading_normals,
+)
 from pbrs_farm.truth.tof_sensor import AZURE, L515, tof_depth
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
@@ -55,7 +64,7 @@ class LabelInputs:
     textures: Mapping[str, NDArray[np.uint8]]  # id -> (H, W, 3 or 4) sRGB, row 0 = top
     seed: int = 0  # of depth_sensor's noise
     partners: Mapping[Relation, Camera] = field(default_factory=dict)  # at this picture's size
-    first_hit: FirstHit | None = None  # for the layers between views
+    first_hit: FirstHit | None = None  # for the layers between views and behind mirrors
     max_albedo: float = 1.0  # that light holds diffuse colour times texture to
 
     @cached_property
@@ -63,6 +72,18 @@ class LabelInputs:
         """The hit record behind glass: the first hit that is neither glass nor pane."""
         transparent = transparent_faces(self.geometry, self.house)
         return self.hit_without(transparent) if transparent.any() else self.hit
+
+    @cached_property
+    def behind_mirror(self) -> HitRecord:
+        """What mirrors show, where one is hit first; ValueError without first_hit where one is."""
+        mirrors = mirror_faces(self.geometry, self.house)
+        if not mirrors.any() or not (self.hit.valid & mirrors[self.hit.face]).any():
+            return self.hit
+        if self.first_hit is None:
+            raise ValueError("what mirrors show needs first_hit")
+        return mirrored_hits(
+            self.hit, self.camera, self.geometry, self.house, self.first_hit, self.textures
+        )
 
     @cached_property
     def to_partners(self) -> dict[Relation, Correspondence]:
@@ -119,11 +140,11 @@ def _material(inputs: LabelInputs) -> NDArray[np.uint16]:
     return np.where(inputs.hit.valid, number, 0).astype(np.uint16)
 
 
-def _glass(inputs: LabelInputs) -> NDArray[np.uint8]:
-    transparent = transparent_faces(inputs.geometry, inputs.house)
-    if not transparent.any():
+def _mask(inputs: LabelInputs, faces: Mask) -> NDArray[np.uint8]:
+    """(H, W) 255 where one of faces (F,) is hit first."""
+    if not faces.any():
         return np.zeros(inputs.hit.face.shape, np.uint8)
-    return np.where(inputs.hit.valid & transparent[inputs.hit.face], 255, 0).astype(np.uint8)
+    return np.where(inputs.hit.valid & faces[inputs.hit.face], 255, 0).astype(np.uint8)
 
 
 def _normal(inputs: LabelInputs, hit: HitRecord) -> NDArray[np.uint16]:
@@ -156,12 +177,21 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "material": _material,
     "nyu13": lambda s: NYU13_FROM_NYU40[semantic_label(s.hit.item, s.house)],
     "class_source": _class_source,
-    "glass": _glass,
+    "roughness": lambda s: roughness_label(s.hit, s.house, s.geometry, s.textures),
+    "metallic": lambda s: metallic_label(s.hit, s.house, s.geometry),
+    "f0": lambda s: f0_label(s.hit, s.house, s.geometry),
+    "glass": lambda s: _mask(s, transparent_faces(s.geometry, s.house)),
+    "mirror": lambda s: _mask(s, mirror_faces(s.geometry, s.house)),
     # The first hit behind glass.
     "behind_glass_depth": lambda s: depth_mm(s.behind.depth_z),
     "behind_glass_normal": lambda s: _normal(s, s.behind),
     "behind_glass_semantic": lambda s: semantic_label(s.behind.item, s.house),
     "behind_glass_instance": lambda s: instance_label(s.behind.item, s.house),
+    # What mirrors show.
+    "behind_mirror_depth": lambda s: depth_mm(s.behind_mirror.depth_z),
+    "behind_mirror_normal": lambda s: _normal(s, s.behind_mirror),
+    "behind_mirror_semantic": lambda s: semantic_label(s.behind_mirror.item, s.house),
+    "behind_mirror_instance": lambda s: instance_label(s.behind_mirror.item, s.house),
     # Edges, and what sensors and encoders make of depth.
     "boundary_occlusion": lambda s: s.boundaries[0],
     "boundary_semantic": lambda s: instance_boundary(semantic_label(s.hit.item, s.house)),

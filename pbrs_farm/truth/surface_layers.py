@@ -1,8 +1,8 @@
-"""Layers of the surface that is hit: albedo, shading normals, model coordinates, hha; no effects."""
+"""Layers of the surface that is hit: albedo, gloss, shading normals, model coordinates, hha; no effects."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64, I32, HitRecord, UnitVectors
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
-from pbrs_farm.core.house import Geometry, House, Item, corners_of_surfaces
+from pbrs_farm.core.gloss import GLASS_F0, MIN_ALPHA, coat_of, mirror_reflectance
+from pbrs_farm.core.house import Geometry, House, Item, Material, MaterialKind, corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.normal_maps import normals_from_picture, perturbed_normals, tangents
 from pbrs_farm.core.resampling import bilinear
 
+_SMOOTH = (MaterialKind.MIRROR, MaterialKind.GLASS, MaterialKind.PANE)  # without any roughness
 _LINEAR_OF_BYTE = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
 _STEPS = 4096  # entries of the encoding table: fine enough that every byte is rounded as by formula
 _BYTE_OF_LINEAR = np.rint(srgb_from_linear(np.arange(_STEPS + 1) / _STEPS) * 255).astype(np.uint8)
@@ -65,6 +67,74 @@ def albedo_of_points(
     return linear
 
 
+def roughness_label(
+    hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
+) -> NDArray[np.uint8]:
+    """(H, W) uint8: 255 times the root of the coat's GGX roughness, as glTF counts it; 0 = nothing.
+
+    Matte surfaces are 255, mirrors and glass 0. textures: as of albedo_label; a roughness map's green
+    is looked up as its colours are.
+    """
+    found = np.zeros(hit.face.shape, np.float64)
+    if not len(geometry.faces):
+        return found.astype(np.uint8)
+    material = np.where(hit.valid, geometry.face_material[hit.face], -1)
+    for number in np.unique(material[material >= 0]):
+        shaded, own = house.materials[int(number)], material == number
+        coat = None if shaded.kind in _SMOOTH else coat_of(shaded)
+        if coat is None:
+            found[own] = 0.0 if shaded.kind in _SMOOTH else 1.0
+            continue
+        alpha = np.full(int(own.sum()), coat.alpha)
+        name = shaded.roughness_texture_id if shaded.shows_maps else None
+        pixels = textures.get(name) if name else None
+        if pixels is not None:
+            green = pixels[..., None] if pixels.ndim == 2 else pixels[..., 1:2]
+            share = bilinear(green, hit.points.uv[own])[:, 0] / 255
+            alpha = np.maximum(coat.alpha * share**2, MIN_ALPHA)
+        found[own] = np.sqrt(alpha)
+    return np.rint(255 * found).astype(np.uint8)
+
+
+def f0_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8 sRGB: what the coat, the metal, the mirror or the glass reflects at right angles.
+
+    0 for matte surfaces, and nothing.
+    """
+    return _of_materials(_f0_srgb8, 3, hit, house, geometry)
+
+
+def metallic_label(hit: HitRecord, house: House, geometry: Geometry) -> NDArray[np.uint8]:
+    """(H, W) uint8: 255 = a metal or a mirror, else 0."""
+
+    def metallic(material: Material) -> int:
+        coat = None if material.kind in _SMOOTH else coat_of(material)
+        is_metal = material.kind is MaterialKind.MIRROR or (coat is not None and coat.is_metal)
+        return 255 if is_metal else 0
+
+    return _of_materials(metallic, 1, hit, house, geometry)[..., 0]
+
+
+def _f0_srgb8(material: Material) -> NDArray[np.uint8]:
+    f0 = np.full(3, GLASS_F0)
+    if material.kind is MaterialKind.MIRROR:
+        f0 = mirror_reflectance(material)
+    elif material.kind not in _SMOOTH:
+        coat = coat_of(material)
+        f0 = np.zeros(3) if coat is None else coat.f0
+    return np.rint(255 * srgb_from_linear(f0)).astype(np.uint8)
+
+
+def _of_materials(
+    value: Callable[[Material], object], n: int, hit: HitRecord, house: House, geometry: Geometry
+) -> NDArray[np.uint8]:
+    """(H, W, n) uint8 value of the material that is hit; 0 = nothing."""
+    if not len(geometry.faces):
+        return np.zeros((*hit.face.shape, n), np.uint8)
+    table = np.array([value(m) for m in house.materials], np.uint8).reshape(-1, n)
+    return np.where(hit.valid[..., None], table[geometry.face_material[hit.face]], np.uint8(0))
+
+
 def shading_normals(
     hit: HitRecord, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
 ) -> UnitVectors:
@@ -76,18 +146,30 @@ def shading_normals(
     normals = hit.points.shading_normal_world.copy()
     if not len(geometry.faces):
         return normals
-    # Bend material by material: each map is looked up once, for all its pixels.
-    material = np.where(hit.valid, geometry.face_material[hit.face], -1)
-    for number in np.unique(material[material >= 0]):
+    seen = hit.valid
+    faces, uv = hit.face[seen], hit.points.uv[seen]
+    normals[seen] = bent_by_maps(normals[seen], faces, uv, house, geometry, textures)
+    return normals
+
+
+def bent_by_maps(
+    normals: UnitVectors, face: I32, uv: F32, house: House, geometry: Geometry,
+    textures: Mapping[str, NDArray[np.uint8]],
+) -> UnitVectors:  # fmt: skip
+    """(N, 3) float32 interpolated normals at uv (N, 2) on faces (N,), with normal maps; on the same side."""
+    normals = normals.copy()
+    # Bend material by material: each map is looked up once, for all its points.
+    material = geometry.face_material[face]
+    for number in np.unique(material):
         shaded = house.materials[int(number)]
         pixels = textures.get(shaded.normal_texture_id or "") if shaded.shows_maps else None
         if pixels is None or pixels.ndim != 3:
             continue
-        mask = material == number
-        values = bilinear(pixels[..., :3], hit.points.uv[mask])
+        own = material == number
+        values = bilinear(pixels[..., :3], uv[own])
         mapped = normals_from_picture(values, shaded.normal_scale).astype(np.float64)
-        faces, seen = hit.face[mask], normals[mask].astype(np.float64)
-        normals[mask] = _bent(geometry, faces, seen, mapped).astype(np.float32)
+        faces, seen = face[own], normals[own].astype(np.float64)
+        normals[own] = _bent(geometry, faces, seen, mapped).astype(np.float32)
     return normals
 
 

@@ -67,7 +67,12 @@ def test_optional_layers_are_checked_where_they_exist(rich):
     certificate = verify(rich, all_pixels=True)
     assert certificate.is_clean, certificate.text()
     names = {"ray: depth_z", "ray: position", "ray: normal_world", "ray: material", "ray: glass"}
-    names |= {f"ray: behind glass {x}" for x in ("depth", "normal", "semantic", "instance")}
+    names |= {
+        f"ray: behind {g} {x}"
+        for g in ("glass", "mirror")
+        for x in ("depth", "normal", "semantic", "instance")
+    }
+    names |= {f"ray: {x}" for x in ("mirror", "roughness", "metallic", "f0")}
     assert names | {"nyu13", "class_source", "boundary_semantic"} <= certificate.counts.keys()
 
 
@@ -79,6 +84,14 @@ def test_optional_layers_are_checked_where_they_exist(rich):
         ("glass.png", "ray: glass"),
         ("behind_glass/depth.png", "ray: behind glass depth"),
         ("behind_glass/instance.png", "ray: behind glass instance"),
+        ("mirror.png", "ray: mirror"),
+        ("behind_mirror/depth.png", "ray: behind mirror depth"),
+        ("behind_mirror/normal.png", "ray: behind mirror normal"),
+        ("behind_mirror/semantic.png", "ray: behind mirror semantic"),
+        ("behind_mirror/instance.png", "ray: behind mirror instance"),
+        ("roughness.png", "ray: roughness"),
+        ("metallic.png", "ray: metallic"),
+        ("f0.png", "ray: f0"),
         ("nyu13.png", "nyu13"),
         ("class_source.png", "class_source"),
         ("boundary_semantic.png", "boundary_semantic"),
@@ -89,7 +102,8 @@ def test_optional_layers_are_checked_where_they_exist(rich):
 def test_one_changed_pixel_of_an_optional_layer_is_caught(rich, tmp_path, file, check):
     shutil.copytree(rich, tmp_path / "root")
     house = house_of(tmp_path / "root")
-    changed_pixel(house / "views/v0" / file, 48, 64, 1 if "normal" not in file else 900)
+    by = next((n for part, n in (("normal", 900), ("roughness", -9), ("f0", 9)) if part in file), 1)
+    changed_pixel(house / "views/v0" / file, 48, 64, by)
     sign(tmp_path / "root", house)
     assert check in failed(tmp_path / "root")
 

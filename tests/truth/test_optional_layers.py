@@ -30,6 +30,7 @@ def label_inputs_of(
         lambda skip: caster.hit_record(view, skip_faces=skip),
         textures or {},
         seed,
+        first_hit=caster.first_hit,
     )
 
 
@@ -90,7 +91,7 @@ def test_a_house_without_glass_or_faces_needs_no_second_cast():
         hit(np.zeros((6, 8)), 0.0), empty, geometry_from_house(empty), camera(), never, {}
     )
     layers = truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs)
-    nothing = ("normal_shading", "normal_world", "behind_glass_normal")
+    nothing = ("normal_shading", "normal_world", "behind_glass_normal", "behind_mirror_normal")
     assert not any(array.any() for name, array in layers.items() if name not in nothing)
     assert all((layers[name] == 32768).all() for name in nothing)
 

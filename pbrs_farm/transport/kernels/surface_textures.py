@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from pbrs_farm.transport.scene_tables.material_rows import MIN_ALPHA
+from pbrs_farm.core.gloss import MIN_ALPHA
 from pbrs_farm.transport.scene_tables.texture_atlas import NORMAL_ZERO
 
 _MIN_UV_AREA = 1e-6  # of a triangle's uvs, over the squares of their edges: less is no area

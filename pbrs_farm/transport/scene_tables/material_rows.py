@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.gloss import MAX_ALBEDO, coat_of, mirror_reflectance
 from pbrs_farm.core.house import House, Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.transport.scene_tables.texture_atlas import TextureAtlas, map_key
@@ -24,13 +25,6 @@ FIRST_MAP_TEXEL, MAP_SIZE = 16, slice(17, 19)  # the same of the roughness and n
 
 SURFACE, MIRROR, GLASS = 0, 1, 2  # rough and diffuse, delta mirror, thin glass
 NULL = 3  # Mitsuba's null BSDF: rays pass as if there were nothing
-
-MAX_ALBEDO: Final = 0.9  # in the preset `physical`: the whitest paints; paths in 1 would never end
-
-_MIRROR_REFLECTANCE: Final = 0.9  # of a mirror whose source gives no colour
-MIN_ALPHA: Final = 0.05  # below it a highlight is as narrow as a mirror's
-_DARKEST_METAL: Final = 0.06  # Ks of a metal whose roughness is known: more than a dielectric's
-_MIN_F0: Final = 0.04  # of a surface whose roughness is known: a dielectric of index 1.5
 
 
 def material_rows(house: House, packed: TextureAtlas, recipe: Recipe) -> tuple[F32, list[str]]:
@@ -70,25 +64,18 @@ def _place_in_atlas(row: F32, material: Material, packed: TextureAtlas) -> None:
 
 
 def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
-    """(row, whether Kd + Ks had to be scaled) in the preset `physical`.
+    """(row, whether Kd + Ks had to be scaled) in the preset `physical`; core/gloss.py says what shines.
 
-    Ks is read as the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks
-    0.5), unless Ks is four times brighter than Kd: then the surface is a metal of reflectance Ks.
-    What the coat reflects is taken off Kd (bsdf.py); metals are scaled to Kd + Ks <= 1. A material
-    that names its roughness has a coat of F0 0.04 at least, and GGX alpha is the roughness squared
-    (glTF 2.0, appendix B).
+    What the coat reflects is taken off Kd (bsdf.py); metals are scaled to Kd + Ks <= 1.
     """
     # Decode colours to linear light.
     row = np.zeros(MATERIAL_FLOATS, np.float32)
-    kd = linear_from_srgb(np.clip(np.nan_to_num(material.diffuse), 0, 1))
-    tint, kd = kd, np.minimum(kd, MAX_ALBEDO)
-    ks_encoded = np.clip(np.nan_to_num(material.specular), 0, 1)
-    ks = linear_from_srgb(ks_encoded)
+    tint = linear_from_srgb(np.clip(np.nan_to_num(material.diffuse), 0, 1))
+    kd = np.minimum(tint, MAX_ALBEDO)
     row[KIND] = SURFACE
     # Describe mirrors, thin glass and lampshades, which have no coat.
     if material.kind is MaterialKind.MIRROR:
-        tint = ks if ks @ LUMINANCE > 0.3 else np.full(3, _MIRROR_REFLECTANCE)
-        row[F0], row[KIND] = np.minimum(tint, 0.98), MIRROR
+        row[F0], row[KIND] = mirror_reflectance(material), MIRROR
         return row, False
     if material.kind is MaterialKind.GLASS:
         # Tint by the glass's own colour as much as it is opaque.
@@ -98,24 +85,15 @@ def _physical(material: Material, recipe: Recipe) -> tuple[F32, bool]:
         row[TAU] = recipe.repair.shade_transmission * kd
         row[KD] = np.minimum(0.9 * kd, 1 - recipe.repair.shade_transmission) * 0.9
         return row, False
-    # Tell metals from coated surfaces.
-    too_much = bool(np.any(kd + ks > 1 + 1e-6))
-    is_rough = material.roughness is not None or material.roughness_texture_id is not None
-    has_coat = is_rough or (material.shininess > 1 and float(ks.max()) > 0)
-    if has_coat and material.is_metal:
-        scale = 1 / max(float((kd + ks).max()), 1.0)
-        kd, f0 = kd * scale, ks * scale
-    else:
-        f0 = np.maximum(0.08 * ks_encoded, _MIN_F0 if is_rough else 0)
-    # Square the roughness, or turn the Phong exponent into GGX roughness.
     # The kernel holds the product with the texture to MAX_ALBEDO.
-    row[KD] = tint if material.texture_id else kd
-    if has_coat:
-        phong = math.sqrt(2 / (min(material.shininess, 1e4) + 2))
-        row[F0] = f0
-        named = 1.0 if material.roughness is None else min(max(material.roughness, 0.0), 1.0)
-        row[ALPHA] = max(named**2 if is_rough else phong, MIN_ALPHA)
-    return row, too_much and has_coat
+    coat = coat_of(material)
+    if coat is None:
+        row[KD] = tint if material.texture_id else kd
+        return row, False
+    row[KD] = tint if material.texture_id else kd * coat.left
+    row[F0], row[ALPHA] = coat.f0, coat.alpha
+    ks = linear_from_srgb(np.clip(np.nan_to_num(material.specular), 0, 1))
+    return row, bool(np.any(kd + ks > 1 + 1e-6))
 
 
 def _float_of_bits(number: int) -> np.float32:

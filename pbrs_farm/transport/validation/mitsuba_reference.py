@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.gloss import MIN_ALPHA
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import mitsuba
@@ -30,7 +31,6 @@ from pbrs_farm.transport.scene_tables.material_rows import (
     KIND,
     MAP_ROUGHNESS,
     MAP_SIZE,
-    MIN_ALPHA,
     MIRROR,
     NULL,
     TAU,

@@ -5,15 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pbrs_farm.core.gloss import MAX_ALBEDO
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
-from pbrs_farm.transport.scene_tables.material_rows import (
-    ALPHA,
-    F0,
-    MAP_ROUGHNESS,
-    MAX_ALBEDO,
-    material_rows,
-)
+from pbrs_farm.transport.scene_tables.material_rows import ALPHA, F0, MAP_ROUGHNESS, material_rows
 from pbrs_farm.transport.scene_tables.portals import MAX_PORTALS, nearest_portals, portals_of_house
 from pbrs_farm.transport.scene_tables.texture_atlas import TextureAtlas, texture_atlas
 from pbrs_farm.transport.validation import known_rooms as rooms
