@@ -54,7 +54,7 @@ def check_developed(
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None:
         return
-    light = _stored_light(view, channels, is_halved, tally)
+    light = stored_light(view, channels, is_halved, tally)
     if light is None:
         return
     stated = view.table.get("modes", {}).get("develop", {})
@@ -251,10 +251,10 @@ def _tiles(picture: NDArray[Any]) -> Floats:
     return np.asarray(parts.mean(axis=(1, 3)))
 
 
-def _stored_light(
+def stored_light(
     view: StoredView, channels: Mapping[str, NDArray[np.float32]], is_halved: bool, tally: Tally
 ) -> dict[str, NDArray[np.float32]] | None:
-    """Both light groups (denoised where the recipe says) and albedo; None where it cannot be had.
+    """Both light groups (denoised where the recipe says), albedo and normal; None where it cannot be had.
 
     is_halved: at half the picture's size.
     """

@@ -9,6 +9,7 @@ from collections import Counter
 from pathlib import Path
 
 from pbrs_farm.check.fields import field_lines
+from pbrs_farm.check.intrinsic_checks import LAYERS as INTRINSIC
 from pbrs_farm.check.pixel_checks import RAY_LAYERS
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS, OWN_LAYERS
@@ -18,6 +19,7 @@ FORMULA = "recomputed from other layers"
 _MOTION = "followed by rays from view to view"
 _BEHIND = "recomputed by rays without glass"
 _MIRRORED = "recomputed by rays that mirrors send on"
+_INTRINSIC = "albedo x shading + residual against radiance.exr developed again, matte surfaces and clear ones by materials"
 _NOISE = "each value within its noise, mean and spread by their statistics"
 
 # File -> how it is looked at.
@@ -35,6 +37,7 @@ HOW: dict[str, str] = {
     "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
     "radiance.exr": "its guides against surfaces, its steps against their albedo, sun and bulbs by shadow rays",
     "projector.png": "dots thrown again by rays, where rays through pixels meet",
+    **{f"{name}.exr": _INTRINSIC for name in INTRINSIC},
     "boundary_occlusion.png": FORMULA, "boundary_crease.png": FORMULA,
     "behind_glass/depth.png": _BEHIND, "behind_glass/normal.png": _BEHIND,
     "behind_glass/semantic.png": _BEHIND, "behind_glass/instance.png": _BEHIND,

@@ -67,7 +67,7 @@ def check_guides(
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
     kinds = triangles.kinds_of(face)
-    flat = _is_amid(arrays["instance"], arrays["normal"])[rows, columns]
+    flat = is_amid(arrays["instance"], arrays["normal"])[rows, columns]
     keep = (face >= 0) & flat & ~np.isin(kinds, ("glass", "pane", "mirror", "bulb"))
     # What lies outside is a picture of its own, and no surface of the home.
     keep &= np.isin(triangles.instance[face], matte_items(house))
@@ -125,7 +125,7 @@ def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tal
     tally.expect("light guides", f"{view.place}/radiance.exr", same, what)
 
 
-def _is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
+def is_amid(instance: NDArray[Any], normal: NDArray[Any]) -> NDArray[np.bool_]:
     """(H, W) whether a pixel and its neighbours show one instance with one normal."""
     flat = ndimage.minimum_filter(instance, 3) == ndimage.maximum_filter(instance, 3)
     for axis in range(3):

@@ -26,6 +26,7 @@ from pbrs_farm.check.fact_checks import check_facts
 from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.house_checks import check_house
+from pbrs_farm.check.intrinsic_checks import check_intrinsic
 from pbrs_farm.check.light_checks import check_developed, may_be_halved
 from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
@@ -202,6 +203,7 @@ def _check_view(
         check_developed(view, channels, arrays, tally, is_halved=is_halved)
         pixels = _chosen(view, SAMPLE)
         check_guides(view, channels, pixels, arrays, scenes.all, scenes.house, tally)
+        check_intrinsic(view, channels, arrays, scenes.all, tally, denoise=not is_halved)
         check_fit(view, channels, bright_pixels(arrays["instance"], scenes.house), tally)
         check_lit(view, channels, arrays, scenes.lit, scenes.all[1], tally)
     check_edges(view, arrays, tally)

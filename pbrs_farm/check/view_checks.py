@@ -54,7 +54,7 @@ def _read_layer(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | 
         tally.expect("layers", place, False, str(error))
         return None
     # Vectors and colours have a third axis, every other layer two axes.
-    depth = {"RGB": (3,), "X Y Z": (3,), "X Y": (2,)}.get(layer.channels, ())
+    depth = {"RGB": (3,), "R G B": (3,), "X Y Z": (3,), "X Y": (2,)}.get(layer.channels, ())
     shape = (*view.size, *depth)
     # An EXR is read as 32-bit floats, whatever it holds.
     dtype = "float32" if layer.dtype == "float16" else layer.dtype
@@ -113,7 +113,7 @@ def check_radiance(
     lacking = names - channels.keys()
     tally.expect("radiance", view.place, not lacking, f"lacks {lacking}")
     # Normals may be negative; light and albedo may not.
-    names |= {name for name in channels if name.startswith("lamp")}
+    names |= {name for name in channels if name.startswith(("lamp", "diffuse_"))}
     for name in sorted(names & channels.keys()):
         plane = channels[name]
         bad = int((~(np.isfinite(plane) & (plane >= 0))).sum())

@@ -54,6 +54,8 @@ class Layer:
     version: int = 1
     # Its pixels show the albedo, which the recipe's materials hold to a limit.
     shows_albedo: bool = False
+    # Layers that are written with it: without them it says nothing.
+    beside: tuple[str, ...] = ()
 
     @property
     def is_label(self) -> bool:
@@ -187,6 +189,23 @@ def _behind(what: str, of: str) -> tuple[Layer, ...]:
     )
 
 
+def _intrinsic(ending: str, of: str) -> tuple[Layer, ...]:
+    """Shading and residual of some light; ending: of their names."""
+    shading = f"shading{ending}"
+
+    def layer(name: str, unit: str, beside: tuple[str, ...]) -> Layer:
+        return Layer(
+            name, f"{name}.exr", "R G B", "float16", unit, "0", "develop", optional=True,
+            shown_as="range", resized="area", beside=beside,
+        )  # fmt: skip
+
+    unit = f"W m-2 sr-1, linear sRGB: of {of}"
+    return (
+        layer(shading, f"{unit}, irradiance over pi", ()),
+        layer(f"residual{ending}", f"{unit}, radiance - albedo x shading", ("albedo", shading)),
+    )
+
+
 # Layers that every view has, and (optional) those written when --layers names them.
 OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # The pictures of the four lighting modes, and what two of them are developed from.
@@ -201,7 +220,8 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     Layer(
         "radiance",
         "radiance.exr",
-        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}; --groups lamps: lamp<N>.{R,G,B}",
+        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}; --groups lamps: lamp<N>.{R,G,B};"
+        " --layers shading: diffuse_{outdoor,indoor,albedo,lamp<N>}.{R,G,B}",
         "float32",
         "W m-2 sr-1, linear sRGB primaries; albedo 0..1; normal: the pixel's mean, world, guides the denoiser",
         "-",
@@ -243,6 +263,10 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     optional_layer("material", "Y", "uint16", "material id, table in view.json", shown_as="ids"),
     optional_layer("nyu13", "Y", "uint8", "NYU13 id", shown_as="ids"),
     optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json", shown_as="ids"),
+    # Light split by the albedo: of all light, and of each light group.
+    *_intrinsic("", "all light"),
+    *_intrinsic("_outdoor", "outdoor light"),
+    *_intrinsic("_indoor", "indoor light"),
     # What lies behind panes and glass objects.
     optional_layer("glass", "Y", "uint8", "255 = glass or pane hit first", shown_as="mask"),
     *_behind("glass", "first hit that is no glass"),
@@ -308,7 +332,14 @@ LAYER: Final = {layer.name: layer for layer in LAYERS}
 
 _VARIANTS: Final = {LAYER[f"mlt_il_ol.{n}"].file for n in range(1, MOST_VARIANTS + 1)}
 
-OPTIONAL: Final = tuple(x.name for x in LAYERS if x.optional and x.step == "truth")
+LIGHT_LAYERS: Final = tuple(
+    name + ending for ending in ("", "_outdoor", "_indoor") for name in ("shading", "residual")
+)
+"""Those of the names that --layers takes that are made of traced light."""
+
+OPTIONAL: Final = tuple(
+    x.name for x in LAYERS if x.optional and (x.step == "truth" or x.name in LIGHT_LAYERS)
+)
 """The names that --layers takes."""
 
 

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.layers import LAYER
-from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.lighting import Group, Mode
 from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.plugins import plugin
 from pbrs_farm.core.recipe import HistogramFields, ToneFields
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
-from pbrs_farm.formats.radiance_exr import radiance_from_exr
+from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
 from pbrs_farm.run.house_cache import CachedHouse
 from pbrs_farm.run.output_root import attribution
 from pbrs_farm.run.relight import linear_aovs
@@ -35,6 +37,16 @@ from pbrs_farm.transport.develop.mode_pictures import (
     develop,
     wanted_exposures,
 )
+from pbrs_farm.transport.diffuse_images import (
+    ALBEDO,
+    IMAGE_OF_GROUP,
+    intrinsic_parts,
+    shading_by_group,
+)
+
+_GROUPS_OF_ENDING: Final = {
+    "": (Group.OUTDOOR, Group.INDOOR), "_outdoor": (Group.OUTDOOR,), "_indoor": (Group.INDOOR,),
+}  # fmt: skip
 
 HouseAndViews = Callable[[], tuple[CachedHouse, Mapping[str, View]]]
 
@@ -50,8 +62,9 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
     the house and its views by id, asked for only where earlier frames decide the exposure.
     """
     key = keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR)
-    aovs = linear_aovs(radiance_from_exr(work.store.get(key), key))
-    # Denoise once for the modes, the variants and the plugins' pictures.
+    radiance = radiance_from_exr(work.store.get(key), key)
+    raw = aovs = linear_aovs(radiance)
+    # Denoise once for the modes, the variants, the plugins' pictures and the intrinsic layers.
     if work.recipe.light.denoise:
         aovs = denoise_aovs(aovs, wraps=_wraps(work))
     camera = work.recipe.camera_of(work.house_id, work.view_id or "")
@@ -74,7 +87,36 @@ def develop_step(work: Work, cached: HouseAndViews) -> StepOutput:
         variants.append({"file": file, "camera": drawn.name} | drawn.facts() | image.facts())
     if variants:
         facts["variants"] = variants
+    if layers := work.layers_of("develop"):
+        arrays = _intrinsic_layers(work, layers, radiance, raw, aovs)
+        files |= {LAYER[n].file: layer_bytes(n, a, credit) for n, a in arrays.items()}
+        facts["layers"] = layers
     return StepOutput(files, facts)
+
+
+def _intrinsic_layers(
+    work: Work, names: Sequence[str], radiance: RadianceExr, raw: LinearAovs, light: LinearAovs
+) -> dict[str, NDArray[np.float16]]:
+    """The named layers of shading and residual; light: raw, or denoised as the recipe says."""
+    images = (ALBEDO, *IMAGE_OF_GROUP.values())
+    diffuse = {name: radiance.image(name) for name in images}
+    denoise = work.recipe.light.denoise
+    shading = shading_by_group(raw, diffuse, denoise=denoise, wraps=_wraps(work))
+    key = keys.view_key(work.house_id, work.view_id or "", LAYER["albedo"].file)
+    found: dict[str, NDArray[np.float16]] = {}
+    for ending, groups in _GROUPS_OF_ENDING.items():
+        asked = [name for name in (f"shading{ending}", f"residual{ending}") if name in names]
+        if not asked:
+            continue
+        total = sum((getattr(light, g.value) for g in groups), np.zeros_like(raw.outdoor))
+        lit = sum((shading[g] for g in groups), np.zeros_like(raw.outdoor))
+        albedo = np.zeros_like(lit)
+        if f"residual{ending}" in asked:
+            label = layer_from_bytes("albedo", work.store.get(key), key)
+            albedo = linear_from_srgb(label / 255).astype(np.float32)
+        parts = intrinsic_parts(total, albedo, lit)
+        found |= {name: parts[name.startswith("residual")] for name in asked}
+    return found
 
 
 def _taken(

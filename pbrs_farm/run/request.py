@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal, cast
 from pydantic import BeforeValidator, Field
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.layers import LAYER, OPTIONAL
+from pbrs_farm.core.layers import LAYER, LIGHT_LAYERS, OPTIONAL
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import RECIPE_NAMES
 from pbrs_farm.core.record import Record
@@ -209,13 +209,18 @@ class Wanted(Record):
 def wanted_of(request: Wanted) -> Wanted:
     """What a request, or a job of the farm, asks of each house, its layers in the table's order.
 
-    Raises BadInput for a layer that is not installed here.
+    With a layer go those that it says nothing without. Raises BadInput for a layer that is not
+    installed here, and for one that is made of light where none is traced.
     """
     want = Wanted(**{name: getattr(request, name) for name in Wanted.model_fields})
     for layer in want.layers:
         if layer not in LAYER:
             raise BadInput("--layers", layer, "no such layer", hint=hint_of_choice(layer, OPTIONAL))
-    return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in want.layers)})
+        if layer in LIGHT_LAYERS and not any(mode.groups for mode in want.modes):
+            text, hint = "is made of traced light", "--modes mlt_ol mlt_il_ol"
+            raise BadInput("--layers", layer, text, hint=hint)
+    asked = {name for layer in want.layers for name in (layer, *LAYER[layer].beside)}
+    return want.model_copy(update={"layers": tuple(x for x in OPTIONAL if x in asked)})
 
 
 class ProcessLimitOptions(Record):

@@ -55,6 +55,11 @@ class Work:
     digest: str = ""  # of the step under way
     tell_share: Callable[[float], None] = unheard  # called with the share done of a long step
 
+    def layers_of(self, step: str) -> tuple[str, ...]:
+        """Those of its optional layers that a step heeds; `light` those that are made of light."""
+        written_by = {"light": "develop"}.get(step, step)
+        return tuple(name for name in self.layers if LAYER[name].step == written_by)
+
 
 @dataclass(frozen=True, slots=True)
 class StepOutput:
@@ -132,8 +137,8 @@ def run_unless_done(
 
 
 def _written_layers(marker: Marker | None) -> tuple[str, ...]:
-    """The optional layers that a view's labels were made with; () for other steps."""
-    if marker is None or marker.step != "truth":
+    """The optional layers that a step of a view was done with."""
+    if marker is None:
         return ()
     return tuple(name for name in marker.facts.get("layers", ()) if name in LAYER)
 
@@ -165,17 +170,31 @@ def _extra(name: str, work: Work) -> object:
     if name == "house":
         return passes.step_depends(required_source(work), work.recipe)
     if name == "truth":
-        others = [layer for layer in work.layers if layer in plugins("layers")]
-        known = [*work.layers, *marks_in_digest("layers", others)]
-        return [*known, *layers_in_digest(work.layers, max_albedo(work.recipe))]
-    if name == "develop" and work.recipe.tone.pictures:
-        return marks_in_digest("pictures", filter(None, work.recipe.tone.pictures.split(":")))
+        labels = work.layers_of("truth")
+        others = [layer for layer in labels if layer in plugins("layers")]
+        known = [*labels, *marks_in_digest("layers", others)]
+        return [*known, *layers_in_digest(labels, max_albedo(work.recipe))]
+    if name == "light" and work.layers_of("light"):
+        return ["diffuse"]
+    if name == "develop":
+        return _extra_of_develop(work)
     preset = work.recipe.cameras.preset
     if name == "cameras" and preset in plugins("cameras"):
         return marks_in_digest("cameras", [preset])[0]
     if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):
         return keys.sha256(camera_file_text(work.recipe.cameras).encode())
     return None
+
+
+def _extra_of_develop(work: Work) -> object:
+    pictures = work.recipe.tone.pictures
+    marks = marks_in_digest("pictures", filter(None, pictures.split(":"))) if pictures else None
+    layers = work.layers_of("develop")
+    if not layers:
+        return marks
+    # It reads the label albedo.png, too.
+    label = layers_in_digest(("albedo",), max_albedo(work.recipe))
+    return [marks, *layers, *label, plan.STEPS["truth"].version]
 
 
 def camera_file_text(fields: CameraFields) -> str:

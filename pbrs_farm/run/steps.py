@@ -172,7 +172,8 @@ def _truth(work: Work) -> StepOutput:
     if room is not None:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)
     # Add the layers that were asked for; those behind glass cast once more without it.
-    if work.layers:
+    layers = work.layers_of("truth")
+    if layers:
         seed = keys.seed(work.house_id, view.id, "truth", work.recipe.seed)
         partners = _partners(work, cached, view, table)
         inputs = truth.LabelInputs(
@@ -180,19 +181,19 @@ def _truth(work: Work) -> StepOutput:
             lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
             partners, caster.first_hit, max_albedo(work.recipe),
         )  # fmt: skip
-        arrays |= truth.optional_layers(work.layers, inputs)
-        table |= truth.optional_tables(work.layers, house)
+        arrays |= truth.optional_layers(layers, inputs)
+        table |= truth.optional_tables(layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
     # The marker remembers the layers: a run that asks for others adds to them.
-    return StepOutput(files, {"table": table, **({"layers": work.layers} if work.layers else {})})
+    return StepOutput(files, {"table": table, **({"layers": layers} if layers else {})})
 
 
 def _partners(
     work: Work, cached: CachedHouse, view: View, table: dict[str, Any]
 ) -> dict[Relation, Camera]:
     """The cameras of the partners that the layers need; they are written into the table."""
-    needed = {LAYER[name].partner for name in work.layers} - {""}
+    needed = {LAYER[name].partner for name in work.layers_of("truth")} - {""}
     if not needed:
         return {}
     from pbrs_farm.truth.optical_flow import partner_table, partners_of
@@ -241,18 +242,21 @@ def _light(work: Work) -> StepOutput:
     checkpoint = LightCheckpoint(work.store, unfinished, work.digest, work.tell_share)
     fields, pilot = work.recipe.light, pilot_of_view(view, views, camera, work.house_id, digest)
     scene, anchors = cached.light_scene, noise_anchors(view, views, camera)
+    layers = work.layers_of("light")
     result = scene.render(
-        camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors
-    )
+        camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors,
+        splits_diffuse=bool(layers),
+    )  # fmt: skip
     # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}
     images |= {layer_name(number): image for number, image in result.lamps.items()}
+    images |= result.diffuse
     # Blacken what no ray hits: an object has no surroundings.
     if keys.is_object(work.house_id):
         missed = _missed(cached, camera)
         images = {name: np.where(missed, np.float32(0), image) for name, image in images.items()}
     exr = radiance_exr(images, attribution=cached.house.source.attribution)
-    facts = _facts_of_light(work, cached, view, result)
+    facts = _facts_of_light(work, cached, view, result) | ({"layers": layers} if layers else {})
     return StepOutput({RADIANCE_EXR: exr}, facts, unfinished)
 
 

@@ -37,6 +37,7 @@ class LightResult:
     lamps: Mapping[int, RadianceImage] = field(
         default_factory=dict
     )  # layers of light.groups "lamps"
+    diffuse: Mapping[str, RadianceImage] = field(default_factory=dict)  # images of `diffuse_images`
 
     def group(self, group: Group) -> RadianceImage:
         """The radiance of one light group."""
@@ -73,6 +74,7 @@ def blacken(result: LightResult, mask: Mask) -> LightResult:
         albedo=cleared(result.albedo),
         normal=cleared(result.normal),
         lamps={number: cleared(image) for number, image in result.lamps.items()},
+        diffuse={name: cleared(image) for name, image in result.diffuse.items()},
     )
 
 

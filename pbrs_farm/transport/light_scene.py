@@ -19,6 +19,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
+from pbrs_farm.transport.diffuse_images import add_diffuse_images
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, add_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, blacken, join_results, result_from_sums
 from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
@@ -121,6 +122,7 @@ class LightScene:
         *,
         pilot: Pilot | None = None,
         anchors: NoiseAnchors | None = None,
+        splits_diffuse: bool = False,
     ) -> LightResult:
         """The radiance of both light groups in a camera's view, by the integrator of fields.
 
@@ -135,13 +137,15 @@ class LightScene:
         pilot: of another view, whose choice of emitters this one takes over; None = its own.
         anchors: frames whose pixels name the random numbers of this view's surfaces, so that noise
         stays on them; None: each pixel has its own.
-        Pixels without a ray are black. Raises MachineFailed for a lens or blur on a scalar variant,
-        RenderFailed for blur by Metropolis.
+        splits_diffuse: the result has the diffuse light of first surfaces, too (diffuse_images.py);
+        `path` alone.
+        Pixels without a ray are black. Raises MachineFailed for a lens, blur or split on a scalar
+        variant, RenderFailed for blur or split by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         own = pilot or Pilot(camera, seed)
         kept = checkpoint or NoCheckpoint()
-        result = self._render(camera, room_id, fields, seed, kept, own, anchors)
+        result = self._render(camera, room_id, fields, seed, kept, own, anchors, splits_diffuse)
         return result if camera.blind is None else blacken(result, camera.blind)
 
     def _render(
@@ -153,7 +157,10 @@ class LightScene:
         checkpoint: RenderCheckpoint,
         pilot: Pilot,
         anchors: NoiseAnchors | None,
+        splits_diffuse: bool,
     ) -> LightResult:
+        if splits_diffuse:
+            self._check_split(fields, room_id, seed)
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
@@ -161,7 +168,9 @@ class LightScene:
 
         emitters, weights = self._view_emitters.of_pilot(pilot.camera, fields, pilot.seed)
         streams = self._streams(camera, anchors) if anchors else None
-        view = SampledView(self.device_scene, emitters, camera, fields, seed, streams)
+        view = SampledView(
+            self.device_scene, emitters, camera, fields, seed, streams, splits_diffuse
+        )
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
             if camera.blur is not None:
@@ -171,12 +180,23 @@ class LightScene:
         facts |= {"integrator": "path", "guided": weights.is_guided}
         if fields.groups == "two":
             sums, spp = path_sums(view, checkpoint)
-            return result_from_sums(sums, camera, spp, facts)
+            result = result_from_sums(sums, camera, spp, facts)
+            return add_diffuse_images(result, sums, spp) if splits_diffuse else result
         # Sum each lamp by itself, too, and split indoor light into layers.
         n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
         sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
         result = result_from_sums(sums, camera, spp, facts)
-        return add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+        result = add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+        return add_diffuse_images(result, sums, spp) if splits_diffuse else result
+
+    def _check_split(self, fields: LightFields, room_id: str, seed: int) -> None:
+        """Raise where diffuse light cannot be split off."""
+        if self.variant.startswith("scalar"):
+            text = f"shading needs LLVM or CUDA, this is {self.variant}"
+            raise MachineFailed(text, hint="sudo apt-get install -y libllvm19")
+        if fields.integrator == "metropolis":
+            text, hint = "shading and residual are of `path` alone", "--set light.integrator=path"
+            raise RenderFailed(text, view=room_id, mode="light", seed=seed, hint=hint)
 
     def _streams(self, camera: Camera, anchors: NoiseAnchors) -> Streams:
         """(H * W,) the stream of each pixel's random numbers, by what its centre shows."""

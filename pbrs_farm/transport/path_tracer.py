@@ -57,6 +57,12 @@ class SampleSums:
     normal: F32  # the same surface's
     n_bad: int  # paths that were not finite, left out
     lamps: F32 | None = None  # (N, L, 3) indoor light by lamp, if asked for
+    # If asked for, of a first surface that scatters: what it would send if it were matte, its coat or
+    # what lies behind it left out; and its diffuse colour alone.
+    diffuse_outdoor: F32 | None = None
+    diffuse_indoor: F32 | None = None
+    diffuse_albedo: F32 | None = None
+    diffuse_lamps: F32 | None = None  # as lamps
     counts: NDArray[np.uint32] | None = None  # TechniqueCounts.numpy(), of the pilot
     arrivals: NDArray[np.uint32] | None = None  # ArrivalCounts.numpy(), of a trial
 
@@ -97,6 +103,7 @@ class Lanes:
     n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each by itself
     is_trial: bool = False  # count the shadow rays that arrive, too
     streams: NDArray[np.uint32] | None = None  # (pixels,) of their random numbers; None: their own
+    splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
 
     @property
     def n_only(self) -> int:
@@ -182,6 +189,60 @@ def _no_mirrored_path(path: PathState) -> _MirroredPath:
     )  # fmt: skip
 
 
+@dataclass
+class _DiffuseSums:
+    """Sums of what first surfaces would send if they were matte, and of the path under way."""
+
+    outdoor: mi.Color3f
+    indoor: mi.Color3f
+    albedo: mi.Color3f
+    path_outdoor: mi.Color3f
+    path_indoor: mi.Color3f
+    onward: mi.Color3f  # by which what the path brings is to be multiplied
+    looks: mi.Bool  # no surface has been met yet
+
+    def start(self, fresh: Any) -> None:
+        """Begin a sample."""
+        for name in ("path_outdoor", "path_indoor", "onward"):
+            setattr(self, name, dr.select(fresh, mi.Color3f(0), getattr(self, name)))
+        self.looks = self.looks | fresh
+
+    def add_step(self, result: StepResult, active: Any) -> tuple[Any, Any]:
+        """Add what a step brings; its indoor light (what a ray meets, what shadow rays bring)."""
+        assert result.white is not None
+        si = result.si
+        is_first = active & self.looks & result.is_rough
+        kd = dr.select(is_first, si.bsdf.kd, 0)
+        self.albedo += kd
+        emitted = self.onward * result.emitted_indoor
+        direct = kd * result.white.indoor + self.onward * result.direct_indoor
+        self.path_outdoor += self.onward * (result.emitted_outdoor + result.direct_outdoor)
+        self.path_outdoor += kd * result.white.outdoor
+        self.path_indoor += emitted + direct
+        self.onward = dr.select(is_first, kd * result.white.onward, self.onward)
+        # Whatever is met first decides: a mirror, glass, the sky end the look; a hole does not.
+        self.looks = self.looks & ~(active & (result.missed | (si.valid & ~si.is_cutout)))
+        return emitted, direct
+
+    def end(self, turns: Any) -> None:
+        """What glass has mirrored is no light of a surface."""
+        self.onward = dr.select(turns, mi.Color3f(0), self.onward)
+        self.looks = self.looks & ~turns
+
+    def add_sample(self, done: Any) -> None:
+        """Add the light of a path where it is done, if it is finite."""
+        good = dr.isfinite(luminance(self.path_outdoor)) & dr.isfinite(luminance(self.path_indoor))
+        self.outdoor += dr.select(done & good, self.path_outdoor, 0)
+        self.indoor += dr.select(done & good, self.path_indoor, 0)
+
+
+def _no_diffuse_sums() -> _DiffuseSums:
+    return _DiffuseSums(
+        mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0),
+        mi.Bool(True),
+    )  # fmt: skip
+
+
 class _Beside(NamedTuple):
     """Where a lane adds what is not its pixel's sum."""
 
@@ -189,6 +250,7 @@ class _Beside(NamedTuple):
     counts: TechniqueCounts
     arrivals: ArrivalCounts
     counts_arrivals: Any  # Bool
+    diffuse_lamps: _LampSums | None = None
 
 
 @dataclass
@@ -246,39 +308,56 @@ def trace(
     stream = lane % dr.opaque(mi.UInt32, lanes.n_streams)
     may_guide = lane >= dr.opaque(mi.UInt32, lanes.n_streams if lanes.is_trial else 0)
     pixel, emitter_filter = _pixels_and_emitters(stream, lanes)
-    lamp_sums = None
-    if lanes.n_lamps > 0:
-        sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
-        lamp_sums = _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
+    lamp_sums = _no_lamp_sums(lane, lanes)
+    diffuse_lamps = _no_lamp_sums(lane, lanes) if lanes.splits_diffuse else None
     counts, arrivals = emitters.outdoor_choice.no_counts(), emitters.arrival.no_counts()
     counts_arrivals = dr.opaque(mi.Bool, lanes.is_trial)
     # Opaque numbers are arguments of the kernel: another seed compiles nothing anew.
     depth_fields = device_fields(light, max_depth=max_depth)
-    total = _trace(
+    total, diffuse = _trace(
         PathContext(
-            scene, emitters, depth_fields, emitter_filter, sunlit, may_guide, splits_glass=True
+            scene,
+            emitters,
+            depth_fields,
+            emitter_filter,
+            sunlit,
+            may_guide,
+            splits_glass=True,
+            splits_white=lanes.splits_diffuse,
         ),
         device_camera(camera),
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
         _keys(stream, lanes),
-        _Beside(lamp_sums, counts, arrivals, counts_arrivals),
+        _Beside(lamp_sums, counts, arrivals, counts_arrivals, diffuse_lamps),
     )
-    dr.eval(total, counts, arrivals)
-    # Read channel by channel: of all three at once Dr.Jit makes a copy, by a kernel of its own.
-    rows = {
-        f.name: np.stack([c.numpy() for c in getattr(total, f.name)], axis=-1)
-        for f in fields(total)
-        if f.name != "n_bad"
-    }
-    lamps = None
+    dr.eval(total, diffuse, counts, arrivals)
+    rows = {f.name: _channels(getattr(total, f.name)) for f in fields(total) if f.name != "n_bad"}
+    if diffuse is not None:
+        for name in ("outdoor", "indoor", "albedo"):
+            rows[f"diffuse_{name}"] = _channels(getattr(diffuse, name))
     if lamp_sums is not None:
-        lamps = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
+        rows["lamps"] = lamp_sums.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
+    if diffuse_lamps is not None:
+        by_lamp = diffuse_lamps.sums.numpy().reshape(lanes.n_lanes, lanes.n_lamps, 3)
+        rows["diffuse_lamps"] = by_lamp
     n_bad = int(np.sum(total.n_bad.numpy(), dtype=np.int64))
     of_pilot = counts.numpy() if lanes.n_only_outdoor > 0 else None
     of_trial = arrivals.numpy() if lanes.is_trial else None
-    return SampleSums(**rows, n_bad=n_bad, lamps=lamps, counts=of_pilot, arrivals=of_trial)
+    return SampleSums(**rows, n_bad=n_bad, counts=of_pilot, arrivals=of_trial)
+
+
+def _channels(colour: Any) -> F32:
+    """(N, 3), read channel by channel: of all three at once Dr.Jit makes a copy, by a kernel of its own."""
+    return np.stack([c.numpy() for c in colour], axis=-1)
+
+
+def _no_lamp_sums(lane: Any, lanes: Lanes) -> _LampSums | None:
+    if lanes.n_lamps == 0:
+        return None
+    sums = dr.zeros(mi.Float, lanes.n_lanes * lanes.n_lamps * 3)
+    return _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
 
 
 def _keys(stream: Any, lanes: Lanes) -> Any:
@@ -312,7 +391,7 @@ def _trace(
     last: Any,
     key: Any,
     beside: _Beside,
-) -> _LaneSums:
+) -> tuple[_LaneSums, _DiffuseSums | None]:
     sums = _LaneSums(
         mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Vector3f(0),
         mi.UInt32(0),
@@ -326,6 +405,9 @@ def _trace(
     corner = mi.Point2f(x0, y0)
     path = camera_path(camera, corner, mi.Point2f(0))
     pane = _no_mirrored_path(path)
+    diffuse: Any = None
+    if dr.hint(context.splits_white, mode="scalar"):
+        diffuse = _no_diffuse_sums()
 
     while active:
         # Start the next sample where the last path has ended.
@@ -335,12 +417,17 @@ def _trace(
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         seen = seen & ~fresh
         pane.start(fresh)
+        if dr.hint(context.splits_white, mode="scalar"):
+            diffuse.start(fresh)
 
         # Go on by a vertex, and add what that brings.
         path, result, alive = advance(context, sampler, path, active)
         l_out += result.emitted_outdoor + result.direct_outdoor
         l_in += result.emitted_indoor + result.direct_indoor
-        _add_by_lamp(beside.lamps, result, active)
+        _add_by_lamp(beside.lamps, result, (result.emitted_indoor, result.direct_indoor), active)
+        if dr.hint(context.splits_white, mode="scalar"):
+            brought = diffuse.add_step(result, active)
+            _add_by_lamp(beside.diffuse_lamps, result, brought, active)
         _count_techniques(beside.counts, context, result, active)
         _count_arrivals(beside, context, result, active)
         first_rough = result.is_rough & ~seen
@@ -355,12 +442,16 @@ def _trace(
             path = dr.select(turns, pane.path(path), path)
             pane.turn(turns)
             seen, done = seen & ~turns, done & ~turns
+            if dr.hint(context.splits_white, mode="scalar"):
+                diffuse.end(turns)
+        if dr.hint(context.splits_white, mode="scalar"):
+            diffuse.add_sample(done)
         sums.add_sample(l_out, l_in, s, done)
         s = s + dr.select(done, mi.UInt32(1), 0)
         fresh = mi.Bool(done)
         active = s < last
 
-    return sums
+    return sums, diffuse
 
 
 def _count_techniques(
@@ -382,12 +473,17 @@ def _count_arrivals(beside: _Beside, context: PathContext, result: StepResult, a
             arrival.count(beside.arrivals, result.si.p, sample.kind, is_cast, sample.arrives)
 
 
-def _add_by_lamp(lamp_sums: _LampSums | None, result: StepResult, active: Any) -> None:
-    """Add what a step brought to the lamps it came from; what is not finite is left out."""
+def _add_by_lamp(
+    lamp_sums: _LampSums | None, result: StepResult, brought: tuple[Any, Any], active: Any
+) -> None:
+    """Add what a step brought (of what its ray met, by shadow rays) to the lamps it came from.
+
+    What is not finite is left out.
+    """
     if lamp_sums is None:
         return
-    emitted = result.emitted_indoor, result.si.emitter
-    direct = result.direct_indoor, result.indoor_sample.emitter
+    emitted = brought[0], result.si.emitter
+    direct = brought[1], result.indoor_sample.emitter
     for light, lamp in (emitted, direct):
         y = luminance(light)
         is_lit = active & (y > 0) & dr.isfinite(y)

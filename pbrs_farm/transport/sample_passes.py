@@ -39,6 +39,7 @@ class SampledView:
     fields: LightFields
     seed: int
     streams: NDArray[np.uint32] | None = None  # of each pixel's random numbers (surface_noise.py)
+    splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
 
 
 def path_sums(
@@ -107,8 +108,9 @@ def _traced(
     """Sums over n samples of every pixel, from the first on."""
     i = view.camera.intrinsics
     lanes = Lanes(
-        i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps, streams=view.streams
-    )
+        i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps, streams=view.streams,
+        splits_diffuse=view.splits_diffuse,
+    )  # fmt: skip
     return trace(view.scene, view.emitters, view.camera, lanes, view.fields, max_depth=max_depth)
 
 

@@ -82,6 +82,30 @@ def exr(file: str, change: Callable[[np.ndarray], np.ndarray]) -> Plant:
     return plant
 
 
+def brighter_shading(view: Path) -> None:
+    """Shading a tenth brighter, and a residual that makes up for it."""
+    srgb = array_from_png((view / "albedo.png").read_bytes()) / 255
+    albedo = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    for ending in ("", "_indoor", "_outdoor"):
+        files = view / f"shading{ending}.exr", view / f"residual{ending}.exr"
+        lit, left = (layers_from_exr(file.read_bytes()) for file in files)
+        for k, c in enumerate("RGB"):
+            left[c] = (left[c] - 0.1 * albedo[..., k] * lit[c]).astype(np.float32)
+            lit[c] = (1.1 * lit[c]).astype(np.float32)
+        for file, planes in zip(files, (lit, left), strict=True):
+            file.write_bytes(exr_from_layers(planes))
+
+
+def brighter_diffuse_light(view: Path) -> None:
+    """The same, and the diffuse light that it is made of."""
+    brighter_shading(view)
+    planes = layers_from_exr((view / "radiance.exr").read_bytes())
+    for name in planes:
+        if name.startswith(("diffuse_outdoor", "diffuse_indoor")):
+            planes[name] = (1.1 * planes[name]).astype(np.float32)
+    (view / "radiance.exr").write_bytes(exr_from_layers(planes))
+
+
 def histogram(change: Callable[[dict], object]) -> Plant:
     def plant(view: Path) -> None:
         held = json.loads((view / "histogram.json").read_text())
@@ -435,6 +459,15 @@ _FINISHED: dict[str, tuple[Plant, str]] = {
     "roughness scaled": (picture("roughness.png", scaled(0.97)), "ray: roughness"),
     "metallic patched": (picture("metallic.png", patch(255)), "ray: metallic"),
     "f0 patched": (picture("f0.png", patch(60)), "ray: f0"),
+    "shading scaled": (exr("shading.exr", scaled(1.02)), "intrinsic sum"),
+    "shading by lamps mirrored": (exr("shading_indoor.exr", mirrored), "shading"),
+    "residual upside down": (exr("residual.exr", lambda a: a[::-1]), "intrinsic sum"),
+    "residual by day scaled": (exr("residual_outdoor.exr", scaled(1.1)), "intrinsic sum"),
+    "shading brighter, residual darker": (brighter_shading, "shading"),
+    "shading brighter, and the light that it is made of": (brighter_diffuse_light, "matte surfaces"),
+    "shading told that is not there": (
+        table(lambda t: t["modes"]["develop"].update(layers=["shading"])), "intrinsic layers",
+    ),
     "source's class patched": (picture("class_source.png", patch(1)), "class_source"),
     "semantic boundary moved": (picture("boundary_semantic.png", lambda a: np.roll(a, 1, 0)), "boundary_semantic"),
     "albedo patched": (picture("albedo.png", patch(40)), "ray: albedo"),

@@ -11,7 +11,7 @@ from pbrs_farm.check import verify
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.core.layers import LAYER, OWN_LAYERS
+from pbrs_farm.core.layers import LAYER, OPTIONAL, OWN_LAYERS
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import Marker, StoredFile
@@ -31,7 +31,7 @@ def views_of(home: House) -> dict[str, Camera]:
 
 def all_layers() -> tuple[str, ...]:
     """Every optional layer of the package itself."""
-    return tuple(x.name for x in OWN_LAYERS if x.optional and x.step == "truth")
+    return tuple(x.name for x in OWN_LAYERS if x.name in OPTIONAL)
 
 
 def encoded(name: str, array: np.ndarray) -> bytes:

@@ -47,12 +47,12 @@ def luminance(rgb: Any) -> Any:
     return rgb[0] * LUMINANCE[0] + rgb[1] * LUMINANCE[1] + rgb[2] * LUMINANCE[2]
 
 
-def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
+def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any, *, least_diffuse: float = 0.0) -> tuple[Any, Any]:
     """(f |cos wo| as Color3f, pdf of sample_bsdf per solid angle) of two local directions.
 
     wi, wo: unit, in the shading frame (z is the normal), pointing away from the surface, wi.z
     > 0; wo.z < 0 is transmission. Mirrors and thin glass give 0: their directions are deltas,
-    which only sample_bsdf draws.
+    which only sample_bsdf draws. least_diffuse: as of sample_bsdf.
     """
     above = wo.z > 0
     cos_o = dr.abs(wo.z)
@@ -68,7 +68,7 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any) -> tuple[Any, Any]:
     value += dr.select(use_coat, coat_reflection(bsdf.f0, bsdf.alpha, wi, wo), 0)
 
     # The pdf of all three lobes.
-    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
+    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi, least_diffuse)
     p_transmitted = 1 - p_diffuse - p_coat
     pdf = dr.select(above, p_diffuse, p_transmitted) * (cos_o * dr.inv_pi)
     d = _ggx_d(dr.normalize(wi + wo), bsdf.alpha)
@@ -94,14 +94,23 @@ def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
     return dr.select(has_coat, _ashikhmin(cos_i), 1.0)
 
 
-def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any) -> Any:
+def white_share(value: Any, wo: Any) -> Any:
+    """Color3f of f |cos wo| of a white matte surface over value, that of a surface (`evaluate_bsdf`); 0 below.
+
+    Where value is 0 in a channel it is 0 there, too.
+    """
+    return dr.select((wo.z > 0) & (value > 0), wo.z * dr.inv_pi / value, 0)
+
+
+def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any, *, least_diffuse: float = 0.0) -> Any:
     """A direction wo drawn with the pdf of evaluate_bsdf().
 
     wi: unit, local, z along the normal. u_lobe in [0, 1) chooses the lobe and is used up by it. The
     direction may lie below the surface (transmission, or a coat at grazing angles): evaluate the
-    BSDF before it is used.
+    BSDF before it is used. least_diffuse: Kd that counts in the choice at least, where what arrives is
+    asked for, too.
     """
-    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi)
+    p_diffuse, p_coat = _lobe_probabilities(bsdf, wi, least_diffuse)
     cosine = mi.warp.square_to_cosine_hemisphere(uv)
     wo = dr.select(u_lobe < p_diffuse, cosine, mi.Vector3f(cosine.x, cosine.y, -cosine.z))
     use_coat = (u_lobe >= p_diffuse) & (u_lobe < p_diffuse + p_coat)
@@ -154,10 +163,12 @@ def thin_glass_reflectance(cos_i: Any) -> Any:
     return 2 * r / (1 + r)
 
 
-def _lobe_probabilities(bsdf: Bsdf, wi: Any) -> tuple[Any, Any]:
+def _lobe_probabilities(bsdf: Bsdf, wi: Any, least_diffuse: float) -> tuple[Any, Any]:
     """(probability of diffuse reflection, of the coat); the rest is transmitted."""
     coat = dr.select(bsdf.alpha > 0, dr.maximum(luminance(_schlick(bsdf.f0, wi.z)), 0.05), 0)
     reflected, transmitted = luminance(bsdf.kd), luminance(bsdf.tau)
+    if least_diffuse > 0:
+        reflected = dr.maximum(reflected, least_diffuse)
     total = reflected + transmitted + coat
     is_black = total <= 0
     scale = dr.rcp(dr.select(is_black, 1, total))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 
-from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, view_independent_pdf
+from pbrs_farm.transport.kernels.bsdf import evaluate_bsdf, view_independent_pdf, white_share
 from pbrs_farm.transport.kernels.device_scene import offset_ray_origin
 from pbrs_farm.transport.kernels.emitters import FIRST_PORTAL, SUN, DirectionSample
 from pbrs_farm.transport.kernels.guided_rays import Guiding
@@ -108,10 +108,11 @@ def _direct_light(
     path: the one that has come to the vertex, if a part of the sun is left to sunlit points.
     """
     if sample is None:
-        return DirectLightSample(mi.Color3f(0), mi.Vector3f(0, 1, 0), mi.Color3f(0))
+        none = mi.Color3f(0)
+        return DirectLightSample(none, mi.Vector3f(0, 1, 0), mi.Color3f(0), white=none)
     si, is_independent = vertex.si, strategy.is_view_independent
     wo = vertex.frame.to_local(sample.d)
-    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo)
+    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo, least_diffuse=context.least_diffuse)
     pdf *= strategy.bsdf_share
 
     # Refuse light through the face where the shading normal says that it does not pass.
@@ -156,8 +157,9 @@ def _direct_light(
     if taken is not None:
         light -= dr.select(contributes & is_consistent, taken * clear, 0)
     arrives = dr.max(clear) > 0
+    white = light * white_share(value, wo) if context.splits_white else None
     return DirectLightSample(
-        light, sample.d, incident, sample.emitter, sample.kind, contributes, arrives
+        light, sample.d, incident, sample.emitter, sample.kind, contributes, arrives, white
     )
 
 

@@ -24,6 +24,8 @@ from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 from pbrs_farm.transport.scene_tables.scene_tables import NO_LAMP
 
 ALL_EMITTERS, NO_EMITTERS = -1, -2
+_LEAST_DIFFUSE = 0.1
+LEAST_KD = 0.002  # of surfaces where white is split off: what reflects nothing tells nothing
 
 
 class DeviceFields(NamedTuple):
@@ -54,6 +56,12 @@ class PathContext(NamedTuple):
     sunlit: SunlitPoints | None = None  # where shadow rays go to sunlit points, too
     may_guide: Any = None  # Bool: lanes whose rays are guided where the view's are; None = all
     splits_glass: bool = False  # rays at glass go through, and the caller follows what it mirrors
+    splits_white: bool = False  # tell what a white matte surface at each vertex would bring, too
+
+    @property
+    def least_diffuse(self) -> float:
+        """Kd that counts in the choice of lobes at least (bsdf.py)."""
+        return _LEAST_DIFFUSE if self.splits_white else 0.0
 
 
 @dataclass
@@ -112,6 +120,7 @@ class DirectLightSample(NamedTuple):
     kind: Any = None  # of the shadow ray (arrival_rates.py)
     is_cast: Any = False  # Bool
     arrives: Any = False  # Bool: nothing stands in its way
+    white: Any = None  # Color3f that a white matte surface would scatter; None = not asked for
 
 
 @dataclass
@@ -133,6 +142,14 @@ class MirroredRay(NamedTuple):
     beta: Any  # throughput
     share: Any  # about, of the light that comes by the glass
     own_share: Any  # the same, over the chance that it is followed
+
+
+class WhiteSplit(NamedTuple):
+    """What a vertex would bring if it were white and matte; throughput included."""
+
+    outdoor: Any  # by shadow rays
+    indoor: Any
+    onward: Any  # Color3f by which what the path brings later is to be multiplied
 
 
 class StepResult(NamedTuple):
@@ -158,6 +175,7 @@ class StepResult(NamedTuple):
     sunlit_sample: DirectLightSample
     is_view_independent: Any  # Bool: weighted by view_independent_pdf (bsdf.py)
     mirrored: MirroredRay | None = None  # where rays at glass are split
+    white: WhiteSplit | None = None  # where white is split off
 
 
 def device_fields(fields: LightFields, *, max_depth: int | None = None) -> DeviceFields:

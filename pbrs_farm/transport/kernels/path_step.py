@@ -19,6 +19,7 @@ from pbrs_farm.transport.kernels.bsdf import (
     sample_bsdf,
     thin_glass_reflectance,
     view_independent_pdf,
+    white_share,
 )
 from pbrs_farm.transport.kernels.device_scene import SurfaceInteraction, offset_ray_origin
 from pbrs_farm.transport.kernels.direct_light import Strategy, sample_direct_light
@@ -36,6 +37,7 @@ from pbrs_farm.transport.kernels.guiding_targets import NO_FACE
 from pbrs_farm.transport.kernels.lamp_guiding import no_reference
 from pbrs_farm.transport.kernels.path_state import (
     ALL_EMITTERS,
+    LEAST_KD,
     NO_EMITTERS,
     DirectionPdfs,
     MirroredRay,
@@ -44,6 +46,7 @@ from pbrs_farm.transport.kernels.path_state import (
     ScatteredRay,
     StepResult,
     Vertex,
+    WhiteSplit,
 )
 from pbrs_farm.transport.kernels.sampler import CAMERA_DIMS, VERTEX_DIMS, Sampler
 from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
@@ -129,6 +132,15 @@ def advance(
         sunlit_sample=direct.sunlit,
         is_view_independent=strategy.is_view_independent,
     )
+    if context.splits_white:
+        share = white_share(scattered.value, vertex.frame.to_local(scattered.d))
+        result = result._replace(
+            white=WhiteSplit(
+                path.beta * (direct.outdoor.white + direct.sunlit.white),
+                path.beta * direct.indoor.white,
+                dr.select(scattered.bounced, share, 0),
+            )
+        )
     if vertex.splits is not None:
         mirrored = _mirrored_ray(context.emitters, vertex, path, lobe.u, active)
         result = result._replace(mirrored=mirrored)
@@ -141,6 +153,8 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     if context.scene.panes is not None:
         looks = active & (path.bsdf_pdf <= 0)
         si, is_pane = context.scene.panes.before(si, path.o, path.d, looks)
+    if context.splits_white:
+        si = si._replace(bsdf=si.bsdf._replace(kd=dr.maximum(si.bsdf.kd, LEAST_KD)))
     is_solid = si.valid & ~si.is_cutout
     is_glass, is_mirror = is_solid & (si.bsdf.kind == GLASS), is_solid & (si.bsdf.kind == MIRROR)
     depth = path.depth + dr.select(is_solid & ~is_glass, mi.UInt32(1), 0)
@@ -286,15 +300,16 @@ def _scatter(step: _Step, goes_on: Any) -> ScatteredRay:
     uv = step.sampler.get_2d(vertex.dim + _SCATTER)
     is_guided, target_face = mi.Bool(False), mi.UInt32(NO_FACE)
     if guiding is None:
-        d = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, vertex.wi, lobe.u, uv)))
+        drawn = sample_bsdf(si.bsdf, vertex.wi, lobe.u, uv, least_diffuse=context.least_diffuse)
+        d = mi.Vector3f(frame.to_world(drawn))
     else:
         to = sample_guided(guiding, context.scene, context.emitters, si, lobe.u, uv)
         is_guided, target_face = to.is_guided, to.target_face
-        by_surface = mi.Vector3f(frame.to_world(sample_bsdf(si.bsdf, vertex.wi, to.u_bsdf, uv)))
-        d = dr.select(is_guided, to.d, by_surface)
+        drawn = sample_bsdf(si.bsdf, vertex.wi, to.u_bsdf, uv, least_diffuse=context.least_diffuse)
+        d = dr.select(is_guided, to.d, mi.Vector3f(frame.to_world(drawn)))
         goes_on = goes_on & to.valid
     wo = frame.to_local(d)
-    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo)
+    value, pdf = evaluate_bsdf(si.bsdf, vertex.wi, wo, least_diffuse=context.least_diffuse)
     bounced = goes_on & (dr.dot(si.ng, d) * wo.z > 0) & (pdf > 0)
 
     # Reflect about the shading normal, or go straight on.
