@@ -11,6 +11,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import OpenImageIO
 import pandas as pd
 import yaml
 from PIL import Image
@@ -22,7 +23,7 @@ class Example:
 
     name: str  # of its picture's file
     rgb: np.ndarray  # (H, W, 3) uint8
-    target: np.ndarray
+    target: np.ndarray | tuple[np.ndarray, ...]
 
 
 def picture(file: Path) -> np.ndarray:
@@ -87,6 +88,29 @@ def marigold(folder: Path, list_file: str) -> Iterator[Example]:
             stored = picture(folder / path)
             assert stored.dtype == np.uint16
             yield Example(rgb_path, rgb, stored / 1000.0)
+
+
+def marigold_lighting(folder: Path, list_file: str) -> Iterator[Example]:
+    """Albedo, shading and residual, linear (H, W, 3), of NPY files that are no pickles."""
+    for line in (folder / list_file).read_text().splitlines():
+        rgb_path, *targets = line.split()
+        assert [Path(p).name.split("_")[0] for p in targets] == ["albedo", "shading", "residual"]
+        arrays = tuple(np.load(folder / path) for path in targets)
+        assert all(a.ndim == 3 and a.dtype == np.float32 for a in arrays)
+        yield Example(rgb_path, picture(folder / rgb_path), arrays)
+
+
+def marigold_appearance(folder: Path, list_file: str) -> Iterator[Example]:
+    """Albedo sRGB, roughness and metallic of red and green, and where a mask of three channels counts."""
+    for line in (folder / list_file).read_text().splitlines():
+        rgb_path, albedo, material, mask = line.split()
+        exr = OpenImageIO.ImageBuf(str(folder / material))
+        pixels = np.asarray(exr.get_pixels(OpenImageIO.FLOAT))
+        planes = {name: pixels[..., k] for k, name in enumerate(exr.spec().channelnames)}
+        three = picture(folder / mask)
+        assert three.ndim == 3
+        parts = picture(folder / albedo), planes["R"], planes["G"], three.all(axis=-1)
+        yield Example(rgb_path, picture(folder / rgb_path), parts)
 
 
 def horizonnet(folder: Path) -> Iterator[Example]:

@@ -16,7 +16,6 @@ import pbrs_farm as pf
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares, split_of_house
-from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.optics_fields import LensFields
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export
@@ -177,16 +176,21 @@ def test_colour_is_the_light_of_the_picture_in_half_floats(root, written):
         assert not frame.has("final_hdf5", "residual.hdf5")
 
 
-def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(monkeypatch) -> None:
+@pytest.mark.parametrize(("picture", "ending"), [("mlt_il_ol", ""), ("mlt_ol", "_outdoor")])
+def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(picture: str, ending: str) -> None:
     rng = np.random.default_rng(2)
     arrays = {
         "albedo": rng.integers(0, 256, (6, 8, 3)).astype(np.uint8),
-        "shading": (40 * rng.random((6, 8, 3))).astype(np.float32),
-        "residual": (rng.random((6, 8, 3)) - 0.3).astype(np.float32),
+        f"shading{ending}": (40 * rng.random((6, 8, 3))).astype(np.float32),
+        f"residual{ending}": (rng.random((6, 8, 3)) - 0.3).astype(np.float32),
     }
-    layers = dict.fromkeys(("shading", "residual"), LAYER["position"])
-    monkeypatch.setattr(hypersim_form, "LAYER", {**LAYER, **layers})
-    view = cast(ChosenView, SimpleNamespace(has=arrays.__contains__, array=arrays.__getitem__))
+    srgb = arrays["albedo"] / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    radiance = linear * arrays[f"shading{ending}"] + arrays[f"residual{ending}"]
+    view = cast(
+        ChosenView,
+        SimpleNamespace(has=arrays.__contains__, array=arrays.__getitem__, picture=picture),
+    )
     light = hypersim_form._light(view)
     assert set(light) == {"color", "diffuse_reflectance", "diffuse_illumination", "residual"}
     total = (
@@ -194,9 +198,13 @@ def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(monkeypatch) -> No
         + light["residual"]
     )
     np.testing.assert_allclose(light["color"], total, rtol=1e-3, atol=1e-3)
-    np.testing.assert_allclose(light["diffuse_illumination"], arrays["shading"], rtol=1e-3)
-    srgb = arrays["albedo"] / 255
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    # It is the light itself, and nothing is negative, as Marigold's preparation wants it.
+    np.testing.assert_allclose(light["color"], np.maximum(radiance, 0), rtol=2e-3, atol=2e-3)
+    assert min(array.min() for array in light.values()) >= 0
+    is_rest = arrays[f"residual{ending}"] >= 0
+    for name, layer in (("diffuse_illumination", "shading"), ("residual", "residual")):
+        stored = arrays[f"{layer}{ending}"]
+        np.testing.assert_allclose(light[name][is_rest], stored[is_rest], rtol=1e-3)
     np.testing.assert_allclose(light["diffuse_reflectance"], linear, rtol=2e-3, atol=1e-5)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,43 @@ def test_marigold_reads_depth_and_normals_from_its_lists(root, tmp_path):
         assert (example.target[~valid] == 0).all()
         # Z points to the camera: no surface turns its back.
         assert (example.target[valid] * rays()[valid]).sum(-1).max() < 1e-3
+
+
+def test_marigold_reads_light_and_materials_from_their_lists(root, tmp_path):
+    folder = tmp_path / "homes"
+    shutil.copytree(root, folder)
+    rng = np.random.default_rng(5)
+    first, second = views(folder)
+    colours = rng.integers(0, 256, (*png(first / "depth.png").shape, 3)).astype(np.uint8)
+    light = {n: rng.random(colours.shape).astype(np.float16) for n in ("shading", "residual")}
+    light["residual"] -= np.float16(0.4)
+    grey = {n: rng.integers(0, 256, colours.shape[:2]) for n in ("roughness", "metallic", "mirror")}
+    (first / "albedo.png").write_bytes(png_from_array(colours))
+    for name, array in light.items():
+        planes = dict(zip("RGB", np.moveaxis(array.astype(np.float32), -1, 0), strict=True))
+        (first / f"{name}.exr").write_bytes(exr_from_layers(planes, half=True))
+    for view in (first, second):
+        (view / "albedo.png").write_bytes(png_from_array(colours))
+        for name, array in grey.items():
+            (view / f"{name}.png").write_bytes(png_from_array(array.astype(np.uint8)))
+    export(folder, tmp_path / "set", "marigold")
+    srgb = colours / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    radiance = linear * light["shading"] + light["residual"]
+    (lit,) = loaders.marigold_lighting(tmp_path / "set", "filename_list_iid_lighting.txt")
+    albedo, shading, residual = lit.target
+    np.testing.assert_allclose(albedo, linear, atol=1e-6)
+    assert min(albedo.min(), shading.min(), residual.min()) >= 0
+    again = albedo * shading + residual
+    np.testing.assert_allclose(again, np.maximum(radiance, 0), atol=1e-4)
+    found = loaders.marigold_appearance(tmp_path / "set", "filename_list_iid_appearance.txt")
+    for example, view in zip(found, views(folder), strict=True):
+        surface, rough, metallic, mask = example.target
+        np.testing.assert_array_equal(surface, colours)
+        np.testing.assert_allclose(rough * 255, grey["roughness"], atol=0.1)
+        np.testing.assert_allclose(metallic * 255, grey["metallic"], atol=0.1)
+        counts = (png(view / "valid.png") > 0) & (grey["mirror"] == 0)
+        np.testing.assert_array_equal(mask, counts)
 
 
 def rays() -> np.ndarray:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 from pbrs_farm.export.chosen_view import (
     Choice,
@@ -30,6 +29,7 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.intrinsic_parts import intrinsic_parts
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
@@ -48,8 +48,6 @@ _SPLIT_FIELDS: Final = (
     "scene_name", "camera_name", "frame_id", "included_in_public_release", "exclude_reason",
     "split_partition_name",
 )  # fmt: skip
-_INTRINSIC: Final = ("albedo", "shading", "residual")
-"""Layers whose files make reflectance, illumination and residual; a view without one has none of the last two."""
 
 
 def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> int:
@@ -205,7 +203,7 @@ def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
 def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
     depth, instance = view.array("depth"), view.array("instance")
     z = np.where(depth < np.iinfo(np.uint16).max, depth, 0) / 1000
-    if _has(view, "depth_z"):
+    if view.has("depth_z"):
         z = view.array("depth_z").astype(np.float64)
     i, seen = intrinsics_of(view.facts), z > 0
     along = np.where(seen, z * hypersim.ray_lengths(i), np.nan)
@@ -223,7 +221,7 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
     }
     if semantic is not None:
         found["semantic"] = np.where(semantic > 0, semantic.astype(np.int16), np.int16(-1))
-    if _has(view, "normal_shading"):
+    if view.has("normal_shading"):
         bent = opengl_normals(view, "normal_shading")
         found |= {"normal_bump_cam": bent, "normal_bump_world": _in_world(bent, pose, turn)}
     return found
@@ -242,17 +240,18 @@ def _in_world(local: F32, pose: F64, turn: F64) -> F32:
 
 
 def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
-    """color, and of intrinsic layers what there is; color == reflectance x illumination + residual where all are."""
+    """color, and of intrinsic layers what there is; color == reflectance x illumination + residual where all are.
+
+    No residual is negative (`intrinsic_parts`).
+    """
     found: dict[str, NDArray[np.float16]] = {}
-    if _has(view, "albedo"):
+    if view.has("albedo"):
         found["diffuse_reflectance"] = _half(linear_from_srgb(view.array("albedo") / 255))
-    if all(_has(view, name) for name in _INTRINSIC):
-        found["diffuse_illumination"] = _half(view.array("shading"))
-        found["residual"] = _half(view.array("residual"))
-        light, shading, rest = (
-            found[name].astype(np.float32)
-            for name in ("diffuse_reflectance", "diffuse_illumination", "residual")
-        )
+    parts = intrinsic_parts(view)
+    if parts is not None:
+        names = "diffuse_reflectance", "diffuse_illumination", "residual"
+        found |= {name: _half(part) for name, part in zip(names, parts, strict=True)}
+        light, shading, rest = (found[name].astype(np.float32) for name in names)
         return found | {"color": _half(light * shading + rest)}
     colour = _colour(view)
     return found if colour is None else found | {"color": _half(colour)}
@@ -277,11 +276,6 @@ def _colour(view: ChosenView) -> F32 | None:
 
 def _half(array: NDArray[Any]) -> NDArray[np.float16]:
     return np.asarray(np.clip(array, -_MOST_LIGHT, _MOST_LIGHT), np.float16)
-
-
-def _has(view: ChosenView, layer: str) -> bool:
-    """Whether the view has a layer and it is not left out of the export."""
-    return layer in LAYER and view.has(layer)
 
 
 def _write_table(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -339,7 +333,10 @@ def _card(out: Path) -> str:
     camera += "" if len(others) <= 9 else f" and {len(others) - 9} more"
     has_light = any(out.glob("ai_*/images/*_final_hdf5/*.color.hdf5"))
     has_parts = any(out.glob("ai_*/images/*_final_hdf5/*.diffuse_illumination.hdf5"))
-    light = "`color` = `diffuse_reflectance` x `diffuse_illumination` + `residual`, in half floats"
+    light = (
+        "`color` = `diffuse_reflectance` x `diffuse_illumination` + `residual`, in half floats; where"
+        " reflectance times irradiance over pi is more than the light, illumination is less"
+    )
     if not has_parts:
         light = (
             "`color` is radiance; there is no `diffuse_illumination` and no `residual`"

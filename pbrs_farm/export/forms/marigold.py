@@ -1,8 +1,12 @@
-"""List files of pictures, depth and normals, as Marigold and those that follow it train from.
+"""List files of pictures, depth, normals and intrinsic parts, as Marigold and those that follow it train from.
 
     <house>/rgb_<view>.png  depth_<view>.png  normal_<view>.npy
     filename_list[_<split>].txt          rgb depth
     filename_list_normals[_<split>].txt  rgb normal
+    <house>/{albedo,shading,residual}_<view>.npy
+    filename_list_iid_lighting[_<split>].txt     rgb albedo shading residual
+    <house>/albedo_<view>.png  material_<view>.exr  mask_<view>.png
+    filename_list_iid_appearance[_<split>].txt   rgb albedo material mask
 
 Effects: reads views, writes files.
 """
@@ -23,9 +27,13 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.intrinsic_parts import intrinsic_parts
+from pbrs_farm.images import exr_from_layers, png_from_array
 
-_LISTS: Final = {"depth": "filename_list", "normal": "filename_list_normals"}
+_LISTS: Final = {
+    "depth": "filename_list", "normal": "filename_list_normals",
+    "lighting": "filename_list_iid_lighting", "appearance": "filename_list_iid_appearance",
+}  # fmt: skip
 
 
 def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
@@ -34,9 +42,13 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     A line is a sample, its paths count from the list's folder. Depth is uint16 PNG, mm along the
     axis, 0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up,
     z towards the camera, 0 where there is none; a view without `normal` stands in the list of depth
-    alone. Views without a picture are named in left_out.txt; BadInput where all are.
+    alone. A view with `albedo`, `shading` and `residual` is a sample of light, as Marigold has it of
+    Hypersim: float32 (H, W, 3), linear, none negative. One with `albedo`, `roughness` and `metallic`
+    is a sample of materials, as Marigold has it of InteriorVerse. Views without a picture are named
+    in left_out.txt; BadInput where all are.
     """
     lines: dict[str, list[str]] = {name: [] for name in _LISTS}
+    n_targets = 0  # files of intrinsic samples
     shown = [view for view in views if view.picture is not None]
     if not shown:
         raise BadInput("--to marigold", "", "no view has a picture", hint="run with --modes")
@@ -52,12 +64,48 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             normal = f"{view.house.id}/normal_{view.id}.npy"
             np.save(out / normal, opengl_normals(view))
             lines["normal"].append(f"{rgb} {normal}\n")
+        for name, write in (("lighting", _write_lighting), ("appearance", _write_appearance)):
+            files = write(view, out)
+            if files:
+                lines[name].append(f"{' '.join((rgb, *files))}\n")
+                n_targets += len(files)
     written = {name: own for name, own in lines.items() if own}
     for name, own in written.items():
         (out / f"{_LISTS[name]}.txt").write_text("".join(own))
     without = [view for view in views if view.picture is None]
-    n_files = len(shown) + sum(len(own) for own in lines.values()) + len(written)
+    n_targets += len(lines["depth"]) + len(lines["normal"])
+    n_files = len(shown) + n_targets + len(written)
     return n_files + name_left_out(out, without, "has no picture")
+
+
+def _write_lighting(view: ChosenView, out: Path) -> list[str]:
+    """Write albedo, shading and residual; their paths, [] of a view without."""
+    parts = intrinsic_parts(view)
+    if parts is None:
+        return []
+    files = [f"{view.house.id}/{n}_{view.id}.npy" for n in ("albedo", "shading", "residual")]
+    for file, part in zip(files, parts, strict=True):
+        np.save(out / file, part)
+    return files
+
+
+def _write_appearance(view: ChosenView, out: Path) -> list[str]:
+    """Write albedo (sRGB), material (linear; R roughness, G metallic, B 0) and the mask of what counts."""
+    if not all(view.has(name) for name in ("albedo", "roughness", "metallic", "valid")):
+        return []
+    parts = "albedo_{}.png", "material_{}.exr", "mask_{}.png"
+    files = [f"{view.house.id}/{part.format(view.id)}" for part in parts]
+    (out / files[0]).write_bytes(view.data("albedo"))
+    rough, metallic = (np.float32(1 / 255) * view.array(n) for n in ("roughness", "metallic"))
+    planes = {"R": rough, "G": metallic, "B": np.zeros_like(rough)}
+    (out / files[1]).write_bytes(exr_from_layers(planes, half=True))
+    counts = view.array("valid") > 0
+    for clear in ("glass", "mirror"):
+        if view.has(clear):
+            counts &= view.array(clear) == 0
+    mask = np.where(counts[..., None], np.uint8(255), np.zeros(3, np.uint8))
+    (out / files[2]).write_bytes(png_from_array(mask))
+    return files
 
 
 def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> int:
@@ -75,7 +123,9 @@ FORM = ViewForm(
     write_marigold,
     "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy` (float32, x right, y up,"
     " z towards the camera) and lists of them, `filename_list.txt` (`rgb depth`) and"
-    " `filename_list_normals.txt` (`rgb normal`); with `--split` `train/filename_list_train.txt` and so on",
+    " `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`"
+    " (`rgb albedo shading residual`, float32 npy, linear), with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`"
+    " (`rgb albedo material mask`, sRGB PNG, EXR of roughness and metallic, PNG without glass and mirrors); with `--split` `train/filename_list_train.txt` and so on",
     finish=name_lists_by_split,
     convention=Convention(
         None, has_k=False, axes="camera x right, y up, z backward", depth="mm, along the axis"

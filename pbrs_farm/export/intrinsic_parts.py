@@ -1,0 +1,28 @@
+"""Albedo, shading and residual of a view for forms that hold no negative residual. Effects: reads the view."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
+from pbrs_farm.export.chosen_view import ChosenView
+
+
+def intrinsic_parts(view: ChosenView) -> tuple[F32, F32, F32] | None:
+    """(albedo, shading, residual), (H, W, 3) float32 linear, none of them negative; None without the layers.
+
+    Of the light that the picture shows. Albedo x shading + residual is its radiance. Where albedo x
+    shading alone would be more (a coat that is seen at a slant, an edge within the pixel), shading is
+    less: Marigold's preparation of Hypersim refuses frames with a negative residual.
+    """
+    groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
+    ending = "_outdoor" if groups == (Group.OUTDOOR,) else ""
+    names = "albedo", f"shading{ending}", f"residual{ending}"
+    if not all(view.has(name) for name in names):
+        return None
+    albedo = linear_from_srgb(view.array(names[0]) / 255).astype(np.float32)
+    shading, residual = (np.asarray(view.array(name), np.float32) for name in names[1:])
+    over = np.divide(residual, albedo, out=np.zeros_like(residual), where=albedo > 0)
+    return albedo, np.maximum(shading + np.minimum(over, 0), 0), np.maximum(residual, 0)
