@@ -1,9 +1,10 @@
-"""Forms of export read back, and answers to questions recomputed: `make bench NAME=sets` -> out/bench/sets.json.
+"""Forms of export read back, answers to questions recomputed, a set made four ways: `make bench NAME=sets` -> out/bench/sets.json.
 
 The loaders are those of tests/export, written from each form's documentation: they share nothing with
 the writers. A form is equal where labels differ in no pixel, depth within the form's step, and K and
 poses are the view's own. Questions are of pictures and walks through dressed homes that nobody tunes on;
-benchmarks/question_check.py answers them again from the stored files.
+benchmarks/question_check.py answers them again from the stored files. A set of two homes has the same
+bytes with one process and two, killed in its middle, and of two shards in one folder.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import csv
 import subprocess
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +28,7 @@ UNITS: Final = {
     "sets.forms": "forms of views read back equal by code that shares nothing with the writers",
     "sets.forms_written": "forms of views",
     "sets.forms_wrong": "names of the others",
+    "sets.same_bytes": "1: one set's file gave the same bytes in each of three folders",
     "sets.questions": "questions of pictures and walks",
     "sets.questions_wrong": "of them whose answer a checker that shares no code denies",
     "sets.blind_best": "largest share that one letter or answer gets right of choices of four",
@@ -72,9 +75,70 @@ def main() -> None:
         "sets.forms": len(READ_BACK) - len(wrong),
         "sets.forms_written": len(READ_BACK),
         "sets.forms_wrong": wrong,
+        "sets.same_bytes": int(_is_made_alike()),
         **_questions(),
     }
     write_report("sets", figures, UNITS)
+
+
+_SET: Final = """
+split = "50/25/25"
+[card]
+title = "Two homes"
+[render]
+recipe = "preview"
+dress = "1"
+modes = ["mlt_il_ol", "opengl_dl"]
+layers = ["albedo", "depth_z"]
+set = ["tone.variants=1"]
+[part.views]
+homes = ["builtin", "made:70118"]
+size = "96x72"
+views = 3
+select = ["black", "plane", "cut", "twins"]
+[part.panoramas]
+homes = ["builtin"]
+size = "96x48"
+views = 1
+set = ["lens.model=equirect"]
+[form.coco]
+parts = ["views"]
+[form.hdf5]
+[form.parquet]
+parts = ["views"]
+size = "48x36"
+"""
+
+
+def _is_made_alike() -> bool:
+    """Whether a set has the same bytes made by one process, by two that were killed, and in two shards."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "two-homes.toml")
+        file.write_text(_SET)
+        plain, killed, shards = (Path(folder, name) for name in ("plain", "killed", "shards"))
+        _pbrs_farm("make", str(file), "--out", str(plain))
+        _killed("make", str(file), "--out", str(killed), "--jobs", "2")
+        _pbrs_farm("make", str(file), "--out", str(killed), "--jobs", "2")
+        for shard in ("2/2", "1/2"):
+            _pbrs_farm("make", str(file), "--out", str(shards), "--shard", shard)
+        _pbrs_farm("make", str(file), "--out", str(shards))
+        sums = [(out / "SHA256SUMS").read_bytes() for out in (plain, killed, shards)]
+        checked = [
+            subprocess.run(["sha256sum", "--check", "--quiet", "SHA256SUMS"], cwd=out, check=False)
+            for out in (plain, killed, shards)
+        ]
+    print("   a set of", len(sums[0].splitlines()), "files", flush=True)
+    return len(set(sums)) == 1 and not any(done.returncode for done in checked)
+
+
+def _killed(*words: str) -> None:
+    """Start a command that makes a set, and kill it by SIGKILL once a view is there."""
+    out = Path(words[words.index("--out") + 1])
+    command = [sys.executable, "-m", "pbrs_farm.cli", *words]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        while process.poll() is None and not list(out.glob("parts/*/houses/*/done/view.*")):
+            time.sleep(0.05)
+        process.kill()
 
 
 def _questions() -> dict[str, Any]:
@@ -90,7 +154,7 @@ def _questions() -> dict[str, Any]:
             root, out = Path(folder, name), Path(folder, f"{name}_questions")
             _pbrs_farm(
                 "run", homes, "--dress", "1", "--recipe", "preview", "--size", "320x240",
-                "--modes", "opengl_dl", *how, "--out", str(root),
+                "--modes", "opengl_dl", *how, "--jobs", "2", "--out", str(root),
             )  # fmt: skip
             _pbrs_farm("export", str(root), "--to", "questions", "--out", str(out))
             verdicts = judged_by(finished_entries(root), list(REASONS))

@@ -237,6 +237,12 @@ def normals_of(path: Path) -> Pixels:
     return (array_from_png(path.read_bytes()) // 257).astype(np.uint8)
 
 
+def data_set() -> Image.Image:
+    frames = pf.open("out/indoor-1k/parts/views")
+    pictures = [frames[k].colour for k in range(8)]
+    return rows(row(*pictures[:4]), row(*pictures[4:]))
+
+
 def gpu() -> Image.Image:
     return row(*(pf.open(f"out/spp{n}")[0].colour for n in (4, 32, 256)))
 
@@ -299,7 +305,7 @@ PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
     f.__name__: f
     for f in (
         own_camera, sun_and_hour, night, class_map, stereo, plugin, blenderproc, coco, questions, yolo, hugging_face,
-        predict, train, gpu, simulators, own_furniture, cluster, estimate, resume,
+        predict, train, data_set, gpu, simulators, own_furniture, cluster, estimate, resume,
     )
 }  # fmt: skip
 

@@ -103,6 +103,7 @@ class SubmitRequest(
         "a job.toml as a template: its options, for the homes that are named here",
         metavar="FILE",
     )
+    part: str = option("", "of a data set with several parts: the one to render", metavar="NAME")
     update: bool = option(False, "give the store this recipe")
     dry_run: bool = option(False, "print tasks, hours, storage; do nothing")
     slots: int = option(2, "for --dry-run: tasks at once", least=1)

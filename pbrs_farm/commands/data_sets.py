@@ -1,18 +1,18 @@
-"""Verbs of data sets: make. Effects: those of a run, and the set's folder."""
+"""Verbs of data sets: make, estimate. Effects: those of a run, and the set's folder."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from pbrs_farm.commands.arguments import Verb, counted, echo, warn
+from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
 from pbrs_farm.commands.options import add_options, request_from
 
 SET = "a set that is shipped, indoor-1k, indoor-10k or indoor-60k, or your own FILE.toml (docs/sets.md)"
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add make."""
+    """Add make and estimate."""
     from pbrs_farm.run.request import ProcessLimitOptions
 
     p = verb("make", _make)
@@ -23,6 +23,10 @@ def add_verbs(verb: Verb) -> None:
     add_options(p, ProcessLimitOptions)
     p.add_argument("--json", action="store_true", help="a JSON line per event")
     p.epilog = "example: pbrs-farm make indoor-1k --out out/indoor-1k --jobs 4"
+
+    p = verb("estimate", _estimate)
+    p.add_argument("set", metavar="SET", help=SET)
+    p.add_argument("--json", action="store_true", help="as JSON")
 
 
 def _make(args: argparse.Namespace) -> int:
@@ -73,3 +77,15 @@ def _make(args: argparse.Namespace) -> int:
         done = "" if n_made else ", nothing to do"
         echo(f"{out}: {counted(n_views, 'view')}, SHA256SUMS{done}")
     return 1 if n_lost else 0
+
+
+def _estimate(args: argparse.Namespace) -> int:
+    from pbrs_farm.commands.set_file import set_from_word
+    from pbrs_farm.sets.estimate_set import estimate_set, estimate_text
+
+    estimate = estimate_set(set_from_word(args.set))
+    if args.json:
+        echo_json(estimate.model_dump(mode="json"))
+    else:
+        echo(estimate_text(estimate))
+    return 0

@@ -85,8 +85,8 @@ class FormTable(ExportOptions):
 
 
 def is_set(word: str) -> bool:
-    """Whether a word names a data set: one that is shipped, or a .toml file with parts."""
-    if word in shipped_sets() and not Path(word).exists():
+    """Whether a word names a data set: one that is shipped, whatever lies there, or a .toml file with parts."""
+    if word in shipped_sets():
         return True
     if not word.endswith(_ENDING) or not Path(word).is_file():
         return False
@@ -102,7 +102,7 @@ def set_from_word(word: str) -> DataSet:
 
     Everything in it is checked, and nothing of its homes is read. Raises BadInput with file and place.
     """
-    if word in shipped_sets() and not Path(word).exists():
+    if word in shipped_sets():
         return set_from_bytes((SHIPPED / f"{word}{_ENDING}").read_bytes(), f"{word}{_ENDING}")
     if not word.endswith(_ENDING):
         hint = hint_of_choice(word, shipped_sets())

@@ -36,17 +36,20 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("submit", _submit)
     p.set_defaults(parser=p)
-    text = "files, folders, example homes; or one job.toml that says all (docs/farm.md)"
+    text = "files, folders, example homes; or one job.toml, or data set, that says all (docs/farm.md, docs/sets.md)"
     p.add_argument("homes", nargs="+", metavar="HOME", help=text)
     add_options(p, SubmitRequest)
 
 
 def _submit(args: argparse.Namespace) -> int:
+    from pbrs_farm.commands.set_file import is_set
     from workers.job import SubmitRequest
 
     described = job_like(args.like, args.homes) if args.like else job_file(args.homes)
     if described is not None:
         return _submit_file(args, described)
+    if not args.like and len(args.homes) == 1 and is_set(args.homes[0]):
+        return _submit_set(args)
     _submitted(args, request_from(args, SubmitRequest))
     return 0
 
@@ -130,6 +133,28 @@ def _submit_file(args: argparse.Namespace, job: dict[str, Any]) -> int:
     selected = ["--selection", name] if job.get("select", {}).get("reference") else []
     command = [sys.executable, "-m", "pbrs_farm.cli", "pack", farm.store.url, *selected, *pack]
     return subprocess.run(command, check=False).returncode
+
+
+def _submit_set(args: argparse.Namespace) -> int:
+    """Submit a part of a data set; its forms are written by `make`, of what was pulled."""
+    from pbrs_farm.commands.set_file import options_given, set_from_word
+    from workers.job import SubmitRequest
+
+    data_set = set_from_word(args.homes[0])
+    names = [part.name for part in data_set.parts]
+    if args.part not in names and (args.part or len(names) > 1):
+        text = "no such part" if args.part else "a store holds one recipe, so one part"
+        raise BadInput("--part", args.part, text, hint=f"of {', '.join(names)}")
+    part = next(part for part in data_set.parts if part.name == (args.part or part.name))
+    job = {"homes": list(part.homes), "render": options_given(part)}
+    chosen = submit_arguments(job, args, args.parser, data_set.file)
+    name = _submitted(chosen, request_from(chosen, SubmitRequest))
+    if name and not args.json:
+        echo(
+            f"when it is done: pbrs-farm pull STORE --out OUT/parts/{part.name};"
+            f" with all parts there: pbrs-farm make {args.homes[0]} --out OUT"
+        )
+    return 0
 
 
 def _warn_of_paths(in_place: Sequence[str]) -> None:

@@ -82,7 +82,8 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
     if out.exists() and not out.is_dir():
         raise BadInput(out, "", "is no folder")
     others = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
-    others = [name for name in others if name != _PARTS and not name.startswith(".")]
+    ours = (_PARTS, data_set.file)
+    others = [name for name in others if name not in ours and not name.startswith(".")]
     if others:
         raise BadInput(out, others[0], "is no part of this set", hint="name a new folder")
     FolderStore(out).put(data_set.file, data_set.data)

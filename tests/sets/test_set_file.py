@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
-from pbrs_farm.cli import main
-from pbrs_farm.commands.set_file import is_set, set_from_bytes, set_from_word
+from pbrs_farm.cli import build_parser, main
+from pbrs_farm.commands.arguments import recipe_of
+from pbrs_farm.commands.job_file import submit_arguments
+from pbrs_farm.commands.options import request_from
+from pbrs_farm.commands.set_file import is_set, options_given, set_from_bytes, set_from_word
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares
+from pbrs_farm.run.request import wanted_of
 from pbrs_farm.sets.data_set import shard_from_text, shipped_sets
+from workers.job import SubmitRequest
 
 TEXT = """
 split = "8/1/1"
@@ -116,6 +122,36 @@ def test_a_file_without_parts_is_no_set(tmp_path: Path) -> None:
         BadInput, match=r"indoor-2k: no such set .*indoor-1k.*or your own FILE.toml"
     ):
         set_from_word("indoor-2k")
+
+
+def test_a_part_is_submitted_with_the_recipe_that_make_has(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("celery")
+    file = tmp_path / "rooms.toml"
+    file.write_text(TEXT)
+    p = build_parser("submitting").verbs()["submit"]
+    for part in set_from_word(str(file)).parts:
+        job = {"homes": list(part.homes), "render": options_given(part)}
+        chosen = submit_arguments(job, p.parse_args([str(file)]), p, "rooms.toml")
+        request = request_from(chosen, SubmitRequest)
+        assert recipe_of(request) == part.recipe
+        assert wanted_of(request) == part.want
+    assert main(["submit", str(file), "--dry-run"]) == 1
+    assert (
+        "--part: a store holds one recipe, so one part (of views, walks)" in capsys.readouterr().err
+    )
+    assert main(["submit", str(file), "--part", "views", "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["houses"], told["views"]) == (12, 36)
+
+
+def test_a_shipped_set_is_found_beside_a_folder_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "indoor-1k").mkdir()
+    assert set_from_word("indoor-1k").name == "indoor-1k"
 
 
 VIEWS = {"indoor-1k": 1_000, "indoor-10k": 10_000, "indoor-60k": 60_000}

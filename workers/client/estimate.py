@@ -1,7 +1,6 @@
 """What a job will cost before it runs: tasks, hours, storage; pure.
 
-The constants were measured on the example homes on two cores; they are
-there to distinguish an hour from a month, not to be right to ten per cent.
+By the constants of pbrs_farm/run/costs.csv: they distinguish an hour from a month.
 """
 
 from __future__ import annotations
@@ -10,15 +9,11 @@ import math
 from typing import Final
 
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.run.costs import cost_of_run, measured, megasamples, views_per_house
 from workers.job import JobSpec
 from workers.node.view_batches import TARGET_S
 
-# 779,342 views of 45,622 houses, the paper's own count.
-VIEWS_PER_HOUSE: Final = 17.1
-_SECONDS_PER_MEGASAMPLE: Final = 0.6  # of light
-_LABELS_S: Final = 1.0  # and OpenGL, a view
-_HOUSE_S: Final = 60.0  # repair and cameras, a house
-_BYTES_PER_PIXEL: Final = {"light": 22.0, "labels": 4.0}
+_CPUS_PER_SLOT: Final = 2
 
 
 def seconds_per_view(recipe: Recipe) -> float:
@@ -27,12 +22,7 @@ def seconds_per_view(recipe: Recipe) -> float:
     From the samples a pixel and the picture's size alone, never less than 1 s. What a scene costs,
     how dark it is, and GPUs are not in it: the farm measures its own rates once a job runs.
     """
-    light = recipe.light
-    # Outdoor and indoor light: two samples where the recipe says one.
-    is_path = light.integrator == "path"
-    per_pixel = light.spp if is_path else light.direct_spp + light.mutations_per_pixel
-    megasamples = 2 * per_pixel * recipe.image.width_px * recipe.image.height_px / 1e6
-    return max(1.0, _SECONDS_PER_MEGASAMPLE * megasamples)
+    return max(1.0, measured()["light_cpu_s"] * megasamples(recipe) / _CPUS_PER_SLOT)
 
 
 def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
@@ -42,25 +32,17 @@ def estimate(spec: JobSpec, n_slots: int) -> dict[str, float | int | str]:
     "storage_gb" are gigabytes (10^9) of all outputs. A guess before anything was rendered: once the
     job runs, `Farm.status` has measured rates.
     """
-    # Expect as many views a house as the paper had, or as were asked for.
-    per_house = min(spec.n_views, VIEWS_PER_HOUSE) if spec.n_views else VIEWS_PER_HOUSE
-    n_views = round(spec.n_houses * per_house)
+    cost = cost_of_run(spec.recipe, spec, spec.n_houses)
     per_batch = max(1.0, TARGET_S / spec.seconds_per_view)
-    n_batches = spec.n_houses * math.ceil(per_house / per_batch)
-    # geometry and reduce a house, then each stage of each batch.
-    n_tasks = 2 * spec.n_houses + n_batches * len(spec.batch_stages)
-    # Sum the time of houses and views, then their pixels.
-    has_light = "light" in spec.batch_stages
-    seconds_per_view = _LABELS_S + (spec.seconds_per_view if has_light else 0.0)
-    seconds = spec.n_houses * _HOUSE_S + n_views * seconds_per_view
-    n_pixels = spec.recipe.image.width_px * spec.recipe.image.height_px
-    per_pixel = _BYTES_PER_PIXEL["labels"] + (_BYTES_PER_PIXEL["light"] if has_light else 0.0)
+    n_batches = spec.n_houses * math.ceil(views_per_house(spec.recipe, spec) / per_batch)
+    slot_hours = cost.cpu_s / _CPUS_PER_SLOT / 3600
     return {
         "job": spec.job_id,
         "houses": spec.n_houses,
-        "views": n_views,
-        "tasks": n_tasks,
-        "slot_hours": round(seconds / 3600, 2),
-        "hours": round(seconds / 3600 / max(1, n_slots), 2),
-        "storage_gb": round(n_views * n_pixels * per_pixel / 1e9, 2),
+        "views": cost.n_views,
+        # geometry and reduce a house, then each stage of each batch.
+        "tasks": 2 * spec.n_houses + n_batches * len(spec.batch_stages),
+        "slot_hours": round(slot_hours, 2),
+        "hours": round(slot_hours / max(1, n_slots), 2),
+        "storage_gb": round(cost.n_bytes / 1e9, 2),
     }

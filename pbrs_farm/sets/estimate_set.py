@@ -1,0 +1,177 @@
+"""What a set costs before it is made: hours, bytes, and dollars on clouds by a table of prices. No effects.
+
+prices.csv has a row a price, with source and date. A cloud is its rows; a further one needs no code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import date
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field
+
+from pbrs_farm.core.record import Record, read_csv
+from pbrs_farm.core.table import Table
+from pbrs_farm.run.costs import RunCost, cost_of_run, measured, megapixels
+from pbrs_farm.sets.data_set import DataSet
+
+PriceName = Literal[
+    "cpu_hour", "cpu_hour_spot", "gpu_hour", "gpu_hour_spot", "gb_month", "put_1000"
+]
+_HOUR_S: Final = 3600.0
+
+
+class Price(Record):
+    """A price of a cloud: dollars of the unit that `what` names."""
+
+    cloud: str
+    what: PriceName
+    usd: Annotated[float, Field(gt=0)]
+    of: str  # machine, region
+    source: str
+    date: date
+
+
+@cache
+def prices() -> Mapping[str, Mapping[PriceName, Price]]:
+    """Cloud -> what -> its price, in the table's order.
+
+    >>> {"cpu_hour", "gb_month"} <= set(prices()["AWS"])
+    True
+    """
+    found: dict[str, dict[PriceName, Price]] = {}
+    for row in read_csv(Path(__file__).with_name("prices.csv"), Price):
+        found.setdefault(row.cloud, {})[row.what] = row
+    return found
+
+
+class CloudCost(Record):
+    """What a set costs on a cloud, in US dollars; None where a price is not known.
+
+    on_demand, spot: of the CPU alone. gpu, gpu_spot: light on an H100, the rest on the CPU.
+    """
+
+    cloud: str
+    on_demand: float | None
+    spot: float | None
+    gpu: float | None
+    gpu_spot: float | None
+    storage_a_month: float | None
+    writing: float | None
+    read_on: str  # the oldest date of its prices
+
+
+class SetEstimate(Record):
+    """What making a set takes: all parts and forms together, then by part, then in dollars."""
+
+    name: str
+    houses: int
+    views: int
+    cpu_hours: float
+    gpu_hours: float  # of light, if it is traced on an H100
+    cpu_hours_beside_gpu: float
+    gigabytes: float  # 10^9 bytes
+    files: int  # of the parts
+    parts: Mapping[str, Mapping[str, int | float]]
+    clouds: tuple[CloudCost, ...]
+
+
+def estimate_set(data_set: DataSet) -> SetEstimate:
+    """What a set costs, by run/costs.csv and prices.csv.
+
+    Views that rules leave out are made and counted. Forms cost no CPU time here: seconds a view at most.
+    """
+    costs = {p.name: cost_of_run(p.recipe, p.want, p.n_houses) for p in data_set.parts}
+    whole = sum(costs.values(), RunCost())
+    n_bytes = whole.n_bytes + _form_bytes(data_set, costs)
+    parts = {
+        name: {
+            "houses": cost.n_houses,
+            "views": cost.n_views,
+            "cpu_hours": round(cost.cpu_s / _HOUR_S, 2),
+            "gigabytes": round(cost.n_bytes / 1e9, 2),
+        }
+        for name, cost in costs.items()
+    }
+    return SetEstimate(
+        name=data_set.name,
+        houses=whole.n_houses,
+        views=whole.n_views,
+        cpu_hours=round(whole.cpu_s / _HOUR_S, 2),
+        gpu_hours=round(whole.gpu_s / _HOUR_S, 2),
+        cpu_hours_beside_gpu=round(whole.cpu_beside_gpu_s / _HOUR_S, 2),
+        gigabytes=round(n_bytes / 1e9, 2),
+        files=round(whole.n_files),
+        parts=parts,
+        clouds=tuple(_on_cloud(name, of, whole, n_bytes) for name, of in prices().items()),
+    )
+
+
+def _form_bytes(data_set: DataSet, costs: Mapping[str, RunCost]) -> float:
+    pixels = {part.name: megapixels(part.recipe) * 1e6 for part in data_set.parts}
+    total = 0.0
+    for form in data_set.forms:
+        size = form.choice.size or (form.packing.size if form.packing else None)
+        for part in form.parts:
+            n_pixels = size[0] * size[1] if size else pixels[part]
+            total += costs[part].n_views * n_pixels * measured()["form_bytes"]
+    return total
+
+
+def _on_cloud(
+    name: str, of: Mapping[PriceName, Price], whole: RunCost, n_bytes: float
+) -> CloudCost:
+    def usd(*amounts: tuple[PriceName, float]) -> float | None:
+        if any(what not in of for what, _amount in amounts):
+            return None
+        return round(sum(of[what].usd * amount for what, amount in amounts), 2)
+
+    cpu, gpu, beside = (s / _HOUR_S for s in (whole.cpu_s, whole.gpu_s, whole.cpu_beside_gpu_s))
+    return CloudCost(
+        cloud=name,
+        on_demand=usd(("cpu_hour", cpu)),
+        spot=usd(("cpu_hour_spot", cpu)),
+        gpu=usd(("gpu_hour", gpu), ("cpu_hour", beside)),
+        gpu_spot=usd(("gpu_hour_spot", gpu), ("cpu_hour_spot", beside)),
+        storage_a_month=usd(("gb_month", n_bytes / 1e9)),
+        writing=usd(("put_1000", whole.n_files / 1000)),
+        read_on=min(price.date for price in of.values()).isoformat(),
+    )
+
+
+def estimate_text(estimate: SetEstimate) -> str:
+    """An estimate for people: a line a part, the sum, a line a cloud, what the table does not know as "-"."""
+    e = estimate
+    sizes = ("part", "houses", "views", "CPU hours", "GB")
+    rows = [(name, *p.values()) for name, p in e.parts.items()]
+    rows += [("all, with forms", e.houses, e.views, e.cpu_hours, e.gigabytes)]
+    costs = (
+        "US dollars",
+        "on demand",
+        "spot",
+        "with H100",
+        "with H100, spot",
+        "a month stored",
+        "written",
+        "read on",
+    )
+    on_clouds = [
+        (c.cloud, c.on_demand, c.spot, c.gpu, c.gpu_spot, c.storage_a_month, c.writing, c.read_on)
+        for c in e.clouds
+    ]
+    light = f"With light on an H100: {e.gpu_hours:,} GPU hours and {e.cpu_hours_beside_gpu:,} CPU hours."
+    return "\n".join([_text_of(sizes, rows), light, "", _text_of(costs, on_clouds)])
+
+
+def _text_of(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    shown = [
+        [
+            f"{v:,.2f}" if isinstance(v, float) else f"{v:,}" if isinstance(v, int) else v
+            for v in row
+        ]
+        for row in rows
+    ]
+    return repr(Table(columns, [dict(zip(columns, row, strict=True)) for row in shown]))
