@@ -14,8 +14,8 @@ from tests.check.roots import SIZE, make_root
 def run(*words: str) -> int:
     verbs = argparse.ArgumentParser().add_subparsers()
 
-    def verb(name, handler, text):  # type: ignore[no-untyped-def]
-        p = verbs.add_parser(name, help=text)
+    def verb(name, handler):  # type: ignore[no-untyped-def]
+        p = verbs.add_parser(name, help=name)
         p.set_defaults(handler=handler)
         return p
 

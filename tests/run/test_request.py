@@ -44,7 +44,7 @@ from workers.job import JobSpec, SubmitRequest
 
 parsers = {}
 
-def verb(name, handler, text):
+def verb(name, handler):
     return parsers.setdefault(name, argparse.ArgumentParser(name))
 
 making.add_verbs(verb)
