@@ -22,7 +22,7 @@ _CLEAR: Final = ("mirror", "glass", "pane")  # kinds without roughness
 _MAPPED: Final = ("opaque", "shade")  # kinds whose roughness map shows
 _LEAST_ALPHA: Final = 0.05
 _DIELECTRIC: Final = 0.04  # of index 1.5, at right angles
-_LEAST_METAL: Final = 0.06  # luminance of Ks
+_LEAST_METAL: Final = 0.2  # luminance of Ks
 _WHITEST: Final = 0.9  # of Kd beside Ks
 
 
