@@ -1,4 +1,4 @@
-"""Forms of export read back, answers to questions recomputed, a set made four ways: `make bench NAME=sets` -> out/bench/sets.json.
+"""Forms of export read back, light summed again, answers recomputed, a set made four ways: `make bench NAME=sets` -> out/bench/sets.json.
 
 The loaders are those of tests/export, written from each form's documentation: they share nothing with
 the writers. A form is equal where labels differ in no pixel, depth within the form's step, and K and
@@ -20,6 +20,7 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
+from benchmarks.intrinsic_check import intrinsic_errors
 from benchmarks.question_check import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
@@ -29,12 +30,14 @@ UNITS: Final = {
     "sets.forms_written": "forms of views",
     "sets.forms_wrong": "names of the others",
     "sets.same_bytes": "1: one set's file gave the same bytes in each of three folders",
+    "sets.intrinsic_error": "largest median of the error of albedo x shading + residual over the light, by light group and in Hypersim's layout",
     "sets.questions": "questions of pictures and walks",
     "sets.questions_wrong": "of them whose answer a checker that shares no code denies",
     "sets.blind_best": "largest share that one letter or answer gets right of choices of four",
     "sets.blind": "score of the best blind answer, by type",
     "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
 }
+_LIT: Final = "made:70118..70119"
 _PICTURES: Final = "made:70101..70114"
 _WALKS: Final = "made:70115..70117"
 _CHOICES_OF_FOUR: Final = (
@@ -76,6 +79,7 @@ def main() -> None:
         "sets.forms_written": len(READ_BACK),
         "sets.forms_wrong": wrong,
         "sets.same_bytes": int(_is_made_alike()),
+        "sets.intrinsic_error": _intrinsic_error(),
         **_questions(),
     }
     write_report("sets", figures, UNITS)
@@ -139,6 +143,21 @@ def _killed(*words: str) -> None:
         while process.poll() is None and not list(out.glob("parts/*/houses/*/done/view.*")):
             time.sleep(0.05)
         process.kill()
+
+
+def _intrinsic_error() -> float:
+    """Of small views of two dressed homes by day, with their lamps lit."""
+    with tempfile.TemporaryDirectory() as folder:
+        root, out = Path(folder, "lit"), Path(folder, "hypersim")
+        _pbrs_farm(
+            "run", _LIT, "--dress", "1", "--recipe", "preview", "--size", "160x120",
+            "--modes", "mlt_ol", "mlt_il_ol", "--views", "2", "--out", str(root),
+            "--layers", "residual", "residual_outdoor", "residual_indoor",
+        )  # fmt: skip
+        _pbrs_farm("export", str(root), "--to", "hypersim", "--out", str(out))
+        errors = intrinsic_errors(root, out)
+    print(*(f"   {error:.1e} {name}" for name, error in errors.items()), sep="\n", flush=True)
+    return max(errors.values())
 
 
 def _questions() -> dict[str, Any]:

@@ -265,8 +265,16 @@ def stored_light(
     planes = {g: np.stack([channels[n] for n in row], axis=-1) for g, row in names.items()}
     if is_halved:
         planes = {g: _halved(plane) for g, plane in planes.items()}
+    return denoised_light(view, planes, tally)
+
+
+def denoised_light(
+    view: StoredView, planes: dict[str, NDArray[np.float32]], tally: Tally
+) -> dict[str, NDArray[np.float32]] | None:
+    """The planes outdoor, indoor, albedo and normal, light denoised where the recipe says; None if it cannot be."""
     if view.recipe is None or not view.recipe.light.denoise:
         return planes
+    planes = dict(planes)
     try:
         pyoidn = _pyoidn()
     except ImportError:

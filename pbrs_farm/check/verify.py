@@ -203,7 +203,9 @@ def _check_view(
         check_developed(view, channels, arrays, tally, is_halved=is_halved)
         pixels = _chosen(view, SAMPLE)
         check_guides(view, channels, pixels, arrays, scenes.all, scenes.house, tally)
-        check_intrinsic(view, channels, arrays, scenes.all, tally, denoise=not is_halved)
+        check_intrinsic(
+            view, channels, arrays, scenes.lit, scenes.all[1], tally, denoise=not is_halved
+        )
         check_fit(view, channels, bright_pixels(arrays["instance"], scenes.house), tally)
         check_lit(view, channels, arrays, scenes.lit, scenes.all[1], tally)
     check_edges(view, arrays, tally)

@@ -166,9 +166,9 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
     recipe = recipe_of(args)
     want = wanted_of(request)
     if want.layers:
-        from pbrs_farm.truth.optional_layers import check_lens
+        from pbrs_farm.run.plan import check_layers
 
-        check_lens(want.layers, recipe.lens.lens)
+        check_layers(want, recipe)
     if recipe.cameras.source in ("file", "trajectory"):
         from pbrs_farm.run.chosen_cameras import check_camera_file
 

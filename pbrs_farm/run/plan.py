@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from pbrs_farm.core import keys
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import LIGHT_LAYERS
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare import passes
@@ -68,6 +70,17 @@ def wanted(
     """What is made, from words: no modes are all of them. BadInput for a word that is none of ours."""
     asked = tuple(modes) or ALL_MODES
     return wanted_of(Wanted(modes=asked, layers=tuple(layers), n_views=n_views, pairs=pairs))
+
+
+def check_layers(want: Wanted, recipe: Recipe) -> None:
+    """Raise BadInput for a layer that views under a recipe cannot have, before anything is rendered."""
+    from pbrs_farm.truth.optional_layers import check_lens
+
+    check_lens(want.layers, recipe.lens.lens)
+    of_light = [name for name in want.layers if name in LIGHT_LAYERS]
+    if of_light and recipe.light.integrator != "path":
+        text = f"is made of light by `path`, the recipe has {recipe.light.integrator}"
+        raise BadInput("--layers", of_light[0], text, hint="--set light.integrator=path")
 
 
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from pbrs_farm.check import verify
-from pbrs_farm.core.layers import LAYERS, MOST_VARIANTS
+from pbrs_farm.core import layers
+from pbrs_farm.core.layers import LAYER, LAYERS, MOST_VARIANTS
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.images import array_from_png, layers_from_exr
 from pbrs_farm.run.local import run_local
@@ -19,7 +20,7 @@ from pbrs_farm.run.local_run import Run, Summary
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.transport.scene_tables.sky import clear_sky_lx
 
-OPTIONAL = [x.name for x in LAYERS if x.optional and x.step == "truth" and not x.partner]
+OPTIONAL = [name for name in layers.OPTIONAL if not LAYER[name].partner]
 ALONE = [x for x in LAYERS if not x.partner]  # what a view has without a partner
 
 
