@@ -57,6 +57,7 @@ OWN_TARGET: Final = {
     "docs": "docs_figures",
     "release": "release",
     "startup": "startup",
+    "anywhere": "anywhere",
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -195,7 +196,7 @@ def _warn_of_slowness() -> None:
     """Warn where only Mitsuba's scalar variant is left, and before kernels are compiled."""
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm
 
-    is_first = not any((Path.home() / ".drjit").glob("*"))
+    is_first = not any(Path(os.environ.get("HOME", "/"), ".drjit").glob("*"))
     if is_first and sys.stderr.isatty():
         warn("the first run on this machine compiles what renders: ten seconds more, once")
     if find_llvm() is None and not Path("/proc/driver/nvidia").exists():

@@ -539,7 +539,9 @@ class Home:
     def sketches(
         self, cameras: Sequence[Camera | Viewpoint], edge_px: Edge = 160
     ) -> list[NDArray[np.uint8]]:
-        """A small OpenGL picture (H, W, 3) sRGB from each camera, edge_px along its longer edge.
+        """A small quick picture (H, W, 3) sRGB from each camera, edge_px along its longer edge.
+
+        By OpenGL; where the machine has none, its diffuse colours by rays.
 
         >>> home.sketches([camera], edge_px=32)[0].shape
         (24, 32, 3)

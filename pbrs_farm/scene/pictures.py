@@ -240,5 +240,7 @@ def _warn_of(summary: Summary) -> None:
     for what, message, command in summary.failures:
         again = f"; again by: {command}" if command else ""
         warn_caller(f"{what}: {message}{again}")
+    for step, why in summary.lacking.items():
+        warn_caller(f"{step} left out: {why}")
     for house, why in summary.without_views:
         warn_caller(f"{house}: no view: {why}")

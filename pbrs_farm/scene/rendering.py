@@ -102,7 +102,7 @@ class Renderer:
     ) -> list[NDArray[np.uint8]]:
         """An OpenGL-DL picture (H, W, 3) of each camera, at its own size; nothing is stored.
 
-        uint8 sRGB. Quick, for aiming cameras: no light is traced and no labels are made. The house
+        uint8 sRGB; without OpenGL the diffuse colours, darker where a surface turns away. Quick, for aiming cameras: no light is traced and no labels are made. The house
         is prepared first, where that was not done.
         """
         return self.call(lambda: self._sketches(source, recipe, cameras))
@@ -208,8 +208,11 @@ class Renderer:
     def _sketches(
         self, source: SourceRef, recipe: Recipe, cameras: Sequence[Camera]
     ) -> list[NDArray[np.uint8]]:
-        work = self._with_house(source, recipe)
-        rasterizer = self._cached(work).rasterizer
+        cached = self._cached(self._with_house(source, recipe))
+        try:
+            rasterizer = cached.rasterizer
+        except MachineFailed:
+            return [_sketch_by_rays(cached, camera) for camera in cameras]
         return [rasterizer.render_dl(camera) for camera in cameras]
 
     def _frames(
@@ -260,6 +263,20 @@ class Renderer:
         data = cameras_json(found, {"source": "given", "n_views": len(found)})
         run_unless_done("cameras", work, lambda _work: StepOutput({"cameras.json": data}, facts))
         self._cached(work).forget_views()
+
+
+def _sketch_by_rays(cached: CachedHouse, camera: Camera) -> NDArray[np.uint8]:
+    """(H, W, 3) uint8: diffuse colours as a lamp at the camera shows them, half as bright edge-on."""
+    from pbrs_farm.transport.scene_tables.material_rows import max_albedo
+    from pbrs_farm.truth.surface_layers import albedo_label
+
+    hit = cached.caster.hit_record(camera)
+    most = max_albedo(cached.recipe)
+    albedo = albedo_label(hit, cached.house, cached.geometry, cached.textures, most)
+    _origin, directions = camera.rays()
+    rays = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+    facing = np.abs((rays * hit.geo_normal_world).sum(-1, keepdims=True))
+    return np.asarray(np.rint(albedo * (0.5 + 0.5 * np.nan_to_num(facing))), np.uint8)
 
 
 def _copy_steps(of: Store, to: Store, house: str, view: str, steps: Iterable[str]) -> None:

@@ -110,7 +110,7 @@ class Viewpoints(Sequence[Viewpoint]):
         return repr(self.table)
 
     def _repr_html_(self) -> str:
-        """The home's plan with them on it, and small OpenGL pictures of at most MOST_SHOWN."""
+        """The home's plan with them on it, and small pictures of at most MOST_SHOWN."""
         if self.home is None or not self:
             return self.table._repr_html_()
         some = self._viewpoints[:MOST_SHOWN]
@@ -121,7 +121,7 @@ class Viewpoints(Sequence[Viewpoint]):
                 for one, rgb in zip(some, pictures, strict=True)
             )
         except PbrsError as error:
-            # A machine without OpenGL shows where they are.
+            # A machine that cannot draw them shows where they are.
             cells = f"<p>{html.escape(str(error))}</p>"
         left = len(self) - len(some)
         more = f"<p>... and {left} more</p>" if left else ""

@@ -9,8 +9,11 @@ from typing import Any
 
 import pytest
 
+from benchmarks.bare_machine import BareMachine, built_wheel, can_be_made
+
 REPO = Path(__file__).parents[2]
 NOTEBOOKS = sorted((REPO / "docs/notebooks").glob("*.ipynb"))
+PIP = '%pip install -q "pbrs-farm[llvm]"'
 
 
 def cells(notebook: Path) -> list[dict[str, Any]]:
@@ -21,9 +24,10 @@ def cells(notebook: Path) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_small_explains_itself_and_holds_no_output(notebook: Path) -> None:
     found = cells(notebook)
-    assert 8 <= len(found) <= 15
+    assert 8 <= len(found) <= 16
     assert sum(cell["cell_type"] == "markdown" for cell in found) >= 4
     assert "".join(found[0]["source"]).startswith("# ")
+    assert "".join(found[1]["source"]) == PIP
     for cell in found:
         assert not cell.get("outputs")
         assert cell.get("execution_count") is None
@@ -51,9 +55,26 @@ def test_a_notebook_runs_to_its_end(
     monkeypatch.setenv("PYTHONPATH", str(REPO))
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
     book = nbformat.read(notebook, as_version=4)
+    # This environment has the package already.
+    book.cells = [cell for cell in book.cells if cell.source != PIP]
     here = {"metadata": {"path": str(tmp_path)}}
     NotebookClient(book, timeout=170, kernel_name="python3", resources=here).execute()
     outputs = [output for cell in book.cells for output in cell.get("outputs", ())]
     assert not [o for o in outputs if o.get("name") == "stderr"]
     shown = [o["data"] for o in outputs if "data" in o]
     assert any("<svg" in d.get("text/html", "") or "image/png" in d for d in shown)
+
+
+@pytest.mark.notebooks
+def test_the_notebooks_run_by_pip_alone_without_root_llvm_or_opengl(tmp_path: Path) -> None:
+    if not can_be_made():
+        pytest.skip("hiding the system's libraries needs unshare, and root or user namespaces")
+    bare = BareMachine(tmp_path)
+    variables = {"PIP_FIND_LINKS": str(built_wheel(tmp_path).parent)}
+    python = bare.environment("env")
+    bare.run([python, "-m", "pip", "install", "-q", "nbclient", "ipykernel"]).check_returncode()
+    for notebook in NOTEBOOKS:
+        # The first one's own cell installs the package.
+        shown = bare.notebook(python, notebook, variables)
+        assert not [line for line in shown if line.startswith("error")], notebook.stem
+        assert {"image/png", "text/html"} & set(shown), notebook.stem

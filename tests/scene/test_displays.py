@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
 import pbrs_farm as pf
@@ -59,6 +60,27 @@ def test_viewpoints_show_what_is_seen_from_them(home: pf.Home) -> None:
     assert cameras[:1]._repr_html_().count("<img") == 1
     assert home.sketches([cameras[0]], 80)[0].shape == (60, 80, 3)
     assert len(home.cameras_around("sofa", n=1, min_visible=0.1)._repr_html_()) > 1000
+
+
+def test_a_machine_without_opengl_sketches_diffuse_colours_by_rays(
+    home: pf.Home, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pbrs_farm.run.house_cache import CachedHouse
+
+    def fail(_self: object) -> None:
+        raise MachineFailed("no OpenGL here")
+
+    camera = home.cameras(n=1)[0]
+    monkeypatch.setattr(CachedHouse, "rasterizer", property(fail))
+    sketch = home.sketches([camera], 80)[0]
+    frame = pf.render(home, camera, modes=[], layers=["albedo"], size=(80, 60))
+    albedo = frame.layer("albedo").astype(float)
+    assert (sketch <= albedo).all()
+    assert (sketch >= albedo // 2).all()
+    # What faces the camera keeps its colour: there normal and ray are one line.
+    share = -frame.normal[..., 2]
+    faces = (share > 0.99)[15:45, 20:60]
+    assert np.abs(sketch - albedo)[15:45, 20:60][faces].max(initial=0) < 12
 
 
 def test_viewpoints_show_where_they_are_without_opengl(

@@ -1,0 +1,133 @@
+"""Where it runs: pip alone, as on a university machine (bare_machine.py), from an empty environment to labelled pictures.
+
+Effects: builds the wheel, asks the package index, renders, and writes out/bench/anywhere.json. A figure is a
+part below with its unit; `python -m benchmarks.anywhere PART` measures that one alone and keeps the others.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks import startup
+from benchmarks.bare_machine import REPO, BareMachine, built_wheel, can_be_made
+from benchmarks.figures import FOLDER, write_report
+
+UNITS: Final = startup.UNITS | {
+    "anywhere.pip_only": "1: the wheel with the extra llvm renders the demo, verifies it and runs a notebook on a bare machine",
+    "anywhere.demo": "1: its demo, a dressed home of six views, ends with 0, and a sheet",
+    "anywhere.verify": "1: its certificate is clean",
+    "anywhere.notebook": "1: docs/notebooks/first_picture.ipynb, its pip cell among it, runs to its end there",
+    "anywhere.llvm": "version of LLVM that rendered there",
+    "anywhere.first_picture_s": "s from an empty environment to the first picture there: pip with a warm cache, then one view",
+    "anywhere.install_s": "s of that for pip",
+    "anywhere.installed_mb": "MB of that environment",
+}
+NOTEBOOK: Final = REPO / "docs/notebooks/first_picture.ipynb"
+
+
+class Bare:
+    """A bare machine with the wheel, and an environment in which it was installed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.machine = BareMachine(folder)
+        self.wheel = built_wheel(folder)
+        self.installed_s = 0.0
+
+    @cached_property
+    def variables(self) -> dict[str, str]:
+        """Where commands find what was fetched, and the wheel for who asks pip for the package's name."""
+        return self.machine.seed_cache() | {
+            "PIP_FIND_LINKS": str(self.wheel.parent), "PIP_CACHE_DIR": str(self.machine.folder / "pip"),
+        }  # fmt: skip
+
+    @cached_property
+    def python(self) -> Path:
+        """Its Python, once pip has installed the wheel twice: to fill pip's cache, and by the clock."""
+        install = ["-m", "pip", "install", "--quiet", f"{self.wheel}[llvm]"]
+        apart = self.machine.environment("apart")
+        self.machine.run([apart, *install], self.variables).check_returncode()
+        shutil.rmtree(apart.parents[1])
+        began = time.monotonic()
+        python = self.machine.environment("env")
+        self.machine.run([python, *install], self.variables).check_returncode()
+        self.installed_s = time.monotonic() - began
+        return python
+
+    def program(self, *words: str) -> bool:
+        """Whether a command of pbrs-farm ends with 0."""
+        command = [self.python.parent / "pbrs-farm", *words]
+        return self.machine.run(command, self.variables).returncode == 0
+
+
+def pip_only(bare: Bare) -> dict[str, Any]:
+    """Demo, certificate and notebook without root, LLVM, OpenGL, libatomic or apt of the system."""
+    folder = bare.machine.folder
+    demo = bare.program("demo", "--out", "demo") and (folder / "demo/sheet.png").is_file()
+    verify = demo and bare.program("verify", "demo")
+    markers = folder.glob("demo/houses/*/done/light.*.json")
+    compiled = {json.loads(p.read_text())["facts"].get("llvm", "") for p in markers}
+    packages = ["-m", "pip", "install", "--quiet", "nbclient", "ipykernel"]
+    bare.machine.run([bare.python, *packages], bare.variables).check_returncode()
+    shown = bare.machine.notebook(bare.python, NOTEBOOK, bare.variables)
+    notebook = "image/png" in shown and not [line for line in shown if line.startswith("error")]
+    return {
+        "anywhere.pip_only": int(demo and verify and notebook),
+        "anywhere.demo": int(demo),
+        "anywhere.verify": int(verify),
+        "anywhere.notebook": int(notebook),
+        "anywhere.llvm": ", ".join(sorted(compiled)),
+    }
+
+
+def first_picture(bare: Bare) -> dict[str, Any]:
+    """From nothing to a picture: the environment, then the built-in home, its kernels compiled first."""
+    python = bare.python
+    files = [p for p in python.parents[1].rglob("*") if p.is_file() and not p.is_symlink()]
+    n_bytes = sum(p.stat().st_size for p in files)
+    began = time.monotonic()
+    is_made = bare.program("demo", "--home", "builtin", "--bare", "--views", "1", "--out", "first")
+    seconds = time.monotonic() - began + bare.installed_s
+    return {
+        "anywhere.first_picture_s": round(seconds, 1) if is_made else -1.0,
+        "anywhere.install_s": round(bare.installed_s, 1),
+        "anywhere.installed_mb": round(n_bytes / 1e6),
+    }
+
+
+def first_minute(_bare: Bare) -> dict[str, Any]:
+    """What startup.py measures, of this checkout."""
+    return startup.startup_figures([sys.executable])
+
+
+# The first picture comes first: its kernels are not compiled yet.
+PARTS: Final[dict[str, Callable[[Bare], dict[str, Any]]]] = {
+    "first_picture": first_picture, "pip_only": pip_only, "startup": first_minute,
+}  # fmt: skip
+"""What is measured, by name; each gives figures of UNITS."""
+
+
+def main(names: Sequence[str] = ()) -> None:
+    """Measure the parts named, or all, and write out/bench/anywhere.json; figures of other parts stay."""
+    if not can_be_made():
+        raise SystemExit(
+            "anywhere: a bare machine needs Linux, unshare and setpriv, and root or user namespaces"
+        )
+    former = FOLDER / "anywhere.json"
+    figures = json.loads(former.read_text())["figures"] if names and former.is_file() else {}
+    with tempfile.TemporaryDirectory(prefix="pbrs-farm-") as name:
+        bare = Bare(Path(name))
+        for part in names or PARTS:
+            figures |= PARTS[part](bare)
+    write_report("anywhere", figures, UNITS)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
