@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo check check-fast test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo check check-fast test test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-light bench-light-tables bench-cycles bench-farm dist image docs format clean
 
 # $(call extra,MODULES,NAME): installs an extra of ours where one of its modules is missing. A command with commas
 # stands in a define or in a variable of its own: in $(if ...) and $(call ...) a comma ends the argument.
@@ -91,6 +91,9 @@ test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a k
 test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL
 	$(BIN)/python -m tests.cuda_on_cpu $(BIN)/pytest -m gpu -k "not opengl" tests/transport tests/workers
+
+gpu-check: ## what an NVIDIA GPU does here, end to end: out/bench/gpu_tests.txt, gpu.json; NAME=tests or NAME=views for one of two calls below 285 s
+	@bash scripts/gpu_check.sh $(if $(NAME),--only $(NAME))
 
 bench: setup ## the short benches, under 25 minutes; NAME=hostile, or any of `python -m benchmarks --list`, for one
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))

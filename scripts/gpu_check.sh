@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# From a bare machine with an NVIDIA driver to a table of what it does here: every test marked gpu, then views
-# an hour. Writes out/bench/gpu_tests.txt and out/bench/gpu.json, and copies them into $OUT where that is set.
+# From a bare machine with an NVIDIA driver to a table of what it does here: every test marked gpu, then light,
+# denoiser, OpenGL, two slots on a card, a home of 4 million triangles and the study's trainer (where torch is). Writes
+# out/bench/gpu_tests.txt and out/bench/gpu.json, and copies them into $OUT where that is set.
 #
 #   scripts/gpu_check.sh                            fetches the libraries with pip
 #   scripts/gpu_check.sh FOLDER                     takes them from a folder: no network, no pip, no xz
@@ -80,8 +81,8 @@ if [ -z "$python" ]; then
 fi
 
 # The driver first: without it everything below would run on the CPU and say nothing.
-nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader ||
-  fail 1 "no NVIDIA driver here (nvidia-smi fails)"
+nvidia-smi --query-gpu=name,driver_version,memory.total --format=csv,noheader 2>/dev/null ||
+  fail 1 "no NVIDIA GPU here: nvidia-smi is missing or finds none; make test-cuda checks the kernels without one"
 for library in libnvoptix.so.1 libGL.so.1 libEGL.so.1 libEGL_nvidia.so.0; do
   ldconfig -p | grep -q "$library" || echo "gpu_check: no $library here: light needs libnvoptix, OpenGL the others (Debian: libgl1 libegl1)" >&2
 done

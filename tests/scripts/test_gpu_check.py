@@ -82,3 +82,12 @@ def test_a_half_ends_before_its_call_and_its_figures_so_far_are_kept(checkout: P
 def test_an_unknown_half_is_refused(checkout: Path) -> None:
     done = checked(checkout, "--only", "speed")
     assert (done.returncode, done.stderr) == (2, "gpu_check: --only wants tests or views\n")
+
+
+def test_a_machine_without_a_gpu_is_told_in_one_line(checkout: Path) -> None:
+    (checkout / "bin/nvidia-smi").write_text("#!/bin/sh\necho no devices >&2\nexit 9\n")
+    done = checked(checkout)
+    assert done.returncode == 1
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("gpu_check: no NVIDIA GPU here")
