@@ -30,6 +30,7 @@ OWN_TARGET: Final = {
     "house_cost": "homes.house_cost",
     "made": "homes.made",
     "variety": "homes.variety",
+    "joints": "homes.joints",
     "light": "light.equal_time",
     "light_pictures": "light.light_pictures",
     "sky": "light.sky_lux",

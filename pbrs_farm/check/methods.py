@@ -34,6 +34,7 @@ HOW: dict[str, str] = {
     **{LAYER[f"mlt_il_ol.{n}"].file: "developed from radiance.exr again" for n in range(1, MOST_VARIANTS + 1)},
     "opengl_dl.png": "its edges against those of the instances",
     "opengl_il.png": "its edges against those of the instances",
+    "articulation.json": "joints against house.json, their axes turned into the camera's frame again",
     "view.json": "camera by rays; boxes, shares and counts recomputed; each field has its check",
     "radiance.exr": "its guides against surfaces, its steps against their albedo, sun and bulbs by shadow rays",
     "projector.png": "dots thrown again by rays, where rays through pixels meet",

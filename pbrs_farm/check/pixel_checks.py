@@ -254,6 +254,19 @@ def _nocs_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
     return right
 
 
+def _part_is_right(stored: NDArray[Any], at: _Pierced) -> Bools:
+    """(N,) the part's row in articulation.json names the part of the face there; 0 what does not move."""
+    rows = {int(row["id"]): (int(row["instance"]), str(row["part"])) for row in at.view.parts}
+    names, own = at.triangles.parts, _of_face(at.triangles.part, at.face)
+    return np.array(
+        [
+            rows.get(int(number)) == (int(instance), names[part]) if number else part == 0
+            for number, instance, part in zip(stored, at.instance, own, strict=True)
+        ],
+        bool,
+    )
+
+
 def _in_frame(world_from_frame: Floats, points: Floats) -> Floats:
     """(N, 3) world points in a frame."""
     own = np.linalg.solve(world_from_frame[:3, :3], (points - world_from_frame[:3, 3]).T)
@@ -404,6 +417,7 @@ _CHECKS: Final[Mapping[str, Callable[[NDArray[Any], _Pierced], Any]]] = {
     "f0": _f0_is_right,
     "normal_shading": _shading_is_right,
     "nocs": _nocs_is_right,
+    "part": _part_is_right,
     "albedo": _albedo_is_right,
 }
 

@@ -124,6 +124,9 @@ class Triangles:
     # (F,) number of the triangle's primitive among those of its node, as surfaces with vertices are
     surface: NDArray[np.int64]
 
+    parts: tuple[str, ...]  # names of parts that move, "" first
+    part: NDArray[np.int64]  # (F,) index of parts
+
     def points_of_surfaces(self, instance: int, surfaces: list[int]) -> NDArray[np.float64]:
         """(N, 3) corners of the triangles of some surfaces of an item."""
         own = (self.instance == instance) & np.isin(self.surface, surfaces)
@@ -248,7 +251,9 @@ def _accessor(document: dict[str, Any], binary: bytes, index: int) -> NDArray[An
 def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
     vertices = [np.zeros((0, 3), np.float32)]
     faces = [np.zeros((0, 3), np.int64)]
-    owners: list[tuple[int, int, int, int]] = []  # instance, material, surface, number of faces
+    # Instance, material, surface, number of faces, part.
+    owners: list[tuple[int, int, int, int, int]] = []
+    parts = {"": 0}
     nyu40: dict[int, int] = {}
     item: dict[int, str] = {}
     uvs = [np.zeros((0, 2), np.float32)]
@@ -276,14 +281,15 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
             corners = _accessor(document, binary, primitive["indices"]).reshape(-1, 3)
             vertices.append(points)
             faces.append(corners.astype(np.int64) + n_vertices)
-            owners.append((instance, int(primitive["material"]), number, len(corners)))
+            part = parts.setdefault(str(primitive.get("extras", {}).get("part", "")), len(parts))
+            owners.append((instance, int(primitive["material"]), number, len(corners), part))
             n_vertices += len(points)
             n_faces += len(corners)
             if max(n_vertices, n_faces) > _MAX_ELEMENTS:
                 raise ValueError(f"more than {_MAX_ELEMENTS} vertices or triangles")
 
     # Repeat each primitive's instance and material for its faces.
-    table = np.array(owners, np.int64).reshape(-1, 4)
+    table = np.array(owners, np.int64).reshape(-1, 5)
     material = np.repeat(table[:, 1], table[:, 3])
     kinds = [m.get("extras", {}).get("kind", "opaque") for m in document.get("materials", [])]
     clear = np.array([k in _SEE_THROUGH for k in kinds], bool)
@@ -299,6 +305,8 @@ def _triangles(document: dict[str, Any], binary: bytes) -> Triangles:
         _colours(document, binary),
         {instance: np.concatenate(points) for instance, points in loose.items()},
         np.repeat(table[:, 2], table[:, 3]),
+        tuple(parts),
+        np.repeat(table[:, 4], table[:, 3]),
         tuple(str(k) for k in kinds),
         np.concatenate(normals),
         _normal_maps(document, binary, tuple(str(k) for k in kinds)),

@@ -81,6 +81,15 @@ class StoredView:
         """Instance id -> class, of the instances in the table."""
         return {int(row["id"]): int(row["nyu40"]) for row in self.table["instances"]}
 
+    @cached_property
+    def parts(self) -> list[dict[str, Any]]:
+        """The rows of articulation.json; none where it is not there or damaged."""
+        try:
+            rows = stored_object(self.folder / "articulation.json")["parts"]
+        except (BadFile, KeyError):
+            return []
+        return list(rows) if isinstance(rows, list) else []
+
     def has(self, file: str) -> bool:
         """Whether the view has this file."""
         return (self.folder / file).is_file()

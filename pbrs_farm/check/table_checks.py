@@ -48,7 +48,7 @@ class HouseItems:
             own = Triangles(
                 t.vertices[used], numbers.reshape(-1, 3).astype(np.int64), np.full(n, instance),
                 t.material[t.instance == instance], {}, np.zeros(n, bool), {}, t.uv[used],
-                t.colours, {}, np.zeros(n, np.int64), t.kinds, t.normals[used], t.maps,
+                t.colours, {}, np.zeros(n, np.int64), ("",), np.zeros(n, np.int64), t.kinds, t.normals[used], t.maps,
             )  # fmt: skip
             self._alone[instance] = own.vertices.astype(np.float64), Rays(own)
         return self._alone[instance]

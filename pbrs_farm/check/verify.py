@@ -27,6 +27,7 @@ from pbrs_farm.check.fields import stored_fields
 from pbrs_farm.check.file_checks import check_files, check_root_manifest
 from pbrs_farm.check.house_checks import check_house
 from pbrs_farm.check.intrinsic_checks import check_intrinsic
+from pbrs_farm.check.joint_checks import check_articulation, check_joints
 from pbrs_farm.check.light_checks import check_developed, may_be_halved
 from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
@@ -166,6 +167,7 @@ def _check_documents(house: StoredHouse, glb: bytes, scenes: Scenes, tally: Tall
         ("house.json", lambda: check_house(house, json_of_glb(glb), digest, tally)),
         ("house.json", lambda: check_models(house, triangles, tally)),
         ("house.json", lambda: check_solids(house, triangles, rays, tally)),
+        ("house.json", lambda: check_joints(house, triangles, tally)),
         ("illuminance.json", lambda: check_illuminance(house, tally)),
         ("cameras.json", lambda: check_choice(house, rays, triangles, tally)),
     )
@@ -195,6 +197,7 @@ def _check_view(
     check_planes(view, arrays, tally)
     check_typed_boundaries(view, arrays, tally)
     check_derived(view, arrays, tally)
+    check_articulation(view, scenes.house, arrays, tally)
     if "projector" in arrays:
         check_projector(view, arrays["projector"], _chosen(view, n_pixels), scenes.all, tally)
     channels = read_radiance(view, tally)

@@ -27,6 +27,7 @@ RECIPE_REPLACED: Final = "recipe_replaced.json"  # there once another recipe was
 MANIFEST: Final = "manifest.jsonl"
 ATTRIBUTION: Final = "ATTRIBUTION.txt"
 DRESS: Final = "dress.json"  # of a house that was dressed
+ARTICULATION: Final = "articulation.json"  # of a view that has the layer `part`
 SELECTION: Final = "selection.json"
 # The folders of an output root that hold a folder per house and per object without context.
 FOLDERS: Final = ("houses", "objects")

@@ -262,6 +262,9 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     ),
     optional_layer("material", "Y", "uint16", "material id, table in view.json", shown_as="ids"),
     optional_layer("nyu13", "Y", "uint8", "NYU13 id", shown_as="ids"),
+    optional_layer(
+        "part", "Y", "uint16", "id of the door, drawer or lid, table in articulation.json", shown_as="ids"
+    ),
     optional_layer("class_source", "Y", "uint16", "the source's class, table in view.json", shown_as="ids"),
     # Light split by the albedo: of all light, and of each light group.
     *_intrinsic("", "all light"),

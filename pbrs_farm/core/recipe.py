@@ -182,6 +182,7 @@ _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "selection": {"min_room_lx": 1.0},
     },
     "fast": {
+        "dress": {"open_share": 0.1},
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "surroundings": {"kind": "drawn"},
         "cameras": _PHOTO,

@@ -75,6 +75,10 @@ class DressFields(FieldGroup):
     mess: Share = Field(
         0.3, description="how little was tidied up: chairs, beds, tables, clothes, pictures"
     )
+    open_share: Share = Field(
+        0.0,
+        description="share of doors and drawers that stand open, as far as nothing is in their way",
+    )
     style: str = Field(
         "", max_length=64, description="the style of every home; empty = drawn by the seed"
     )

@@ -40,6 +40,7 @@ from pbrs_farm.dress.old_place import (
 )
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surfaces.skirting import BASEBOARD
+from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.home.room_use import is_outdoors
 
@@ -169,6 +170,10 @@ def _swap_set(
     if not candidates:
         house.refused[f"{PASS}: no other model fits"] += 1
         return
+    # What opens gives way to what opens alone; libraries' models have one lump for all their fronts.
+    opens = any(item.joints for item in items)
+    if opens:
+        candidates = [one for one in candidates if one[0].id.startswith(GENERATED)]
     # What hangs stays hung, what stands keeps standing.
     candidates = [
         (piece, scale)
@@ -183,6 +188,8 @@ def _swap_set(
         piece, scale = candidates[int(k)]
         shape = catalogue.shape(piece)
         if shape is None or not is_lit_alike(bool(shape.lights), items):
+            continue
+        if opens and not shape.joints:
             continue
         new = [_item_at_old_place(house, piece, shape, scale, group, m) for m in members]
         lifts = _lifts(around, members, new)

@@ -121,6 +121,8 @@ def primitive(writer: glb.GlbWriter, house: House, item: Item, s: Surface) -> di
     if s.uvs is not None:
         attributes["TEXCOORD_0"] = writer.add_vertices(s.uvs * V_DOWN)
     row: dict[str, Any] = {"attributes": attributes, "material": int(s.material)}
+    if s.part:
+        row["extras"] = {"part": s.part}
     if len(s.faces):
         return row | {"indices": writer.add_faces(s.faces), "mode": _TRIANGLES}
     # Keep vertices without faces as points.

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, Bools, Matrix4
+from pbrs_farm.core.classes import FLOOR_MAT
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Box, Item, Surface
 from pbrs_farm.core.joints import Joint, JointKind
@@ -77,7 +78,7 @@ def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> t
     """(value, id) how far towards a wanted value a part of scene.items[index] goes, and what stops it.
 
     "" where nothing does. It stops 4 mm before faces of other items and of other parts of its own
-    item; its own body never stops it. What its rim alone would graze, by less than about a
+    item; its own body never stops it, and rugs and mats give way. What its rim alone would graze, by less than about a
     centimetre, is let pass: neighbours' fronts, a rug below a door. Closing is never stopped.
     """
     item = scene.items[index]
@@ -103,6 +104,8 @@ def _near(
     """The items whose faces meet a box, with those faces; of the own item the other parts."""
     for k in scene.items_in(low, high):
         item = scene.items[k]
+        if item.nyu40 == FLOOR_MAT:
+            continue
         if k == index:
             others = [j.part for j in item.joints if j.part != part]
             corners = np.concatenate(

@@ -1,6 +1,6 @@
 """The passes that make a finished house of a source: a table of what each does, when and by what.
 
-    read -> stand-ins -> furnish -> dress -> repair -> surroundings -> edits
+    read -> stand-ins -> furnish -> dress -> repair -> open -> surroundings -> edits
 
 The table is the only list of passes: finished_house.py calls them in its order; the digest of the step
 `house`, the versions by which workers know each other and the keys of caches are made from it.
@@ -125,6 +125,14 @@ def _is_dressed(source: SourceRef, recipe: Recipe) -> bool:
     return _is_home(source, recipe) and bool(dress_seed(source, recipe))
 
 
+def _stands_open(source: SourceRef, recipe: Recipe) -> bool:
+    return _is_dressed(source, recipe) and recipe.dress.open_share > 0
+
+
+def _open_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    return [dress_seed(source, recipe), recipe.dress.open_share]
+
+
 def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     if source.kind != "plugin":
         return []
@@ -144,7 +152,7 @@ def _furnish_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     # Where the libraries lie is no matter: their content is.
     fields = recipe.dress.model_dump(
-        mode="json", exclude={"seed", "catalogue", "furnish", "passes"}
+        mode="json", exclude={"seed", "catalogue", "furnish", "passes", "open_share"}
     )
     plugins = filter(None, recipe.dress.passes.split(":"))
     catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", plugins)
@@ -244,6 +252,14 @@ def _repair(work: Preparation) -> Preparation:
     return replace(work, current=house, report=report, dressing=dressed.report)
 
 
+def _leave_open(work: Preparation) -> Preparation:
+    """A share of the doors and drawers of a lived-in home left open, drawn by the seed of dressing."""
+    from pbrs_farm.prepare.open_joints import left_open
+
+    share, seed = work.recipe.dress.open_share, dress_seed(work.source, work.recipe)
+    return replace(work, current=left_open(work.house, share, seed))
+
+
 def _surround(work: Preparation) -> Preparation:
     """Streets, gardens and courts before the windows."""
     from pbrs_farm.dress.surroundings import with_surroundings
@@ -267,6 +283,7 @@ PASSES: Final = (
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 8, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
+    Pass("open", 1, ("dress",), _leave_open, _stands_open, _open_depends),
     Pass(
         "surroundings", 2, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",

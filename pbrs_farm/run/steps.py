@@ -185,6 +185,10 @@ def _truth(work: Work) -> StepOutput:
         table |= truth.optional_tables(layers, house)
     credit = house.source.attribution
     files = {LAYER[name].file: layer_bytes(name, a, credit) for name, a in arrays.items()}
+    if "part" in arrays:
+        files[keys.ARTICULATION] = json_bytes(
+            truth.articulation_table(arrays["part"], house, camera)
+        )
     # The marker remembers the layers: a run that asks for others adds to them.
     return StepOutput(files, {"table": table, **({"layers": layers} if layers else {})})
 

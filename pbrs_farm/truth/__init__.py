@@ -1,5 +1,6 @@
 """Ground truth: one hit record at pixel centres -> every label layer; no effects, no effects."""
 
+from pbrs_farm.truth.articulation import articulation_table
 from pbrs_farm.truth.boundary import typed_boundaries
 from pbrs_farm.truth.coverage import coverage
 from pbrs_farm.truth.depth_sensor import sensor_depth
@@ -16,6 +17,7 @@ from pbrs_farm.truth.view_table import is_truncated, view_table
 __all__ = [
     "OPTIONAL_NAMES",
     "LabelInputs",
+    "articulation_table",
     "coverage",
     "depth_mm",
     "instance_label",

@@ -18,6 +18,7 @@ from pbrs_farm.core.house import Geometry, House, MaterialKind
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.lenses import Lens
 from pbrs_farm.core.plugins import plugins
+from pbrs_farm.truth.articulation import part_label
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
 from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.mirrored_hits import mirror_faces, mirrored_hits
@@ -182,6 +183,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "f0": lambda s: f0_label(s.hit, s.house, s.geometry),
     "glass": lambda s: _mask(s, transparent_faces(s.geometry, s.house)),
     "mirror": lambda s: _mask(s, mirror_faces(s.geometry, s.house)),
+    "part": lambda s: part_label(s.hit, s.house, s.geometry),
     # The first hit behind glass.
     "behind_glass_depth": lambda s: depth_mm(s.behind.depth_z),
     "behind_glass_normal": lambda s: _normal(s, s.behind),

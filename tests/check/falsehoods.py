@@ -656,6 +656,57 @@ _EDITED: dict[str, tuple[Plant, str]] = {
     "nocs mirrored": (picture("nocs.png", lambda a: np.where(a.any(-1, keepdims=True), 65535 - a, 0)), "ray: nocs"),
 }  # fmt: skip
 
+
+def parts(change: Callable[[dict], object]) -> Plant:
+    """Of the part that covers most in articulation.json."""
+
+    def plant(view: Path) -> None:
+        held = json.loads((view / "articulation.json").read_text())
+        change(max(held["parts"], key=lambda r: r["pixels"]))
+        (view / "articulation.json").write_text(json.dumps(held))
+
+    return plant
+
+
+def joint(change: Callable[[dict], object]) -> Plant:
+    """Of the open door in house.json."""
+
+    def open_one(house: dict) -> dict:
+        every = [j for i in house["items"] for j in i.get("joints", [])]
+        return next(j for j in every if j["value"] > 0)
+
+    return document("house.json", lambda h: change(open_one(h)))
+
+
+def moving(change: Callable[[dict], object]) -> Plant:
+    """Of the first primitive of house.glb that moves."""
+
+    def first(h: dict) -> dict:
+        every = [p for m in h["meshes"] for p in m["primitives"]]
+        return next(p for p in every if "part" in p.get("extras", {}))
+
+    return glb(lambda h: change(first(h)))
+
+
+_OPENED: dict[str, tuple[Plant, str]] = {
+    "a door that does not move": (picture("part.png", lambda a: np.where(a > 0, 0, a)), "ray: part"),
+    "parts moved": (picture("part.png", lambda a: np.roll(a, 3, 1)), "ray: part"),
+    "a joint's axis in the camera's frame": (parts(lambda r: r.update(axis_opencv=[1.0, 0.0, 0.0])), "articulation"),
+    "a point of its axis": (parts(lambda r: r["point_opencv"].__setitem__(2, 9.0)), "articulation"),
+    "how far a part is open": (parts(lambda r: r.update(value=0.1)), "articulation"),
+    "the limit of a part": (parts(lambda r: r.update(upper=3.0)), "articulation"),
+    "what a part weighs": (parts(lambda r: r.update(mass_kg=1.0)), "articulation"),
+    "a part of another item": (parts(lambda r: r.update(item="piece_1")), "articulation"),
+    "pixels of a part": (parts(lambda r: r.update(pixels=r["pixels"] + 1)), "articulation"),
+    "box of a part": (parts(lambda r: r["box2d"].__setitem__(0, 0)), "articulation"),
+    "a door of house.json beyond its limit": (joint(lambda j: j.update(value=2.5)), "joints"),
+    "a hinge of house.json elsewhere": (joint(lambda j: j["point"].__setitem__(0, 20.0)), "joints"),
+    "an axis of house.json that is none": (joint(lambda j: j.update(axis=[0.0, 2.0, 0.0])), "joints"),
+    "another kind of joint": (joint(lambda j: j.update(kind="ball")), "joints"),
+    "a part of house.glb renamed": (moving(lambda p: p["extras"].update(part="lid 1")), "joints"),
+    "a part of house.glb told still": (moving(lambda p: p.pop("extras")), "joints"),
+}  # fmt: skip
+
 _FINISHED |= {
     # Light that is not what the labels show, developed again.
     "radiance of another view": (of_other_view(with_guides=True), "light guides"),
@@ -709,7 +760,7 @@ _SENSOR: dict[str, tuple[Plant, str]] = {
 }  # fmt: skip
 
 FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
-    "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED,
+    "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED, "opened": _OPENED,
     "sun": _SUN, "sensor": _SENSOR,
 }  # fmt: skip
 

@@ -58,6 +58,15 @@ def _edited(root: Path) -> None:
         pf.render(home, look, layers=layers).save(root)
 
 
+def _opened(root: Path) -> None:
+    """The door between the rooms ajar, with the parts that open."""
+    home = small_home().open("door_inner", 0.6)
+    door = home.items["door_inner"]
+    x, y, z = door.bounds.mean(0)
+    look = pf.Camera.look_at((x - 1.6, y + 0.3, z - 0.9), (x, y, z), size=(160, 120), hfov_deg=70)
+    pf.render(home, look, modes=["opengl_dl"], layers=["part"]).save(root)
+
+
 def _read(title: str) -> Make:
     def make(root: Path) -> None:
         with tempfile.TemporaryDirectory() as name:
@@ -78,6 +87,7 @@ ROOTS: dict[str, Make] = {
     "dark": rendered("builtin", {"light.denoise": "true", "light.spp": "8", "sky.time": "night", "tone.camera": "webcam",
                                  "tone.variants": "1", "image.width_px": "216", "image.height_px": "162"}, n_views=2, layers=()),
     "edited": _edited,
+    "opened": _opened,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),
     "generated, with a balcony, mirrors and sun": rendered("made:11", {"light.denoise": "true", "light.spp": "16"}, n_views=4, layers=("albedo",)),
     **{f"read from {title}": _read(title) for title in _READ},

@@ -10,6 +10,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.dress.old_place import OldPlace, before_boards
@@ -269,3 +270,21 @@ def test_a_swapped_cabinet_stands_before_the_skirting_board_that_the_old_one_sto
     assert drawn_in.low[2] == pytest.approx(0.0125)
     assert (drawn_in.high == place.high).all()
     assert before_boards(place, [beside]).low[2] == 0.0
+
+
+def test_what_opens_gives_way_to_what_opens_alone() -> None:
+    joint = Joint("drawer 1", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 0.3)
+    old = replace(_item("chest", DRESSER, [2.0, 0.0, 1.0], 17), joints=(joint,))
+    lump = _catalogue(("dresser", "lump", DRESSER))
+    assert _swapped(lump, old).items[0].source_class == "T#old"
+    # Of the generated ones only those that open: the others may have none of its fronts.
+    pieces = tuple(
+        Piece(f"generated#{name}", name, "dresser", Place.FLOOR, 17, DRESSER)
+        for name in ("opens", "shut")
+    )
+    shapes = {"opens": replace(_shape(DRESSER), joints=(joint,)), "shut": _shape(DRESSER)}
+    catalogue = Catalogue(
+        (*lump.pieces, *pieces), lambda p: shapes.get(p.name, _shape(p.size)), "t"
+    )
+    for seed in range(6):
+        assert _swapped(catalogue, old, seed=seed).items[0].source_class == "generated#opens"

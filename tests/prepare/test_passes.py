@@ -140,6 +140,7 @@ def test_another_version_of_a_pass_makes_anew_the_houses_that_go_through_it(
     changed = {
         "dress.furnish": "empty",
         "dress.catalogue": "generated",
+        "dress.open_share": 0.1,
         "surroundings.kind": "drawn",
     }
     full = with_settings(Recipe(), changed)
