@@ -61,9 +61,9 @@ def startup_figures(python: Sequence[str]) -> dict[str, Any]:
 
 def _costs(words: Sequence[str], home: Path) -> tuple[float, float]:
     """(seconds, CPU seconds) of a command that must end well, its kernel cache below a home folder."""
-    before, began = _cpu_s(), time.monotonic()
+    before, began = cpu_s(), time.monotonic()
     _said(words, home)
-    return time.monotonic() - began, _cpu_s() - before
+    return time.monotonic() - began, cpu_s() - before
 
 
 def _said(words: Sequence[str], home: Path) -> str:
@@ -72,7 +72,7 @@ def _said(words: Sequence[str], home: Path) -> str:
     return subprocess.run(words, env=environment, check=True, capture_output=True, text=True).stdout
 
 
-def _cpu_s() -> float:
+def cpu_s() -> float:
     """CPU seconds of all processes that this one started and that have ended."""
     spent = resource.getrusage(resource.RUSAGE_CHILDREN)
     return spent.ru_utime + spent.ru_stime

@@ -264,6 +264,8 @@ def _demo(args: argparse.Namespace) -> int:
     if home != "builtin" and not Path(home).exists():
         from pbrs_farm.assets import homes_package
 
+        if homes_package.cached() is None:
+            warn("fetching the example homes, 17 MB, once")
         # Without a network the demo still shows something.
         try:
             homes_package.fetch()
@@ -306,12 +308,16 @@ Open {out}/index.html in a browser. What to do next:
 
 def _demo_dressing(args: argparse.Namespace) -> str | None:
     """The seeds that the demo dresses its home by; None where there is nothing to dress it with."""
-    from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
+    from pbrs_farm.assets import furniture_package
+    from pbrs_farm.prepare.dress_catalogue import GENERATED, fetch_catalogue
 
     if args.bare:
         return None
+    fields = recipe_of(args).dress
+    if GENERATED not in fields.catalogue.split(":") and furniture_package.cached() is None:
+        warn("fetching the furniture, 120 MB, once")
     try:
-        fetch_catalogue(recipe_of(args).dress)
+        fetch_catalogue(fields)
     except MachineFailed as error:
         warn(f"the furniture cannot be fetched: {error}")
         warn("going on with the home as it was drawn")

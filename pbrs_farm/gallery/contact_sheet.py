@@ -15,11 +15,13 @@ from PIL import Image, ImageDraw, ImageFont
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.classes import NYU40_COLOURS, NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.layers import Layer
+from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.gallery.gallery_page import attributions, best_first
 from pbrs_farm.gallery.sheet_text import Font, draw_line
-from pbrs_farm.gallery.view_tiles import TILES, Tile, tiles_of
+from pbrs_farm.gallery.view_tiles import NOT_RENDERED, TILES, Tile, tiles_of
 
 TILE_PX: Final = 224  # longer edge
 _GAP_PX: Final = 6
@@ -37,10 +39,11 @@ _MOST_LINES: Final = 6
 def contact_sheet(
     folder: Path, *, max_views: int = 12, made: Mapping[Path, Sequence[Tile]] | None = None
 ) -> bytes:
-    """PNG bytes: a row of nine tiles for each of at most max_views views of an output folder.
+    """PNG bytes: a row of tiles for each of at most max_views views of an output folder.
 
     made: view folder -> tiles of at most TILE_PX that are there already.
-    The views are spread over houses, then rooms, the best first. A tile that is missing says so. Raises BadInput
+    The views are spread over houses, then rooms, the best first. A tile that is missing says so; a
+    column that no view has is left out. Raises BadInput
     if folder is no output folder or holds no view.
     """
     # Choose the views and make their tiles.
@@ -50,17 +53,21 @@ def contact_sheet(
     views = spread_views(everything, max_views)
     there = made or {}
     rows = [(view, there.get(view.folder) or tiles_of(view, TILE_PX)) for view in views]
+    # A damaged layer is there, too: its tile says so.
+    rendered = {t.kind for _view, tiles in rows for t in tiles if t.missing != NOT_RENDERED}
+    kinds = [kind for kind in TILES if kind in rendered]
+    rows = [(view, [t for t in tiles if t.kind in rendered]) for view, tiles in rows]
     heights = [_row_height(tiles) for _view, tiles in rows]
     classes = _classes_shown([tiles for _view, tiles in rows])
     credits = _sheet_credits(everything)
 
     # Lay out: header, a row per view, legend, credits.
-    width = 2 * _MARGIN_PX + len(TILES) * TILE_PX + (len(TILES) - 1) * _GAP_PX
+    width = 2 * _MARGIN_PX + max(4, len(kinds)) * (TILE_PX + _GAP_PX) - _GAP_PX
     legend = _legend_rows(classes, width - 2 * _MARGIN_PX)
     header, foot = 112, 48 + 28 * len(legend) + 22 * len(credits)
     sheet = Image.new("RGB", (width, header + sum(heights) + foot), PAPER)
     draw = ImageDraw.Draw(sheet)
-    _draw_header(draw, everything, len(views))
+    _draw_header(draw, everything, len(views), kinds)
     y = header
     for (view, tiles), height in zip(rows, heights, strict=True):
         _draw_row(sheet, draw, y, view, tiles)
@@ -123,18 +130,27 @@ def _font(size: int) -> Font:
     return ImageFont.load_default(size)
 
 
-def _draw_header(draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int) -> None:
+def _draw_header(
+    draw: ImageDraw.ImageDraw, views: Sequence[ViewEntry], n_shown: int, kinds: Sequence[Layer]
+) -> None:
     # Write what the sheet shows, then a title over each column.
     n_houses = len({view.house.id for view in views})
     draw.text((_MARGIN_PX, 22), "pbrs_farm", INK, _font(30))
     part = "" if n_shown == len(views) else f"{n_shown} of "
     text = (
         f"{part}{len(views)} view{'s'[: len(views) != 1]}, "
-        f"{n_houses} house{'s'[: n_houses != 1]}: four lighting modes, labels of the same pixels"
+        f"{n_houses} house{'s'[: n_houses != 1]}: {_modes_text(kinds)}labels of the same pixels"
     )
     draw.text((_MARGIN_PX + 172, 34), text, _FAINT, _font(16))
-    for i, kind in enumerate(TILES):
+    for i, kind in enumerate(kinds):
         draw.text((_MARGIN_PX + i * (TILE_PX + _GAP_PX), 80), kind.shown_title, INK, _font(15))
+
+
+def _modes_text(kinds: Sequence[Layer]) -> str:
+    """ "two lighting modes, " of the columns; "" where there is none."""
+    n_modes = sum(kind.name in {mode.value for mode in ALL_MODES} for kind in kinds)
+    number = ("", "one", "two", "three", "four")[n_modes]
+    return f"{number} lighting mode{'s'[: n_modes != 1]}, " if n_modes else ""
 
 
 def _draw_row(

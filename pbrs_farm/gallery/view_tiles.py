@@ -25,6 +25,8 @@ TILES: Final = tuple(
     )
 )  # fmt: skip
 """The layers of a sheet, a column each."""
+NOT_RENDERED: Final = "not rendered"
+"""Why a tile is missing whose file there is not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +79,7 @@ def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]
 def _shown_layer(view: ViewEntry, kind: Layer) -> _Layer:
     path = view.file(kind.file)
     if path is None:
-        return _Layer(kind, missing="not rendered")
+        return _Layer(kind, missing=NOT_RENDERED)
     try:
         stored = images.array_from_png(read_regular(path), str(path))
         if kind.is_photo:

@@ -16,6 +16,7 @@ from pbrs_farm.cli import main
 from pbrs_farm.commands import explaining, making
 from pbrs_farm.commands.making import _folder_of
 from pbrs_farm.core import keys
+from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.layers import LAYERS, text_table
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import house_from_bundle
@@ -353,3 +354,29 @@ def test_a_demo_that_made_nothing_does_not_show_an_older_one(tmp_path, monkeypat
     assert main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().out == ""
     assert (tmp_path / "sheet.png").read_bytes() == b"older"
+
+
+def test_a_demo_without_a_network_says_what_it_cannot_fetch_and_shows_the_built_in_home(
+    tmp_path, monkeypatch, capsys
+):
+    def refuse(*_args: object) -> None:
+        raise MachineFailed("https://mirror/some.deb: no route", hint="put it into the cache")
+
+    shown: list[list[str]] = []
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("pbrs_farm.assets.debian._fetch", refuse)
+    monkeypatch.setattr(making, "_run_homes", lambda _args, homes, **_: shown.append(homes) or 1)
+    main(["demo", "--out", str(tmp_path / "out")])
+    assert shown == [["builtin"]]
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "pbrs-farm: fetching the example homes, 17 MB, once",
+        "pbrs-farm: the example homes cannot be fetched: https://mirror/some.deb: no route (put it into the cache)",
+        "pbrs-farm: going on with the built-in home",
+        "pbrs-farm: fetching the furniture, 120 MB, once",
+        "pbrs-farm: the furniture cannot be fetched: https://mirror/some.deb: no route (put it into the cache)",
+        "pbrs-farm: going on with the home as it was drawn",
+    ]
+    # With --bare nothing is fetched but the home.
+    main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path / "out")])
+    assert capsys.readouterr().err == ""

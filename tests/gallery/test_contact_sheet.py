@@ -70,6 +70,22 @@ def test_sheet_is_a_png_with_a_row_for_each_view(root: Path) -> None:
     assert four.shape[0] > one.shape[0] + 3 * 60
 
 
+def test_a_sheet_leaves_out_the_columns_that_no_view_has(tmp_path: Path) -> None:
+    write_house(tmp_path, "a", ())
+    views = tmp_path / "houses/a/views"
+    write_view(views / "0_0_1", without=("opengl_dl", "opengl_il"))
+    write_view(views / "0_0_2", without=("opengl_dl", "mlt_ol"))
+    narrow = images.array_from_png(sheet.contact_sheet(tmp_path))
+    write_view(views / "0_0_3")
+    wide = images.array_from_png(sheet.contact_sheet(tmp_path))
+    # One view has OpenGL's indoor mode, none the other: one column less.
+    assert wide.shape[1] - narrow.shape[1] == sheet.TILE_PX + 6
+    assert (
+        sheet._modes_text([t for t in TILES if t.name != "opengl_dl"]) == "three lighting modes, "
+    )
+    assert sheet._modes_text(TILES[4:]) == ""
+
+
 def test_sheet_shows_the_classes_colours(root: Path) -> None:
     pixels = images.array_from_png(sheet.contact_sheet(root)).reshape(-1, 3)
     for nyu40 in (1, 2):
