@@ -66,9 +66,17 @@ name_for() {
   esac
 }
 
+has_llvm() { has_lib 'libLLVM\(-19\.so\|\.so\.19\|-20\.so\|\.so\.2[0-9]\|-1[78]\.so\|\.so\.18\)'; }
+
+# What pip installs: LLVM too where the system has none, since who has no root cannot add it (Linux on x86-64).
+extras() {
+  has_llvm || printf 'llvm,'
+  echo "$EXTRAS"
+}
+
 missing_packages() {
   local p
-  has_lib 'libLLVM\(-19\.so\|\.so\.19\|-20\.so\|\.so\.2[0-9]\|-1[78]\.so\|\.so\.18\)' || echo libllvm19
+  has_llvm || echo libllvm19
   has_lib 'libatomic\.so\.1' || echo libatomic1
   [ "$(uname)" != Darwin ] || { missing_on_macos; return; }
   has_lib 'libEGL\.so\.1' || echo libegl1
@@ -175,7 +183,7 @@ main() {
     exit 1
   }
   if ! PYTHONUNBUFFERED=1 $VENV/bin/python -m pip install --disable-pip-version-check --no-input --progress-bar off --no-compile \
-    -e ".[$EXTRAS]" 2>&1 | tee $LOG | told_of_pip >&2; then
+    -e ".[$(extras)]" 2>&1 | tee $LOG | told_of_pip >&2; then
     tail -n 20 $LOG >&2
     echo "setup: pip failed; all that it said: $LOG" >&2
     exit 1

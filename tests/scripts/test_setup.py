@@ -45,3 +45,11 @@ def test_a_mac_is_told_what_brew_installs(tmp_path: Path) -> None:
     text = told("", tmp_path, f"command_for {NEEDED}", macos=True)
     assert text == "brew install llvm redis"
     assert "libegl1" not in told("", tmp_path, "missing_packages", macos=True)
+
+
+def test_llvm_comes_by_pip_where_the_system_has_none(tmp_path: Path) -> None:
+    def has(answer: str) -> str:
+        return told("ID=debian", tmp_path, f"has_lib() {{ {answer}; }}; extras")
+
+    assert has("true").startswith("s3,")
+    assert has("false") == f"llvm,{has('true')}"
