@@ -10,20 +10,23 @@ from numpy.typing import NDArray
 Pixels = TypeVar("Pixels", bound=NDArray[Any])
 
 
-def resized_by_area(picture: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """(height, width, C) uint8: each pixel the mean of what it covers of picture (H, W, C), rounded.
+def resized_by_area(picture: Pixels, width: int, height: int) -> Pixels:
+    """(height, width, ...): each pixel the mean of what it covers of picture (H, W, ...), uint8 or floats.
 
-    Values are averaged as they are encoded (sRGB), as usual loaders do. Enlarging gives areas of
-    one colour.
+    Bytes are averaged as they are encoded (sRGB), as usual loaders do, and rounded. Enlarging gives
+    areas of one colour.
     """
     if picture.shape[:2] == (height, width):
         return picture
+    if picture.dtype.kind == "f":
+        wide = _axis_means(_axis_means(picture.astype(np.float64), 0, height), 1, width)
+        return wide.astype(picture.dtype)  # type: ignore[return-value]
     # Average whole blocks in integers where the grid divides, else along one axis after the other.
     rows, columns = picture.shape[0] / height, picture.shape[1] / width
     if rows.is_integer() and columns.is_integer():
-        return _block_means(picture, int(rows), int(columns))
+        return _block_means(picture, int(rows), int(columns))  # type: ignore[return-value]
     means = _axis_means(_axis_means(picture.astype(np.float64), 0, height), 1, width)
-    return np.asarray(np.rint(means), np.uint8)
+    return np.asarray(np.rint(means), np.uint8)  # type: ignore[return-value]
 
 
 def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:

@@ -80,7 +80,7 @@ ROOTS: dict[str, Make] = {
     "finished": rendered("builtin", n_views=2, pairs=True),
     "film": rendered("builtin", _WALK | {"blur.shutter_s": "0.01", "blur.rolling_s": "0.02"}, n_views=0),
     "pair": rendered("builtin", {"cameras.stereo_m": "0.065"}, n_views=2),
-    "lamps": rendered("builtin", {"light.groups": "lamps", "light.spp": "16"}, layers=()),
+    "lamps": rendered("builtin", {"light.groups": "lamps", "light.spp": "16"}, layers=("residual_indoor",)),
     "cameras": rendered("builtin", {"light.denoise": "true", "light.spp": "16", "tone.variants": "3"}, layers=("residual",)),
     "sun": rendered("builtin", {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "345", "light.spp": "16"}, layers=()),
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),

@@ -26,6 +26,20 @@ def test_parts_of_pixels_count_as_much_as_they_cover():
     assert resized_by_area(picture, 2, 1)[..., 0].tolist() == [[30, 150]]
 
 
+@pytest.mark.parametrize("to", [(8, 6), (10, 7), (50, 30)])
+def test_light_is_averaged_as_it_is_and_keeps_its_type(to):
+    light = np.random.default_rng(1).normal(0, 100, (24, 40, 3)).astype(np.float32)
+    small = resized_by_area(light, *to)
+    assert small.dtype == np.float32
+    assert small.mean() == pytest.approx(light.mean(), rel=1e-4)
+    by_blocks = light.reshape(6, 4, 8, 5, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(resized_by_area(light, 8, 6), by_blocks, rtol=1e-4, atol=1e-3)
+    # A layer of one channel has two axes.
+    grey = np.arange(96, dtype=np.uint8).reshape(8, 12)
+    assert resized_by_area(grey, 6, 4)[0, 0] == 7  # (0 + 1 + 12 + 13) / 4, rounded up
+    assert resized_by_area(grey, 5, 3).shape == (3, 5)
+
+
 @pytest.mark.parametrize("to", [(8, 6), (10, 7), (5, 5)])
 def test_it_is_the_box_filter_of_openimageio_within_rounding(to):
     picture = np.random.default_rng(0).integers(0, 256, (24, 40, 3)).astype(np.uint8)
