@@ -120,12 +120,21 @@ def _check_choice_row(
         return
     # Count the pixels of each thing at the size at which the view was judged.
     width, height = held["width_px"], held["height_px"]
+    fx, fy, cx, cy = (held[name] for name in ("fx", "fy", "cx", "cy"))
     if house.recipe:
         fields = house.recipe["cameras"]
         width, height = fields["score_width_px"], fields["score_height_px"]
+        if house.recipe.get("lens", {}).get("fx"):
+            # Given cameras are counted before the recipe's lens, chosen ones through a pin-hole of
+            # its field of view, aspect and square pixels, with the axis in the middle.
+            if row["origin"] != "sampled":
+                return
+            height = max(round(width * held["height_px"] / held["width_px"]), 1)
+            fy = fx * (held["height_px"] / height) / (held["width_px"] / width)
+            cx, cy = held["width_px"] / 2, held["height_px"] / 2
     columns, lines = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    x = (columns.ravel() * held["width_px"] / width - held["cx"]) / held["fx"]
-    y = (lines.ravel() * held["height_px"] / height - held["cy"]) / held["fy"]
+    x = (columns.ravel() * held["width_px"] / width - cx) / fx
+    y = (lines.ravel() * held["height_px"] / height - cy) / fy
     local = np.stack([x, -y, -np.ones(len(x))], axis=1)
     face = rays.first(pose[:3, 3], local @ pose[:3, :3].T)
     counts = np.bincount(np.where(face >= 0, triangles.instance[face], 0))

@@ -7,6 +7,7 @@ the groups it uses and nothing else. `--set group.field=value` overrides any fie
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import Any, Self
 
@@ -115,6 +116,24 @@ class Recipe(FieldGroup):
                 f"blur.aperture_mm: lens.model {self.lens.model} has no plane of focus"
             )
         return self
+
+    @property
+    def judged_cameras(self) -> CameraFields:
+        """The group `cameras` by which views are chosen: with the field of view of the recipe's lens.
+
+        A pin-hole or radtan lens that states a focal length has one field of view and one aspect, which
+        no candidate's zoom changes; views of other lenses are chosen through the group's own pin-hole.
+        """
+        f, lens = self.cameras, self.lens
+        if lens.fx == 0 or not lens.lens.depth_is_planar:
+            return f
+        own = {
+            "hfov_rad": 2 * math.atan(0.5 * lens.width_px / lens.fx),
+            "hfov_spread": 0.0,
+            "score_height_px": max(round(f.score_width_px * lens.height_px / lens.width_px), 1),
+            "coarse_height_px": max(round(f.coarse_width_px * lens.height_px / lens.width_px), 1),
+        }
+        return f.model_copy(update=own)
 
     def camera_of(self, house_id: str, view_id: str, variant: int = 0) -> PictureCamera:
         """The camera that takes one view's pictures: tone.camera's; of a variant, one that is drawn.

@@ -39,7 +39,7 @@ STEPS: Final = {
     step.name: step
     for step in (
         Step("house", 1, passes.STEP_GROUPS, per_view=False),
-        Step("cameras", 5, ("cameras", "lens"), ("house",), per_view=False),
+        Step("cameras", 6, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),

@@ -101,7 +101,7 @@ def _cameras(work: Work) -> StepOutput:
     from pbrs_farm.run.chosen_cameras import chosen_cameras
 
     cached = _cached_house(work)
-    house, fields = cached.house, work.recipe.cameras
+    house, fields = cached.house, work.recipe.judged_cameras
     seed = camera_seed(work.house_id, work.recipe)
     if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
@@ -115,7 +115,7 @@ def _cameras(work: Work) -> StepOutput:
 def _object_cameras(work: Work, house: House, seed: int) -> StepOutput:
     from pbrs_farm.sample.object_cameras import object_views
 
-    f = work.recipe.cameras
+    f = work.recipe.judged_cameras
     intrinsics = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
     views = object_views(house.items[0].bounds, intrinsics, seed, (house.id,))
     return _camera_output(views, {"preset": "objects", "n_views": len(views)}, work.recipe)

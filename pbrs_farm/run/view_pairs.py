@@ -43,7 +43,7 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
 
     caster = Caster.of_house(dressed)
     views = sample_cameras(
-        dressed, recipe.cameras, camera_seed(dressed.id, recipe), caster.item_counts,
+        dressed, recipe.judged_cameras, camera_seed(dressed.id, recipe), caster.item_counts,
         caster.depth_pictures,
     ).views  # fmt: skip
     rows = [(v.id, v.room_id, v.score) for v in views]

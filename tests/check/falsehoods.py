@@ -759,9 +759,15 @@ _SENSOR: dict[str, tuple[Plant, str]] = {
     "exposure of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_il_ol"].update(exposure=0.001)), "light developed"),
 }  # fmt: skip
 
+_LENS: dict[str, tuple[Plant, str]] = {
+    "pixels that another field of view counts": (
+        document("cameras.json", lambda h: [r.update(objects={k: round(n * 0.9) for k, n in r["objects"].items()}) for r in h["views"]]), "choice",
+    ),
+}  # fmt: skip
+
 FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
     "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED, "opened": _OPENED,
-    "sun": _SUN, "sensor": _SENSOR,
+    "sun": _SUN, "sensor": _SENSOR, "lens": _LENS,
 }  # fmt: skip
 
 

@@ -86,6 +86,7 @@ ROOTS: dict[str, Make] = {
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
     "dark": rendered("builtin", {"light.denoise": "true", "light.spp": "8", "sky.time": "night", "tone.camera": "webcam",
                                  "tone.variants": "1", "image.width_px": "216", "image.height_px": "162"}, n_views=2, layers=()),
+    "lens": rendered("builtin", {"lens.preset": "d455", "image.width_px": "212", "lens.cx": "380", "lens.fy": "460"}, layers=()),
     "edited": _edited,
     "opened": _opened,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),

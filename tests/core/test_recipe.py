@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -81,3 +82,24 @@ def test_a_lens_that_does_not_fit_is_refused_in_one_line(settings, words):
     with pytest.raises(BadRecipe, match=words) as error:
         recipe_from_name("fast", settings)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "hfov_deg", "score_px"),
+    [
+        # 60 degrees across, as Roberts et al. 2021 say; 86 of a D455, as its data sheet says.
+        ({"lens.preset": "hypersim"}, 60.0, (640, 480)),
+        ({"lens.preset": "d455", "image.width_px": "424"}, 86.0, (640, 362)),
+    ],
+)
+def test_views_are_chosen_by_the_field_of_view_of_the_lens(settings, hfov_deg, score_px):
+    judged = recipe_from_name("preview", settings | {"cameras.hfov_rad": "1.5"}).judged_cameras
+    assert math.degrees(judged.hfov_rad) == pytest.approx(hfov_deg, abs=0.1)
+    assert (judged.score_width_px, judged.score_height_px) == score_px
+    assert judged.hfov_spread == 0
+
+
+@pytest.mark.parametrize("lens", [{}, {"lens.model": "radtan", "lens.k1": "-0.1"}])
+def test_views_of_a_lens_without_a_focal_length_are_chosen_by_their_own(lens):
+    recipe = recipe_from_name("preview", lens)
+    assert recipe.judged_cameras == recipe.cameras

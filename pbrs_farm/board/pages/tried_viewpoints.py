@@ -54,7 +54,7 @@ def candidates(store: Store, house_id: str) -> dict[str, Any]:
     cached = CachedHouse(store, recipe, house_id, "")
     counters = cached.caster.item_counts, cached.caster.depth_pictures
     seed = camera_seed(house_id, recipe)
-    sampling = sample_cameras(cached.house, recipe.cameras, seed, *counters)
+    sampling = sample_cameras(cached.house, recipe.judged_cameras, seed, *counters)
     rows = [
         [*(round(float(x), 3) for x in eye), int(verdict), k]
         for k, trace in enumerate(sampling.traces)
