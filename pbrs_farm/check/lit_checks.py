@@ -7,6 +7,7 @@ alone brings; where the sun is hidden it must be less than half of it.
 
 from __future__ import annotations
 
+import itertools
 import math
 import zlib
 from collections.abc import Iterator, Mapping
@@ -34,6 +35,7 @@ _PLACES = 400  # of a view
 _LEAST_COSINE = 0.25  # to a light: slanting light is of the shading normal's making
 _LEAST_ALBEDO = 0.04
 _HALF = 0.5  # of what the sun brings by itself: noise, and colours that albedo's luminance averages
+_COAT = 0.04  # of light that comes upright, what a coat reflects: glass of index 1.5
 _LAMP = 0.6  # of what a bulb brings by itself: noise, and clamped bounces
 _LEVEL = (
     5.0  # between the floor that a view sees and that of its room: furniture shades, lamps are near
@@ -46,6 +48,8 @@ _GREY = 0.02  # between the colours of a light that names none
 _WARM_K = 4000.0  # of lamps that are redder than any day
 _DAY_LX = 1000.0  # of the sky, above which windows outshine lamps that they mirror
 _WINDOW_RAYS = 3000  # of a view, that look for windows
+_MOST_BULB_PX = 400  # that are looked at
+_BULB_GRID = 15  # places a side of such a pixel and those about it, a fifth of a pixel apart
 _FEW_BULB_PX = 4  # pixels amid a bulb that tell nothing
 _SUN_RAD = math.radians(0.6)  # about the sun's middle, twice its disc: its shadow has soft edges
 _FEW = 24  # places that tell nothing
@@ -90,6 +94,11 @@ class LitScene:
         return self._of_kinds("glass", "shade", "mirror") | self.triangles.has_holes
 
     @cached_property
+    def is_bulb(self) -> NDArray[np.bool_]:
+        """(F,) of what shines by itself."""
+        return self._of_kinds("bulb")
+
+    @cached_property
     def bulbs(self) -> dict[str, tuple[Floats, float, int]]:
         """Name of a light -> points (N, 3) of its bulb, its flux in lm, its item's instance; round ones alone."""
         found = {}
@@ -115,9 +124,20 @@ class _Places:
     points: Floats  # (N, 3), pushed off the surface
     normals: Floats  # (N, 3), towards the camera
     corners: Floats  # (N, 5, 3) middle and corners of the window, on the surface, pushed off it
+    painted: Floats  # (N,) of light that comes and leaves upright: not by a coat; 1 = has none
+    facing: Floats  # (N,) cosine of the normal to the ray that sees it
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def returned(self, cosine: Floats) -> Floats:
+        """(N,) share of a matt surface's light that is sent to the camera, at least; cosine: to the light.
+
+        Under a coat slanting light does not reach the paint, nor leave it (Ashikhmin and Shirley 2000).
+        """
+        through = [1 - (1 - np.clip(c, 0, 1) / 2) ** 5 for c in (cosine, self.facing)]
+        under_coat = np.minimum(28 / 23 * self.painted * through[0] * through[1], 1)
+        return np.where(self.painted < 1, under_coat, 1.0)
 
 
 def check_lit(
@@ -180,7 +200,22 @@ def _places(
             at = origin + ray * rays.distance(face, origin, ray)[:, None]
         points.append(np.nan_to_num(at) + _PUSH_M * normal)
     corners = np.stack(points, axis=1)
-    return _Places(rows, columns, corners[:, 0], normal, corners)
+    has_coat = np.array([_has_coat(m) for m in scene.house.house["materials"]], bool)
+    albedo = _luminance(channels, "albedo")[rows, columns]
+    painted = (1 - _COAT) * (1 - _COAT / np.maximum(albedo, _COAT))
+    towards = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return _Places(
+        rows, columns, corners[:, 0], normal, corners,
+        np.where(has_coat[scene.triangles.material[face]], painted, 1.0),
+        -np.einsum("ni,ni->n", normal, towards),
+    )  # fmt: skip
+
+
+def _has_coat(material: Mapping[str, Any]) -> bool:
+    """Whether a material is said to shine at all, be it ever so rough (docs/light.md)."""
+    named = material["roughness"] is not None or material["roughness_texture_id"] is not None
+    shines = material["shininess"] > 1 and max(material["specular"] or (0.0,)) > 0
+    return bool(named or shines)
 
 
 def _luminance(channels: Channels, name: str) -> Floats:
@@ -219,11 +254,11 @@ def _check_sun(
             n_free += free
             n_rays += 1
     lux = _lux(channels, "outdoor", places)
-    bright = lux >= _HALF * normal_lx * cosine
+    least = _HALF * normal_lx * cosine
     place = f"{view.place}/radiance.exr"
     for name, chosen, right in (
-        ("lit by the sun", sure & (n_free == n_rays), bright),
-        ("in its shadow", sure & (n_free == 0), ~bright),
+        ("lit by the sun", sure & (n_free == n_rays), lux >= least * places.returned(cosine)),
+        ("in its shadow", sure & (n_free == 0), lux < least),
     ):
         n = int(chosen.sum())
         if n >= _FEW:
@@ -262,7 +297,7 @@ def _check_bulbs(
 def _direct_lux(
     places: _Places, corners: Floats, flux: float, instance: int, scene: LitScene
 ) -> Floats:
-    """(N,) lx by a round bulb that shines evenly, 0 where not all of it is seen."""
+    """(N,) lx that a round bulb alone is seen to bring, 0 where not all of it is in sight."""
     middle = (corners.min(0) + corners.max(0)) / 2
     to = middle - places.points
     distance = np.linalg.norm(to, axis=1)
@@ -274,7 +309,8 @@ def _direct_lux(
         met: Faces = scene.inside.first(places.points, ray)
         free &= (met >= 0) & (scene.triangles.instance[met] == instance)
         free &= scene.triangles.kinds_of(met) == "bulb"
-    return np.where(free, flux / (4 * math.pi * distance**2) * cosine, 0.0)
+    lux = flux / (4 * math.pi * distance**2) * cosine * places.returned(cosine)
+    return np.where(free, lux, 0.0)
 
 
 def _expect_lit(place: str, name: str, lux: Floats, direct: Floats, tally: Tally) -> None:
@@ -346,22 +382,36 @@ def _check_seen_bulbs(
         rows, columns = np.nonzero(instance == number)
         if len(rows) < _FEW_BULB_PX:
             continue
-        origin, directions = view.rays(rows, columns)
-        face = rays.first(origin, directions)
+        light = scene.house.items[number]["lights"][lamp_names(scene.house)[name][1]]
+        emitting = scene.is_bulb & (scene.triangles.instance == number)
+        emitting &= np.isin(scene.triangles.surface, light["emitting"])
         mask = np.zeros(instance.shape, bool)
-        k = lamp_names(scene.house)[name][1]
-        own = np.isin(
-            scene.triangles.surface[face], scene.house.items[number]["lights"][k]["emitting"]
-        )
-        mask[rows, columns] = own & (scene.triangles.kinds_of(face) == "bulb")
-        amid = ndimage.binary_erosion(mask, np.ones((3, 3), bool))
-        if amid.sum() < _FEW_BULB_PX:
+        mask[rows, columns] = _shows(emitting, view, rays, rows, columns)
+        amid = np.argwhere(ndimage.binary_erosion(mask, np.ones((3, 3), bool)))[:_MOST_BULB_PX]
+        # Between the rods of a bulb are gaps that no pixel's middle meets.
+        for dy, dx in itertools.product(np.linspace(-1.4, 1.4, _BULB_GRID), repeat=2):
+            amid = amid[_shows(emitting, view, rays, amid[:, 0] + dy, amid[:, 1] + dx)]
+        if len(amid) < _FEW_BULB_PX:
             continue
-        found = float(np.median(level[amid]))
+        found = float(np.median(level[tuple(amid.T)]))
         expected = flux / (LM_PER_W * math.pi * _area_outside(corners.reshape(-1, 3, 3)))
         what = f"bulb {name} shows {found:.4g} W m-2 sr-1, by house.json {expected:.4g}"
         same = abs(found / expected - 1) <= _BULB_SHARE
         tally.expect("bulbs", f"{view.place}/radiance.exr", same, what)
+
+
+def _shows(
+    faces: NDArray[np.bool_],
+    view: StoredView,
+    rays: Rays,
+    rows: NDArray[Any],
+    columns: NDArray[Any],
+) -> NDArray[np.bool_]:
+    """(N,) whether these places of the picture show one of the faces (F,)."""
+    if not len(rows):
+        return np.zeros(0, bool)
+    face = rays.first(*view.rays(rows, columns))
+    return np.asarray((face >= 0) & faces[face])
 
 
 def _check_windows(

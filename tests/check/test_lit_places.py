@@ -1,0 +1,44 @@
+"""What a coated surface sends back of a light, as `verify` expects it, against the model of docs/light.md."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pbrs_farm.check.lit_checks import _has_coat, _Places
+
+
+def _seen(albedo: float, to_light: float, to_camera: float) -> float:
+    """Radiance over that of a matt surface of the same albedo, of which a coat of F0 0.04 is a part."""
+    kd, f0 = albedo - 0.04, 0.04
+
+    def through(cosine: float) -> float:
+        return 1 - (1 - cosine / 2) ** 5
+
+    return 28 / 23 * kd * (1 - f0) * through(to_light) * through(to_camera) / albedo
+
+
+@pytest.mark.parametrize("to_camera", [0.15, 0.5, 0.98])
+@pytest.mark.parametrize("to_light", [0.3, 0.86])
+@pytest.mark.parametrize("albedo", [0.1, 0.94])
+def test_a_coated_ceiling_seen_at_a_slant_sends_less_back(
+    albedo: float, to_light: float, to_camera: float
+) -> None:
+    one, none = np.ones(1), np.zeros((1, 3))
+    painted = one * 0.96 * (1 - 0.04 / albedo)
+    places = _Places(
+        np.zeros(1, int), np.zeros(1, int), none, none, none[None], painted, one * to_camera
+    )
+    expected = min(_seen(albedo, to_light, to_camera), 1)
+    assert places.returned(one * to_light)[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_roughness_makes_a_coat_and_a_colour_without_shine_none() -> None:
+    dull = {
+        "roughness": None, "roughness_texture_id": None, "shininess": 40.0,
+        "specular": [0.0, 0.0, 0.0],
+    }  # fmt: skip
+    assert not _has_coat(dull)
+    assert _has_coat(dull | {"roughness": 0.9})
+    assert _has_coat(dull | {"specular": [0.2, 0.2, 0.2]})
+    assert not _has_coat(dull | {"specular": [0.2, 0.2, 0.2], "shininess": 0.0})
