@@ -23,7 +23,7 @@ from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
 from pbrs_farm.check.fact_checks import lamp_names
 from pbrs_farm.check.lamp_checks import flux_lm
-from pbrs_farm.check.radiance_checks import LUMINANCE, Channels, matte_items
+from pbrs_farm.check.radiance_checks import COAT, LUMINANCE, Channels, coated_materials, matte_items
 from pbrs_farm.check.solid_checks import is_within
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
@@ -35,7 +35,6 @@ _PLACES = 400  # of a view
 _LEAST_COSINE = 0.25  # to a light: slanting light is of the shading normal's making
 _LEAST_ALBEDO = 0.04
 _HALF = 0.5  # of what the sun brings by itself: noise, and colours that albedo's luminance averages
-_COAT = 0.04  # of light that comes upright, what a coat reflects: glass of index 1.5
 _LAMP = 0.6  # of what a bulb brings by itself: noise, and clamped bounces
 _LEVEL = (
     5.0  # between the floor that a view sees and that of its room: furniture shades, lamps are near
@@ -200,22 +199,14 @@ def _places(
             at = origin + ray * rays.distance(face, origin, ray)[:, None]
         points.append(np.nan_to_num(at) + _PUSH_M * normal)
     corners = np.stack(points, axis=1)
-    has_coat = np.array([_has_coat(m) for m in scene.house.house["materials"]], bool)
     albedo = _luminance(channels, "albedo")[rows, columns]
-    painted = (1 - _COAT) * (1 - _COAT / np.maximum(albedo, _COAT))
+    painted = (1 - COAT) * (1 - COAT / np.maximum(albedo, COAT))
     towards = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     return _Places(
         rows, columns, corners[:, 0], normal, corners,
-        np.where(has_coat[scene.triangles.material[face]], painted, 1.0),
+        np.where(coated_materials(scene.house)[scene.triangles.material[face]], painted, 1.0),
         -np.einsum("ni,ni->n", normal, towards),
     )  # fmt: skip
-
-
-def _has_coat(material: Mapping[str, Any]) -> bool:
-    """Whether a material is said to shine at all, be it ever so rough (docs/light.md)."""
-    named = material["roughness"] is not None or material["roughness_texture_id"] is not None
-    shines = material["shininess"] > 1 and max(material["specular"] or (0.0,)) > 0
-    return bool(named or shines)
 
 
 def _luminance(channels: Channels, name: str) -> Floats:

@@ -6,6 +6,7 @@ in this place of the picture and in no other, whatever the noise.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,8 @@ Channels = Mapping[str, NDArray[np.float32]]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 _GUIDE_DEG = 25.0  # a normal map may bend a guide, and a pixel is not flat
 _GUIDE_ALBEDO = 0.1  # of 1, in linear light: a texture's mean over the pixel against its middle
+_BESIDE = (-0.3, 0.3)  # px from a pixel's middle: fine cloth and print are other colours there
+COAT = 0.04  # of light that comes upright, what a coat reflects: glass of index 1.5
 _VARNISH = 0.3  # of 1, as stored: .07 in linear light
 _GUIDE_SHARE = 0.8  # of pixels amid one surface; blur and depth of field cost the rest
 _GUIDE_PX = 1  # by which the guides' edges may lie beside the labels': a few samples against one
@@ -75,8 +78,19 @@ def check_guides(
         return
     rows, columns, face, directions = rows[keep], columns[keep], face[keep], directions[keep]
     point = origin + directions * rays.distance(face, origin, directions)[:, None]
-    srgb = albedo_of_faces(view, face, point, triangles) / 255
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    srgb = [albedo_of_faces(view, face, point, triangles) / 255]
+    for dy, dx in itertools.product(_BESIDE, repeat=2):
+        _, beside = view.rays(rows + dy, columns + dx)
+        met = rays.first(origin, beside)
+        met = np.where(met >= 0, met, face)
+        point = origin + beside * rays.distance(met, origin, beside)[:, None]
+        point = np.where(np.isfinite(point), point, 0.0)
+        srgb.append(albedo_of_faces(view, met, point, triangles) / 255)
+    linear = np.mean(
+        [np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4) for s in srgb], axis=0
+    )
+    # The guide is of all light that comes back, a coat's, too.
+    linear += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
     stored = np.stack([channels[n][rows, columns] for n in names], axis=1).astype(np.float64)
     close = np.abs(stored[:, :3] - linear).max(axis=1) <= _GUIDE_ALBEDO
     normal = rays.normal(face, directions)
@@ -100,6 +114,23 @@ def matte_items(house: StoredHouse) -> list[int]:
         for n, row in house.items.items()
         if row["nyu40"] and all(max(colours[s["material"]]) <= _VARNISH for s in row["surfaces"])
     ]
+
+
+def coated_materials(house: StoredHouse) -> NDArray[np.bool_]:
+    """(M,) whether a material shines at all, be it ever so rough (docs/light.md); the published ones never do."""
+    is_physical = house.recipe.get("materials", {}).get("preset") != "released"
+    return np.array(
+        [
+            is_physical
+            and (
+                m["roughness"] is not None
+                or m["roughness_texture_id"] is not None
+                or (m["shininess"] > 1 and max(m["specular"] or (0.0,)) > 0)
+            )
+            for m in house.house["materials"]
+        ],
+        bool,
+    )
 
 
 def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tally: Tally) -> None:

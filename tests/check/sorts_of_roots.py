@@ -91,5 +91,6 @@ ROOTS: dict[str, Make] = {
     "opened": _opened,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),
     "generated, with a balcony, mirrors and sun": rendered("made:11", {"light.denoise": "true", "light.spp": "16"}, n_views=4, layers=("albedo",)),
+    "generated, with a lamp of rods": rendered("made:22", {"cameras.cell_m": "0.25", "cameras.score_width_px": "80", "cameras.score_height_px": "60"}, n_views=4, layers=()),
     **{f"read from {title}": _read(title) for title in _READ},
 }  # fmt: skip

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from pbrs_farm.check.lit_checks import _has_coat, _Places
+from pbrs_farm.check.lit_checks import _Places
+from pbrs_farm.check.radiance_checks import coated_materials
 
 
 def _seen(albedo: float, to_light: float, to_camera: float) -> float:
@@ -38,7 +41,9 @@ def test_a_roughness_makes_a_coat_and_a_colour_without_shine_none() -> None:
         "roughness": None, "roughness_texture_id": None, "shininess": 40.0,
         "specular": [0.0, 0.0, 0.0],
     }  # fmt: skip
-    assert not _has_coat(dull)
-    assert _has_coat(dull | {"roughness": 0.9})
-    assert _has_coat(dull | {"specular": [0.2, 0.2, 0.2]})
-    assert not _has_coat(dull | {"specular": [0.2, 0.2, 0.2], "shininess": 0.0})
+    rough, shiny = dull | {"roughness": 0.9}, dull | {"specular": [0.2, 0.2, 0.2]}
+    materials = [dull, rough, shiny, shiny | {"shininess": 0.0}]
+    house = SimpleNamespace(house={"materials": materials}, recipe={})
+    assert coated_materials(house).tolist() == [False, True, True, False]
+    house.recipe = {"materials": {"preset": "released"}}
+    assert not coated_materials(house).any()
