@@ -89,6 +89,10 @@ def check_guides(
     linear = np.mean(
         [np.where(s <= 0.04045, s / 12.92, ((s + 0.055) / 1.055) ** 2.4) for s in srgb], axis=0
     )
+    # Light of the published materials takes their plain colours as they are (docs/spec/suncg.md).
+    if _is_released(house):
+        is_plain = np.array([m["texture_id"] is None for m in house.house["materials"]], bool)
+        linear = np.where(is_plain[triangles.material[face]][:, None], srgb[0], linear)
     # The guide is of all light that comes back, a coat's, too.
     linear += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
     stored = np.stack([channels[n][rows, columns] for n in names], axis=1).astype(np.float64)
@@ -116,21 +120,19 @@ def matte_items(house: StoredHouse) -> list[int]:
     ]
 
 
+def _is_released(house: StoredHouse) -> bool:
+    """Whether light is made with the published materials."""
+    return bool(house.recipe.get("materials", {}).get("preset") == "released")
+
+
 def coated_materials(house: StoredHouse) -> NDArray[np.bool_]:
     """(M,) whether a material shines at all, be it ever so rough (docs/light.md); the published ones never do."""
-    is_physical = house.recipe.get("materials", {}).get("preset") != "released"
-    return np.array(
-        [
-            is_physical
-            and (
-                m["roughness"] is not None
-                or m["roughness_texture_id"] is not None
-                or (m["shininess"] > 1 and max(m["specular"] or (0.0,)) > 0)
-            )
-            for m in house.house["materials"]
-        ],
-        bool,
-    )
+    rows = house.house["materials"]
+    if _is_released(house):
+        return np.zeros(len(rows), bool)
+    is_rough = [r["roughness"] is not None or r["roughness_texture_id"] is not None for r in rows]
+    shines = [r["shininess"] > 1 and max(r["specular"] or (0.0,)) > 0 for r in rows]
+    return np.asarray(np.array(is_rough, bool) | np.array(shines, bool))
 
 
 def _check_place(view: StoredView, channels: Channels, normal: NDArray[Any], tally: Tally) -> None:

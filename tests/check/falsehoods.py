@@ -760,6 +760,7 @@ _SENSOR: dict[str, tuple[Plant, str]] = {
 }  # fmt: skip
 
 _LENS: dict[str, tuple[Plant, str]] = {
+    "guides of other materials than the published": (light(lambda p: p.update({n: a ** np.float32(2.2) for n, a in p.items() if n.startswith("albedo")})), "light guides"),
     "pixels that another field of view counts": (
         document("cameras.json", lambda h: [r.update(objects={k: round(n * 0.9) for k, n in r["objects"].items()}) for r in h["views"]]), "choice",
     ),
