@@ -78,7 +78,7 @@ def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> t
     """(value, id) how far towards a wanted value a part of scene.items[index] goes, and what stops it.
 
     "" where nothing does. It stops 4 mm before faces of other items and of other parts of its own
-    item; its own body never stops it, and rugs and mats give way. What its rim alone would graze, by less than about a
+    item that stand open; its own body and what is shut never stop it, and rugs and mats give way. What its rim alone would graze, by less than about a
     centimetre, is let pass: neighbours' fronts, a rug below a door. Closing is never stopped.
     """
     item = scene.items[index]
@@ -101,13 +101,13 @@ def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> t
 def _near(
     scene: SceneTriangles, index: int, part: str, low: F64, high: F64
 ) -> Iterator[tuple[str, F64]]:
-    """The items whose faces meet a box, with those faces; of the own item the other parts."""
+    """The items whose faces meet a box, with those faces; of the own item other open parts."""
     for k in scene.items_in(low, high):
         item = scene.items[k]
         if item.nyu40 == FLOOR_MAT:
             continue
         if k == index:
-            others = [j.part for j in item.joints if j.part != part]
+            others = [j.part for j in item.joints if j.part != part and j.value != 0]
             corners = np.concatenate(
                 [np.zeros((0, 3, 3)), *(part_triangles(item, p) for p in others)]
             )

@@ -104,3 +104,16 @@ def test_shutting_is_never_stopped() -> None:
     door = item_at(cupboard(JointKind.REVOLUTE), "front", 1.0)
     wall = thing("wall", (0.1, 0, 0.1), (0.2, 1, 0.3))
     assert free_value(SceneTriangles([door, wall]), 0, "front", 0.0) == (0.0, "")
+
+
+def test_a_sibling_stops_a_part_only_where_it_stands_open() -> None:
+    chest = cupboard(JointKind.PRISMATIC)
+    bar = thing("bar", (0.1, 0.2, DEEP + 0.002), (0.5, 0.4, DEEP + 0.012)).surfaces[0]
+    slide = Joint("bar", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 0.3)
+    both = replace(
+        chest, surfaces=(*chest.surfaces, replace(bar, part="bar")), joints=(*chest.joints, slide)
+    )
+    assert free_value(SceneTriangles([both]), 0, "front", 0.4) == (0.4, "")
+    value, by = free_value(SceneTriangles([item_at(both, "bar", 0.2)]), 0, "front", 0.4)
+    assert value == pytest.approx(0.202 - 0.004, abs=0.002)
+    assert by == both.id

@@ -260,8 +260,9 @@ def wardrobe(m: Maker, size: Size) -> None:
                         m.add(slab((a + 0.035, low + 0.06, z + 0.0181),
                             (b - 0.035, top - 0.06, z + 0.0188)), of=SILVERED)  # fmt: skip
                     for x in (a + 0.003, b - 0.023):
-                        m.add(bevelled((x, low + 0.031, z + 0.0185),
-                            (x + 0.02, top - 0.031, z + 0.024), 0.001), of=rail)  # fmt: skip
+                        # The grips of a leaf behind another lie flat, so that it slides past.
+                        m.add(bevelled((x, low + 0.031, z + 0.0182), (x + 0.02, top - 0.031,
+                            z + (0.024 if k % 2 else 0.0196)), 0.0006), of=rail)  # fmt: skip
                 space = (-hw + k * w / n + (0.008 if k else 0.016),
                     -hw + (k + 1) * w / n - (0.008 if k < n - 1 else 0.016))  # fmt: skip
                 if k:

@@ -6,7 +6,7 @@ swings to the side on which the hinge stands out of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -14,8 +14,9 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.frames import rotation_y, transform_points
 from pbrs_farm.core.house import Box, Item, ItemKind
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
@@ -23,10 +24,17 @@ from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.piece_items import piece_item
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
-from pbrs_farm.read.sweethome3d.piece_models import HINGE, PieceModels, Transformations, joint_of
+from pbrs_farm.read.sweethome3d.piece_models import (
+    HINGE,
+    PieceModels,
+    Transformations,
+    hangs_on,
+    joint_of,
+)
 from pbrs_farm.read.sweethome3d.placement import PieceFrame, local_from_model
 
 ANGLES_DEG: Final = (85.0, 70.0, 55.0)  # the widest that nothing stands in the way of
+_UPRIGHT: Final = 0.99  # of a hinge's direction
 _SHUT: Final = 2.5  # times as wide as it reaches out of the wall, handles included
 _SIDE_M: Final = 0.5  # from a door's middle, where its rooms have begun
 _OFF_MIDDLE_M: Final = np.array([0.011, 0.017])
@@ -46,11 +54,16 @@ class Leaf:
     turn: float  # 1 or -1: the sense about y that opens it
 
 
-def shut_leaves(meshes: Iterable[Mesh], matrix: F64) -> tuple[Leaf, ...]:
+def shut_leaves(
+    meshes: Iterable[Mesh], matrix: F64, told: Sequence[Joint] = ()
+) -> tuple[Leaf, ...]:
     """The leaves of a door's model that hang on an upright hinge and lie in the wall.
 
-    matrix: (4, 4) from the model's frame to the piece's.
+    matrix: (4, 4) from the model's frame to the piece's. told: the joints that the file tells, in the
+    model's frame; they stand before the hinges that the model names.
     """
+    if told:
+        return tuple(_told_leaves(tuple(meshes), matrix, told))
     leaves: dict[str, list[F64]] = {}
     hinges: dict[str, list[F64]] = {}
     for mesh in meshes:
@@ -63,6 +76,18 @@ def shut_leaves(meshes: Iterable[Mesh], matrix: F64) -> tuple[Leaf, ...]:
                 break
     found = [_find_leaf(j, leaves[j], hinges[j]) for j in sorted(leaves) if j in hinges]
     return tuple(leaf for leaf in found if leaf is not None)
+
+
+def _told_leaves(meshes: Sequence[Mesh], matrix: F64, told: Sequence[Joint]) -> Iterator[Leaf]:
+    for number, joint in enumerate(told, 1):
+        own = joint.placed(matrix)
+        name = f"hinge_{number}"
+        parts = [
+            transform_points(matrix, m.positions) for m in meshes if hangs_on(m, frozenset([name]))
+        ]
+        if own.kind is JointKind.REVOLUTE and abs(own.axis[1]) > _UPRIGHT and parts:
+            hinge = np.array(own.point)[[0, 2]]
+            yield Leaf(name, hinge, np.concatenate(parts), float(np.sign(own.axis[1])))
 
 
 def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | None:
@@ -186,7 +211,7 @@ def opened_doors(
         if model is None or not is_plain:
             continue
         matrix, meshes = local_from_model(piece, model), models.meshes(piece.model)
-        leaves = shut_leaves(meshes, matrix)
+        leaves = shut_leaves(meshes, matrix, piece.joints)
         if not leaves:
             if _fills_its_hole(meshes, matrix) and not any(HINGE in m.group for m in meshes):
                 text = "its model names no hinge: stays as it is drawn"

@@ -40,13 +40,18 @@ def piece_joints(
     """
     to_world = np.eye(4)
     to_world[:3, :3], to_world[:3, 3] = frame.axes, frame.origin
+    moves: Mapping[str, tuple[float, ...]] = {joint_of(n): m for n, m in piece.transformations}
     if piece.joints:
-        return {
-            f"{_HANGERS[joint.kind]}_{k}": joint.placed(to_world @ matrix)
+        told = {
+            f"{_HANGERS[joint.kind]}_{k}": joint.placed(matrix)
             for k, joint in enumerate(piece.joints, 1)
         }
+        return {
+            name: (_moved(joint, moves[name], matrix) if name in moves else joint).placed(to_world)
+            for name, joint in told.items()
+            if moves.get(name) != ()
+        }
     hung, fixed = _points_by_joint(meshes, matrix)
-    moves: Mapping[str, tuple[float, ...]] = {joint_of(n): m for n, m in piece.transformations}
     word = "leaf" if piece.frame is not None else "door"
     found: dict[str, Joint] = {}
     for name in sorted(hung.keys() & fixed.keys()):
