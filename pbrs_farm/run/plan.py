@@ -47,7 +47,7 @@ STEPS: Final = {
         Step("illuminance", 9, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 25, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
+            "light", 26, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
         Step("develop", 8, ("tone", "light", "sensor"), ("light",), needs=("light",)),

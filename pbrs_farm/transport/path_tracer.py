@@ -170,6 +170,7 @@ class _MirroredPath:
             beta=self.beta,
             depth=self.depth,
             n_nulls=self.n_nulls,
+            met_glass=mi.Bool(True),
             reference=behind.reference,
             bsdf_pdf=mi.Float(0),
             guiding_odds=mi.Float(0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import House, Material, MaterialKind
+from pbrs_farm.core.house import NOTHING_LEFT, House, Material, MaterialKind
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
@@ -72,6 +72,26 @@ def test_a_thing_of_glass_mirrors_by_its_first_face_and_without_noise(
     scene = LightScene.load(home, {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
     found = scene.render(camera, "0_0", FIELDS, 1).outdoor
     np.testing.assert_allclose(found, expected, rtol=0.01)
+
+
+def test_glass_behind_the_holes_of_a_leaf_mirrors_as_glass_before_them() -> None:
+    def sheet(z: float, material: int, *, x: float = 0.0, half: float = 9.0):  # type: ignore[no-untyped-def]
+        corners = [(x - half, -half, z), (x + half, -half, z), (x + half, half, z), (x - half, half, z)]  # fmt: skip
+        return rooms.quad(corners, material)
+
+    materials = [
+        rooms.matte("black", 0.0),
+        Material("pane", kind=MaterialKind.PANE, opacity=0.3),
+        Material("glass", kind=MaterialKind.GLASS, opacity=0.0),
+        Material("holes", alpha_cutout=True, alpha_cutoff=NOTHING_LEFT),
+    ]
+    surfaces = [sheet(-1.0, 0), sheet(9.0, 1, x=40.0, half=1.0), sheet(0.0, 2), sheet(0.5, 3)]
+    camera = rooms.camera((0, 0, 2), (0, 0, 0), 8, 8, 0.01)
+    scene = LightScene.load(
+        rooms.house(surfaces, materials), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0))
+    )
+    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
+    np.testing.assert_allclose(found, fresnel(1.0), rtol=0.01)
 
 
 def test_only_the_first_of_two_panes_mirrors() -> None:

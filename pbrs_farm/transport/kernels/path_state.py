@@ -73,6 +73,7 @@ class PathState:
     beta: mi.Color3f  # throughput
     depth: mi.UInt32  # vertices so far, glass passed and cut-outs not counted
     n_nulls: mi.UInt32  # glass and cut-outs so far
+    met_glass: mi.Bool  # glass so far
     reference: ReferencePoint  # the last rough vertex, where d was drawn
     bsdf_pdf: mi.Float  # of d by the surface there; 0 = by the camera, a mirror or glass
     guiding_odds: mi.Float  # share of rays aimed at targets, over the pdf of all other techniques
@@ -225,7 +226,8 @@ def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
 
 def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) -> PathState:
     white, none, unguided = mi.Color3f(1), mi.UInt32(0), mi.UInt32(NO_FACE)
-    return PathState(o, d, white, depth, none, reference, pdf, mi.Float(0), unguided)
+    met = mi.Bool(False)
+    return PathState(o, d, white, depth, none, met, reference, pdf, mi.Float(0), unguided)
 
 
 def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:

@@ -180,7 +180,7 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     if context.splits_glass and is_pane is not None:
         # Of things the first face mirrors, for both of their wall: to draw at each would be speckle.
         straight = is_glass & (path.bsdf_pdf <= 0)
-        splits = is_pane | (straight & (path.n_nulls == 0))
+        splits = is_pane | (straight & ~path.met_glass)
         is_behind = straight & ~splits
     return Vertex(
         si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near, is_pane, splits, is_behind
@@ -356,6 +356,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
             beta=beta,
             depth=vertex.depth,
             n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
+            met_glass=path.met_glass | (vertex.is_glass & is_null),
             reference=dr.select(bounced, here, path.reference),
             bsdf_pdf=dr.select(bounced, pdf, dr.select(mirrored, 0, path.bsdf_pdf)),
             guiding_odds=dr.select(bounced, odds, dr.select(mirrored, 0, path.guiding_odds)),
