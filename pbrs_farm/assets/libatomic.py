@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import system_command
 
 if TYPE_CHECKING:
     from pbrs_farm.assets.debian import Deb
@@ -33,9 +34,18 @@ def load_libatomic() -> None:
     try:
         ctypes.CDLL(NAME)
     except OSError:
-        from pbrs_farm.assets.debian import fetched_deb
+        _load(unpacked_library(_package()))
 
-        _load(unpacked_library(fetched_deb(PACKAGE, TESTED_VERSION)))
+
+def _package() -> Deb:
+    from pbrs_farm.assets.debian import fetched_deb
+
+    try:
+        return fetched_deb(PACKAGE, TESTED_VERSION)
+    except MachineFailed as error:
+        text = f"this system has no libatomic, which Dr.Jit needs: {error.message}"
+        hint = f"{system_command('atomic')}; or {error.hint}"
+        raise MachineFailed(text, hint=hint) from None
 
 
 def unpacked_library(deb: Deb) -> Path:
@@ -58,4 +68,4 @@ def _load(library: Path) -> None:
         ctypes.CDLL(str(library))
     except OSError as error:
         text = f"{error}; Debian's file is for x86-64, this machine is {platform.machine()}"
-        raise MachineFailed(text, hint="install libatomic (of GCC)") from None
+        raise MachineFailed(text, hint=system_command("atomic")) from None

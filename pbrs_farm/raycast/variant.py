@@ -43,6 +43,7 @@ def _module(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except (ImportError, NameError) as error:  # NameError: Dr.Jit without a library that it wants
+        load_libatomic()  # says what is missing, where that is it
         text = f"Mitsuba cannot be imported: {error}"
         raise MachineFailed(text, hint=mitsuba_command()) from error
 
@@ -103,7 +104,7 @@ def name_libraries() -> Path | None:
     library = find_llvm()
     if library is not None:
         os.environ["DRJIT_LIBLLVM_PATH"] = str(library)
-        # Their links have other names where the wheel was unpacked and Python not started since.
+        # A wheel's links to them are made when Python starts next: until then only their files are there.
         folder = library.parent / "x86_64-unknown-linux-gnu"
         with contextlib.suppress(OSError):
             for name in _BESIDE_LLVM if folder.is_dir() else ():

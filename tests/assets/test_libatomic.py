@@ -79,5 +79,26 @@ def test_a_file_for_another_processor_is_told(
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", refuse)
     monkeypatch.setattr("pbrs_farm.assets.debian.fetched_deb", lambda *_: deb)
-    with pytest.raises(MachineFailed, match=r"wrong ELF class.*install libatomic"):
+    with pytest.raises(MachineFailed, match=r"wrong ELF class.*libatomic"):
         libatomic.load_libatomic()
+
+
+def test_a_system_without_it_or_a_network_is_told_both_ways_to_get_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from pbrs_farm.raycast import variant
+
+    def refuse(name: str) -> None:
+        raise OSError("no such file")
+
+    def offline(*_words: object) -> None:
+        raise MachineFailed("https://mirror/x.deb: no route", hint="put x.deb into the cache")
+
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.setattr(ctypes, "CDLL", refuse)
+    monkeypatch.setattr("pbrs_farm.assets.debian.fetched_deb", offline)
+    # What cannot be imported tells it, too, instead of the library's own words.
+    expected = r"no libatomic, which Dr\.Jit needs: https://mirror.*libatomic.*; or put x\.deb into"
+    for call in (libatomic.load_libatomic, lambda: variant._module("no_such_drjit")):
+        with pytest.raises(MachineFailed, match=expected):
+            call()
