@@ -48,7 +48,7 @@ def main(words: list[str] | None = None) -> None:
     counts: Counter[str] = Counter()
     for house in _homes(n):
         lacking = _count(house, counts)
-        print(f"{house.id}: nothing opens of {', '.join(sorted(lacking)) or 'nothing'}", flush=True)
+        print(f"{house.id}: stay shut: {', '.join(sorted(lacking)) or 'none'}", flush=True)
     figures = {
         "joints.homes": n,
         "joints.things": counts["things"],
