@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import random
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -16,9 +17,10 @@ from benchmarks.question_check import wrong_answers
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
+from pbrs_farm.export.questions import asking
 from pbrs_farm.export.questions.asking import Asker, blind_scores, mean_relative_accuracy
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
-from pbrs_farm.export.questions.kinds import KINDS, bearing_deg
+from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind, bearing_deg
 from pbrs_farm.export.questions.references import references_of
 from tests.sample.sampled_rooms import box, room_house
 from tests.scene.homes import small_home
@@ -228,3 +230,21 @@ def test_questions_of_a_real_view_are_right_by_a_checker_that_shares_no_code(tmp
     assert all(annotations[ref["ann_id"]]["image_id"] == ref["image_id"] for ref in refs)
     talks = [json.loads(line) for line in (out / "conversations.jsonl").read_text().splitlines()]
     assert [turn["from"] for turn in talks[0]["conversations"]] == ["human", "gpt"]
+
+
+def test_how_often_the_few_answers_of_a_kind_are_right_differs_by_two_at_most(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def drafts(clip: Any, _rng: Any) -> Iterator[Draft]:
+        for k in range(4):
+            answer = "right" if clip.name == "c7" and k == 0 else "left"
+            yield Draft({"a": "lamp"}, answer, ("left", "right"), (k,))
+
+    kind = QuestionKind("side", drafts, ("Where is the {a} {here}?",), answers=("left", "right"))
+    monkeypatch.setattr(asking, "KINDS", (kind,))
+    clips = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(12)]
+    asked = Asker().asked(clips)
+    # Two "left"; then nothing is asked until a "right" may be, which makes room for one "left".
+    assert [(q.clip, q.answer) for q in asked] == [
+        ("c0", "left"), ("c0", "left"), ("c7", "right"), ("c7", "left"),
+    ]  # fmt: skip

@@ -17,6 +17,7 @@ from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind
 DATASET: Final = "pbrs_farm"
 _OF_A_PICTURE: Final = 2  # questions of a kind
 _OF_A_WALK: Final = 8
+_MOST_APART: Final = 2  # how often one of few answers and another are right
 _LETTERS: Final = "ABCD"
 
 
@@ -72,16 +73,24 @@ class Asker:
             drafts = list(kind.drafts(clip, rng))
             for _ in range(min(len(drafts), _OF_A_WALK if clip.is_walk else _OF_A_PICTURE)):
                 draft = self._rarest(kind, drafts)
+                if draft is None:
+                    break
                 drafts = [d for d in drafts if set(d.about) != set(draft.about)]
                 found.append(self._worded(clip, kind, draft, rng))
                 if not drafts:
                     break
         return found
 
-    def _rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft:
-        """The first draft whose answer has been given least often; then it is counted."""
+    def _rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
+        """The first draft whose answer has been given least often; then it is counted.
+
+        None where that answer would become the usual one of a kind with few answers.
+        """
         count = self._answers[kind.name]
         draft = min(drafts, key=lambda d: count[d.answer])
+        least = min((count[answer] for answer in kind.answers), default=count[draft.answer])
+        if count[draft.answer] >= least + _MOST_APART:
+            return None
         count[draft.answer] += 1
         return draft
 

@@ -28,6 +28,9 @@ _CLEARLY_M: Final = 0.25  # ... and by so many metres
 _STEP_APART_M: Final = 0.7  # between the middles of things that a direction is asked of
 _MARGIN_DEG: Final = 15.0  # that a direction keeps from the border to the next one
 _LATER_FRAMES: Final = 5  # a thing that comes later is not even noticed so many frames before
+_SIDES: Final = ("left", "right")
+_SIDES_OR_BACK: Final = ("left", "right", "back")
+_QUADRANTS: Final = ("front-left", "front-right", "back-left", "back-right")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +45,17 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class QuestionKind:
-    """name: of VSI-Bench. styles: templates with the fields of Draft.words and {here}."""
+    """name: of VSI-Bench. styles: templates with the fields of Draft.words and {here}.
+
+    answers: all that there are, where they are the same few for each question: how often they are right
+    differs by two at most.
+    """
 
     name: str
     drafts: Callable[[Clip, random.Random], Iterator[Draft]]
     styles: tuple[str, ...]
     of_walks_only: bool = False
+    answers: tuple[str, ...] = ()
 
 
 def _tried(
@@ -268,30 +276,33 @@ KINDS: Final = (
         ),
     ),
     QuestionKind(
-        "object_rel_direction_easy", _directions(_left_or_right, ("left", "right")),
+        "object_rel_direction_easy", _directions(_left_or_right, _SIDES),
         (
             "I stand by the {a} and face the {b}. Is the {c} to my left or to my right?",
             "Standing next to the {a} and looking at the {b}, on which side is the {c}: left or right?",
         ),
+        answers=_SIDES,
     ),
     QuestionKind(
-        "object_rel_direction_medium", _directions(_left_right_or_back, ("left", "right", "back")),
+        "object_rel_direction_medium", _directions(_left_right_or_back, _SIDES_OR_BACK),
         (
             "I stand by the {a} and face the {b}. Is the {c} to my left, to my right, or behind me? Behind"
             " me means that I would have to turn by at least 135 degrees to face it.",
             "Next to the {a}, looking at the {b}: is the {c} left, right or back? Back is a turn of 135"
             " degrees or more.",
         ),
+        answers=_SIDES_OR_BACK,
     ),
     QuestionKind(
         "object_rel_direction_hard",
-        _directions(_quadrant, ("front-left", "front-right", "back-left", "back-right")),
+        _directions(_quadrant, _QUADRANTS),
         (
             "I stand by the {a} and face the {b}. Is the {c} to my front-left, front-right, back-left or"
             " back-right? These are the quadrants of a plan with me at the middle, facing along its axis.",
             "Next to the {a}, looking at the {b}: in which quadrant is the {c}, with me at the origin and"
             " the {b} straight ahead?",
         ),
+        answers=_QUADRANTS,
     ),
     QuestionKind(
         "route_planning", _routes,
