@@ -59,6 +59,7 @@ OWN_TARGET: Final = {
     "release": "release",
     "startup": "startup",
     "anywhere": "anywhere",
+    "robots": "homes.robots",
 }
 
 

@@ -18,23 +18,14 @@ import shapely
 from pbrs_farm.core import classes, keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import (
-    House,
-    Item,
-    ItemKind,
-    LightPart,
-    Room,
-    Surface,
-    corners_of_surfaces,
-)
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
-from pbrs_farm.geometry.convex_parts import hulls_of_parts
+from pbrs_farm.export.home_links import Link, links_of
 
-COLLISION: Final = "the convex hull of each connected part"
+COLLISION: Final = "convex parts within 5 mm, no more than 32"
 COLLIDES: Final = f"things collide as {COLLISION}"
-_MOST_PARTS: Final = 12  # of an item
-_KG_PER_M3: Final = 100.0  # of collision volume: furniture is mostly air
-_LEAST_KG, _MOST_KG = 0.1, 150.0
+_MOST_KG: Final = 150.0
+_LARGE_M: Final = 0.5  # what opens and is larger stands still
 _RESTING_M: Final = 0.03  # between a thing and what it stands on
 WALKER_M: Final = 0.2  # radius of what moves on the navigable floor
 _HEAD_M: Final = 1.6  # the height of the walker: what hangs higher is walked under
@@ -50,7 +41,7 @@ _FIXED: Final = frozenset({
     classes.NYU40_NAMES.index(name)
     for name in ("cabinet", "counter", "sink", "toilet", "bathtub", "picture", "blinds", "curtain",
                  "mirror", "shower curtain", "otherstructure", "whiteboard", "bookshelf", "dresser",
-                 "refrigerator", "wall", "floor", "ceiling", "door", "window")
+                 "refrigerator", "floor mat", "wall", "floor", "ceiling", "door", "window")
     if name in classes.NYU40_NAMES
 })  # fmt: skip
 
@@ -104,37 +95,31 @@ class Piece:
         return classes.NYU40_NAMES[self.item.nyu40]
 
     @cached_property
-    def colliders(self) -> tuple[F64, ...]:
-        """Convex parts (V, 3), local; () of the building and of what has no surface.
+    def links(self) -> tuple[Link, ...]:
+        """Its body, and each part that a joint moves."""
+        local_from_world = np.asarray(np.linalg.inv(self.world_from_local), np.float64)
+        return links_of(self.surfaces, self.item.joints, local_from_world)
 
-        Found by cutting the mesh into parts and taking each one's hull; kept. A hull is larger than
-        its part, so a gap in furniture may be closed.
+    @cached_property
+    def colliders(self) -> tuple[F64, ...]:
+        """Convex parts (V, 3) of all its links, local; () of the building and of what has no surface.
+
+        No part reaches more than 5 mm beyond the mesh, where 32 parts are enough; none is left out.
         """
-        triangles = corners_of_surfaces(self.surfaces)
-        if self.is_building or not len(triangles):
+        if self.is_building:
             return ()
-        return hulls_of_parts(triangles, most=_MOST_PARTS)
+        return tuple(part for link in self.links for part in link.colliders)
 
     @cached_property
     def mass_kg(self) -> float:
-        """100 kg for each cubic metre of its collision parts, between 0.1 and 150 kg."""
-        volume = sum(_hull_volume(part) for part in self.colliders)
-        return float(np.clip(_KG_PER_M3 * volume, _LEAST_KG, _MOST_KG))
+        """Of all its links, no more than 150 kg."""
+        return min(sum(link.mass_kg for link in self.links), _MOST_KG)
 
     @property
     def inertia(self) -> F64:
         """(3,) kg m2 about the middle of its box: a solid box's."""
         x, y, z = np.maximum(self.size, 0.01) ** 2
         return np.asarray(self.mass_kg / 12 * np.array([y + z, x + z, x + y]))
-
-
-def _hull_volume(points: F64) -> float:
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return float(ConvexHull(points).volume)
-    except (QhullError, ValueError):
-        return 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +206,7 @@ def _piece(item: Item, instance: int, name: str, is_resting: bool) -> Piece:
     local_from_world = np.asarray(np.linalg.inv(frame), np.float64)
     surfaces = tuple(_surface_in_frame(s, local_from_world) for s in item.surfaces if len(s.faces))
     is_fixed = item.kind in BUILDING or item.nyu40 in _FIXED or not is_resting
+    is_fixed |= bool(item.joints) and float(size.max()) > _LARGE_M
     return Piece(
         item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights))
     )

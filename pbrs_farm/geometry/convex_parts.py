@@ -2,20 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.core.mesh import signed_volume
+from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.mesh import (
+    area_vectors,
+    closed_edge_share,
+    face_areas,
+    lengths,
+    signed_volume,
+    unit_normals,
+)
+from pbrs_farm.geometry.surface_points import spread_points
 from pbrs_farm.installation import install_command
 
 _NEARLY_CONVEX = 0.95  # share of its hull that a mesh fills which needs no decomposition
 _MOST_MOVES = 200  # of a point back into a hull, plane by plane
 _BEYOND_M = 1e-6  # of a hull, where a point may stay
 _FLAT_M = 5e-4  # half the thickness of a flat thing
+_SPACING_M = 0.008  # of points on a thing that hulls are measured against
+_MOST_POINTS, _FEW = 200_000, 2_000
+_HULL_SPACING_M, _HULL_STEPS = 0.02, 16  # of points on hulls
+_FAR_M = 0.03  # beyond a thing, from which distances are rough
+_CLOSED = 0.9  # share of paired edges from which triangles bound a solid
+_LEAST_WIDE_M = 0.004  # a part that is thinner is not cut across
+_HOLLOW = 0.2  # what depth of hollows counts beside volume, in choosing a cut
+_SLIVER_M = 1e-3  # faces that are narrower have no slab
+_LEVEL = 0.99  # cosine from which a face lies across an axis
+_SAME_M = 1e-3  # faces that near lie in one plane
+_MOST_PLANES = 1  # along an axis, beside its middle
+_STRAIGHT = 0.5  # of the commonest direction's faces: what lies along its axes is not turned
 
 
 def hulls_of_parts(triangles: F64, *, most: int = 12) -> tuple[F64, ...]:
@@ -24,16 +48,262 @@ def hulls_of_parts(triangles: F64, *, most: int = 12) -> tuple[F64, ...]:
     A table is its top and its legs, a chair its seat, back and legs, in milliseconds; a part that is
     hollow is filled. The `most` largest parts are kept.
     """
+    groups = (group.reshape(-1, 3) for group in _connected(triangles))
+    hulls = [hull for group in groups if (hull := hull_of(group)) is not None]
+    largest = sorted(hulls, key=lambda hull: -ConvexHull(hull).volume)[:most]
+    return tuple(largest) or (thickened(triangles.reshape(-1, 3)),)
+
+
+def _connected(triangles: F64) -> list[F64]:
+    """Triangles (F, 3, 3) by what hangs together."""
     points = triangles.reshape(-1, 3)
     corners = np.unique(points.round(5), axis=0, return_inverse=True)[1].reshape(-1, 3)
     ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
     graph = coo_array((np.ones(len(ends)), ends.T), shape=(corners.max() + 1,) * 2)
     _, part_of = connected_components(graph, directed=False)
     part_of_face = part_of[corners[:, 0]]
-    groups = [triangles[part_of_face == k].reshape(-1, 3) for k in np.unique(part_of_face)]
-    hulls = [hull for group in groups if (hull := hull_of(group)) is not None]
-    largest = sorted(hulls, key=lambda hull: -ConvexHull(hull).volume)[:most]
-    return tuple(largest) or (thickened(points),)
+    return [triangles[part_of_face == k] for k in np.unique(part_of_face)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """Triangles that one hull holds."""
+
+    groups: tuple[F64, ...]  # (F, 3, 3) each, which hang together
+    hull: F64  # (V, 3)
+    beyond_m: float  # how far the hull reaches beyond the thing
+
+
+def close_parts(triangles: F64, *, within_m: float = 0.005, most: int = 32) -> tuple[F64, ...]:
+    """Convex parts (V, 3) that hold all of triangles (F, 3, 3); never none.
+
+    Parts that hang together are told apart, and cut along their axes until no hull reaches more than
+    within_m beyond the thing, the worst ones first, into no more than `most`. What is hollow stays
+    so. Boards and legs come out as they are.
+    """
+    turn = rotation_y(_level_turn(triangles))
+    groups = [_fronts_outwards(group) for group in _connected(triangles @ turn)]
+    thing = _Thing.of(groups, within_m)
+    if len(groups) <= most:
+        parts = [thing.part((group,)) for group in groups]
+    else:
+        parts = [thing.part(tuple(groups))]
+    done: list[_Part] = []
+    while parts and len(parts) + len(done) < most:
+        part = parts.pop(max(range(len(parts)), key=lambda k: parts[k].beyond_m))
+        halves = thing.halves(part) if part.beyond_m > within_m else ()
+        if halves:
+            parts += halves
+        else:
+            done.append(part)
+    return tuple(part.hull @ turn.T for part in (*done, *parts))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Thing:
+    """What parts are measured against: points on its faces."""
+
+    points: F64  # (N, 3)
+    normals: F64  # (N, 3) unit, outwards of solids
+    bounds_solid: Bools  # (N,)
+    spacing_m: float  # of the points
+    tree: cKDTree[None]
+    few: tuple[
+        cKDTree[None], I64
+    ]  # a tree of some of the points, quick to ask from far, their numbers
+    within_m: float
+
+    @classmethod
+    def of(cls, groups: Sequence[F64], within_m: float) -> _Thing:
+        triangles = np.concatenate(groups)
+        spacing_m = max(_SPACING_M, float(np.sqrt(face_areas(triangles).sum() / _MOST_POINTS)))
+        points, which = spread_points(triangles, spacing_m)
+        solid = np.repeat([_is_solid(g) for g in groups], [len(g) for g in groups])
+        some = np.arange(0, len(points), max(1, len(points) // _FEW))
+        few = cKDTree(points[some]), some
+        normals = unit_normals(triangles)[which]
+        return cls(points, normals, solid[which], spacing_m, cKDTree(points), few, within_m)
+
+    def part(self, groups: tuple[F64, ...]) -> _Part:
+        points = np.concatenate(groups).reshape(-1, 3)
+        hull = None if _is_flat(points) else hull_of(points)
+        if hull is None:
+            return _Part(groups, flat_part(points), 0.0)
+        return _Part(groups, hull, self._beyond(hull))
+
+    def _beyond(self, hull: F64) -> float:
+        """How far the hull's faces lie from the thing, on its outside."""
+        corners = hull[hull_faces(hull)]
+        if not len(corners):
+            return 0.0
+        points, _ = spread_points(corners, max(_HULL_SPACING_M, float(np.ptp(hull)) / _HULL_STEPS))
+        found = self.tree.query(points, distance_upper_bound=_FAR_M)
+        far, near = np.asarray(found[0]), np.asarray(found[1])
+        lost = ~np.isfinite(far)
+        if lost.any():
+            tree, numbers = self.few
+            found = tree.query(points[lost])
+            far[lost], near[lost] = found[0], numbers[found[1]]
+        above = ((points - self.points[near]) * self.normals[near]).sum(1)
+        # Between points on a face, what counts is how far off its plane.
+        far = np.where(far < self.within_m + self.spacing_m, np.abs(above), far)
+        # What lies deep in a solid is far from its faces as well.
+        is_outside = (above >= 0) | ~self.bounds_solid[near]
+        return float(far[is_outside].max(initial=0.0))
+
+    def halves(self, part: _Part) -> tuple[_Part, ...]:
+        """The part in two; () where nothing cuts it."""
+        if len(part.groups) > 1:
+            middles = np.array([(g.min((0, 1)) + g.max((0, 1))) / 2 for g in part.groups])
+            order = np.argsort(middles[:, np.ptp(middles, axis=0).argmax()], kind="stable")
+            ends = order[: len(order) // 2], order[len(order) // 2 :]
+            return tuple(self.part(tuple(part.groups[k] for k in end)) for end in ends)
+        (triangles,) = part.groups
+        best: tuple[_Part, ...] = ()
+        least, size = np.inf, float(np.linalg.norm(np.ptp(part.hull, axis=0)))
+        for axis, place in _planes(triangles):
+            sides = [half for half in _cut_in_two(triangles, axis, place) if len(half)]
+            if len(sides) < 2:
+                continue
+            halves = tuple(self.part((half,)) for half in sides)
+            # What is left to cut, by volume; of equals that which reaches the least far beyond.
+            left = [h for h in halves if h.beyond_m > self.within_m]
+            cost = sum(hull_volume(h.hull) * (1 + _HOLLOW * h.beyond_m / size) for h in left)
+            if cost < least:
+                best, least = halves, cost
+        return best
+
+
+def slabs(triangles: F64, depth_m: float = 0.02) -> tuple[F64, ...]:
+    """Convex slabs (V, 3) behind the faces of triangles (F, 3, 3): of walls and floors.
+
+    Faces of one plane that make a convex outline are one slab, others one each.
+    """
+    longest = lengths(triangles - np.roll(triangles, 1, axis=1)).max(1)
+    triangles = triangles[2 * face_areas(triangles) > _SLIVER_M * longest]
+    normals = unit_normals(triangles)
+    offsets = (normals * triangles[:, 0]).sum(1)
+    rows = np.column_stack([np.rint(normals * 500), np.rint(offsets / _SAME_M)])
+    _, plane = np.unique(rows, axis=0, return_inverse=True)
+    found = []
+    for k in range(int(plane.max(initial=-1)) + 1):
+        own = np.flatnonzero(plane == k)
+        normal = normals[own[0]]
+        outline = _outline(triangles[own].reshape(-1, 3), normal)
+        whole = face_areas(triangles[own]).sum()
+        faces = [outline[0]] if outline and outline[1] < 1.001 * whole else list(triangles[own])
+        found += [np.concatenate([face, face - depth_m * normal]) for face in faces]
+    return tuple(found)
+
+
+def _outline(points: F64, normal: F64) -> tuple[F64, float] | None:
+    """The convex outline of points in a plane, (V, 3) and its area; None where they lie in a line."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    plane = points @ np.stack([first, np.cross(normal, first)], -1)
+    try:
+        hull = ConvexHull(plane)
+    except (QhullError, ValueError):
+        return None
+    return points[hull.vertices], float(hull.volume)
+
+
+def _fronts_outwards(group: F64) -> F64:
+    """Triangles (F, 3, 3) of a solid, turned over where they look inwards."""
+    return group[:, ::-1] if signed_volume(group, group.mean((0, 1))) < 0 else group
+
+
+def _is_solid(group: F64) -> bool:
+    return closed_edge_share(group.round(5)) >= _CLOSED
+
+
+def _planes(triangles: F64) -> Iterator[tuple[int, float]]:
+    """Planes (axis, place) along which a part may be cut: its middle, and its largest level faces."""
+    normals = area_vectors(triangles) / 2
+    areas = lengths(normals)
+    corners = triangles.reshape(-1, 3)
+    for axis in range(3):
+        low, high = corners[:, axis].min(), corners[:, axis].max()
+        if high - low < 2 * _LEAST_WIDE_M:
+            continue
+        yield axis, float((low + high) / 2)
+        level = np.abs(normals[:, axis]) > _LEVEL * areas
+        at = np.rint(triangles[level, :, axis].mean(1) / _SAME_M).astype(np.int64)
+        places, which = np.unique(at, return_inverse=True)
+        weight = np.bincount(which, areas[level], len(places))
+        inner = (places * _SAME_M > low + _SAME_M) & (places * _SAME_M < high - _SAME_M)
+        for k in np.argsort(-weight * inner, kind="stable")[:_MOST_PLANES]:
+            if inner[k]:
+                # The place itself, not the middle of its step.
+                found = triangles[level, :, axis].mean(1)[which == k]
+                yield axis, float(found.mean())
+
+
+def _cut_in_two(triangles: F64, axis: int, place: float) -> tuple[F64, F64]:
+    """What of triangles lies below a plane and what above; what lies in it by its fronts, outwards."""
+    return _above(triangles, axis, place, -1.0), _above(triangles, axis, place, 1.0)
+
+
+def _above(triangles: F64, axis: int, place: float, sign: float) -> F64:
+    height = sign * (triangles[..., axis] - place)
+    inner = height >= -_BEYOND_M
+    count = inner.sum(1)
+    rises = height.max(1) > _BEYOND_M
+    bounds = sign * area_vectors(triangles)[:, axis] < 0
+    found = [triangles[(count == 3) & (rises | bounds)]]
+    for n in (1, 2):
+        # Turn each triangle so that its first corner is alone on its side.
+        own, h = triangles[rises & (count == n)], height[rises & (count == n)]
+        lonely = (inner[rises & (count == n)] == (n == 1)).argmax(1)
+        rows = np.arange(len(own))
+        (a, ha), (b, hb), (c, hc) = (
+            (own[rows, (lonely + k) % 3], h[rows, (lonely + k) % 3]) for k in range(3)
+        )
+        on_ab = a + (b - a) * (ha / (ha - hb))[:, None]
+        on_ac = a + (c - a) * (ha / (ha - hc))[:, None]
+        if n == 1:
+            found.append(np.stack([a, on_ab, on_ac], 1))
+        else:
+            found += [np.stack([on_ab, b, c], 1), np.stack([on_ab, c, on_ac], 1)]
+    return np.concatenate(found)
+
+
+def _level_turn(triangles: F64) -> float:
+    """The angle about y, radians, by which the most of upright faces lies along x and z."""
+    normals = area_vectors(triangles)
+    area = np.hypot(normals[:, 0], normals[:, 2])
+    upright = area > _LEVEL * lengths(normals)
+    if not upright.any():
+        return 0.0
+    # Directions that differ by a quarter turn are one: fold them, and take the commonest degree.
+    angle = np.arctan2(normals[upright, 2], normals[upright, 0]) % (np.pi / 2)
+    degree = np.rint(np.degrees(angle)).astype(np.int64) % 90
+    weight = np.bincount(degree, area[upright], 90)
+    best = int(weight.argmax())
+    same = degree == best
+    off = (angle[same] - np.radians(best) + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    found = np.radians(best) + float(np.average(off, weights=area[upright][same]))
+    return 0.0 if weight[0] >= _STRAIGHT * weight[best] else -found
+
+
+def _is_flat(points: F64) -> bool:
+    off = points - points.mean(0)
+    least = np.linalg.eigh(off.T @ off)[1][:, 0]
+    return bool(np.ptp(off @ least) < _FLAT_M / 2)
+
+
+def flat_part(points: F64) -> F64:
+    """Points (N, 3) in a plane as a convex part a millimetre thick, those of its outline twice."""
+    middle = points.mean(0)
+    _, size, axes = np.linalg.svd(points - middle, full_matrices=False)
+    if len(size) < 3 or size[1] < _BEYOND_M:
+        return thickened(points)
+    plane = (points - middle) @ axes[:2].T
+    try:
+        rim = points[ConvexHull(plane).vertices]
+    except (QhullError, ValueError):
+        return thickened(points)
+    return np.concatenate([rim - _FLAT_M * axes[2], rim + _FLAT_M * axes[2]])
 
 
 def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> tuple[F64, ...]:
@@ -91,6 +361,14 @@ def hull_of(points: F64) -> F64 | None:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):
         return None
+
+
+def hull_volume(points: F64) -> float:
+    """Cubic metres of the convex hull of points (N, 3); 0 where they lie in a plane."""
+    try:
+        return float(ConvexHull(points).volume)
+    except (QhullError, ValueError):
+        return 0.0
 
 
 def hull_faces(points: F64) -> I64:

@@ -60,6 +60,12 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None =
     return points if box is None else points[((points > box[0]) & (points < box[1])).all(1)]
 
 
+def spread_points(corners: F64, spacing_m: float) -> tuple[F64, NDArray[np.int64]]:
+    """(N, 3) points on triangles (F, 3, 3), about spacing_m apart, and (N,) the triangle of each."""
+    grids = _grids(corners, spacing_m)
+    return grids.points(None), np.repeat(np.arange(len(corners)), grids.n_u * grids.n_v)
+
+
 class _Grids(NamedTuple):
     """A grid over each of some triangles: steps along its longest edge, rows towards the apex."""
 

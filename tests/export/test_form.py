@@ -55,7 +55,9 @@ def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: 
         export(root, tmp_path / "x", "voc")
     with pytest.raises(BadInput, match="is a form of homes"):
         export(root, tmp_path / "x", "gltf")
-    with pytest.raises(BadInput, match=r"no such form of a home.*gltf, habitat, sdf, usd, usdz\)"):
+    with pytest.raises(
+        BadInput, match=r"no such form of a home.*gltf, habitat, mjcf, sdf, usd, usdz\)"
+    ):
         export_homes(root, tmp_path / "x", "coco")
 
 

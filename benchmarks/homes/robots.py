@@ -1,0 +1,182 @@
+"""Homes with joints in other programs: `make bench NAME=robots` -> out/bench/robots.json.
+
+Homes that nobody tunes on are dressed, exported as MJCF, loaded by MuJoCo, left alone for two seconds,
+and each door and drawer is pushed to its end. `python -m benchmarks robots` takes a home after the
+other; BENCH_HOMES=2 takes the first two.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, cKDTree
+
+from benchmarks.figures import write_report
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import House
+from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.export.export_homes import export_house
+from pbrs_farm.export.forms.mjcf import body_name
+from pbrs_farm.export.home_pieces import ExportedHome, exported_home
+from pbrs_farm.geometry.opened import free_value
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.geometry.surface_points import surface_points
+from pbrs_farm.prepare.finished_house import repaired_house
+from pbrs_farm.prepare.source import resolve, variants
+
+UNITS: Final = {
+    "joints.loads": "homes that MuJoCo loads",
+    "joints.homes": "homes",
+    "joints.settle_mm": "mm that the most restless thing moves in 2 s",
+    "joints.deepest_mm": "mm that the deepest contact penetrates then",
+    "joints.pushed": "doors and drawers that nothing stands before",
+    "joints.jammed": "of them that stop before their limits",
+    "joints.jammed_names": "of these",
+    "joints.hull_mm": "mm that a face of a thing lies beyond its collision parts at most",
+    "joints.over_mm": "mm that collision parts reach beyond their thing, 95th percentile of things",
+    "joints.fixed": "loose things that found no rest and stand fixed",
+}
+HOMES: Final = tuple(f"made:{70201 + k}" for k in range(20))
+_REST_S: Final = 2.0
+_PUSH_S: Final = 4.0
+_PUSH: Final = 25.0  # newtons, or newton metres of hinges, beside friction
+_OVER_M: Final = 0.003
+_NEAR: Final = 0.05  # share of its way by which a part may stop short
+
+
+def main() -> None:
+    """Measure every home."""
+    names = HOMES[: int(os.environ.get("BENCH_HOMES", len(HOMES)))]
+    rows = []
+    for name in names:
+        source = variants(resolve(name), [1])[0]
+        house, _ = repaired_house(source, recipe_from_name("fast"))
+        rows.append(measured(house))
+        print(name, {k: v for k, v in rows[-1].items() if k != "over"}, flush=True)
+    write_report("robots", figures(rows), UNITS)
+
+
+def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Of all homes."""
+    return {
+        "joints.loads": sum(row["loads"] for row in rows),
+        "joints.homes": len(rows),
+        "joints.settle_mm": round(max(row["settle_mm"] for row in rows), 3),
+        "joints.deepest_mm": round(max(row["deepest_mm"] for row in rows), 3),
+        "joints.pushed": sum(row["pushed"] for row in rows),
+        "joints.jammed": sum(len(row["jammed"]) for row in rows),
+        "joints.jammed_names": [name for row in rows for name in row["jammed"]],
+        "joints.hull_mm": round(max(row["hull_mm"] for row in rows), 2),
+        "joints.over_mm": round(float(np.percentile([x for r in rows for x in r["over"]], 95)), 2),
+        "joints.fixed": sum(row["fixed"] for row in rows),
+    }
+
+
+def measured(house: House) -> dict[str, Any]:
+    """The numbers of one home."""
+    home = exported_home(house)
+    short, over = hull_distances(home)
+    row: dict[str, Any] = {"hull_mm": short, "over": over, "loads": 0, "pushed": 0, "jammed": []}
+    row |= {"settle_mm": np.inf, "deepest_mm": np.inf, "fixed": 0}
+    with tempfile.TemporaryDirectory() as scratch:
+        export_house(house, Path(scratch) / "home", "mjcf")
+        (path,) = (Path(scratch) / "home").glob("*.xml")
+        try:
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            return row | {"fault": str(error)}
+    row["loads"] = 1
+    loose = sum(bool(p.surfaces) and not p.is_fixed for p in home.pieces)
+    row["fixed"] = loose - int((model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).sum())
+    row["settle_mm"], row["deepest_mm"] = settled(model)
+    row["pushed"], row["jammed"] = pushed(model, home)
+    return row
+
+
+def settled(model: Any) -> tuple[float, float]:
+    """(mm that a body moves in two seconds, mm of the deepest contact then)."""
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    before = state.xpos.copy()
+    for _ in range(int(_REST_S / model.opt.timestep)):
+        mujoco.mj_step(model, state)
+    moved = np.linalg.norm(state.xpos - before, axis=1).max()
+    deepest = max((-c.dist for c in state.contact[: state.ncon]), default=0.0)
+    return 1e3 * float(moved), 1e3 * float(max(deepest, 0.0))
+
+
+def pushed(model: Any, home: ExportedHome) -> tuple[int, list[str]]:
+    """How many joints are pushed to their ends and back, and the names of those that jam.
+
+    What geometry alone says stands in the way (`free_value`) is no jam: such joints are left out.
+    """
+    scene = SceneTriangles(home.house.items)
+    free = []
+    for k, piece in enumerate(home.pieces):
+        for link in piece.links[1:]:
+            joint = link.joint
+            assert joint is not None
+            if free_value(scene, k, link.part, joint.upper)[1] == "":
+                free.append(body_name(piece, link.part))
+    jammed = [name for name in free if not _travels(model, name)]
+    return len(free), jammed
+
+
+def _travels(model: Any, name: str) -> bool:
+    """Whether a joint reaches both of its limits when it is pushed."""
+    joint = model.joint(name)
+    low, high = joint.range
+    at, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+    push = _PUSH + float(model.dof_frictionloss[dof])
+    state = mujoco.MjData(model)
+    for sign, end in ((1.0, high), (-1.0, low)):
+        state.qfrc_applied[:] = 0
+        state.qfrc_applied[dof] = sign * push
+        for _ in range(int(_PUSH_S / model.opt.timestep)):
+            mujoco.mj_step(model, state)
+            if sign * (state.qpos[at] - end) > -_NEAR * (high - low):
+                break
+        else:
+            return False
+    return True
+
+
+def hull_distances(home: ExportedHome) -> tuple[float, list[float]]:
+    """(mm that faces lie beyond the parts at most, mm that each thing's parts reach beyond it).
+
+    The second counts what lies inside a mesh only where the mesh is closed.
+    """
+    short, over = 0.0, []
+    for piece in home.things:
+        for link in piece.links:
+            if not len(link.triangles):
+                continue
+            points = surface_points(link.triangles, 0.02)
+            beyond = np.full(len(points), np.inf)
+            for part in link.colliders:
+                planes = ConvexHull(part).equations
+                beyond = np.minimum(beyond, (points @ planes[:, :3].T + planes[:, 3]).max(1))
+            short = max(short, 1e3 * float(beyond.max()))
+            over.append(1e3 * _over(link.triangles, link.colliders))
+    return max(short, 0.0), over
+
+
+def _over(triangles: F64, parts: tuple[F64, ...]) -> float:
+    """Metres that the middles of hulls' faces lie beyond a mesh, outside it where it is closed."""
+    mesh = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
+    mesh.merge_vertices()
+    points = np.concatenate([trimesh.convex.convex_hull(part).triangles_center for part in parts])
+    far, _ = cKDTree(surface_points(triangles, 0.006)).query(points)
+    if mesh.is_watertight and (far > _OVER_M).any():
+        far[far > _OVER_M] *= ~mesh.contains(points[far > _OVER_M])
+    return float(far.max())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""What of a piece moves on its own: its body and each part that a joint turns or slides; no effects.
+
+Every form that has joints writes these: meshes and convex parts in the piece's frame, where they
+stand; mass and inertia; what may pass through what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.house import Surface, corners_of_surfaces
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.geometry.convex_parts import close_parts, hull_volume, hulls_of_parts
+
+_KG_PER_M3: Final = 100.0  # of the hulls of parts: furniture is mostly air
+_LEAST_KG, _MOST_KG = 0.1, 150.0
+_LEAST_LINK_KG: Final = 0.05
+_MOST_FILLED: Final = 12  # parts whose hulls are counted for the mass
+BODY: Final = ""
+"""The part that stands still, or falls as one where the piece is loose."""
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid body of a piece, in the piece's frame."""
+
+    part: str  # Surface.part; BODY of what has no joint
+    surfaces: tuple[Surface, ...]
+    joint: Joint | None  # against the body, in the piece's frame; None of the body
+
+    @cached_property
+    def triangles(self) -> F64:
+        """(F, 3, 3) metres."""
+        return corners_of_surfaces(self.surfaces)
+
+    @cached_property
+    def colliders(self) -> tuple[F64, ...]:
+        """Convex parts (V, 3) within 5 mm of its faces; () without a face. Found once a shape."""
+        if not len(self.triangles):
+            return ()
+        return _parts_of(_Shape(self.triangles))
+
+    @cached_property
+    def mass_kg(self) -> float:
+        """Its joint's, or 100 kg for each cubic metre that its parts fill, 0.1 to 150."""
+        if self.joint is not None and self.joint.mass_kg > 0:
+            return max(self.joint.mass_kg, _LEAST_LINK_KG)
+        if not len(self.triangles):
+            return _LEAST_KG
+        filled = hulls_of_parts(self.triangles, most=_MOST_FILLED)
+        volume = sum(hull_volume(part) for part in filled)
+        return float(np.clip(_KG_PER_M3 * volume, _LEAST_KG, _MOST_KG))
+
+    @cached_property
+    def bounds(self) -> F64:
+        """(2, 3) lowest and highest corner; zeros without a face."""
+        points = self.triangles.reshape(-1, 3)
+        return np.array([points.min(0), points.max(0)]) if len(points) else np.zeros((2, 3))
+
+    @property
+    def middle(self) -> F64:
+        """(3,) of its box, where its mass is."""
+        return np.asarray(self.bounds.mean(0))
+
+    @property
+    def inertia(self) -> F64:
+        """(3,) kg m2 about its middle, along the piece's axes: a solid box's."""
+        x, y, z = np.maximum(np.ptp(self.bounds, axis=0), 0.01) ** 2
+        return np.asarray(self.mass_kg / 12 * np.array([y + z, x + z, x + y]))
+
+
+def links_of(
+    surfaces: Sequence[Surface], joints: Sequence[Joint], local_from_world: F64
+) -> tuple[Link, ...]:
+    """The body, then a link for each joint whose part has faces.
+
+    surfaces: in the piece's frame. joints: in the world, as an item has them.
+    """
+    moving = {joint.part for joint in joints}
+    body = tuple(s for s in surfaces if s.part not in moving)
+    found = [Link(BODY, body, None)]
+    for joint in joints:
+        own = tuple(s for s in surfaces if s.part == joint.part)
+        if own:
+            found.append(Link(joint.part, own, joint.placed(local_from_world)))
+    return tuple(found)
+
+
+def travel(joint: Joint) -> tuple[float, float]:
+    """How far a joint goes from where its part stands: (back, on), radians or metres, back <= 0."""
+    return min(joint.lower - joint.value, 0.0), max(joint.upper - joint.value, 0.0)
+
+
+def effort_of(joint: Joint) -> tuple[float, float]:
+    """(damping, friction) of a joint as furniture has them: N s/m and N of slides, N m s and N m of hinges.
+
+    A drawer runs at a push of 3 N, a door at 3 N at its handle; heavy ones take more.
+    """
+    mass = max(joint.mass_kg, 1.0)
+    if joint.kind is JointKind.PRISMATIC:
+        return 2.0 + mass, 1.0 + 0.2 * mass
+    return 0.2 + 0.05 * mass, 0.2 + 0.02 * mass
+
+
+class _Shape:
+    """Triangles as a key: equal ones are decomposed once."""
+
+    def __init__(self, triangles: F64) -> None:
+        self.triangles = triangles
+        self._key = keys.sha256(np.ascontiguousarray(triangles.round(6)).tobytes())
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Shape) and self._key == other._key
+
+
+@lru_cache(maxsize=4096)
+def _parts_of(shape: _Shape) -> tuple[F64, ...]:
+    return close_parts(shape.triangles)

@@ -1,0 +1,127 @@
+"""A home as a model of MuJoCo: it loads, rests, and its drawers and doors travel as their joints say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from pbrs_farm.core.house import Box, House, Item, ItemKind, Material, Source
+from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.export.export_homes import export_house
+from pbrs_farm.geometry.opened import item_at
+from tests.export.homes import repaired_home
+from tests.geometry.test_opened import WIDE, cupboard, thing
+
+
+def small_home(*items: Item) -> House:
+    """Items on a floor of 4 m."""
+    floor = replace(thing("floor", (-2, -0.1, -2), (2, 0, 2)), kind=ItemKind.FLOOR)
+    source = Source("builtin", "", "", licence="CC0")
+    return House("small", "small", source, (), (), (floor, *items), (Material("wood"),), {})
+
+
+def loose(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Item:
+    item = thing(name, low, high)
+    a, b = np.array(low), np.array(high)
+    return replace(item, box=Box((a + b) / 2, (b - a) / 2, np.eye(3)))
+
+
+def model_of(house: House, folder: Path) -> Any:
+    export_house(house, folder, "mjcf")
+    return mujoco.MjModel.from_xml_path(str(folder / f"{house.id}.xml"))
+
+
+def corners(model: Any, state: Any, body: str) -> np.ndarray:
+    """Bounds in the world, y up, of a body's visual vertices."""
+    found = []
+    for k in range(model.ngeom):
+        if model.body(model.geom_bodyid[k]).name == body and model.geom_group[k] == 2:
+            mesh = model.geom_dataid[k]
+            first, n = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            points = model.mesh_vert[first : first + n] @ state.geom_xmat[k].reshape(3, 3).T
+            found.append(points + state.geom_xpos[k])
+    x, y, z = np.concatenate(found).T
+    points = np.stack([x, z, -y], -1)
+    return np.array([points.min(0), points.max(0)])
+
+
+@pytest.mark.parametrize("kind", list(JointKind))
+@pytest.mark.parametrize("stands_at", [0.0, 0.2])
+def test_a_joint_moves_its_part_as_the_home_does(
+    tmp_path: Path, kind: JointKind, stands_at: float
+) -> None:
+    shut = cupboard(kind)
+    item = item_at(shut, "front", stands_at)
+    model = model_of(small_home(item), tmp_path)
+    state = mujoco.MjData(model)
+    joint = model.joint("cupboard.front")
+    assert joint.range == pytest.approx([0, shut.joints[0].upper])
+    assert state.qpos[joint.qposadr[0]] == pytest.approx(stands_at)
+    for value in (0.0, 0.3):
+        state.qpos[joint.qposadr[0]] = value
+        mujoco.mj_kinematics(model, state)
+        expected = item_at(shut, "front", value).surfaces[1].positions
+        got = corners(model, state, "cupboard.front")
+        assert got == pytest.approx(np.array([expected.min(0), expected.max(0)]), abs=1e-5)
+
+
+def push(model: Any, name: str, by: float, seconds: float = 3.0) -> float:
+    state = mujoco.MjData(model)
+    joint = model.joint(name)
+    state.qfrc_applied[joint.dofadr[0]] = by
+    for _ in range(int(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, state)
+    return float(state.qpos[joint.qposadr[0]])
+
+
+def test_a_drawer_runs_between_fronts_that_touch_it_and_meets_a_thing_before_it(
+    tmp_path: Path,
+) -> None:
+    # The neighbour's front is 3 mm away, less than what hulls keep apart.
+    drawers = cupboard(JointKind.PRISMATIC), cupboard(JointKind.PRISMATIC, WIDE, "neighbour")
+    model = model_of(small_home(*drawers), tmp_path / "free")
+    assert push(model, "cupboard.front", 20.0) == pytest.approx(0.4, abs=0.01)
+    pillar = replace(loose("pillar", (0.1, 0, 0.22), (0.5, 1, 0.4)), nyu40=3)
+    model = model_of(small_home(drawers[0], pillar), tmp_path / "met")
+    assert push(model, "cupboard.front", 20.0) == pytest.approx(0.2, abs=0.01)
+
+
+def test_loose_things_are_at_rest_and_what_hovers_has_sunk(tmp_path: Path) -> None:
+    house = small_home(
+        loose("block", (0, 0.02, 0), (0.2, 0.22, 0.2)), loose("mug", (1, 0, 1), (1.08, 0.1, 1.08))
+    )
+    house = replace(house, items=tuple(replace(i, room_id="r") for i in house.items))
+    model = model_of(house, tmp_path)
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    before = state.xpos.copy()
+    for _ in range(1000):
+        mujoco.mj_step(model, state)
+    assert np.abs(state.xpos - before).max() < 1e-3
+    assert corners(model, state, "block")[0, 1] == pytest.approx(0, abs=1e-3)
+    assert model.body("mug").dofnum[0] == 6
+
+
+def test_the_built_in_home_loads_with_its_textures_and_free_bodies(tmp_path: Path) -> None:
+    house = repaired_home()
+    model = model_of(house, tmp_path)
+    assert model.ntex > 0
+    is_free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    assert is_free.any()
+    assert (model.body_mass[model.jnt_bodyid] > 0).all()
+
+
+def test_a_part_that_weighs_says_so(tmp_path: Path) -> None:
+    item = cupboard(JointKind.REVOLUTE)
+    heavy = replace(item, joints=(Joint(**{**_fields(item.joints[0]), "mass_kg": 7.5}),))
+    model = model_of(small_home(heavy), tmp_path)
+    assert model.body("cupboard.front").mass == pytest.approx(7.5)
+
+
+def _fields(joint: Joint) -> dict[str, Any]:
+    return {name: getattr(joint, name) for name in Joint.__slots__}
