@@ -1,4 +1,4 @@
-"""`pbrs-farm export ROOT --to gltf | habitat | mjcf | sdf | usd`: homes as scenes of other simulators.
+"""`pbrs-farm export ROOT --to gltf | habitat | mjcf | sdf | urdf | usd`: homes as scenes of other simulators.
 
 Effects: reads house.glb and house.json of an output folder, writes a new folder; it appears whole or
 not at all.

@@ -32,7 +32,7 @@ def passing_pairs(home: ExportedHome) -> tuple[tuple[End, End], ...]:
     """Pairs of bodies, one of them a part, that pass through each other; each pair once.
 
     A part and its body always; parts of one thing, and what stands still, where the part touches
-    them along its way and `geometry.opened.free_value` lets it pass.
+    them as it stands, or along its way and `geometry.opened.free_value` lets it pass.
     """
     scene = SceneTriangles(home.house.items)
     found: dict[tuple[End, End], None] = {}
@@ -50,8 +50,11 @@ def _touched(home: ExportedHome, scene: SceneTriangles, number: int, part: str) 
     joint = next(j for j in item.joints if j.part == part)
     corners = part_triangles(item, part)
     free, stopped_by = free_value(scene, number, part, joint.upper)
-    points = _on_way(joint, surface_points(corners, _SPACING_M), free)
-    tree = cKDTree(points)
+    standing = surface_points(corners, _SPACING_M)
+    points = _on_way(joint, standing, free)
+    # What stops it counts where it touches the part as it stands.
+    trees = {False: cKDTree(points), True: cKDTree(standing)}
+    tree = trees[False]
     low, high = points.min(0) - _TOUCHES_M, points.max(0) + _TOUCHES_M
     box = np.array([low, high])
     for k in scene.items_in(low, high):
@@ -61,7 +64,7 @@ def _touched(home: ExportedHome, scene: SceneTriangles, number: int, part: str) 
                 own = part_triangles(item, sibling.part)
                 if sibling.part != part and _meets(tree, own, box):
                     yield (k, sibling.part)
-        elif other.is_fixed and other.item.id != stopped_by and _meets(tree, scene.of_item(k), box):
+        elif other.is_fixed and _meets(trees[other.item.id == stopped_by], scene.of_item(k), box):
             yield from ((k, link.part) for link in other.links)
 
 

@@ -205,10 +205,10 @@ class Home:
 
     @checked_call
     def export(self, folder: str | Path, to: str = "gltf") -> Path:
-        """Write the home itself for another program: to = gltf, habitat, mjcf, sdf, usd or usdz.
+        """Write the home itself for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
 
         Each thing is one node, prim or model with a collider and its lamps; docs/formats.md describes
-        the forms, and `pf.load` reads each of them but mjcf and sdf. Raises BadInput where the folder holds something.
+        the forms, and `pf.load` reads each of them but mjcf, sdf and urdf. Raises BadInput where the folder holds something.
 
             >>> home.export("as_gltf").is_dir()
             True

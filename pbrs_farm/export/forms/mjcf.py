@@ -28,12 +28,12 @@ from pbrs_farm.geometry.convex_parts import slabs
 from pbrs_farm.installation import need
 
 _STEP_S: Final = 0.002
-_FALL_S: Final = 6.0  # that loose things have to come to rest
+_FALL_S: Final = 3.0  # that loose things have to come to rest
 _STILL_M: Final = 2e-4  # that a thing at rest moves in _LOOK_S
 _LOOK_S: Final = 0.5
 _LOST_M: Final = 0.25  # a thing that fell farther had nothing to stand on: it is fixed where it was
 _TIPPED_RAD: Final = 0.35
-_ROUNDS: Final = 4
+_ROUNDS: Final = 3
 _ON_BOX_M: Final = 1e-4
 _Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -268,7 +268,7 @@ def _settle(model: _Model, path: Path) -> list[str]:
                 body.remove(joint)
                 del model.loose[name]
                 fixed.append(name)
-            elif not bad.any():
+            else:
                 body.set("pos", _numbers(after[k, :3]))
                 body.set("quat", _numbers(after[k, 3:]))
         path.write_bytes(model.text)
