@@ -9,18 +9,23 @@ from typing import Any
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdLux, UsdPhysics, UsdUtils, UsdValidation
+from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import NOTHING_LEFT, MaterialKind, Texture
+from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.export.forms.usd import write_usd
 from pbrs_farm.export.forms.usdz import write_usdz
 from pbrs_farm.export.home_pieces import exported_home
 from pbrs_farm.formats.house_glb import gltf_material
+from pbrs_farm.geometry.opened import item_at
 from pbrs_farm.images import png_from_array
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from tests.export.homes import differences, repaired_home
+from tests.export.test_home_mjcf import small_home
+from tests.geometry.test_opened import cupboard
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +111,67 @@ def test_pieces_collide_loose_ones_have_a_mass_and_lamps_shine(written: dict[str
             lamps += 4 * np.pi**2 * radius**2 * nits
     expected = sum(lamp.flux_lm for piece in home.pieces for lamp in piece.lamps)
     assert lamps == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("kind", list(JointKind))
+@pytest.mark.parametrize("stands_at", [0.0, 0.2])
+def test_what_opens_is_an_articulation_whose_joint_holds_its_bodies_together(
+    tmp_path: Path, kind: JointKind, stands_at: float
+) -> None:
+    shut = cupboard(kind)
+    item = item_at(shut, "front", stands_at)
+    home = exported_home(small_home(item))
+    write_usd(home, tmp_path)
+    stage = Usd.Stage.Open(str(tmp_path / "small.usdc"))
+    joints = {p.GetTypeName(): p for p in stage.Traverse() if p.IsA(UsdPhysics.Joint)}
+    (word,) = set(joints) - {"PhysicsFixedJoint"}
+    assert word.lower() == f"physics{kind}joint"
+    joint, root = joints[word], joints["PhysicsFixedJoint"]
+    (found,) = [p for p in stage.Traverse() if p.HasAPI(UsdPhysics.ArticulationRootAPI)]
+    assert found == root
+    unit = 180 / np.pi if kind is JointKind.REVOLUTE else 1.0
+    assert joint.GetAttribute("physics:upperLimit").Get() == pytest.approx(
+        shut.joints[0].upper * unit
+    )
+    # By the frames of both ends, the value at which the part stands.
+    frames = [_world_frame(stage, joint, n) for n in (0, 1)]
+    between = np.linalg.inv(frames[0]) @ frames[1]
+    if kind is JointKind.PRISMATIC:
+        assert between[:3, 3] == pytest.approx([stands_at, 0, 0], abs=1e-5)
+    else:
+        assert np.arctan2(between[2, 1], between[1, 1]) == pytest.approx(stands_at, abs=1e-5)
+        assert between[:3, 3] == pytest.approx(np.zeros(3), abs=1e-5)
+    assert _world_frame(stage, root, 1) == pytest.approx(_world_frame(stage, root, 0), abs=1e-5)
+    part = stage.GetPrimAtPath(f"{root.GetPath().GetParentPath()}/Body")
+    assert part.GetRelationship("physics:filteredPairs").GetTargets() == [
+        f"{part.GetPath().GetParentPath()}/Part_1"
+    ]
+    # Where it is seen it is where the home has it.
+    (prim,) = [p for p in stage.Traverse() if p.GetDisplayName() == "front"]
+    box = UsdGeom.BBoxCache(Usd.TimeCode.Default(), ["default"]).ComputeWorldBound(prim)
+    low = np.array(box.ComputeAlignedRange().GetMin())
+    points = item.surfaces[1].positions
+    assert low == pytest.approx(
+        [points[:, 0].min(), -points[:, 2].max(), points[:, 1].min()], abs=1e-5
+    )
+    registry = UsdValidation.ValidationRegistry()
+    context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
+    assert [e.GetMessage() for e in context.Validate(stage)] == []
+    # A body within a body would be no body of its own.
+    for p in stage.Traverse():
+        above = [a for a in Usd.PrimRange(p) if a != p and a.HasAPI(UsdPhysics.RigidBodyAPI)]
+        assert not (p.HasAPI(UsdPhysics.RigidBodyAPI) and above)
+
+
+def _world_frame(stage: Any, joint: Any, end: int) -> np.ndarray:
+    """(4, 4) of one end of a joint in the stage, by its body's place."""
+    targets = joint.GetRelationship(f"physics:body{end}").GetTargets()
+    frame = np.eye(4)
+    if targets:
+        cache = UsdGeom.XformCache()
+        frame = np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(targets[0]))).T
+    turn = joint.GetAttribute(f"physics:localRot{end}").Get()
+    local = np.eye(4)
+    local[:3, :3] = Rotation.from_quat([*turn.GetImaginary(), turn.GetReal()]).as_matrix()
+    local[:3, 3] = joint.GetAttribute(f"physics:localPos{end}").Get()
+    return frame @ local

@@ -15,11 +15,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import USUAL_CUTOFF, House, ItemKind, MaterialKind, Surface
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.form import HomeForm
+from pbrs_farm.export.home_links import BODY, effort_of
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, rooms_json
+from pbrs_farm.export.passing import End, passing_pairs
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
+from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.installation import need
 
 _SUFFIXES: Final = {"image/png": ".png", "image/jpeg": ".jpg"}
@@ -85,6 +90,8 @@ class _Stage:
         looks = {k: self._material(k) for k in sorted(used)}
         for number, piece in enumerate(self._home.pieces):
             self._item(piece, number + 1, looks)
+        for pair in passing_pairs(self._home):
+            self._let_pass(*pair)
         for k, room in enumerate(self._home.house.rooms):
             self._room(k, room)
         self._stage.GetRootLayer().Save()
@@ -108,20 +115,95 @@ class _Stage:
             extras["has_frame"] = True  # its box lies along its own axes
         attribute = prim.CreateAttribute("pbrs:item", Sdf.ValueTypeNames.String)
         attribute.Set(json.dumps(extras, allow_nan=False))
-        for k, surface in enumerate(piece.surfaces):
+        if len(piece.links) > 1:
+            self._articulation(piece, path, looks)
+        for k, surface in enumerate(piece.surfaces if len(piece.links) == 1 else ()):
             mesh = self._mesh(f"{path}/Mesh_{k}", surface, looks[surface.material])
             if piece.is_building:
                 # The building is met as it is, and stands still.
                 UsdPhysics.CollisionAPI.Apply(mesh)
                 UsdPhysics.MeshCollisionAPI.Apply(mesh).CreateApproximationAttr("none")
-        if not piece.is_building and piece.surfaces:
-            self._colliders(piece, path)
+        if not piece.is_building and piece.surfaces and len(piece.links) == 1:
+            self._colliders(piece.colliders, path)
             if not piece.is_fixed:
                 UsdPhysics.RigidBodyAPI.Apply(prim)
                 UsdPhysics.MassAPI.Apply(prim).CreateMassAttr(piece.mass_kg)
         local_from_world = np.asarray(np.linalg.inv(piece.world_from_local), np.float64)
         for k, lamp in enumerate(piece.lamps):
             self._lamp(f"{path}/Light_{k}", lamp, local_from_world)
+
+    # What opens
+
+    def _articulation(self, piece: Piece, path: str, looks: dict[int, Any]) -> None:
+        """A rigid body for the piece's body and for each part, and the joints between them.
+
+        The articulation's root is the fixed joint of what stands still, else the body, as Isaac asks.
+        A part's frame is its place when shut: the joint's value is 0 there.
+        """
+        from pxr import Gf, UsdGeom, UsdPhysics
+
+        bodies = {}
+        for k, link in enumerate(piece.links):
+            bodies[link.part] = f"{path}/Body" if link.joint is None else f"{path}/Part_{k}"
+            xform = UsdGeom.Xform.Define(self._stage, bodies[link.part])
+            shut = np.eye(4) if link.joint is None else link.joint.motion(0.0)
+            xform.AddTransformOp().Set(_matrix(np.asarray(np.linalg.inv(shut), np.float64)))
+            for n, surface in enumerate(link.surfaces):
+                mesh = f"{bodies[link.part]}/Mesh_{n}"
+                self._mesh(mesh, moved_surface(surface, shut), looks[surface.material])
+            parts = tuple(transform_points(shut, part) for part in link.colliders)
+            self._colliders(parts, bodies[link.part])
+            UsdPhysics.RigidBodyAPI.Apply(xform.GetPrim())
+            UsdPhysics.MassAPI.Apply(xform.GetPrim()).CreateMassAttr(link.mass_kg)
+            if link.joint is not None:
+                xform.GetPrim().SetDisplayName(link.part[:200])
+                self._joint(f"{path}/Joint_{k}", bodies[BODY], bodies[link.part], link.joint)
+        root = self._stage.GetPrimAtPath(bodies[BODY])
+        if piece.is_fixed:
+            fixed = UsdPhysics.FixedJoint.Define(self._stage, f"{path}/Joint_0")
+            fixed.CreateBody1Rel().SetTargets([bodies[BODY]])
+            z_up = np.array(_Z_UP, np.float64).T @ piece.world_from_local
+            fixed.CreateLocalPos0Attr(Gf.Vec3f(*map(float, z_up[:3, 3])))
+            fixed.CreateLocalRot0Attr(_quaternion(Rotation.from_matrix(z_up[:3, :3])))
+            fixed.CreateLocalPos1Attr(Gf.Vec3f(0, 0, 0))
+            fixed.CreateLocalRot1Attr(Gf.Quatf(1, 0, 0, 0))
+            root = fixed.GetPrim()
+        UsdPhysics.ArticulationRootAPI.Apply(root)
+
+    def _let_pass(self, end: End, other: End) -> None:
+        """Two bodies do not meet: a part, and what it touches without being stopped."""
+        from pxr import UsdPhysics
+
+        paths = []
+        for number, part in (end, other):
+            piece = self._home.pieces[number]
+            path = f"/Home/Items/{piece.name}"
+            k = next(k for k, link in enumerate(piece.links) if link.part == part)
+            paths.append(
+                path if len(piece.links) == 1 else f"{path}/Part_{k}" if k else f"{path}/Body"
+            )
+        prim = self._stage.GetPrimAtPath(paths[0])
+        pairs = UsdPhysics.FilteredPairsAPI.Apply(prim).CreateFilteredPairsRel()
+        pairs.AddTarget(paths[1])
+
+    def _joint(self, path: str, body: str, part: str, joint: Joint) -> None:
+        from pxr import Gf, UsdPhysics
+
+        is_slide = joint.kind is JointKind.PRISMATIC
+        kind = UsdPhysics.PrismaticJoint if is_slide else UsdPhysics.RevoluteJoint
+        row = kind.Define(self._stage, path)
+        row.CreateBody0Rel().SetTargets([body])
+        row.CreateBody1Rel().SetTargets([part])
+        row.CreateAxisAttr("X")
+        turn = _quaternion(Rotation.align_vectors([joint.axis], [[1.0, 0.0, 0.0]])[0])
+        for n in (0, 1):
+            getattr(row, f"CreateLocalPos{n}Attr")(Gf.Vec3f(*map(float, joint.point)))
+            getattr(row, f"CreateLocalRot{n}Attr")(turn)
+        unit = 1.0 if is_slide else float(np.degrees(1))
+        row.CreateLowerLimitAttr(joint.lower * unit)
+        row.CreateUpperLimitAttr(joint.upper * unit)
+        drive = UsdPhysics.DriveAPI.Apply(row.GetPrim(), "linear" if is_slide else "angular")
+        drive.CreateDampingAttr(effort_of(joint)[0] / unit)
 
     def _label(self, prim: Any, name: str) -> None:
         from pxr import Sdf, UsdSemantics
@@ -162,10 +244,10 @@ class _Stage:
             primvars.CreatePrimvar("doNotCastShadows", Sdf.ValueTypeNames.Bool).Set(True)
         return mesh.GetPrim()
 
-    def _colliders(self, piece: Piece, path: str) -> None:
+    def _colliders(self, parts: tuple[F64, ...], path: str) -> None:
         from pxr import UsdGeom, UsdPhysics, Vt
 
-        for k, part in enumerate(piece.colliders):
+        for k, part in enumerate(parts):
             triangles = hull_faces(part)
             if not len(triangles):
                 continue
@@ -312,6 +394,13 @@ class _Stage:
         for wrap in ("wrapS", "wrapT"):
             node.CreateInput(wrap, Sdf.ValueTypeNames.Token).Set("repeat")
         return node
+
+
+def _quaternion(turn: Rotation) -> Any:
+    from pxr import Gf
+
+    x, y, z, w = (float(v) for v in turn.as_quat())
+    return Gf.Quatf(w, x, y, z)
 
 
 def _matrix(b_from_a: F64) -> Any:
