@@ -80,6 +80,9 @@ def make_root(
         table |= truth.optional_tables(names, home)
         made = {LAYER[k].file: encoded(k, v) for k, v in layers.items()}
         made["view.json"] = json.dumps(table).encode()
+        if with_optional:
+            rows = truth.articulation_table(layers["part"], home, camera)
+            made[keys.ARTICULATION] = json.dumps(rows).encode()
         files[f"truth.{name}"] = {f"views/{name}/{k}": v for k, v in made.items()}
     for step, made in files.items():
         for file, data in made.items():
