@@ -116,6 +116,8 @@ def pushed(model: Any, home: ExportedHome) -> tuple[int, list[str]]:
 
     What geometry alone says stands in the way (`free_value`) is no jam: such joints are left out.
     """
+    # What lies still costs nothing until something wakes it.
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     scene = SceneTriangles(home.house.items)
     free = []
     for k, piece in enumerate(home.pieces):
