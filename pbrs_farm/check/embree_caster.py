@@ -28,6 +28,7 @@ class Hits(Protocol):
     def distance(self, face: Faces, origin: Floats, directions: Floats) -> Floats: ...
     def normal(self, face: Faces, directions: Floats) -> Floats: ...
     def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces: ...
+    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]: ...
 
 
 class Rays:
@@ -102,6 +103,10 @@ class Rays:
         origins = np.broadcast_to(origin, directions.shape)
         kept[some[self._is_hole(face[some], origins[some], directions[some])]] = -1
         return kept
+
+    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]:
+        """Where the rays come from that meet something, (N, 3), their directions, and the way until there, (N,)."""
+        return np.broadcast_to(origin, directions.shape), directions, np.zeros(len(directions))
 
     def _is_hole(self, face: Faces, origins: Floats, directions: Floats) -> NDArray[np.bool_]:
         t = self.distance(face, origins, directions)

@@ -41,8 +41,14 @@ class MirrorRays:
         return seen
 
     def without_holes(self, face: Faces, origin: Floats, directions: Floats) -> Faces:
-        """(N,) -1: of triangles in one place behind a mirror none is told from another."""
-        return np.full(len(face), -1, np.int64)
+        """As Rays, behind the mirrors."""
+        at, d, _way = self.last_leg(origin, directions)
+        return self._rays.without_holes(face, at, d)
+
+    def last_leg(self, origin: Floats, directions: Floats) -> tuple[Floats, Floats, Floats]:
+        """As Rays: from the last mirrors."""
+        _face, way, at, d, _mirrors = self._followed(origin, directions)
+        return at, d, way
 
     def _followed(
         self, origin: Floats, directions: Floats

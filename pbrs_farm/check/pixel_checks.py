@@ -124,11 +124,12 @@ def _fill_one_place(
     triangles, rays = scene
     found = np.zeros(len(first), bool)
     # Only pixels where both rays hit something, and not the same triangle.
-    both = chosen & (first >= 0) & (other >= 0) & (first != other)
-    for k in np.nonzero(both)[0]:
+    both = np.nonzero(chosen & (first >= 0) & (other >= 0) & (first != other))[0]
+    starts, legs, _way = rays.last_leg(origin, directions[both])
+    for k, start, leg in zip(both, starts, legs, strict=True):
         pair, ray = np.array([first[k], other[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
-        t = _distances_pierced(triangles, pair, origin, ray)
+        t = _distances_pierced(triangles, pair, start, leg)
         # One place: parallel, and closer along the normal than a tie may be.
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
             found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
@@ -321,14 +322,15 @@ def _coincident(
     found = np.full(len(face), -1, np.int64)
     if "instance" not in labels:
         return found
-    first = rays.distance(face, origin, directions)
+    starts, legs, way = rays.last_leg(origin, directions)
+    first = rays.distance(face, origin, directions) - way
     # Measure gaps across the surface: a slanting ray is longer between the two.
     across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
     for instance in np.unique(labels["instance"]):
         # Look for a triangle of that instance at the depth of the first hit.
         own = np.nonzero(triangles.instance == instance)[0]
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
-            t = _distances_pierced(triangles, own, origin, directions[pixel])
+            t = _distances_pierced(triangles, own, starts[pixel], legs[pixel])
             gap = np.abs(t - first[pixel]) * across[pixel]
             gap[own == face[pixel]] = np.inf
             if len(own) and gap.min() <= TIE_DEPTH_M:
