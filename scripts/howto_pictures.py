@@ -93,6 +93,21 @@ def night() -> Image.Image:
     return row(frames[0].colour, frames[1].colour)
 
 
+def intrinsic() -> Image.Image:
+    frame = pf.open("out/intrinsic")[0]
+
+    def shown(light: NDArray[Any], white: float) -> Pixels:
+        return (255 * np.clip(light / white, 0, 1) ** (1 / 2.2)).astype(np.uint8)
+
+    shading, residual = frame.layer("shading"), frame.layer("residual")
+    white = float(np.percentile(shading, 98))
+    roughness = np.repeat(frame.layer("roughness")[..., None], 3, axis=-1)
+    return rows(
+        row(frame.colour, frame.layer("albedo"), roughness),
+        row(shown(shading, white), shown(residual, white / 2), shown(frame.layer("shading_indoor"), white)),
+    )  # fmt: skip
+
+
 def class_map() -> Image.Image:
     frame = max(
         pf.open("out/studio"), key=lambda f: float((f.classes_by("out/mine.csv") > 0).mean())
@@ -304,7 +319,7 @@ def switches() -> None:
 PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
     f.__name__: f
     for f in (
-        own_camera, sun_and_hour, night, class_map, stereo, plugin, blenderproc, coco, questions, yolo, hugging_face,
+        own_camera, sun_and_hour, night, intrinsic, class_map, stereo, plugin, blenderproc, coco, questions, yolo, hugging_face,
         predict, train, data_set, gpu, simulators, own_furniture, cluster, estimate, resume,
     )
 }  # fmt: skip
