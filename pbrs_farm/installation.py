@@ -165,7 +165,8 @@ def is_installed(module: str) -> bool:
 
     A package that is there and broken counts as installed.
     """
-    return find_spec(module) is not None
+    # kombu, once imported, has no spec any more.
+    return module in sys.modules or find_spec(module) is not None
 
 
 def need(*modules: str) -> None:

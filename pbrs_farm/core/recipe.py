@@ -192,6 +192,7 @@ _PHOTO: Mapping[str, Any] = {
 
 _PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "preview": {
+        "dress": {"open_share": 0.1},
         "repair": {"lamp_in_every_room": True, "lamp_lx": 100.0, "add_ceilings": True},
         "surroundings": {"kind": "drawn"},
         "cameras": _PHOTO,

@@ -37,7 +37,8 @@ def code_of(path: Path) -> str:
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".ipynb":
         cells = [c for c in json.loads(text)["cells"] if c["cell_type"] == "code"]
-        return "\n".join("".join(cell["source"]) for cell in cells)
+        code = "\n".join("".join(cell["source"]) for cell in cells)
+        return re.sub(r"^%pip .*$", "", code, flags=re.MULTILINE)
     return text
 
 

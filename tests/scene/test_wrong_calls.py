@@ -233,6 +233,8 @@ WRONG: list[tuple[str, Call, str]] = [
     ("Items.named", lambda g: g.home.items.named(3), "named: pattern"),
     ("Items.near", lambda g: g.home.items.near("sofa", within_m=-1), "near: within_m"),
     ("Items.near", lambda g: g.home.items.near("sofaa"), "sofaa"),
+    ("Home.open", lambda g: g.home.open("sofa"), "nothing of it opens"),
+    ("Home.open", lambda g: g.home.open("sofa", 2), "open: share"),
     ("Frame.layer", lambda g: g.frame.layer("depht"), "no layer depht"),
     ("Frame.layer", lambda g: g.frame.layer(3), "layer: name"),
     ("Frame.picture", lambda g: g.frame.picture("mlt_ol"), "no picture in mlt_ol"),
