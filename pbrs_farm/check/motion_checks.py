@@ -217,10 +217,11 @@ def _judge_motion(name: str, values: Floats, found: Followed) -> tuple[Bools, Bo
 def half_step(values: Floats) -> Floats:
     """Half the distance between 16-bit floats next to values: what storing them may cost.
 
-    A stored value is right within this of the computed one; float64, of any shape. Values must lie
-    within the range of 16-bit floats.
+    A stored value is right within this of the computed one; float64, of any shape. NaN for values
+    beyond the range of 16-bit floats.
     """
-    return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
 
 
 def check_partners(views: list[StoredView], tally: Tally) -> None:
