@@ -60,22 +60,28 @@ echo "worker $PBRS_FARM_WORKER: ${PBRS_FARM_SLOTS:-1} slots, ${PBRS_FARM_GRACE_S
 
 words=()
 [ -n "${PBRS_WALL_S:-}" ] && words=(--until "$PBRS_WALL_S")
+# Whatever the scheduler sends means: leave. It may come before there is a worker to tell.
+worker='' told=''
+leave() { told=1; [ -z "$worker" ] || kill -TERM "$worker" 2>/dev/null; }
+trap leave TERM USR1 USR2 INT XCPU
 # GridEngine warns the whole process group: what is ignored here stays so in all that the worker starts.
 (trap '' USR1 USR2 XCPU; exec "${PBRS_BIN:-pbrs-farm}" worker "${words[@]}") &
 worker=$!
-# Whatever the scheduler sends means: leave.
-leave() { kill -TERM "$worker" 2>/dev/null; }
-trap leave TERM USR1 USR2 INT XCPU
+[ -z "$told" ] || leave
 # A spot instance is told by its metadata two minutes before.
 if [ -n "${AWS_BATCH_JOB_ID:-}${PBRS_SPOT:-}" ]; then
   at=${PBRS_SPOT_URL:-http://169.254.169.254/latest/meta-data/spot/instance-action}
   (while kill -0 "$worker" 2>/dev/null; do curl -fs -m 2 "$at" >/dev/null && kill -TERM "$worker"; sleep 5; done) &
 fi
-# A signal ends `wait`, not the worker.
+# A signal ends `wait` (its code is above 128), not the worker; what that ended with is asked for once more (127: it was told).
 code=0
 while kill -0 "$worker" 2>/dev/null; do wait "$worker"; code=$?; done
+wait "$worker" 2>/dev/null
+again=$?
+[ "$again" -eq 127 ] || code=$again
 # Told to leave before its time, the job goes back into the queue: exit 99 asks GridEngine, 85 is AWS Batch's and Condor's to retry.
-if [ -e "$scratch/preempted" ]; then
+# A worker that was told while it started had no time to leave a note: it died of the signal (143).
+if [ -e "$scratch/preempted" ] || [ "$told $code" = "1 143" ]; then
   echo "worker $PBRS_FARM_WORKER: told to leave; back into the queue"
   [ -n "${SLURM_JOB_ID:-}" ] && scontrol requeue "$SLURM_JOB_ID" && exit 0
   [ -n "${SGE_TASK_ID:-}" ] && exit 99

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,11 +13,22 @@ import pytest
 from tests.workers.small_farm import REPO
 
 SCRIPT = REPO / "deploy/pilot/worker.sh"
-# Stands for `pbrs-farm worker`: says how it was started, and leaves a note when it is told to leave.
-WORKER = """#!/bin/bash
-trap 'touch "$PBRS_FARM_SCRATCH/preempted"; echo left; exit 0' TERM
-echo "$PBRS_FARM_WORKER $PBRS_FARM_SLOTS $PBRS_FARM_GRACE_S $PBRS_FARM_QUEUES $*"
-for _ in $(seq 100); do sleep 0.1; [ -n "$PBRS_TEST_OVER" ] && exit 0; done
+# Stands for `pbrs-farm worker`: says how it was started, and leaves a note when it is told to leave. Python as the
+# worker is: a shell that waits for one `sleep` after another loses a signal now and then.
+WORKER = f"""#!{sys.executable} -IS
+import os, signal, sys, time
+
+
+def leave(*_):
+    open(os.environ["PBRS_FARM_SCRATCH"] + "/preempted", "w").close()
+    os.write(1, b"left\\n")
+    os._exit(0)
+
+
+signal.signal(signal.SIGTERM, leave)
+names = ("WORKER", "SLOTS", "GRACE_S", "QUEUES")
+print(*(os.environ.get("PBRS_FARM_" + name, "") for name in names), *sys.argv[1:], flush=True)
+time.sleep(0 if os.environ.get("PBRS_TEST_OVER") else 10)
 """
 
 
