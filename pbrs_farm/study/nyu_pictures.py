@@ -140,7 +140,11 @@ def nyu_arrays(path: Path, plan: TrainingPlan, split: str) -> ViewArrays:
     ids, rows = [], []
     for picture in nyu_pictures(path, plan, split):
         ids.append(f"{NYU_HOME}/{picture.id}")
-        truth = {name: _resized(name, array, plan) for name, array in picture.truth.items()}
+        truth = {
+            name: _resized(name, array, plan)
+            for name, array in picture.truth.items()
+            if plan.task == "depth" or name != "depth"  # which normals are judged by alone
+        }
         rows.append({"colour": picture.colour, **truth})
     arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return ViewArrays(tuple(ids), arrays.pop("colour"), arrays)

@@ -22,12 +22,16 @@ DEPTH_TRUTH: Final = "the photograph's own depth along the axis, where it has on
 
 
 def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
-    """What a photograph's depth says, at its own size, in the form of the task's targets."""
+    """What a photograph's depth says, at its own size, in the form of the task's targets.
+
+    Depth stands beside normals, which are judged by it.
+    """
     depth_m = photo.depth_mm / np.float64(1000)
+    depth = {"depth": depth_m.astype(np.float32)}
     if plan.task == "depth":
-        return {"depth": depth_m.astype(np.float32)}
+        return depth
     normal, valid = normals_of_depth(depth_m, K)
-    return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid}
+    return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid, **depth}
 
 
 def crop_to_plan(

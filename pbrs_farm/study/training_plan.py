@@ -1,7 +1,8 @@
 """Plans of training: every constant a field, and the plans by name; no effects, no torch.
 
-`tiny` is two cores and minutes, `paper` section 4 of the paper, `released` what its code does
-against its text, `h200` one large GPU and half an hour for four modes.
+`tiny` is two cores and minutes, `lite` the same on an encoder that ImageNet may have trained,
+`paper` section 4 of the paper, `released` what its code does against its text, `h200` one large GPU
+and half an hour for four modes.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class TrainingPlan:
     n_classes: int = 40  # of segmentation: 40 as they are, 13 = NYU13
     enlarge: int = 1  # pictures times this before the network, its maps back after it
     encoding: str = (
-        "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet
+        "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet, lite
     )
     # Steps
     batch: int = 8  # views a step, over all processes
@@ -83,15 +84,14 @@ class TrainingPlan:
                             ("judge_views", 1), ("final_views", 1)):  # fmt: skip
             if getattr(self, name) < least:
                 raise BadInput("plan", name, f"expected {least} or more, got {getattr(self, name)}")
-        halved = self.network in ("small", "residual")
+        halved = self.network in ("small", "residual", "efficient")
         if halved and (self.width_px % 2 or self.height_px % 2):
             text = f"{self.width_px}x{self.height_px}: network {self.network} wants even numbers"
             raise BadInput("plan", "width_px, height_px", text)
         # Its deepest stage would be one cell, whose spread over a batch of one is none.
-        if self.network == "residual" and max(self.width_px, self.height_px) <= 32:
-            text = (
-                f"{self.width_px}x{self.height_px}: network residual wants a side above 32 pixels"
-            )
+        deep = self.network in ("residual", "efficient")
+        if deep and max(self.width_px, self.height_px) <= 32:
+            text = f"{self.width_px}x{self.height_px}: network {self.network} wants a side above 32 pixels"
             raise BadInput("plan", "width_px, height_px", text)
         if not 0 <= self.average < 1:
             raise BadInput("plan", "average", f"expected 0 to below 1, got {self.average}")
@@ -111,7 +111,7 @@ _FREE: Final = ("workers", "memory_gb", "log_every", "judge_every", "judge_views
 
 _CHOICES: Final = {
     "task": TASKS,
-    "encoding": ("centred", "caffe", "imagenet"),
+    "encoding": ("centred", "caffe", "imagenet", "lite"),
     "optimiser": ("adamw", "rmsprop", "sgd"),
     "schedule": ("one_cycle", "steps", "constant"),
     "loss": ("cosine", "chord"),
@@ -162,10 +162,15 @@ _TINY_EDGES = TrainingPlan(
 )  # fmt: skip
 _TINY_DEPTH = replace(_TINY_NORMALS, task="depth", steps=2000, turn_deg=0.0, judge_every=200)
 
+# As `tiny`, on an encoder that --init imagenet starts from.
+_LITE: Final[dict[str, Any]] = {"name": "lite", "network": "efficient", "encoding": "lite"}
+
 PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     (plan.name, plan.task): plan
     for plan in (
         _TINY_NORMALS, _TINY_CLASSES, _TINY_EDGES, _TINY_DEPTH,
+        replace(_TINY_NORMALS, **_LITE), replace(_TINY_CLASSES, **_LITE),
+        replace(_TINY_EDGES, **_LITE), replace(_TINY_DEPTH, **_LITE),
         _PAPER_NORMALS, _PAPER_CLASSES, _PAPER_EDGES,
         # The released code divides by 5 every 150 k steps.
         replace(_PAPER_NORMALS, name="released", rate_factor=0.2, rate_every=150_000),

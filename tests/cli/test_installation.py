@@ -32,7 +32,7 @@ def test_every_extra_named_is_one_of_pyproject() -> None:
     # `all` is every extra that a user may want; those of developers, benches and studies are apart.
     of_all = extras["all"][0].partition("[")[2].strip("]").split(",")
     assert set(of_all) == set(extras) - {
-        "all", "bench", "dev", "docs", "notebooks", "release", "study", "study-peers", "tensorboard", "wandb",
+        "all", "bench", "dev", "docs", "imagenet", "notebooks", "release", "study", "study-peers", "tensorboard", "wandb",
     }  # fmt: skip
 
 

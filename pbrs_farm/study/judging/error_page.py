@@ -16,7 +16,7 @@ from pbrs_farm.core.shown_text import MAX_PLACE, shown
 from pbrs_farm.study.judging.evaluation import (
     Evaluation,
     Trained,
-    figures_table,
+    evaluation_text,
     notes,
     predictions_of,
     report,
@@ -35,8 +35,7 @@ def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> 
     table.md, evaluation.json and index.html; files of an earlier evaluation are replaced.
     """
     make_folder(out)
-    text = "\n".join([figures_table(run, evaluations), "", *notes(run, evaluations), ""])
-    (out / "table.md").write_text(text)
+    (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n")
     (out / "evaluation.json").write_text(json.dumps(report(run, evaluations), indent=1) + "\n")
     page = out / "index.html"
     page.write_text(error_page(run, evaluations))

@@ -6,7 +6,7 @@ import hashlib
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from pbrs_farm.core.resampling import resized_nearest
 from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, title_of
 from pbrs_farm.study.judging.paper_figures import PaperRow, paper_row, tuned_row
 from pbrs_farm.study.metrics.edge_scores import EXACT_THRESHOLDS
+from pbrs_farm.study.metrics.error_parts import PARTS, ErrorParts
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
 from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
@@ -88,6 +89,7 @@ class Evaluation:
 
     views: JudgedViews
     rows: dict[str, Judged]  # "network", the baseline's name, HED untouched
+    parts: dict[str, ErrorParts] = field(default_factory=dict)  # of normals, by the same names
 
     @property
     def groups(self) -> dict[str, float]:
@@ -105,6 +107,8 @@ class Evaluation:
             "truth": self.views.truth,
             "n_views": len(self.views.ids),
             "figures": {name: judged.figures for name, judged in self.rows.items()},
+            "parts": {name: parts.means_deg() for name, parts in self.parts.items()},
+            "shares": next(iter(self.parts.values())).shares() if self.parts else {},
             "groups": self.groups,
             "errors": dict(zip(self.views.ids, self.rows["network"].errors, strict=True)),
         }
@@ -171,12 +175,14 @@ def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
     Beside the network stand the baseline (what the training views are on average) and, for
     boundaries where its weights are installed, HED untouched. Figures are those of task.figures.
     """
-    rows = {"network": _judged(predictions_of(run, views), run, views)}
     still = (resized_nearest(run.baseline, width, height) for height, width in views.sizes)
-    rows[run.figures["baseline_name"]] = _judged(still, run, views)
+    said = {"network": predictions_of(run, views), run.figures["baseline_name"]: still}
     if run.task.name == "boundaries" and has_hed():
-        rows[_HED_ROW] = _judged(_untouched_hed(run, views), run, views)
-    return Evaluation(views, rows)
+        said[_HED_ROW] = _untouched_hed(run, views)
+    evaluation = Evaluation(views, {})
+    for name, predictions in said.items():
+        evaluation = _with_row(run, evaluation, name, predictions)
+    return evaluation
 
 
 def with_others(
@@ -189,12 +195,27 @@ def with_others(
     """
     if name in evaluation.rows:
         raise BadInput("--predictions", name, "a second column of this name", hint="NAME=DIR")
-    judged = _judged(predictions, run, evaluation.views)
-    return Evaluation(evaluation.views, evaluation.rows | {name: judged})
+    return _with_row(run, evaluation, name, predictions)
 
 
-def _judged(predictions: Iterable[NDArray[Any]], run: Trained, views: JudgedViews) -> Judged:
-    return score_predictions(predictions, views.truths, run.task, run.plan)
+def _with_row(
+    run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
+) -> Evaluation:
+    views, parts = evaluation.views, dict(evaluation.parts)
+    if run.task.name == "normals":
+        parts[name] = ErrorParts()
+        predictions = _counted(predictions, views, parts[name])
+    judged = score_predictions(predictions, views.truths, run.task, run.plan)
+    return Evaluation(views, evaluation.rows | {name: judged}, parts)
+
+
+def _counted(
+    predictions: Iterable[NDArray[Any]], views: JudgedViews, parts: ErrorParts
+) -> Iterator[NDArray[Any]]:
+    """The same predictions; each is counted as it passes."""
+    for prediction, truth, colour in zip(predictions, views.truths, views.colour, strict=True):
+        parts.add(prediction, truth, colour)
+        yield prediction
 
 
 def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
@@ -233,6 +254,24 @@ def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:
         tuned = f", then {paper.tuned}" if paper.tuned else ""
         titles.append(f"paper: {paper.pretrained}{tuned}, on NYUv2")
     return markdown(titles, rows)
+
+
+def parts_tables(evaluations: list[Evaluation]) -> str:
+    """Mean angle by kind of surface, depth and luma, a table each that was judged; "" of other tasks."""
+    tables = []
+    for one in evaluations:
+        means = {name: parts.means_deg() for name, parts in one.parts.items()}
+        if not means:
+            continue
+        shares = next(iter(one.parts.values())).shares()
+        rows = [
+            [part, f"{100 * shares[part]:.1f} %", *(shown_figure("mean_deg", row[part]) for row in means.values())]
+            for part in PARTS
+            if all(part in row for row in means.values())
+        ]  # fmt: skip
+        titles = [f"{one.views.name}: mean, degrees", "pixels", *means]
+        tables.append(markdown(titles, rows))
+    return "\n\n".join(tables)
 
 
 def _paper(run: Trained) -> PaperRow | None:
@@ -287,11 +326,18 @@ def _said_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
     ]
 
 
+def evaluation_text(run: Trained, evaluations: list[Evaluation]) -> str:
+    """The table of figures, of normals those by part, and the notes, as Markdown."""
+    parts = parts_tables(evaluations)
+    tables = [figures_table(run, evaluations), "", *([parts, ""] if parts else [])]
+    return "\n".join([*tables, *notes(run, evaluations)])
+
+
 def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
     """Everything of the table and more, as JSON values: evaluation.json.
 
-    run, trained (figures at the end of training), evaluations (figures, groups and every view's
-    error), the paper's row and the notes.
+    run, trained (figures at the end of training), evaluations (figures, of normals the parts, groups
+    and every view's error), the paper's row and the notes.
     """
     paper = _paper(run)
     return {

@@ -24,6 +24,7 @@ from pbrs_farm.study.training.view_sources import (
     credits_of,
     held_out_views,
     is_held_out,
+    with_layer,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.views.open_views import open_views
@@ -52,6 +53,8 @@ def open_judged_place(
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)
     source = TrainingSource((place,), (own_mode or mode,), hold_out, all_there=False)
+    if plan.task == "normals":
+        source = with_layer(source, plan, "depth")
     return _of_homes(source, plan, label or path.name, trained_on, most)
 
 

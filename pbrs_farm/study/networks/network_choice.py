@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
 from pbrs_farm.study.networks.edge_hed import EdgeHed
+from pbrs_farm.study.networks.efficient_unet import EfficientUnet
 from pbrs_farm.study.networks.normals_fcn import NormalsFcn
 from pbrs_farm.study.networks.residual_unet import ResidualUnet
 from pbrs_farm.study.networks.small_unet import SmallUnet
@@ -19,6 +20,7 @@ from pbrs_farm.study.networks.small_unet import SmallUnet
 _NETWORKS: Final[dict[str, Callable[[int], nn.Module]]] = {
     "small": SmallUnet,
     "residual": ResidualUnet,
+    "efficient": EfficientUnet,
     "paper": NormalsFcn,
     "paper_tiny": lambda n_out: NormalsFcn(n_out, divide=8),
     "dilated": DilatedVgg,
@@ -32,6 +34,7 @@ _NETWORKS: Final[dict[str, Callable[[int], nn.Module]]] = {
 # Means of colour 0..255: of BGR as Caffe's VGG was trained, and of RGB 0..1 with their spreads.
 _CAFFE_BGR: Final = (104.00699, 116.66877, 122.67892)
 _IMAGENET: Final = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
+_LITE: Final = (127 / 255, 128 / 255)  # of EfficientNet-Lite, -1 to 1 about
 
 
 def network_of(name: str, n_out: int) -> nn.Module:
@@ -59,5 +62,7 @@ def encode_colour(colour: Tensor, encoding: str) -> Tensor:
     if encoding == "caffe":
         mean = torch.tensor(_CAFFE_BGR, dtype=colour.dtype, device=colour.device)
         return colour.flip(1) * 255 - mean.view(3, 1, 1)
+    if encoding == "lite":
+        return (colour - _LITE[0]) / _LITE[1]
     mean, spread = torch.tensor(_IMAGENET, dtype=colour.dtype, device=colour.device)
     return (colour - mean.view(3, 1, 1)) / spread.view(3, 1, 1)

@@ -24,13 +24,13 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
         self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 96, 128, 160), n_attention: int = 2
     ) -> None:
         super().__init__()
-        self.stem = _Residual(3 * FOLD**2 + 2, widths[0])
+        self.stem = Residual(3 * FOLD**2 + 2, widths[0])
         pairs = list(itertools.pairwise(widths))
-        self.down = nn.ModuleList(_Residual(a, b) for a, b in pairs)
-        self.up = nn.ModuleList(_Residual(a + b, a) for a, b in reversed(pairs))
+        self.down = nn.ModuleList(Residual(a, b) for a, b in pairs)
+        self.up = nn.ModuleList(Residual(a + b, a) for a, b in reversed(pairs))
         start_he(self)
         self.place = nn.Linear(2, widths[-1])
-        self.attention = nn.ModuleList(_Attention(widths[-1]) for _ in range(n_attention))
+        self.attention = nn.ModuleList(Attention(widths[-1]) for _ in range(n_attention))
         self.head = nn.Conv2d(widths[0], n_out * FOLD**2, 3, padding=1)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -38,15 +38,22 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
         x = functional.pixel_unshuffle(x, FOLD)
         x = self.stem(torch.cat([x, rows_and_columns(x)], 1))
         x, skips = encode(self.down, x)
-        # Attend between all cells of the bottleneck, each with its place in the picture.
-        cells = x.flatten(2).mT + self.place(rows_and_columns(x).flatten(2).mT)
-        for attention in self.attention:
-            cells = attention(cells)
-        x = cells.mT.reshape(x.shape).contiguous(memory_format=torch.channels_last)
+        x = attended(x, self.place, self.attention)
         return functional.pixel_shuffle(self.head(decode(self.up, x, skips)), FOLD)
 
 
-class _Residual(nn.Module):  # type: ignore[misc]
+def attended(x: Tensor, place: nn.Linear, blocks: nn.ModuleList) -> Tensor:
+    """Features (B, C, H, W) after every cell has attended to every other, each with its place in the picture.
+
+    place: rows and columns to C channels. blocks: `Attention` of C channels.
+    """
+    cells = x.flatten(2).mT + place(rows_and_columns(x).flatten(2).mT)
+    for block in blocks:
+        cells = block(cells)
+    return cells.mT.reshape(x.shape).contiguous(memory_format=torch.channels_last)
+
+
+class Residual(nn.Module):  # type: ignore[misc]
     """Two convolutions beside a short cut."""
 
     def __init__(self, n_in: int, n_out: int) -> None:
@@ -65,7 +72,7 @@ def _convolution(n_in: int, n_out: int) -> nn.Sequential:
     return nn.Sequential(conv, nn.BatchNorm2d(n_out))
 
 
-class _Attention(nn.Module):  # type: ignore[misc]
+class Attention(nn.Module):  # type: ignore[misc]
     """A pre-norm transformer block, attention then MLP: cells (B, N, C) -> the same."""
 
     def __init__(self, n: int, heads: int = 5) -> None:

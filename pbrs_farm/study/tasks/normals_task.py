@@ -43,10 +43,12 @@ class NormalsTask:
         return 3
 
     def targets(self, sample: Sample, plan: TrainingPlan) -> Arrays:
-        """normal (H, W, 3) int16 and valid (H, W)."""
+        """normal (H, W, 3) int16 and valid (H, W); depth (H, W) metres where it was asked for, to judge by."""
         if sample.normal is None or sample.valid is None:
             raise BadInput(sample.id, "normal", "the view has no normals")
-        return {"normal": np.rint(sample.normal * _SCALE).astype(np.int16), "valid": sample.valid}
+        depth = {} if sample.depth is None else {"depth": sample.depth}
+        normal = np.rint(sample.normal * _SCALE).astype(np.int16)
+        return {"normal": normal, "valid": sample.valid, **depth}
 
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
         """The angle's cosine over valid pixels."""

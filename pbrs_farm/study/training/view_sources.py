@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
@@ -33,7 +33,8 @@ class TrainingSource:
     places: roots or shards, or NYUv2's .mat alone. modes: each view is taken once in each of them. hold_out: homes by id,
     or by name without digest and variant, that never train; None = the split by house holds out
     val and test (a fifth of the homes). all_there: a name of hold_out that no place has is an error;
-    where several sources are compared, another one may have it. objects: models without context instead of rooms. most: at
+    where several sources are compared, another one may have it. beside: layers that are read
+    beside the task's. objects: models without context instead of rooms. most: at
     most so many training views, spread over all; 0 = all.
     """
 
@@ -43,6 +44,7 @@ class TrainingSource:
     objects: bool = False
     most: int = 0
     all_there: bool = True
+    beside: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -117,9 +119,19 @@ def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
         views = open_views(place)
         lacking |= views.left_out
         for mode in source.modes:
-            request = _request(mode, plan)
+            request = _request(mode, source, plan)
             lacking |= views.only(objects=source.objects, request=request).left_out
     return lacking
+
+
+def with_layer(source: TrainingSource, plan: TrainingPlan, layer: str) -> TrainingSource:
+    """The source that also reads a layer, where every view it would take has that; else as it is."""
+    more = replace(source, beside=(*source.beside, layer))
+    try:
+        lacks = left_out(more, plan).keys() - left_out(source, plan).keys()
+    except BadInput:  # no view has it
+        return source
+    return source if lacks else more
 
 
 def missing_of(source: TrainingSource) -> list[str]:
@@ -158,7 +170,7 @@ def _pictures(
 def _in_each_light(
     views: Sequence[Frame], source: TrainingSource, plan: TrainingPlan
 ) -> tuple[Picture, ...]:
-    requests = [_request(mode, plan) for mode in source.modes]
+    requests = [_request(mode, source, plan) for mode in source.modes]
     return tuple((view, request) for request in requests for view in views)
 
 
@@ -183,7 +195,7 @@ def _nyu_views(source: TrainingSource, plan: TrainingPlan, split: str, most: int
 def _finished(views: Views, source: TrainingSource, plan: TrainingPlan) -> Views:
     """Those that have all that the plan's task needs, in every mode."""
     for mode in source.modes:
-        views = views.only(objects=source.objects, request=_request(mode, plan))
+        views = views.only(objects=source.objects, request=_request(mode, source, plan))
     return views
 
 
@@ -198,6 +210,6 @@ def _arrays(pictures: Sequence[Picture], plan: TrainingPlan) -> ViewArrays:
     return arrays_of_samples(samples, task_of(plan.task), plan)
 
 
-def _request(mode: str, plan: TrainingPlan) -> SampleRequest:
-    size = (plan.width_px, plan.height_px)
-    return SampleRequest(task_of(plan.task).layers, mode=mode, axes="opencv", size=size)
+def _request(mode: str, source: TrainingSource, plan: TrainingPlan) -> SampleRequest:
+    size, layers = (plan.width_px, plan.height_px), (*task_of(plan.task).layers, *source.beside)
+    return SampleRequest(layers, mode=mode, axes="opencv", size=size)

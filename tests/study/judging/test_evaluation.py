@@ -109,6 +109,13 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
     figures = json.loads((run / "e" / "evaluation.json").read_text())
     assert [one["n_views"] for one in figures["evaluations"]] == [3, 1]
     assert set(figures["evaluations"][1]["errors"]) == {"wall"}
+    # The photograph's wall is 2 m away and faces the camera; the home's views have depth as well.
+    parts = [one["parts"] for one in figures["evaluations"]]
+    assert parts[1].keys() == {"network", "mean normal"}
+    assert {"frontal", "2 to 4 m"} <= parts[1]["mean normal"].keys()
+    assert not {"up", "nearer than 2 m"} & parts[1]["mean normal"].keys()
+    assert any(" m" in part for part in parts[0]["network"])
+    assert "photos: mean, degrees" in said
     page = (run / "e" / "index.html").read_text()
     assert page.count("<figure>") == 4 * 4
     assert "home home-2-00000000: a person" in page

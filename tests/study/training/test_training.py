@@ -19,8 +19,8 @@ from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_loop import LossFailed, seconds_a_step
 from pbrs_farm.study.training.training_views import BatchOrder
-from pbrs_farm.study.training_plan import plan_of
-from tests.study.training.made_views import killed_plan, small_plan, views
+from pbrs_farm.study.training_plan import TASKS, plan_of
+from tests.study.training.made_views import SMALL, killed_plan, small_plan, views
 
 pytestmark = pytest.mark.study
 
@@ -49,6 +49,13 @@ from pbrs_farm.study.training.training_job import Job, train
 plan = small_plan(steps="2")
 train(Job(plan, Path(sys.argv[1])), views(3, plan), views(2, plan))
 """
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_plan_lite_trains_every_task(task: str, tmp_path: Path) -> None:
+    plan = plan_of(task, "lite", SMALL | {"steps": "2"})
+    figures = train(Job(plan, tmp_path), views(3, plan))
+    assert all(np.isfinite(list(figures["network"]["train"].values())))
 
 
 @pytest.mark.parametrize("task", ["normals", "boundaries", "mean"])

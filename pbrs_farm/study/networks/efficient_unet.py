@@ -1,0 +1,119 @@
+"""A U-Net on EfficientNet-Lite0, whose encoder can start from ImageNet; no effects.
+
+The encoder is EfficientNet (Tan and Le 2019) without squeeze and excitation and with ReLU6, as its
+Lite variants are: 3.0 million of 4.3 million weights. The decoder is ours: two blocks of attention at a 32nd of the
+picture's size, where cells know their place, then a block a stage with a skip connection.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from torch import Tensor, nn
+from torch.nn import functional
+
+from pbrs_farm.study.networks.residual_unet import Attention, Residual, attended
+from pbrs_farm.study.networks.small_unet import FOLD, decode
+from pbrs_farm.study.networks.vgg import start_he
+
+# Repeats, kernel, stride, expansion and width of each stage (table 1 of the paper; Lite keeps the
+# stem's 32 channels).
+_STAGES: Final = (
+    (1, 3, 1, 1, 16), (2, 3, 2, 6, 24), (2, 5, 2, 6, 40), (3, 3, 2, 6, 80), (3, 5, 1, 6, 112),
+    (4, 5, 2, 6, 192), (1, 3, 1, 6, 320),
+)  # fmt: skip
+_STEM: Final = 32
+_EPSILON: Final = 1e-3  # of normalisation, as it was trained
+_AFTER: Final = (0, 1, 2, 4)  # stages whose outputs are skip connections: a 2nd to a 16th
+_DEEPEST: Final = 160  # channels of the cells that attend
+_UP: Final = (128, 96, 64, 48)  # of the decoder, from coarse to fine
+
+
+class EfficientUnet(nn.Module):  # type: ignore[misc]
+    """(B, 3, H, W) colour -> (B, n_out, H, W); H and W even, of 34 pixels or more."""
+
+    def __init__(self, n_out: int = 3) -> None:
+        super().__init__()
+        self.encoder = LiteEncoder()
+        self.narrow = nn.Conv2d(_STAGES[-1][-1], _DEEPEST, 1)
+        skips = [_STAGES[k][-1] for k in reversed(_AFTER)]
+        below = (_DEEPEST, *_UP[:-1])
+        self.up = nn.ModuleList(
+            Residual(a + skip, b) for a, skip, b in zip(below, skips, _UP, strict=True)
+        )
+        start_he(self)
+        self.place = nn.Linear(2, _DEEPEST)
+        self.attention = nn.ModuleList(Attention(_DEEPEST) for _ in range(2))
+        self.head = nn.Conv2d(_UP[-1], n_out * FOLD**2, 3, padding=1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """The map, of no particular length."""
+        x, skips = self.encoder(x)
+        x = attended(self.narrow(x), self.place, self.attention)
+        return functional.pixel_shuffle(self.head(decode(self.up, x, skips)), FOLD)
+
+
+class LiteEncoder(nn.Module):  # type: ignore[misc]
+    """(B, 3, H, W) -> features (B, 320, H / 32, W / 32), and the skip connections from fine to coarse."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stem = _unit(3, _STEM, 3, stride=2)
+        stages, n_in = [], _STEM
+        for repeats, kernel, stride, expansion, width in _STAGES:
+            blocks = []
+            for k in range(repeats):
+                blocks.append(_Inverted(n_in, width, kernel, 1 if k else stride, expansion))
+                n_in = width
+            stages.append(nn.Sequential(*blocks))
+        self.stages = nn.ModuleList(stages)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, list[Tensor]]:
+        """Bottleneck features, and what `decode` takes beside them."""
+        x = self.stem(x)
+        skips: list[Tensor] = []
+        for k, stage in enumerate(self.stages):
+            x = stage(x)
+            if k in _AFTER:
+                skips.append(x)
+        return x, skips
+
+
+class _Inverted(nn.Module):  # type: ignore[misc]
+    """An inverted residual (Sandler et al. 2018): wider, filtered a channel alone, narrower."""
+
+    def __init__(self, n_in: int, n_out: int, kernel: int, stride: int, expansion: int) -> None:
+        super().__init__()
+        n = n_in * expansion
+        self.expand = _unit(n_in, n, 1) if expansion > 1 else nn.Identity()
+        self.filter = _unit(n, n, kernel, stride=stride, groups=n)
+        self.project = _unit(n, n_out, 1, is_last=True)
+        self.has_short_cut = stride == 1 and n_in == n_out
+
+    def forward(self, x: Tensor) -> Tensor:
+        y = self.project(self.filter(self.expand(x)))
+        return x + y if self.has_short_cut else y
+
+
+def _unit(
+    n_in: int, n_out: int, kernel: int, *, stride: int = 1, groups: int = 1, is_last: bool = False
+) -> nn.Sequential:
+    """Convolution, normalisation and, but for the last of a block, ReLU6."""
+    conv = _SameConv(n_in, n_out, kernel, stride=stride, groups=groups, bias=False)
+    norm = nn.BatchNorm2d(n_out, eps=_EPSILON)
+    return nn.Sequential(conv, norm, *([] if is_last else [nn.ReLU6(inplace=True)]))
+
+
+class _SameConv(nn.Conv2d):  # type: ignore[misc]
+    """A convolution that pads as TensorFlow's "same": at a stride of 2 more at the end than before it."""
+
+    def forward(self, x: Tensor) -> Tensor:
+        pads: list[int] = []
+        # functional.pad wants the last axis first.
+        for n, kernel, stride in zip(
+            reversed(x.shape[-2:]), reversed(self.kernel_size), reversed(self.stride), strict=True
+        ):
+            total = max((-(-n // stride) - 1) * stride + kernel - n, 0)
+            pads += [total // 2, total - total // 2]
+        x = functional.pad(x, pads) if any(pads) else x
+        return functional.conv2d(x, self.weight, None, self.stride, 0, 1, self.groups)
