@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -19,6 +20,7 @@ from typing import Any, Final
 from benchmarks import startup
 from benchmarks.bare_machine import REPO, BareMachine, built_wheel, can_be_made
 from benchmarks.figures import FOLDER, write_report
+from tests.anywhere.without_posix import pbrs_farm
 
 UNITS: Final = startup.UNITS | {
     "anywhere.pip_only": "1: the wheel with the extra llvm renders the demo, verifies it and runs a notebook on a bare machine",
@@ -30,6 +32,7 @@ UNITS: Final = startup.UNITS | {
     "anywhere.first_picture_cpu_s": "CPU s of that",
     "anywhere.install_s": "s of that for pip",
     "anywhere.installed_mb": "MB of that environment",
+    "anywhere.posix_free": "1: import, help, demo, a run and its resumption end well where our modules lack POSIX, a view with the same bytes",
 }
 NOTEBOOK: Final = REPO / "docs/notebooks/first_picture.ipynb"
 
@@ -106,6 +109,26 @@ def first_picture(bare: Bare) -> dict[str, Any]:
     }
 
 
+def posix_free(bare: Bare) -> dict[str, Any]:
+    """What our modules do without the names that only POSIX has (tests/anywhere), beside what they do with them."""
+    folder = bare.machine.folder
+    words = ["run", "builtin", "--recipe", "preview", "--views", "1", "--out"]
+    with_posix = [sys.executable, "-m", "pbrs_farm.cli", *words, str(folder / "with")]
+    subprocess.run(with_posix, check=True, capture_output=True)
+    demo = ["demo", "--home", "builtin", "--bare", "--views", "1", "--out", folder / "shown"]
+    commands = [["--help"], demo, *[[*words, folder / "without"]] * 2]
+    done = [pbrs_farm(*command) for command in commands]
+    is_well = not any(d.returncode for d in done) and ": 0 steps done," in done[-1].stdout
+    files = [_files_of_views(folder / name) for name in ("with", "without")]
+    return {"anywhere.posix_free": int(is_well and bool(files[0]) and files[0] == files[1])}
+
+
+def _files_of_views(root: Path) -> dict[str, bytes]:
+    """Bytes by path of the files of every view below a root."""
+    found = [p for p in root.glob("houses/*/views/**/*") if p.is_file()]
+    return {str(p.relative_to(root)): p.read_bytes() for p in found}
+
+
 def first_minute(_bare: Bare) -> dict[str, Any]:
     """What startup.py measures, of this checkout."""
     return startup.startup_figures([sys.executable])
@@ -114,6 +137,7 @@ def first_minute(_bare: Bare) -> dict[str, Any]:
 # The first picture comes first: its kernels are not compiled yet.
 PARTS: Final[dict[str, Callable[[Bare], dict[str, Any]]]] = {
     "first_picture": first_picture, "pip_only": pip_only, "startup": first_minute,
+    "posix_free": posix_free,
 }  # fmt: skip
 """What is measured, by name; each gives figures of UNITS."""
 

@@ -1,6 +1,6 @@
 """What this process works on, for the process that watches it: after a crash it names file and step.
 
-Effects: writes lines to the pipe that send_notes_to names. run/processes/verb_process.py reads them.
+Effects: writes lines to the file that send_notes_to names. run/processes/verb_process.py reads them.
 """
 
 from __future__ import annotations
@@ -11,22 +11,22 @@ from contextvars import ContextVar
 from typing import Final
 
 _MAX_CHARS: Final = 300  # of a file's name
-_PIPE: ContextVar[int | None] = ContextVar("pipe", default=None)
+_FILE: ContextVar[int | None] = ContextVar("file", default=None)
 
 
 def note_step(file: str, step: str) -> None:
     """Note that the step of a file begins, for the process that watches this one, if one does.
 
     A library of others may kill the process without a word; the last note then says where.
-    Characters that cannot be printed become "?". A pipe that is closed is no error.
+    Characters that cannot be printed become "?". What cannot be written is no error.
     """
-    pipe = _PIPE.get()
-    if pipe is not None:
+    notes = _FILE.get()
+    if notes is not None:
         line = "".join(c if c.isprintable() else "?" for c in file)[:_MAX_CHARS]
         with contextlib.suppress(OSError):
-            os.write(pipe, f"{line}: {step}\n".encode("utf-8", "replace"))
+            os.write(notes, f"{line}: {step}\n".encode("utf-8", "replace"))
 
 
-def send_notes_to(pipe: int) -> None:
+def send_notes_to(notes: int) -> None:
     """Write the notes of this thread's context to a file descriptor from now on."""
-    _PIPE.set(pipe)
+    _FILE.set(notes)

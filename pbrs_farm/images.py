@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.file_kinds import kind_of
+from pbrs_farm.operating_system import OPEN_FILES, memory_file
 
 MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 
@@ -34,8 +35,6 @@ _FIXED_DATE: Final = "2000:01:01 00:00:00"  # of EXR files: equal images, equal 
 # 3 levels takes 536 kB and a fifth of its time (535 kB).
 _PNG_LABELS: Final = (32, 4)
 _PNG_PHOTO: Final = (64, 2)
-
-_OPEN_FILES: Final = Path("/proc/self/fd")  # Linux: the files this process holds open, by number
 
 # First bytes -> kind of file.
 _MAGIC: Final = (
@@ -285,26 +284,16 @@ def _temporary(suffix: str, data: bytes | None = None) -> Iterator[Path]:
         path.unlink(missing_ok=True)
 
 
-def _memory_file() -> int | None:
-    """A file in memory, None where the system has none or a sandbox forbids it."""
-    if not (hasattr(os, "memfd_create") and _OPEN_FILES.is_dir()):
-        return None
-    try:
-        return os.memfd_create("pbrs-image")
-    except OSError:
-        return None
-
-
 @contextmanager
 def _scratch(suffix: str) -> Iterator[Path]:
     """An empty file in memory, where the system has such: one on a disk would be written out."""
-    handle = _memory_file()
+    handle = memory_file("pbrs-image")
     if handle is None:
         with _temporary(suffix) as path:
             yield path
         return
     try:
-        yield _OPEN_FILES / str(handle)
+        yield OPEN_FILES / str(handle)
     finally:
         os.close(handle)
 
@@ -320,7 +309,7 @@ def _encoded(array: NDArray[Any], spec: Any, suffix: str) -> bytes:
         closed = output.close()
         if not (written and closed):
             text = f"OpenImageIO cannot write {suffix}: {output.geterror()}"
-            is_in_memory = path.parent == _OPEN_FILES
+            is_in_memory = path.parent == OPEN_FILES
             hint = "is there memory left?" if is_in_memory else f"is there room for {path}?"
             raise MachineFailed(text, hint=hint)
         return path.read_bytes()

@@ -19,6 +19,7 @@ from typing import Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.file_kinds import HEAD_BYTES, other_kind, wrong_kind
+from pbrs_farm.operating_system import NOT_REGULAR, open_unwaiting
 
 MAX_FILE_BYTES: Final = 512 * 2**20  # of a file that is read whole: a home, a scene, a picture
 MAX_SCENE_BYTES: Final = 1_000_000_000  # of a scene or model with the files beside it
@@ -30,11 +31,11 @@ MAX_DIGEST_BYTES: Final = 4 * 2**30  # of one that is read in pieces
 def open_regular(path: Path, max_bytes: int = MAX_FILE_BYTES) -> Iterator[BufferedReader]:
     """The file, opened to be read; OSError where it is no regular file or above max_bytes."""
     # Ask not to wait, so that a pipe without a writer opens, and look at what was opened.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    descriptor = open_unwaiting(path)
     with os.fdopen(descriptor, "rb") as file:
         status = os.fstat(descriptor)
         if not stat.S_ISREG(status.st_mode):
-            raise OSError(errno.EINVAL, "is no regular file (a device or a pipe)", str(path))
+            raise OSError(errno.EINVAL, NOT_REGULAR, str(path))
         if status.st_size > max_bytes:
             text = f"has {status.st_size / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} MB are read"
             raise OSError(errno.EFBIG, text, str(path))

@@ -31,7 +31,7 @@ from benchmarks.figures import write_report
 from benchmarks.memory import cpu_s, descendants, resident_mb
 from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.operating_system import die_with_parent
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.secret import Secret
 from workers.client.farm_client import Farm, completed, new_spec

@@ -25,9 +25,9 @@ from benchmarks.figures import write_report
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, Surface
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
+from pbrs_farm.operating_system import resident_mb
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.repair import repair
-from pbrs_farm.run.processes.limits import resident_mb
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, develop
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import sky_for_house

@@ -14,7 +14,7 @@ from typing import Final
 
 import pbrs_farm
 from benchmarks.figures import write_report
-from pbrs_farm.run.processes.limits import tree_mb
+from pbrs_farm.operating_system import tree_mb
 
 OUT: Final = Path("out/bench/demo")
 VIEWS: Final = 6  # as the Makefile's demo

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -194,12 +193,13 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
 
 def _warn_of_slowness() -> None:
     """Warn where only Mitsuba's scalar variant is left, and before kernels are compiled."""
+    from pbrs_farm.operating_system import has_nvidia_driver, kernel_cache
     from pbrs_farm.raycast.variant import MIN_LLVM, find_llvm
 
-    is_first = not any(Path(os.environ.get("HOME", "/"), ".drjit").glob("*"))
+    is_first = not any(kernel_cache().glob("*"))
     if is_first and sys.stderr.isatty():
         warn("the first run on this machine compiles what renders: ten seconds more, once")
-    if find_llvm() is None and not Path("/proc/driver/nvidia").exists():
+    if find_llvm() is None and not has_nvidia_driver():
         warn(
             f"no LLVM of version {MIN_LLVM} or later: going on with Mitsuba's scalar_rgb, several"
             f" times slower ({llvm_command()})"

@@ -356,7 +356,7 @@ def _ablation(args: argparse.Namespace) -> int:
     comparison = Comparison(sets, plan, args.out, args.seeds, exact=args.exact)
     result = compare(comparison, judged_on, echo)
     text = ablation_table(result)
-    (args.out / "table.md").write_text(text)
-    (args.out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n")
+    (args.out / "table.md").write_text(text, "utf-8")
+    (args.out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n", "utf-8")
     echo(f"\n{text}\n{args.out / 'table.md'}")
     return 0

@@ -168,11 +168,13 @@ def remarks_of(out: Path) -> list[str]:
     Read from the files of the export, so also of one made earlier. [] where there is nothing to say.
     """
     files = [out / "data.yaml", out / LEFT_OUT, *(out / split / LEFT_OUT for split in SPLITS)]
-    lines = [line for file in files if file.is_file() for line in file.read_text().splitlines()]
+    lines = [
+        line for file in files if file.is_file() for line in file.read_text("utf-8").splitlines()
+    ]
     said = [
         line.removeprefix("# ") for line in lines if line.startswith("# ") or ": has no " in line
     ]
     remarks = [out / REMARKS, *(out / split / REMARKS for split in SPLITS)]
     return said + [
-        line for file in remarks if file.is_file() for line in file.read_text().splitlines()
+        line for file in remarks if file.is_file() for line in file.read_text("utf-8").splitlines()
     ]

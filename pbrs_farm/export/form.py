@@ -169,7 +169,7 @@ def name_left_out(out: Path, views: list[ChosenView], why: str) -> int:
     if not views:
         return 0
     lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
-    (out / LEFT_OUT).write_text("".join(lines))
+    (out / LEFT_OUT).write_text("".join(lines), "utf-8")
     return 1
 
 

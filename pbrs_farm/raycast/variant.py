@@ -30,10 +30,12 @@ _LIBRARY_PLACES: Final = (
     "/usr/lib64/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
     "/usr/local/lib/libLLVM*.so*",
-    # Homebrew on Apple silicon and on Intel.
+    # Homebrew on Apple silicon and on Intel; Windows, whose installer names no version.
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+    "/Program Files/LLVM/bin/LLVM-C.dll",
 )
+_UNNAMED: Final = (MIN_LLVM,)  # what a library without a version in its name counts as
 # Beside the LLVM of a wheel (karellen-llvm-core), as it needs them: each after those it is linked with.
 _BESIDE_LLVM: Final = ("libunwind.so.1.0", "libc++abi.so.1.0", "libc++.so.1.0")
 
@@ -51,10 +53,15 @@ def _module(name: str) -> Any:
 def llvm_version(library: Path) -> tuple[int, ...]:
     """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown.
 
+    Windows' LLVM-C.dll names none and counts as MIN_LLVM: Dr.Jit says, once it is loaded, which it is.
+
     Links are followed, so the file must be there for links to name a version.
     """
     # Resolve links first: libLLVM.so alone names no version.
-    match = re.search(r"LLVM(?:-|\.so\.|\.)(\d+(?:\.\d+)*)", library.resolve().name)
+    name = library.resolve().name
+    if name == "LLVM-C.dll":
+        return _UNNAMED
+    match = re.search(r"LLVM(?:-|\.so\.|\.)(\d+(?:\.\d+)*)", name)
     return tuple(int(n) for n in match.group(1).split(".")) if match else ()
 
 
@@ -69,7 +76,8 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
     patterns = (*_LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
     found: dict[Path, tuple[int, ...]] = {}
     for pattern in patterns:
-        for path in Path("/").glob(pattern.lstrip("/")):
+        root = Path(Path(pattern).anchor)
+        for path in root.glob(str(Path(pattern).relative_to(root))):
             # A link and its target are one library.
             version = llvm_version(path)
             if version:

@@ -10,7 +10,6 @@ import contextlib
 import importlib
 import os
 import pkgutil
-import resource
 import sys
 import time
 import traceback
@@ -20,11 +19,11 @@ from typing import Any, Literal
 
 from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.operating_system import give_back_memory, peak_mb
 from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.child_process import Handler, Message, Send
-from pbrs_farm.run.processes.limits import give_back_memory
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting, task_from_line
 from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
@@ -163,8 +162,3 @@ def limit_threads(step: str, n_threads: int) -> None:
     """
     if n_threads < (os.cpu_count() or 1) and step in _DRJIT_STEPS:
         set_threads(n_threads)
-
-
-def peak_mb() -> float:
-    """Largest resident memory of this process so far, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000  # Linux counts in KiB

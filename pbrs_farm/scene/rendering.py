@@ -25,6 +25,7 @@ from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.serialise import json_bytes
+from pbrs_farm.operating_system import after_fork
 from pbrs_farm.prepare.apply_edits import apply_edits
 from pbrs_farm.prepare.dress_catalogue import fetch_catalogue
 from pbrs_farm.prepare.passes import FinishedHouse, cache_key, uses_catalogue
@@ -52,7 +53,7 @@ class Renderer:
 
     def __init__(self) -> None:
         self._pid = os.getpid()
-        os.register_at_fork(after_in_child=self._begin_in_child)
+        after_fork(self._begin_in_child)
         self._lock = threading.Lock()
         self._thread: ThreadPoolExecutor | None = None
         self._ident = 0  # of that thread

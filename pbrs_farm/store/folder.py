@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreRefused, StoreUnavailable
+from pbrs_farm.operating_system import create_new, flush_folder
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, open_regular, read_regular
 from pbrs_farm.store.object_store import Head, check_key, check_prefix
 
@@ -143,8 +144,7 @@ class FolderStore:
 
     def _write_temporary(self, data: bytes | memoryview) -> Path:
         temporary = self.root / TEMPORARY / f"{os.getpid()}-{secrets.token_hex(8)}"
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        descriptor = _with_parent(temporary, lambda: os.open(temporary, flags, 0o666))
+        descriptor = _with_parent(temporary, lambda: create_new(temporary))
         try:
             with os.fdopen(descriptor, "wb", buffering=0) as file:
                 # Unbuffered writes may take a part only.
@@ -160,13 +160,8 @@ class FolderStore:
 
     def _flush_folder(self, folder: Path) -> None:
         # Make the new name last, too: it is the folder's content.
-        if not self._fsync:
-            return
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        if self._fsync:
+            flush_folder(folder)
 
     def _walk(self, prefix: str) -> Iterator[str]:
         try:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.operating_system import has_drive, path_of_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.memory_store import MemoryStore
 from pbrs_farm.store.object_store import LAYOUT, Store
@@ -41,10 +42,10 @@ def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
     if url == "memory:":
         return MemoryStore()
     if parts.scheme == "file" and parts.netloc in ("", "localhost") and parts.path:
-        return _folder(Path(unquote(parts.path)), settings)
+        return _folder(path_of_url(parts.path), settings)
     if parts.scheme == "s3" and parts.netloc and "@" not in parts.netloc:
         return _laid_out(S3Store(parts.netloc, parts.path, settings.s3), settings.layout != "files")
-    if not parts.scheme and url:
+    if url and (not parts.scheme or has_drive(url)):
         return _folder(Path(url), settings)
     # Do not repeat a URL that may hold a password.
     shown = f"{parts.scheme}:..." if "@" in url else repr(url)

@@ -25,6 +25,16 @@ def test_ci_runs_the_one_script_on_every_python_that_the_project_takes() -> None
     assert (REPO / ".ci/run").exists()
 
 
+def test_ci_tries_a_view_and_its_resumption_on_the_systems_that_no_one_here_has() -> None:
+    job = loaded(REPO / ".github/workflows/ci.yml")["jobs"]["systems"]
+    assert [system.partition("-")[0] for system in job["strategy"]["matrix"]["system"]] == [
+        "macos", "windows",
+    ]  # fmt: skip
+    run = job["steps"][-1]["run"]
+    for words in ("pbrs-farm demo", "0 steps done", "pbrs-farm verify"):
+        assert words in run
+
+
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.stem)
 def test_a_workflow_makes_targets_that_there_are(path: Path) -> None:
     made = re.findall(r"run: make ([a-z-]+)", path.read_text(encoding="utf-8"))

@@ -6,12 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pbrs_farm.run.processes.limits import (
-    give_back_memory,
-    machine_mb,
-    memory_share_mb,
-    resident_mb,
-)
+from pbrs_farm.operating_system import give_back_memory, resident_mb
+from pbrs_farm.run.processes.limits import machine_mb, memory_share_mb
 
 
 def test_memory_is_the_containers_when_it_has_a_limit(tmp_path: Path) -> None:

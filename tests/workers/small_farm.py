@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.memory import descendants
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.operating_system import die_with_parent
 from pbrs_farm.settings import settings_from_environment
 from pbrs_farm.store import Store, StoreSettings
 from pbrs_farm.store.folder import FolderStore

@@ -108,7 +108,7 @@ def lua_constants() -> str:
 def script_text(name: str) -> str:
     """A script with what all share before it; whatever it does is written when it is over."""
     folder = Path(__file__).with_name("lua")
-    common, body = ((folder / f"{n}.lua").read_text() for n in ("common", name))
+    common, body = ((folder / f"{n}.lua").read_text("utf-8") for n in ("common", name))
     main = f"local function main()\n{body}end\nlocal answer = main()\nflush()\nreturn answer\n"
     return lua_constants() + common + main
 

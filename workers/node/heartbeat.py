@@ -9,7 +9,7 @@ from typing import Any, Final
 from celery import bootsteps
 from celery.worker import state
 
-from pbrs_farm.run.processes.limits import tree_mb
+from pbrs_farm.operating_system import tree_mb
 from workers.config import config_from_environment
 from workers.ledger.redis_ledger import RedisLedger, redis_client
 from workers.ledger.task_ledger import LedgerUnavailable

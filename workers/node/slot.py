@@ -19,6 +19,7 @@ from functools import partial
 from typing import Final, TypeVar
 
 from pbrs_farm.core.errors import PbrsError, StoreFailed
+from pbrs_farm.operating_system import is_running
 from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProcess
 from pbrs_farm.store import Store, store_from_url
@@ -301,7 +302,7 @@ class Slot:
         # holder: "<token>|worker|since"; a token is "worker:pid:number:random".
         token = holder.partition("|")[0]
         worker, _, pid = token.rpartition(":")[0].rpartition(":")[0].rpartition(":")
-        if worker != self._config.worker or not pid.isdigit() or _is_alive(int(pid)):
+        if worker != self._config.worker or not pid.isdigit() or is_running(int(pid)):
             return
         fault = Fault(
             fault="lost",
@@ -353,13 +354,3 @@ def _request(held: _Claimed) -> TaskRequest:
         source=inputs if is_geometry else "",
         attempt=held.attempt,
     )
-
-
-def _is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True

@@ -17,13 +17,11 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from types import FrameType
 from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed, PbrsError
-from pbrs_farm.run.processes.child_process import die_with_parent
-from pbrs_farm.run.processes.limits import tree_mb
+from pbrs_farm.operating_system import dying_with_parent, is_running, tree_mb
 from pbrs_farm.store import store_from_url
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.ids import QUEUES
@@ -102,7 +100,7 @@ def sweep(config: FarmConfig) -> None:
     # Logs of pool processes that are gone; "pbrs-<worker>-<pid>".
     for folder in config.scratch.glob(f"pbrs-{config.worker}-*"):
         pid = folder.name.rpartition("-")[2]
-        if pid.isdigit() and not Path(f"/proc/{pid}").exists():
+        if pid.isdigit() and not is_running(int(pid)):
             shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -123,7 +121,7 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
     celery = subprocess.Popen(
         command(config),
         env={**os.environ, "PBRS_FARM_STORE_ID": config.store_id},
-        preexec_fn=lambda: die_with_parent(signal.SIGTERM),
+        preexec_fn=dying_with_parent(signal.SIGTERM),
     )
     while True:
         code = _reap(celery)

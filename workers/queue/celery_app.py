@@ -17,7 +17,7 @@ from celery.signals import setup_logging, worker_init, worker_process_init
 from kombu import Exchange, Queue
 from kombu.serialization import register
 
-from pbrs_farm.run.processes.child_process import die_with_parent
+from pbrs_farm.operating_system import die_with_parent
 from pbrs_farm.store.s3 import forbid_in_this_process
 from workers.config import FarmConfig, config_from_environment
 from workers.ids import QUEUES

@@ -255,7 +255,7 @@ def _camera_json(view: ChosenView) -> dict[str, Any]:
 
 
 def _write_json(path: Path, document: Any) -> None:
-    path.write_text(json.dumps(document, indent=1) + "\n")
+    path.write_text(json.dumps(document, indent=1) + "\n", "utf-8")
 
 
 FORM = ViewForm(

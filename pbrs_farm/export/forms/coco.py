@@ -40,7 +40,9 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> int:
         "images": images,
         "annotations": annotations,
     }
-    (out / "annotations.json").write_text(json.dumps(document, separators=(",", ":")) + "\n")
+    (out / "annotations.json").write_text(
+        json.dumps(document, separators=(",", ":")) + "\n", "utf-8"
+    )
     n_pictures = sum("file_name" in image for image in images)
     return 1 + n_pictures + _write_panoptic(views, images, document["categories"], out)
 
@@ -130,7 +132,7 @@ def _write_panoptic(
             for c in categories
         ],
     }
-    (out / "panoptic.json").write_text(json.dumps(document, separators=(",", ":")) + "\n")
+    (out / "panoptic.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
     return 1 + len(views)
 
 

@@ -54,7 +54,7 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
 
 def _write_lines(file: Path, lines: Iterable[str]) -> None:
-    file.write_text("".join(lines))
+    file.write_text("".join(lines), "utf-8")
 
 
 def _camera_line(view: ChosenView) -> str:

@@ -37,7 +37,7 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
         index.append(json.dumps(row))
     # Say which view each file holds.
-    (out / "index.jsonl").write_text("\n".join(index) + "\n")
+    (out / "index.jsonl").write_text("\n".join(index) + "\n", "utf-8")
     return len(views) + 1
 
 

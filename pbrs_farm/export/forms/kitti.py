@@ -44,7 +44,7 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     if not rows:
         hint = "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward"
         raise BadInput("--to", "kitti", "no view has flow or disparity", hint=hint)
-    (out / "index.txt").write_text("\n".join(rows) + "\n")
+    (out / "index.txt").write_text("\n".join(rows) + "\n", "utf-8")
     return n_files + 1
 
 

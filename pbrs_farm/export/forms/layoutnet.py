@@ -51,7 +51,7 @@ def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> int:
         picture = turned_picture(view.array(view.picture or ""), axes.T @ pose_opencv(view)[:3, :3])
         (out / "img" / f"{name}.png").write_bytes(png_from_array(picture))
         lines = [f"{x:.3f} {y:.3f}\n" for x, y in corner_pixels(view, axes).reshape(-1, 2)]
-        (out / "label_cor" / f"{name}.txt").write_text("".join(lines))
+        (out / "label_cor" / f"{name}.txt").write_text("".join(lines), "utf-8")
     left_out = [view for view in views if not _is_fit(view)]
     return 2 * len(shown) + name_left_out(out, left_out, f"has no {_FIT}")
 

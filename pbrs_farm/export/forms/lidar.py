@@ -76,7 +76,7 @@ def _write_scans(folder: Path, views: list[ChosenView], sensor: LidarSensor, nam
         (folder / f"{view.id}.pcd").write_bytes(_pcd(records, words))
         time = view.facts.get("time_s")
         rows.append(f"{number if time is None else time:.6f} {' '.join(words)}\n")
-    (folder / "poses.txt").write_text("".join(rows))
+    (folder / "poses.txt").write_text("".join(rows), "utf-8")
     return 2 * len(views) + 1
 
 

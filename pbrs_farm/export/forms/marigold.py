@@ -71,7 +71,7 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> int:
                 n_targets += len(files)
     written = {name: own for name, own in lines.items() if own}
     for name, own in written.items():
-        (out / f"{_LISTS[name]}.txt").write_text("".join(own))
+        (out / f"{_LISTS[name]}.txt").write_text("".join(own), "utf-8")
     without = [view for view in views if view.picture is None]
     n_targets += len(lines["depth"]) + len(lines["normal"])
     n_files = len(shown) + n_targets + len(written)

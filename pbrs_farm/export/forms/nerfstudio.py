@@ -48,7 +48,9 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int
             "applied_transform": Z_UP_FROM_Y_UP[:3].tolist(),
             "frames": frames,
         }
-        (out / house / "transforms.json").write_text(json.dumps(transforms, indent=1) + "\n")
+        (out / house / "transforms.json").write_text(
+            json.dumps(transforms, indent=1) + "\n", "utf-8"
+        )
         n_files += 1
     return n_files
 

@@ -157,7 +157,7 @@ def _write_references(
 
 def _write_blind_scores(questions: Sequence[Question], out: Path) -> list[str]:
     scores = blind_scores(questions)
-    with (out / "blind_scores.csv").open("w", newline="") as file:
+    with (out / "blind_scores.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["question_type", "questions", "blind_score"])
         writer.writerows([kind, n, f"{score:.3f}"] for kind, (n, score) in scores.items())

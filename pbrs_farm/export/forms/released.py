@@ -45,16 +45,16 @@ def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> int:
                     n_files += 1
             good.append("{house}/{id}\n".format(**place))
         n_files += _write_cameras(out / "camera_v2" / house, own)
-    (out / "data_goodlist_v2.txt").write_text("".join(good))
+    (out / "data_goodlist_v2.txt").write_text("".join(good), "utf-8")
     return n_files + 1
 
 
 def _write_cameras(folder: Path, views: list[ChosenView]) -> int:
     # A line of both camera files for each view, in the order of the views' numbers.
     folder.mkdir(parents=True)
-    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views))
+    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views), "utf-8")
     names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
-    (folder / "room_camera_name.txt").write_text(names)
+    (folder / "room_camera_name.txt").write_text(names, "utf-8")
     return 2
 
 

@@ -58,7 +58,7 @@ def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView,
             rows[name].append(f"{time:.6f} {at}")
         rows["groundtruth"].append(_trajectory_row(time, pose_opencv(view)))
     for name, lines in rows.items():
-        (folder / f"{name}{side}.txt").write_text("\n".join(lines) + "\n")
+        (folder / f"{name}{side}.txt").write_text("\n".join(lines) + "\n", "utf-8")
     return 2 * len(timed) + 3
 
 

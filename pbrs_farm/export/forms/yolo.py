@@ -111,7 +111,7 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> int:
             remarks.append(f"# the split left {name} empty, so {other} stands in for it")
     lines = [*remarks, *(f"{name}: {folders[name]}" for name in SPLITS if name in folders)]
     lines += fields
-    (out / "data.yaml").write_text("\n".join(lines) + "\n")
+    (out / "data.yaml").write_text("\n".join(lines) + "\n", "utf-8")
     return 1
 
 

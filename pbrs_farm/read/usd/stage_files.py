@@ -18,6 +18,7 @@ from typing import Any, Final
 from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.operating_system import MEMORY_LIMIT, has_crashed
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, real_path
@@ -169,9 +170,9 @@ def opened_stage(folder: StageFolder, notes: Notes) -> Any:
 
 
 # Damaged binary layers may keep the library for ever, or kill it: try them in a process that may die.
-_TRIAL: Final = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))
+_TRIAL: Final = f"""
+{MEMORY_LIMIT}
+import sys
 from pxr import Usd, UsdUtils
 try:
     UsdUtils.ExtractExternalReferences(sys.argv[1])
@@ -209,7 +210,7 @@ def _fault_of(path: str, _size: int, _changed: int, n_bytes: int) -> str:
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"damaged: the library does not open it within {limit_s:.0f} s"
-    return "damaged: the library dies of it" if done.returncode < 0 else ""
+    return "damaged: the library dies of it" if has_crashed(done.returncode) else ""
 
 
 FAULTS: Final = (Tf.ErrorException, UnicodeDecodeError)

@@ -6,11 +6,8 @@ Effects: a process in a session of its own, and its log file.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
 import os
-import select
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -18,9 +15,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
-from pbrs_farm.run.processes.limits import resident_mb
+from pbrs_farm.operating_system import OWN_SESSION, ReplyPipe, end_tree, resident_mb
 
-_PR_SET_PDEATHSIG: Final = 1  # of linux/prctl.h
 _CLOSE_S: Final = 10.0  # what freeing GL and Mitsuba may take
 PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
 """Code of a child that sees the modules its parent sees, wherever it was started."""
@@ -56,15 +52,11 @@ class ChildProcess:
         command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
             self._process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=file,
-                start_new_session=True,
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, **OWN_SESSION
             )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._requests, self._replies = self._process.stdin, self._process.stdout
+        self._requests, self._replies = self._process.stdin, ReplyPipe(self._process.stdout)
 
     def send(self, line: bytes) -> None:
         """Put a line into its pipe; nothing when it is dead, as exit_code then says."""
@@ -80,10 +72,9 @@ class ChildProcess:
         """
         # Read on where no whole line is held yet.
         if b"\n" not in self._buffer:
-            readable, _, _ = select.select([self._replies], [], [], timeout_s)
-            if not readable:
+            chunk = self._replies.read(timeout_s)
+            if chunk is None:
                 return None
-            chunk = os.read(self._replies.fileno(), 65536)
             if not chunk:  # it is ending; exit_code tells how as soon as it has
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     self._process.wait(timeout=1.0)
@@ -100,15 +91,12 @@ class ChildProcess:
     def kill(self) -> None:
         """Kill it and whatever it started; it is gone afterwards.
 
-        SIGKILL to its whole process group: nothing of it can clean up. Take `close` where it should
-        free what it holds.
+        Nothing of it can clean up. Take `close` where it should free what it holds.
         """
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
+        end_tree(self._process)
         self._process.wait()
-        for pipe in (self._requests, self._replies):
-            with contextlib.suppress(BrokenPipeError):
-                pipe.close()
+        self.release()
+        self._replies.close()
 
     def release(self) -> None:
         """Close its requests' pipe, so that it ends by itself as soon as it can."""
@@ -150,31 +138,6 @@ class ChildProcess:
     def clear_log(self) -> None:
         """Empty its log: the next task's begins."""
         os.truncate(self._log, 0)
-
-
-def ending(code: int) -> str:
-    """How a process ended, in words; code: minus the signal that killed it.
-
-    Signals are named; SIGKILL says that memory may have been short, as the kernel kills so.
-    """
-    if code == -signal.SIGKILL:
-        return "its process was killed by SIGKILL from outside (out of memory?)"
-    if code < 0:
-        return f"its process was killed by {signal.Signals(-code).name}"
-    return f"its process ended with {code}"
-
-
-def die_with_parent(sign: int = signal.SIGKILL) -> None:
-    """Ask Linux to send us the signal when the thread that started us ends.
-
-    The thread, not the process: a parent must start children from a thread that lives as long as
-    they should. Linux only. It is lost when the child starts another program with other rights.
-    """
-    parent = os.getppid()
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(sign), 0, 0, 0)
-    # The parent may have ended before prctl.
-    if os.getppid() != parent:
-        os.kill(os.getpid(), sign)
 
 
 # ready: it may be given a task. step: a step begins. waiting: storage does not answer.

@@ -1,16 +1,17 @@
 """What a render process may use, and what the machine has.
 
-Effects: reads /proc and /sys; give_back_memory acts on this process.
+Effects: reads /sys.
 """
 
 from __future__ import annotations
 
-import ctypes
 import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+from pbrs_farm.operating_system import memory_bytes
 
 # cgroup v2 (the unified hierarchy) first, then v1.
 _CGROUP_LIMITS: Final = (
@@ -43,10 +44,10 @@ def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
     other processes already use is not taken off.
     """
     # Take the container's limit where it is below what the machine has.
-    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    total = memory_bytes()
     for path in limits:
         try:
-            text = path.read_text().strip()
+            text = path.read_text("ascii").strip()
         except OSError:
             continue
         if text.isdigit() and int(text) < _NO_LIMIT:
@@ -65,39 +66,3 @@ def memory_share_mb(n_processes: int) -> float:
     A tenth is left for the scheduler and the system.
     """
     return _SHARE_OF_MACHINE * machine_mb() / max(1, n_processes)
-
-
-def tree_mb(pid: int) -> float:
-    """Resident memory of a process and all it started, in MiB; pages they share count for each.
-
-    0 for a process that is gone. Pages shared between the processes make the sum larger than what
-    they take together.
-    """
-    try:
-        # Children are listed by the thread that started them.
-        lists = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
-    except OSError:
-        return 0.0
-    return resident_mb(pid) + sum(tree_mb(int(child)) for words in lists for child in words)
-
-
-def resident_mb(pid: int) -> float:
-    """Resident memory of a process in MiB, 0 when it is gone.
-
-    Read from /proc, so Linux only; pages shared with others count in full.
-    """
-    try:
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    except (OSError, IndexError, ValueError):
-        return 0.0
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
-def give_back_memory() -> None:
-    """Hand pages that nothing uses back to the system, where the C library can; 5 ms.
-
-    Each thread has an arena of its own (mallopt(3)), which keeps what was freed.
-    """
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)

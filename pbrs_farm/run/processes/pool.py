@@ -5,7 +5,6 @@ Effects: starts and kills processes, writes their logs to a temporary folder.
 
 from __future__ import annotations
 
-import select
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
+from pbrs_farm.operating_system import wait_readable
 from pbrs_farm.run.processes.child_process import Message
 from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of
 from pbrs_farm.run.processes.limits import ProcessLimits
@@ -134,9 +134,9 @@ class Pool:
         """
         busy = [w for w in self._workers if w.task is not None]
         if busy:
-            select.select([w.process for w in busy], [], [], CHECK_EVERY_S)
+            wait_readable([w.process for w in busy], CHECK_EVERY_S)
         for worker in busy:
-            # Read until it has nothing more to say: its buffer does not wake select.
+            # Read until it has nothing more to say: its buffer wakes nobody.
             while worker.task is not None and (heard := worker.process.poll(0.0)) is not None:
                 if isinstance(heard, Ended):
                     yield from self._ended(worker, worker.task, heard)

@@ -7,13 +7,13 @@ farm one for each slot; the limits and what counts as a sign of life are the sam
 from __future__ import annotations
 
 import math
-import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from pbrs_farm.run.processes.child_process import Child, Message, ending, message_from_line
+from pbrs_farm.operating_system import ending, was_killed
+from pbrs_farm.run.processes.child_process import Child, Message, message_from_line
 from pbrs_farm.run.processes.limits import ProcessLimits
 
 CHECK_EVERY_S: Final = 1.0
@@ -210,5 +210,5 @@ class RenderProcess:
         code = child.exit_code() or 0
         self.stop()
         seconds = self._clock() - self._begun_at
-        cause = "resource" if code == -signal.SIGKILL else "crash"
+        cause = "resource" if was_killed(code) else "crash"
         return Ended(seconds, cause, ending(code))

@@ -16,7 +16,8 @@ import sys
 import traceback
 from typing import BinaryIO, NoReturn
 
-from pbrs_farm.run.processes.child_process import Message, die_with_parent
+from pbrs_farm.operating_system import die_with_parent
+from pbrs_farm.run.processes.child_process import Message
 
 
 def main(target: str) -> int:

@@ -1,6 +1,6 @@
 """A verb in a process of its own, so that a library that dies costs one line.
 
-Effects: starts a process, reads what it tells of its work, writes to that pipe.
+Effects: starts a process, reads what it tells of its work from a temporary file.
 """
 
 from __future__ import annotations
@@ -11,16 +11,21 @@ import pkgutil
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Final
 
 from pbrs_farm.crash_notes import send_notes_to
-from pbrs_farm.run.processes.child_process import PATH_FROM_PARENT, die_with_parent, ending
+from pbrs_farm.operating_system import die_with_parent, ending, has_crashed
+from pbrs_farm.run.processes.child_process import PATH_FROM_PARENT
 
 _BOOT: Final = PATH_FROM_PARENT + (
     "from pbrs_farm.run.processes.verb_process import main; "
-    "sys.exit(main(int(sys.argv[2]), sys.argv[3], sys.argv[4:]))"
+    "sys.exit(main(sys.argv[2], sys.argv[3], sys.argv[4:]))"
 )
+
+_TAIL_BYTES: Final = 65536  # of the notes, in which the last one is whole
 
 
 def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -> int:
@@ -28,31 +33,29 @@ def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -
 
     Where the child is killed: 1, after one line through say with the file and the step it was at.
     """
-    told, telling = os.pipe()
-    command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), str(telling), target]
-    # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.
-    before = signal.signal(signal.SIGINT, lambda _number, _frame: None)
-    try:
-        process = subprocess.Popen([*command, *words], pass_fds=(telling,))
-        os.close(telling)
-        # Keep the last notice; the pipe ends when the child does.
-        notices = b""
-        with os.fdopen(told, "rb", buffering=0) as pipe:
-            while chunk := pipe.read(65536):
-                notices = (notices + chunk)[-65536:]
-        code = process.wait()
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if code >= 0:
-        return code
+    # A file and no pipe: not every system hands descriptors on.
+    with tempfile.TemporaryDirectory(prefix="pbrs-farm-") as folder:
+        notes = Path(folder) / "notes"
+        notes.touch()
+        command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), str(notes), target]
+        # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.
+        before = signal.signal(signal.SIGINT, lambda _number, _frame: None)
+        try:
+            code = subprocess.Popen([*command, *words]).wait()
+        finally:
+            signal.signal(signal.SIGINT, before)
+        if not has_crashed(code):
+            return code
+        with notes.open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - _TAIL_BYTES))
+            notices = file.read()
     lines = notices.decode("utf-8", "replace").splitlines()
     say(f"{lines[-1] if lines else ' '.join(words[:2])}: {ending(code)}")
     return 1
 
 
-def main(telling: int, target: str, words: Sequence[str]) -> int:
-    """The child: run the function that target names; its notices leave through `telling`."""
+def main(notes: str, target: str, words: Sequence[str]) -> int:
+    """The child: run the function that target names; its notices are added to a file."""
     die_with_parent()
-    os.set_inheritable(telling, False)
-    send_notes_to(telling)
+    send_notes_to(os.open(notes, os.O_WRONLY | os.O_APPEND))
     return int(pkgutil.resolve_name(target)(words))

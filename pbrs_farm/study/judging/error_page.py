@@ -35,10 +35,12 @@ def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> 
     table.md, evaluation.json and index.html; files of an earlier evaluation are replaced.
     """
     make_folder(out)
-    (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n")
-    (out / "evaluation.json").write_text(json.dumps(report(run, evaluations), indent=1) + "\n")
+    (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n", "utf-8")
+    (out / "evaluation.json").write_text(
+        json.dumps(report(run, evaluations), indent=1) + "\n", "utf-8"
+    )
     page = out / "index.html"
-    page.write_text(error_page(run, evaluations))
+    page.write_text(error_page(run, evaluations), "utf-8")
     return page
 
 

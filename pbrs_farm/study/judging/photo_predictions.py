@@ -137,8 +137,8 @@ def predict_photographs(run: Trained, files: Sequence[Path], out: Path) -> Itera
                 row["seconds"] = round(seconds, 3)
             yield {k: v for k, v in row.items() if k != "tiles"}
     table = [{k: v for k, v in row.items() if k != "tiles"} for row in rows]
-    (out / "predictions.json").write_text(json.dumps(table, indent=1) + "\n")
-    (out / "index.html").write_text(_page(run, rows))
+    (out / "predictions.json").write_text(json.dumps(table, indent=1) + "\n", "utf-8")
+    (out / "index.html").write_text(_page(run, rows), "utf-8")
 
 
 def _batches(run: Trained, files: Sequence[Path]) -> Iterator[list[Photograph | dict[str, Any]]]:

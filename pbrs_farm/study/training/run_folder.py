@@ -105,7 +105,7 @@ class RunFolder:
     def write_text(self, name: str, text: str) -> None:
         """A file of text, whole or not at all."""
         beside = self.root / f"{name}.part"
-        beside.write_text(text)
+        beside.write_text(text, "utf-8")
         beside.replace(self.root / name)
 
     def figures(self) -> dict[str, Any]:
@@ -119,7 +119,7 @@ class RunFolder:
     def metrics(self) -> list[dict[str, float]]:
         """The rows of metrics.jsonl that are whole."""
         path, rows = self.root / "metrics.jsonl", []
-        for line in path.read_text().splitlines() if path.exists() else []:
+        for line in path.read_text("utf-8").splitlines() if path.exists() else []:
             try:
                 rows.append(json.loads(line))
             except ValueError:
@@ -137,7 +137,7 @@ class RunFolder:
 
     def add_metrics(self, row: dict[str, float]) -> None:
         """Append a row."""
-        with (self.root / "metrics.jsonl").open("a") as file:
+        with (self.root / "metrics.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
 
 

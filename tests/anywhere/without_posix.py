@@ -1,0 +1,26 @@
+"""Commands of ours in processes whose modules of pbrs_farm lack what only POSIX has (site/sitecustomize.py)."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+REPO: Final = Path(__file__).parents[2]
+SITE: Final = Path(__file__).parent / "site"
+
+
+def python_without_posix(words: Sequence[str | Path]) -> subprocess.CompletedProcess[str]:
+    """A Python with words, and every one it starts, without POSIX; its output is kept."""
+    path = os.pathsep.join(map(str, [SITE, REPO, *filter(None, sys.path)]))
+    environment = {**os.environ, "PYTHONPATH": path}
+    command = [sys.executable, *map(str, words)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def pbrs_farm(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """A command of pbrs-farm there."""
+    return python_without_posix(["-m", "pbrs_farm.cli", *words])
