@@ -163,7 +163,9 @@ _TINY_EDGES = TrainingPlan(
 _TINY_DEPTH = replace(_TINY_NORMALS, task="depth", steps=2000, turn_deg=0.0, judge_every=200)
 
 # As `tiny`, on an encoder that --init imagenet starts from.
-_LITE: Final[dict[str, Any]] = {"name": "lite", "network": "efficient", "encoding": "lite"}
+_LITE: Final[dict[str, Any]] = {
+    "name": "lite", "network": "efficient", "encoding": "lite", "rate": 1e-3,
+}  # fmt: skip
 
 PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     (plan.name, plan.task): plan
