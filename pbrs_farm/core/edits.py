@@ -19,6 +19,8 @@ from pbrs_farm.core.record import Record
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row, Row]
 Vector = tuple[float, float, float]
+BodyRow = tuple[float, float, float, float, float, float, float]
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class ModelRef(Record):
@@ -65,7 +67,38 @@ class OpenJoints(Record):
 
     do: Literal["open"] = "open"
     joints: tuple[tuple[str, str], ...]  # (item, part)
-    share: Annotated[float, Field(ge=0, le=1)]  # of the way to the joint's upper limit
+    share: Share  # of the way to the joint's upper limit
+
+
+class KeyJoints(Record):
+    """Let doors, drawers and lids open and shut over time, as far as nothing stands in their way."""
+
+    do: Literal["key_joints"] = "key_joints"
+    joints: tuple[tuple[str, str], ...]  # (item, part)
+    keys: tuple[tuple[float, Share], ...]  # (seconds, share of the way to the joint's upper limit)
+
+
+class BodyMotion(Record):
+    """Where an item is over time; the fields are those of a Motion of a whole item."""
+
+    item: str
+    times_s: tuple[float, ...]
+    values: tuple[BodyRow, ...]
+    pivot: Vector
+
+
+class RecordBodies(Record):
+    """Let items move as they were recorded: a fall, a push."""
+
+    do: Literal["record"] = "record"
+    bodies: tuple[BodyMotion, ...]
+
+
+class StandAt(Record):
+    """Stop at a time: what moves stands there, for good."""
+
+    do: Literal["at"] = "at"
+    time_s: float
 
 
 class PaintItems(Record):
@@ -114,6 +147,9 @@ Edit = Annotated[
     | RemoveItems
     | MoveItems
     | OpenJoints
+    | KeyJoints
+    | RecordBodies
+    | StandAt
     | PaintItems
     | CoverItems
     | SetLight

@@ -1,4 +1,4 @@
-"""House > Level > Room > Item > Surface, Material, Opening, LightPart; frozen values, no effects.
+"""House > Level > Room > Item > Surface, Material, Opening, LightPart, Motion; frozen values, no effects.
 
 Everything stands in the world frame: metres, right-handed, y up. Geometry is float32, already
 placed (no instancing), so that what is stored, labelled and rendered is the same bits.
@@ -20,6 +20,7 @@ from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb
 from pbrs_farm.core.joints import Joint
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.mesh import points_bounds, triangle_corners
+from pbrs_farm.core.motions import Motion
 
 MAX_INSTANCES = 65535
 _LEAST_METAL: Final = 0.2  # reflectance, linear; the dullest metals have .4, dielectrics .1 at most
@@ -414,6 +415,7 @@ class House:
     cameras: tuple[StoredCamera, ...] = ()
     notes: tuple[Note, ...] = ()
     is_repaired: bool = False
+    motions: tuple[Motion, ...] = ()  # of what moves with time: at most one a joint and one an item
 
     def level(self, level_id: str) -> Level:
         """The level of that id; KeyError if there is none."""

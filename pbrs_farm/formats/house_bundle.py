@@ -17,6 +17,7 @@ from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import USUAL_CUTOFF, House, Item, Material
+from pbrs_farm.core.motions import fault_of_motion
 from pbrs_farm.formats import glb
 from pbrs_farm.formats.house_glb import V_DOWN, glb_from_house
 from pbrs_farm.formats.serialise import json_from_value, pretty_json, value_from_json
@@ -45,6 +46,9 @@ def _json_of_house(house: House) -> dict[str, Any]:
         for name in House.__slots__
         if name not in ("items", "textures", "materials")
     }
+    # A home in which nothing moves says nothing of it.
+    if not house.motions:
+        del data["motions"]
     data["materials"] = [_json_of_material(m) for m in house.materials]
     data["items"] = [_json_of_item(item, i + 1) for i, item in enumerate(house.items)]
     data["textures"] = [
@@ -185,6 +189,13 @@ def _check_references(house: House) -> None:
     for i, room in enumerate(house.rooms):
         if len(room.polygon) < 3:
             raise BadHouse("house.json", f"rooms[{i}].polygon", "has fewer than three corners")
+    parts = {item.id: {"", *(joint.part for joint in item.joints)} for item in house.items}
+    for i, motion in enumerate(house.motions):
+        fault = fault_of_motion(motion)
+        if motion.part not in parts.get(motion.item, ()):
+            fault = f"no part {motion.part!r} of an item {motion.item!r}"
+        if fault:
+            raise BadHouse("house.json", f"motions[{i}]", fault)
     for i, item in enumerate(house.items):
         if item.level_id not in levels:
             raise BadHouse("house.json", f"items[{i}].level_id", f"no level {item.level_id!r}")

@@ -47,7 +47,7 @@ def item_at(item: Item, part: str, value: float) -> Item:
     matrix = joint.motion(value)
     surfaces = tuple(moved_surface(s, matrix) if s.part == part else s for s in item.surfaces)
     joints = tuple(replace(j, value=value) if j.part == part else j for j in item.joints)
-    return _boxed(replace(item, surfaces=surfaces, joints=joints))
+    return box_around(replace(item, surfaces=surfaces, joints=joints))
 
 
 def joint_of(item: Item, part: str) -> Joint:
@@ -58,7 +58,8 @@ def joint_of(item: Item, part: str) -> Joint:
     raise KeyError(part)
 
 
-def _boxed(item: Item) -> Item:
+def box_around(item: Item) -> Item:
+    """The item whose box, where it has one, keeps its axes and holds what its surfaces are now."""
     if item.box is None:
         return item
     axes = item.box.axes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -11,18 +11,19 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
     CoverItems,
+    KeyJoints,
     MoveItems,
     OpenJoints,
     PaintItems,
     PlaceModel,
+    RecordBodies,
     RemoveItems,
     SetLight,
-    rows_of_matrix,
+    StandAt,
 )
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
@@ -41,11 +42,13 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.core.motions import Motion
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.geometry.moving import house_at, moved_item
 from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.geometry.solids import sphere
-from pbrs_farm.prepare.open_joints import opened
+from pbrs_farm.prepare.open_joints import keyed, opened, with_motions
 from pbrs_farm.prepare.source import SourceRef
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.objects.own_model import model_shape
@@ -133,7 +136,8 @@ def _remove(house: House, edit: RemoveItems, _fields: ReadFields) -> House:
     items = tuple(
         _emptied(item, k) if item.id in gone else item for k, item in enumerate(house.items, 1)
     )
-    return replace(house, items=items, openings=openings)
+    motions = tuple(motion for motion in house.motions if motion.item not in gone)
+    return replace(house, items=items, openings=openings, motions=motions)
 
 
 def _emptied(item: Item, instance: int) -> Item:
@@ -144,51 +148,50 @@ def _emptied(item: Item, instance: int) -> Item:
 
 
 def _move(house: House, edit: MoveItems, _fields: ReadFields) -> House:
+    for motion in house.motions:
+        if motion.item in edit.items and not motion.is_of_joint:
+            text = "moves as it was recorded"
+            raise BadInput(house.id, motion.item, text, hint="move it before it is recorded")
     matrix = np.array(edit.world_from_world)
-    return _changed(house, edit.items, lambda item: _at_home(house, _moved(item, matrix)))
-
-
-def _moved(item: Item, matrix: F64) -> Item:
-    turn = matrix[:3, :3]
-    box, pose = item.oriented_box, item.pose
-    if pose is not None:
-        pose = replace(
-            pose, world_from_model=rows_of_matrix(matrix @ np.array(pose.world_from_model))
-        )
-    return replace(
-        item,
-        surfaces=tuple(moved_surface(s, matrix) for s in item.surfaces),
-        lights=tuple(_moved_light(light, matrix) for light in item.lights),
-        box=Box(transform_points(matrix, box.centre[None])[0], box.half, turn @ box.axes),
-        pose=pose,
-        joints=tuple(joint.placed(matrix) for joint in item.joints),
-    )
-
-
-def _moved_light(light: LightPart, matrix: F64) -> LightPart:
-    def point(p: tuple[float, float, float]) -> tuple[float, float, float]:
-        return triple(transform_points(matrix, np.array([p]))[0])
-
-    end = light.position_end
-    return replace(
-        light,
-        position=point(light.position),
-        position_end=None if end is None else point(end),
-        direction=triple(matrix[:3, :3] @ np.array(light.direction)),
-    )
+    return _changed(house, edit.items, lambda item: _at_home(house, moved_item(item, matrix)))
 
 
 def _open(house: House, edit: OpenJoints, _fields: ReadFields) -> House:
-    _found(house, {item for item, _part in edit.joints})
-    for item_id, part in edit.joints:
-        index = next(k for k, item in enumerate(house.items) if item.id == item_id)
-        parts = [joint.part for joint in house.items[index].joints]
+    for index, part in _joints_named(house, edit.joints):
+        house = opened(house, index, part, edit.share)
+    held = set(edit.joints)
+    motions = tuple(m for m in house.motions if (m.item, m.part) not in held)
+    return replace(house, motions=motions)
+
+
+def _key_joints(house: House, edit: KeyJoints, _fields: ReadFields) -> House:
+    for index, part in _joints_named(house, edit.joints):
+        house = keyed(house, index, part, edit.keys)
+    return house
+
+
+def _joints_named(house: House, joints: Sequence[tuple[str, str]]) -> list[tuple[int, str]]:
+    """(item's index, part) of joints that are named by (item's id, part)."""
+    _found(house, {item for item, _part in joints})
+    index_of = {item.id: k for k, item in enumerate(house.items)}
+    for item_id, part in joints:
+        parts = [joint.part for joint in house.items[index_of[item_id]].joints]
         if part not in parts:
             raise BadInput(
                 house.id, f"{item_id}/{part}", "no such joint", hint=did_you_mean(part, parts)
             )
-        house = opened(house, index, part, edit.share)
-    return house
+    return [(index_of[item_id], part) for item_id, part in joints]
+
+
+def _record(house: House, edit: RecordBodies, _fields: ReadFields) -> House:
+    _found(house, {body.item for body in edit.bodies})
+    return with_motions(
+        house, [Motion(b.item, "", b.times_s, b.values, b.pivot) for b in edit.bodies]
+    )
+
+
+def _stand_at(house: House, edit: StandAt, _fields: ReadFields) -> House:
+    return replace(house_at(house, edit.time_s), motions=())
 
 
 def _paint(house: House, edit: PaintItems, _fields: ReadFields) -> House:
@@ -339,6 +342,9 @@ _ONE: Final[dict[str, Callable[[House, Any, ReadFields], House]]] = {
     "remove": _remove,
     "move": _move,
     "open": _open,
+    "key_joints": _key_joints,
+    "record": _record,
+    "at": _stand_at,
     "paint": _paint,
     "cover": _cover,
     "light": _set_light,

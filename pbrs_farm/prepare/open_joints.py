@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -10,6 +11,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import House, Item, MaterialKind, Note
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.motions import Motion
 from pbrs_farm.geometry.opened import free_value, item_at, joint_of
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 
@@ -26,18 +28,58 @@ def opened(house: House, index: int, part: str, share: float) -> House:
     Where a wall or a thing stands in its way it stops before that, and a note says so. A joint that
     stands further open is shut to there.
     """
+    value, notes = _reach(house, index, part, share)
+    item = item_at(house.items[index], part, value)
+    items = tuple(item if k == index else other for k, other in enumerate(house.items))
+    return replace(house, items=items, notes=(*house.notes, *notes))
+
+
+def keyed(
+    house: House, index: int, part: str, keys_of_time: Sequence[tuple[float, float]]
+) -> House:
+    """The house in which a part of items[index] opens and shuts over time.
+
+    keys_of_time: (seconds, share of the joint's way, 0..1), times ascend. It stands where the first
+    key has it. What is in its way holds it as in `opened`, of the home at rest.
+    """
+    joint = joint_of(house.items[index], part)
+    # Ask from where it is shut: there is no way to what it stands beyond.
+    shut = _shut(house, index, part)
+    most, notes = _reach(shut, index, part, max(share for _time, share in keys_of_time))
+    values = tuple((min(_value(joint, share), most),) for _time, share in keys_of_time)
+    motion = Motion(house.items[index].id, part, tuple(t for t, _share in keys_of_time), values)
+    item = item_at(house.items[index], part, values[0][0])
+    items = tuple(item if k == index else other for k, other in enumerate(house.items))
+    house = replace(house, items=items, notes=(*house.notes, *notes))
+    return with_motions(house, [motion])
+
+
+def with_motions(house: House, motions: Sequence[Motion]) -> House:
+    """The house with these motions, instead of those that it has of the same parts."""
+    new = {(motion.item, motion.part): motion for motion in motions}
+    kept = (m for m in house.motions if (m.item, m.part) not in new)
+    return replace(house, motions=(*kept, *new.values()))
+
+
+def _shut(house: House, index: int, part: str) -> House:
+    item = item_at(house.items[index], part, joint_of(house.items[index], part).lower)
+    return house.with_items(item if k == index else i for k, i in enumerate(house.items))
+
+
+def _reach(house: House, index: int, part: str, share: float) -> tuple[float, tuple[Note, ...]]:
+    """How far a part of items[index] opens towards a share of its way, and what is to be said of it."""
     item = house.items[index]
     joint = joint_of(item, part)
-    wanted = joint.lower + share * (joint.upper - joint.lower)
+    wanted = _value(joint, share)
     value, stopped_by = free_value(SceneTriangles(house.items), index, part, wanted)
-    items = list(house.items)
-    items[index] = item_at(item, part, value)
-    notes = house.notes
-    if wanted - value > _NEAR:
-        text = f"stands open by {_amount(joint, value)} of {_amount(joint, wanted)}"
-        note = Note(STOPPED, f"{item.id}/{part}", f"{text}: {stopped_by} is in its way")
-        notes = (*notes, note)
-    return replace(house, items=tuple(items), notes=notes)
+    if wanted - value <= _NEAR:
+        return value, ()
+    text = f"stands open by {_amount(joint, value)} of {_amount(joint, wanted)}"
+    return value, (Note(STOPPED, f"{item.id}/{part}", f"{text}: {stopped_by} is in its way"),)
+
+
+def _value(joint: Joint, share: float) -> float:
+    return joint.lower + share * (joint.upper - joint.lower)
 
 
 def left_open(house: House, share: float, seed: int) -> House:
