@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
-from pbrs_farm.core.house import House, Surface
+from pbrs_farm.core.house import House, Item, Surface
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 
 
@@ -24,6 +24,7 @@ class DrawMesh:
     draw_material: I64  # (D,) index into House.materials
     draw_low: F64  # (D, 3) corners of the bounding box in the world
     draw_high: F64
+    item_first: I64  # (I + 1,) first vertex of each item, and the end
 
     @property
     def n_draws(self) -> int:
@@ -41,32 +42,66 @@ def mesh_from_house(house: House) -> DrawMesh:
     indices: list[NDArray[np.uint32]] = []
     rows: list[tuple[int, int, int, int]] = []
     boxes: list[tuple[F32, F32]] = []
-    n_vertices = n_faces = 0
+    item_first = [0]
+    n_faces = 0
 
     # Write item by item, and within an item material by material: each pair is one draw.
     for instance, item in enumerate(house.items, start=1):
-        for material in dict.fromkeys(s.material for s in item.surfaces):
-            first, corners = n_faces, []
-            for surface in item.surfaces:
-                if surface.material != material:
-                    continue
-                v, f = _vertices(surface)
-                vertices.append(v)
-                indices.append((f + n_vertices).astype(np.uint32))
-                corners.append(v[f.reshape(-1), :3])
-                n_vertices, n_faces = n_vertices + len(v), n_faces + len(f)
-            if n_faces > first:
-                points = np.concatenate(corners)
-                boxes.append((points.min(0), points.max(0)))
-                rows.append((first, n_faces - first, instance, material))
+        n_vertices = item_first[-1]
+        for material, v, f in _draws_of_item(item):
+            vertices.append(v)
+            indices.append((f + n_vertices).astype(np.uint32))
+            if len(f):
+                boxes.append(_box(v, f))
+                rows.append((n_faces, len(f), instance, material))
+            n_vertices, n_faces = n_vertices + len(v), n_faces + len(f)
+        item_first.append(n_vertices)
 
     table = np.array(rows, np.int64).reshape(-1, 4)
     box = np.array(boxes, np.float64).reshape(-1, 2, 3)
     return DrawMesh(
         np.concatenate([np.zeros((0, 8), np.float32), *vertices]),
         np.concatenate([np.zeros((0, 3), np.uint32), *indices]),
-        *table.T, *np.moveaxis(box, 1, 0),
+        table[:, 0], table[:, 1], table[:, 2], table[:, 3], box[:, 0], box[:, 1],
+        np.array(item_first),
     )  # fmt: skip
+
+
+def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:
+    """Put an item that has moved into the mesh, in place, and its boxes; the rows of vertices that are new.
+
+    item: the one of that instance id when the mesh was made, moved rigidly part by part.
+    """
+    draws = _draws_of_item(item)
+    rows = slice(*mesh.item_first[instance - 1 : instance + 1].tolist())
+    mesh.vertices[rows] = np.concatenate(
+        [np.zeros((0, 8), np.float32), *(v for _m, v, _f in draws)]
+    )
+    boxes = [_box(v, f) for _material, v, f in draws if len(f)]
+    own = np.flatnonzero(mesh.draw_item == instance)
+    for k, (low, high) in zip(own, boxes, strict=True):
+        mesh.draw_low[k], mesh.draw_high[k] = low, high
+    return rows
+
+
+def _draws_of_item(item: Item) -> list[tuple[int, F32, I64]]:
+    """(material, vertices, faces into them) of an item's draws, material by material."""
+    found = []
+    for material in dict.fromkeys(s.material for s in item.surfaces):
+        vertices, faces, n = [], [], 0
+        for surface in item.surfaces:
+            if surface.material == material:
+                v, f = _vertices(surface)
+                vertices.append(v)
+                faces.append(f + n)
+                n += len(v)
+        found.append((material, np.concatenate(vertices), np.concatenate(faces)))
+    return found
+
+
+def _box(vertices: F32, faces: I64) -> tuple[F32, F32]:
+    points = vertices[faces.reshape(-1), :3]
+    return points.min(0), points.max(0)
 
 
 def _vertices(surface: Surface) -> tuple[F32, I64]:

@@ -18,7 +18,7 @@ from pbrs_farm.core.camera import Camera, pinholes_of
 from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import RasterFields
-from pbrs_farm.raster.draw_mesh import mesh_from_house
+from pbrs_farm.raster.draw_mesh import mesh_from_house, move_item
 from pbrs_farm.raster.gl_device import (
     RenderTarget,
     n_samples,
@@ -63,7 +63,7 @@ class Rasterizer:
         n_lights = self._fields.lights_per_object
         self._context = open_context()
         self._samples = n_samples(self._context, self._fields.samples)
-        self._mesh = mesh_from_house(house)
+        self._house, self._mesh = house, mesh_from_house(house)
         self._white_per_lx = brightness_scale(house, n_lights)
         self._sky = tuple(linear_from_srgb(np.array(SKY_SRGB)))
         features = [
@@ -97,6 +97,27 @@ class Rasterizer:
         uploaded = {name: texture_from_pixels(gl, pixels) for name, pixels in wanted}
         white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
+
+    def draw_house(self, house: House) -> None:
+        """Draw the house as it is at another time from now on: of what moved alone it uploads vertices.
+
+        house: this renderer's own, whose items may have moved rigidly, part by part (geometry/moving.py).
+        """
+        changed = [
+            k
+            for k, (a, b) in enumerate(zip(self._house.items, house.items, strict=True))
+            if a is not b
+        ]
+        if changed:
+            alignment = self._context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
+            blocks = light_blocks(house, self._fields.lights_per_object)
+            with self._context:
+                self._lights.write(aligned_rows(blocks, alignment).tobytes())
+                for k in changed:
+                    rows = move_item(self._mesh, k + 1, house.items[k])
+                    data = self._mesh.vertices[rows].tobytes()
+                    self._vertices.write(data, offset=rows.start * self._mesh.vertices[0].nbytes)
+        self._house = house
 
     def __enter__(self) -> Rasterizer:
         return self

@@ -7,8 +7,10 @@ computed in double precision from that face's float32 vertices, the same bits in
 from __future__ import annotations
 
 import contextlib
+import copy
 from collections.abc import Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -22,6 +24,7 @@ from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.mesh import faces_with_area, triangle_corners
 from pbrs_farm.raycast.cutout_tracer import CutOutTracer
 from pbrs_farm.raycast.hit_records import hit_record_from_faces
+from pbrs_farm.raycast.nearest_tracer import NearestTracer, PartTracer
 from pbrs_farm.raycast.scalar_tracer import ScalarTracer
 from pbrs_farm.raycast.tracer import JitTracer, RayTracer
 from pbrs_farm.raycast.variant import choose_variant
@@ -47,7 +50,11 @@ class Caster:
         self.variant = choose_variant() if variant is None else variant
         # Ids run from 1: the largest is the number of items.
         self.n_items = int(geometry.face_item.max()) if len(geometry.face_item) else 0
-        self._tracer = self._tracer_of(_hittable(geometry))
+        self._begin(_hittable(geometry))
+
+    def _begin(self, hittable: Bools, still: _StillFaces | None = None) -> None:
+        self._hittable, self._still = hittable, still
+        self._tracer = self._tracer_of(hittable)
         self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
 
     @classmethod
@@ -57,6 +64,22 @@ class Caster:
         geometry: of the house, where it is at hand.
         """
         return cls(geometry or geometry_from_house(house), cut_outs=cut_outs_of_house(house))
+
+    @cached_property
+    def _tracers_of_still(self) -> dict[bytes, RayTracer | None]:
+        """Of the faces that casters of other times share, by which faces they are."""
+        return {}
+
+    def at(self, geometry: Geometry, moving: Bools) -> Caster:
+        """The caster of the same faces at another time; what stands still is traced as one mesh, kept.
+
+        geometry: as this caster's own, but that vertices of the moving faces (F,) lie elsewhere by
+        rigid motions. Hits are those of a caster of that geometry, but for ties.
+        """
+        other = copy.copy(self)
+        other.geometry = geometry
+        other._begin(self._hittable, _StillFaces(~moving, self._tracers_of_still))
+        return other
 
     def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
         """The first hit of the ray through each pixel's centre (rule 8).
@@ -136,13 +159,15 @@ class Caster:
         # Keep the last tracer: the views of a house skip the same faces.
         key = np.packbits(skip_faces).tobytes()
         if self._without[0] != key:
-            keep = _hittable(self.geometry) & ~skip_faces
+            keep = self._hittable & ~skip_faces
             self._without = (key, self._tracer_of(keep))
         return self._without[1]
 
     def _tracer_of(self, keep: Bools) -> RayTracer | None:
         """The tracer of the faces to keep (F,), None of none."""
         build = partial(_tracer, self.variant, self.geometry)
+        if self._still is not None:
+            build = partial(_tracer_of_both, self.variant, self.geometry, self._still)
         if (keep & faces_with_holes(self.geometry, self.cut_outs)).any():
             return CutOutTracer(self.geometry, self.cut_outs, keep, build)
         return build(keep)
@@ -162,6 +187,30 @@ def cut_outs_of_house(house: House) -> dict[int, CutOut]:
         with contextlib.suppress(BadInput):
             pictures[key] = decode_texture(texture.data, texture.name, texture.media_type)
     return cut_outs_by_material(house, pictures)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _StillFaces:
+    """What stands still in a geometry, with tracers of it that were built."""
+
+    faces: Bools  # (F,)
+    tracers: dict[bytes, RayTracer | None]  # by the faces kept of them
+
+
+def _tracer_of_both(
+    variant: str, geometry: Geometry, still: _StillFaces, keep: Bools
+) -> RayTracer | None:
+    """The tracer of faces to keep, of which those that stand still may be in one that was built."""
+    standing, moving = keep & still.faces, keep & ~still.faces
+    key = np.packbits(standing).tobytes()
+    if key not in still.tracers:
+        still.tracers[key] = _tracer(variant, geometry, standing)
+    parts: list[RayTracer | None] = [still.tracers[key]]
+    if moving.any():
+        build = ScalarTracer if variant.startswith("scalar") else JitTracer
+        parts.append(PartTracer(geometry, moving, partial(build, variant)))
+    found = [tracer for tracer in parts if tracer is not None]
+    return NearestTracer(*found) if len(found) == 2 else next(iter(found), None)
 
 
 def _tracer(variant: str, geometry: Geometry, keep: Bools) -> RayTracer | None:

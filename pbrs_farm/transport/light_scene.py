@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.errors import MachineFailed, RenderFailed
-from pbrs_farm.core.house import House
+from pbrs_farm.core.errors import BadHouse, MachineFailed, RenderFailed
+from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
+from pbrs_farm.geometry.moving import MovingHouse
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.diffuse_images import add_diffuse_images
 from pbrs_farm.transport.lamp_layers import MAX_SUMS, add_lamp_layers
 from pbrs_farm.transport.light_result import LightResult, blacken, join_results, result_from_sums
 from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import panes_of_house, portals_of_house
-from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, tables_from_house
+from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, moved_rows, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
 from pbrs_farm.transport.surface_noise import NoiseAnchors, Streams, surface_streams
 
@@ -36,12 +37,26 @@ if TYPE_CHECKING:
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
 
 
+def _without_panes(house: House) -> MovingHouse:
+    return MovingHouse(house, geometry_from_house(house, with_panes=False))
+
+
+def _moved(
+    moving: MovingHouse, tables: SceneTables, time_s: float | None
+) -> tuple[F32, NDArray[np.uint32], F32]:
+    """What DeviceScene.move takes: vertices at a time, the faces that move, their rows."""
+    geometry = moving.geometry if time_s is None else moving.at(time_s)[1]
+    faces = np.flatnonzero(moving.moving_faces[tables.kept])
+    return geometry.positions, faces.astype(np.uint32), moved_rows(geometry, tables, faces)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Pilot:
     """A view whose pilot says how often each emitter is worth sampling."""
 
     camera: Camera
     seed: int  # of that view's light
+    time_s: float | None = None  # of that view, in a home in which things move
 
 
 class LightScene:
@@ -59,6 +74,7 @@ class LightScene:
         variant: str,
         outside: tuple[House, SceneTables] | None = None,
         panes: SceneTables | None = None,
+        moving: tuple[MovingHouse, MovingHouse | None] | None = None,
     ) -> None:
         self.tables = tables
         self.sky = sky
@@ -74,6 +90,9 @@ class LightScene:
             if panes is not None and variant.startswith("llvm"):
                 self.device_scene.panes = Panes(panes)
         self._portals = portals
+        self._moving = moving  # the home and its panes; None where nothing moves
+        self._panes = panes
+        self._time_s: float | None = None  # that the device has
         # OptiX takes one scene in a kernel: there windows show the sky alone.
         self._outside = outside if variant.startswith("llvm") else None
 
@@ -105,7 +124,36 @@ class LightScene:
             outside = beyond, tables_from_house(beyond, own, recipe)
         glass = None if recipe.materials.preset == "released" else panes_of_house(inside)
         panes = None if glass is None else tables_from_house(glass, {}, recipe)
-        return LightScene(tables, sky, portals_of_house(house), name, outside, panes)
+        moving = None
+        if inside.motions:
+            moving = _without_panes(inside), None if glass is None else _without_panes(glass)
+        return LightScene(tables, sky, portals_of_house(house), name, outside, panes, moving)
+
+    def move_to(self, time_s: float | None) -> None:
+        """Put what moves where it is at a time, in seconds; None: at rest. Nothing where it is there.
+
+        Raises MachineFailed for a scalar variant and BadHouse for a lamp that moves: the light of
+        either is made for one place.
+        """
+        if self._moving is None or time_s == self._time_s:
+            return
+        home, panes = self._moving
+        self._check_moving(home.house)
+        positions, faces, rows = _moved(home, self.tables, time_s)
+        self.device_scene.move(positions, faces, rows)
+        if panes is not None and self._panes is not None and self.device_scene.panes is not None:
+            self.device_scene.panes.move(*_moved(panes, self._panes, time_s))
+        self._time_s = time_s
+
+    def _check_moving(self, house: House) -> None:
+        if self.variant.startswith("scalar"):
+            text = f"light of things that move needs LLVM or CUDA, this is {self.variant}"
+            raise MachineFailed(text, hint="sudo apt-get install -y libllvm19")
+        moving = {motion.item for motion in house.motions}
+        for item in house.items:
+            if item.lights and item.id in moving:
+                text = "is a lamp that moves: its light would not follow"
+                raise BadHouse(house.source.file, item.id, text, hint="let it stand still")
 
     @property
     def n_lamps(self) -> int:
@@ -143,7 +191,7 @@ class LightScene:
         variant, RenderFailed for blur or split by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
-        own = pilot or Pilot(camera, seed)
+        own = pilot or Pilot(camera, seed, self._time_s)
         kept = checkpoint or NoCheckpoint()
         result = self._render(camera, room_id, fields, seed, kept, own, anchors, splits_diffuse)
         return result if camera.blind is None else blacken(result, camera.blind)
@@ -166,7 +214,7 @@ class LightScene:
         mitsuba(self.variant)
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
-        emitters, weights = self._view_emitters.of_pilot(pilot.camera, fields, pilot.seed)
+        emitters, weights = self._emitters_of_pilot(pilot, fields)
         streams = self._streams(camera, anchors) if anchors else None
         view = SampledView(
             self.device_scene, emitters, camera, fields, seed, streams, splits_diffuse
@@ -188,6 +236,20 @@ class LightScene:
         result = result_from_sums(sums, camera, spp, facts)
         result = add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
         return add_diffuse_images(result, sums, spp) if splits_diffuse else result
+
+    def _emitters_of_pilot(
+        self, pilot: Pilot, fields: LightFields
+    ) -> tuple[Emitters, EmitterWeights]:
+        """The emitters weighted by a pilot, which is measured at its own time."""
+        now_s, at = self._time_s, (pilot.camera, fields, pilot.seed, pilot.time_s)
+        if not self._view_emitters.is_built:
+            self.move_to(None)
+            self._view_emitters.build(pilot.camera.eye)
+        if not self._view_emitters.knows(*at):
+            self.move_to(pilot.time_s)
+        found = self._view_emitters.of_pilot(*at)
+        self.move_to(now_s)
+        return found
 
     def _check_split(self, fields: LightFields, room_id: str, seed: int) -> None:
         """Raise where diffuse light cannot be split off."""
@@ -245,6 +307,7 @@ class LightScene:
         if self.variant.startswith("scalar"):
             return {}
         mitsuba(self.variant)
+        self.move_to(None)
         from pbrs_farm.transport.illuminance import floor_points, illuminance_lx
 
         lux: dict[str, dict[str, float]] = {}

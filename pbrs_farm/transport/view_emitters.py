@@ -60,6 +60,19 @@ class ViewEmitters:
         self._built: Emitters | None = None  # at the first view
         self._piloted: tuple[object, EmitterWeights] | None = None  # the last pilot and its weights
 
+    @property
+    def is_built(self) -> bool:
+        """Whether steps 1 to 4 are done: of a house in which things move they are done at rest."""
+        return self._built is not None
+
+    def build(self, place: F64) -> None:
+        """Do steps 1 to 4, where that was not done. place: (3,) of any view."""
+        self._set_view(*self._alike(place))
+
+    def _alike(self, place: F64) -> tuple[F64, EmitterWeights]:
+        portals = nearest_portals(self._portals, place)
+        return portals, uniform_weights(len(self._tables.lamps), len(portals))
+
     def measure(
         self, camera: Camera, fields: LightFields, seed: int
     ) -> tuple[Emitters, EmitterWeights]:
@@ -80,11 +93,15 @@ class ViewEmitters:
             emitters.set_weights(weights)
         return emitters, weights
 
+    def knows(self, camera: Camera, fields: LightFields, seed: int, time_s: float | None) -> bool:
+        """Whether `of_pilot` would measure nothing."""
+        return self._piloted is not None and self._piloted[0] == _key(camera, fields, seed, time_s)
+
     def of_pilot(
-        self, camera: Camera, fields: LightFields, seed: int
+        self, camera: Camera, fields: LightFields, seed: int, time_s: float | None = None
     ) -> tuple[Emitters, EmitterWeights]:
-        """As measure, but measured only where camera, fields or seed differ from the call before."""
-        key = seed, camera.intrinsics, camera.world_from_camera.tobytes(), fields
+        """As measure, but measured only where an argument differs from the call before."""
+        key = _key(camera, fields, seed, time_s)
         if self._piloted is None or self._piloted[0] != key:
             emitters, weights = self.measure(camera, fields, seed)
             self._piloted = key, weights
@@ -121,3 +138,7 @@ class ViewEmitters:
             outside = Outside(tables, beyond, self._sky)
             emitters.set_outside(outside, outside.light_dome(self._scene, self._portals))
         return emitters
+
+
+def _key(camera: Camera, fields: LightFields, seed: int, time_s: float | None) -> object:
+    return seed, camera.intrinsics, camera.world_from_camera.tobytes(), fields, time_s

@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.raycast.tracer import scene_from_mesh
 from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
 from pbrs_farm.transport.kernels.packets import colour, point, vector
@@ -120,6 +122,26 @@ class DeviceScene:
         self._materials = device_array(mi.Float, tables.material_rows.ravel())
         self._texels = device_array(mi.UInt32, tables.texels)
         self._max_albedo = dr.opaque(mi.Float, tables.max_albedo)
+
+    def move(self, positions: F32, faces: NDArray[np.uint32], rows: F32) -> None:
+        """Put vertices elsewhere: all positions (V, 3), and the new rows (N, FACE_FLOATS) of faces (N,) that move.
+
+        What guiding has written into the rows stays. Trees are built anew. What moves must not emit.
+        """
+        flat = np.ascontiguousarray(positions, np.float32).ravel()
+        scenes = {id(s): s for s in (self._all, self._fast, self._opaque, self._transparent)}
+        for scene in scenes.values():
+            if scene is not None:
+                parameters = mi.traverse(scene)
+                parameters["house.vertex_positions"] = flat
+                parameters.update()
+        geometric = np.setdiff1d(
+            np.arange(FACE_FLOATS), (FRONT_PDF, BACK_PDF, TARGET_EMITTER)
+        ).astype(np.uint32)
+        at = faces.astype(np.uint32)[:, None] * np.uint32(FACE_FLOATS) + geometric
+        values = device_array(mi.Float, np.ascontiguousarray(rows[:, geometric]).ravel())
+        dr.scatter(self._rows, values, device_array(mi.UInt32, at.ravel()))
+        dr.eval(self._rows)
 
     def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
         """The first surface along a ray, by the faster test where there is a tree for it.
@@ -310,6 +332,11 @@ class Panes:
     def __init__(self, tables: SceneTables) -> None:
         """tables: of the panes alone, as clear thin glass (`panes_of_house`)."""
         self._scene = DeviceScene(tables)
+
+    def move(self, positions: F32, faces: NDArray[np.uint32], rows: F32) -> None:
+        """Put panes elsewhere, as `DeviceScene.move`; nothing where none moves."""
+        if len(faces):
+            self._scene.move(positions, faces, rows)
 
     def before(
         self, si: SurfaceInteraction, o: Any, d: Any, looks: Any

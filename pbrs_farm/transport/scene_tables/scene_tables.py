@@ -60,6 +60,7 @@ class SceneTables:
     lamp_faces: NDArray[np.uint32]  # (T,) face
     lamp_areas: F32  # (T,) running sum of areas over the lamp's area
     lamp_symmetries: F32  # (L, 4) as symmetry_row; no side where light may pass its faces
+    kept: Bools  # (G,) of the geometry's faces without panes: those that are here, in their order
     notes: tuple[str, ...]  # what had to be changed or left out
 
 
@@ -116,8 +117,17 @@ def tables_from_house(
         lamp_faces=lamp_faces,
         lamp_areas=lamp_areas,
         lamp_symmetries=symmetries,
+        kept=keep,
         notes=(*notes, *material_notes),
     )
+
+
+def moved_rows(geometry: Geometry, tables: SceneTables, faces: I64) -> F32:
+    """(N, FACE_FLOATS) rows of faces (N,) of tables, whose vertices lie as a geometry has them now.
+
+    geometry: of the same house, with vertices elsewhere. What guiding fills is 0 in them.
+    """
+    return _face_rows(geometry, tables.faces[faces])
 
 
 def _solid_faces(geometry: Geometry) -> Bools:

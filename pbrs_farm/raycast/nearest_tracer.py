@@ -1,0 +1,71 @@
+"""Ray tracers of some faces of a mesh, and the nearer of two: what stands still is traced apart from what moves.
+
+Effects: holds the tracers that it asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F32, I32, Bools
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.house import Geometry
+from pbrs_farm.raycast.tracer import RayTracer, counted_labels, faces_as_picture, rays_of_pixels
+
+Build = Callable[[F32, I32], RayTracer]  # positions (V, 3) and faces (F, 3) of a mesh -> its tracer
+
+
+class PartTracer:
+    """The RayTracer of some faces of a geometry, as a mesh of their own; faces keep their numbers."""
+
+    def __init__(self, geometry: Geometry, keep: Bools, build: Build) -> None:
+        """keep: (F,) bool, at least one."""
+        self._numbers = np.flatnonzero(keep).astype(np.int32)
+        used, faces = np.unique(geometry.faces[self._numbers], return_inverse=True)
+        positions = geometry.positions[used]
+        positions = np.where(np.isfinite(positions), positions, np.float32(0))
+        self._tracer = build(positions, faces.reshape(-1, 3).astype(np.int32))
+
+    def faces_of_camera(self, camera: Camera) -> I32:
+        return self._named(self._tracer.faces_of_camera(camera))
+
+    def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
+        t, face = self._tracer.first_hit(origins, directions, max_distance)
+        return t, self._named(face)
+
+    def counts(
+        self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
+    ) -> NDArray[np.uint32]:
+        return self._tracer.counts(cameras, face_label[self._numbers], n_labels)
+
+    def _named(self, face: I32) -> I32:
+        return np.where(face >= 0, self._numbers[face], np.int32(-1))
+
+
+class NearestTracer:
+    """The RayTracer of two meshes: of their first hits the nearer one."""
+
+    def __init__(self, first: RayTracer, second: RayTracer) -> None:
+        self._first, self._second = first, second
+
+    def faces_of_camera(self, camera: Camera) -> I32:
+        origins, directions, blind = rays_of_pixels(camera)
+        reach = np.full(len(directions), np.inf, np.float32)
+        _t, face = self.first_hit(origins, directions, reach)
+        return faces_as_picture(face, camera, blind)
+
+    def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
+        t, face = self._first.first_hit(origins, directions, max_distance)
+        other_t, other = self._second.first_hit(origins, directions, max_distance)
+        is_nearer = other_t < t
+        return np.where(is_nearer, other_t, t), np.where(is_nearer, other, face)
+
+    def counts(
+        self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
+    ) -> NDArray[np.uint32]:
+        pictures = (self.faces_of_camera(camera) for camera in cameras)
+        rows = [counted_labels(face, face_label, n_labels) for face in pictures]
+        return np.array(rows, np.uint32).reshape(len(cameras), n_labels)
