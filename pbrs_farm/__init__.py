@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from pbrs_farm.scene.models import Model as Model
     from pbrs_farm.scene.models import model as model
     from pbrs_farm.scene.models import models as models
+    from pbrs_farm.scene.pictures import film as film
     from pbrs_farm.scene.pictures import render as render
     from pbrs_farm.scene.pictures import render_homes as render_homes
     from pbrs_farm.study.packing.pack_shards import pack as pack
@@ -60,6 +61,7 @@ _PUBLIC: Final = {
     "Recipe": "pbrs_farm.core.recipe:Recipe",
     "SampleRequest": "pbrs_farm.views.view_sample:SampleRequest",
     "export_views": "pbrs_farm.export.export_views:export",
+    "film": "pbrs_farm.scene.pictures:film",
     "load": "pbrs_farm.scene.home:load",
     "make": "pbrs_farm.scene.home:make",
     "model": "pbrs_farm.scene.models:model",
@@ -87,6 +89,7 @@ __all__ = [
     "StoreFailed",
     "__version__",
     "export_views",
+    "film",
     "load",
     "make",
     "model",

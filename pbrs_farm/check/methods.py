@@ -45,7 +45,7 @@ HOW: dict[str, str] = {
     "behind_mirror/depth.png": _MIRRORED, "behind_mirror/normal.png": _MIRRORED,
     "behind_mirror/semantic.png": _MIRRORED, "behind_mirror/instance.png": _MIRRORED,
     "flow_forward.exr": _MOTION, "flow_forward_kitti.png": _MOTION, "occlusion_forward.png": _MOTION,
-    "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
+    "scene_flow.exr": _MOTION, "flow_backward.exr": _MOTION, "flow_backward_kitti.png": _MOTION,
     "occlusion_backward.png": _MOTION, "disparity.png": _MOTION, "occlusion_stereo.png": _MOTION,
 }  # fmt: skip
 

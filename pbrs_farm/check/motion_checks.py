@@ -6,8 +6,9 @@ one's (an edge that two casters see differently) is left to the checks of its ow
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from pbrs_farm.check.lens_rays import StoredLens
 from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
+SCENE_FLOW_M = 5e-5  # vertices of both times are 32-bit floats
 FLOW_PX = 0.02  # beside half a step of what stores it
 SEEN, OUTSIDE, HIDDEN = 0, 128, 255
 BORDER_PX = 0.01  # of the other picture: on it a point is in or out
@@ -34,7 +36,27 @@ FLOW_LAYERS = {
 MOTION_LAYERS = {name for names in FLOW_LAYERS.values() for name in names}
 
 
-MOTION_LAYERS |= {"disparity", "occlusion_stereo"}
+MOTION_LAYERS |= {"disparity", "occlusion_stereo", "scene_flow"}
+
+Carry = Callable[[Floats, Faces], Floats]
+"""Where points (N, 3) on faces (N,) are at the partner's time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Then:
+    """The house at the partner's time."""
+
+    rays: Rays
+    carry: Carry
+
+
+def _carried(then: Then, faces: Faces, points: Floats) -> Floats:
+    return then.carry(points, faces)
+
+
+def stay(points: Floats, _faces: Faces) -> Floats:
+    """Points where nothing moves."""
+    return points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,13 +113,15 @@ def follow_points(
     columns: NDArray[np.int64],
     z: Floats,
     rays: Rays,
+    carry: Callable[[Floats], Floats] = lambda points: points,
 ) -> Followed:
     """The surfaces at depth z (N,) metres behind pixels' centres, looked for in the other picture.
 
-    rows and columns are (N,) indices of pixels. Flow is in px from the pixel's own centre; the
+    rows and columns are (N,) indices of pixels. rays: of the house at the other view's time; carry:
+    takes the points there. Flow is in px from the pixel's own centre; the
     state of each point is OUTSIDE, SEEN or HIDDEN.
     """
-    points, px, margin = _points_of(view, other, rows, columns, z)
+    points, px, margin = _points_of(view, other, rows, columns, z, carry)
     with np.errstate(invalid="ignore"):
         inside = margin >= 0
     state = np.full(len(rows), OUTSIDE, np.int64)
@@ -113,19 +137,20 @@ def near_edge(
     columns: NDArray[np.int64],
     z: Floats,
     rays: Rays,
+    carry: Callable[[Floats], Floats] = lambda points: points,
 ) -> Bools:
     """(N,) another state is as right: on the border of the other picture, or beside what hides it.
 
     Ask it only of points whose stored state differs from `follow_points`: it casts rays five times.
     """
-    points, _px, margin = _points_of(view, other, rows, columns, z)
+    points, _px, margin = _points_of(view, other, rows, columns, z, carry)
     with np.errstate(invalid="ignore"):
         is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
     # Ask again a little beside each point: where answers differ both are right.
     seen = _is_seen(points, other, rays, slack_m=0.01)
     for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         origin, beside = view.rays(rows + JITTER_PX * dy, columns + JITTER_PX * dx)
-        moved = origin + beside * z[:, None]
+        moved = carry(origin + beside * z[:, None])
         is_tie |= _is_seen(moved, other, rays, slack_m=0.01) != seen
     return is_tie
 
@@ -136,10 +161,11 @@ def _points_of(
     rows: NDArray[np.int64],
     columns: NDArray[np.int64],
     z: Floats,
+    carry: Callable[[Floats], Floats],
 ) -> tuple[Floats, Floats, Floats]:
     """(N, 3) surface points, their (N, 2) px in the other picture, (N,) px inside its border."""
     origin, directions = view.rays(rows, columns)
-    points = origin + directions * z[:, None]
+    points = carry(origin + directions * z[:, None])
     px, _depth = other.pixels(points)
     height, width = other.size
     with np.errstate(invalid="ignore"):
@@ -164,33 +190,66 @@ def check_motion(
     rays: Rays,
     pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
     tally: Tally,
+    then: Callable[[float | None], Then] | None = None,
 ) -> None:
-    """Recompute the layers between views at pixels (rows, columns)."""
+    """Recompute the layers between views at pixels (rows, columns).
+
+    rays: of the house at the view's time; then: of the house at another time, where things move.
+    """
     rows, columns = pixels
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
     z = rays.distance(face, origin, directions)
     # Keep the pixels whose stored depth is that of the ray.
     own = (face >= 0) & (np.abs(arrays["depth"][rows, columns] - z * 1000) <= 1.0 + z)
-    rows, columns, z = rows[own], columns[own], z[own]
+    rows, columns, z, face = rows[own], columns[own], z[own], face[own]
     for relation in (*FLOW_LAYERS, "stereo"):
         other = other_view(view, relation)
         names = FLOW_LAYERS.get(relation, ("disparity", "occlusion_stereo"))
         if other is None:
-            there = [name for name in names if name in arrays]
-            tally.expect("motion", view.place, not there, f"{there} without a {relation} view")
+            between = (*names, "scene_flow") if relation == "next" else names
+            lost = [name for name in between if name in arrays]
+            tally.expect("motion", view.place, not lost, f"{lost} without a {relation} view")
             continue
-        found = follow_points(view, other, rows, columns, z, rays)
+        row = view.table["partners"][relation]
+        there = Then(rays, stay) if then is None else then(row.get("time_s"))
+        found = follow_points(
+            view, other, rows, columns, z, there.rays, partial(_carried, there, face)
+        )
+        if relation == "next" and "scene_flow" in arrays:
+            _check_scene_flow(view, arrays["scene_flow"], (rows, columns, z, face), there, tally)
         stored = {n: arrays[n][rows, columns].astype(np.float64) for n in names if n in arrays}
         for name, values in stored.items():
             right, may_tie = _judge_motion(name, values, found)
             # Look again at what is wrong.
             ties = np.nonzero(~right & may_tie)[0]
-            ties = ties[near_edge(view, other, rows[ties], columns[ties], z[ties], rays)]
+            ties = ties[
+                near_edge(
+                    view, other, rows[ties], columns[ties], z[ties], there.rays,
+                    partial(_carried, there, face[ties]),
+                )
+            ]  # fmt: skip
             right[ties] = True
             tally.add(f"motion: {name}", len(values), ties=len(ties))
             for k in np.nonzero(~right)[0]:
                 tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
+
+
+def _check_scene_flow(
+    view: StoredView,
+    stored: NDArray[Any],
+    seen: tuple[NDArray[np.int64], NDArray[np.int64], Floats, Faces],
+    then: Then,
+    tally: Tally,
+) -> None:
+    """How far things have moved until the next frame, of points at depth z on faces."""
+    rows, columns, z, face = seen
+    origin, directions = view.rays(rows, columns)
+    points = origin + directions * z[:, None]
+    off = np.abs(stored[rows, columns] - (then.carry(points, face) - points)).max(axis=1)
+    tally.add("motion: scene_flow", len(rows))
+    for k in np.nonzero(~(off <= SCENE_FLOW_M))[0]:
+        tally.fail("motion: scene_flow", view.place, f"row {rows[k]}, column {columns[k]}")
 
 
 def _judge_motion(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:

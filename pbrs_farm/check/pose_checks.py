@@ -53,6 +53,9 @@ class SeenView:
     view: StoredView
     depth: NDArray[Any]  # as depth.png stores it
     normal: NDArray[Any]  # as normal.png stores it
+    moves: NDArray[np.bool_] | None = (
+        None  # (H, W) shows something that may be elsewhere in other views
+    )
 
 
 def check_reprojection(views: list[SeenView], tally: Tally) -> None:
@@ -102,6 +105,8 @@ def _model_points(seen: SeenView) -> NDArray[np.float64]:
     # Keep the pixels whose 5 x 5 neighbours lie on the plane of the normal.
     z = seen.depth[rows, columns] / 1000
     flat = (z > 0) & (z < 65)
+    if seen.moves is not None:
+        flat &= ~seen.moves[rows, columns]
     for dy, dx in np.ndindex(5, 5):
         r, c = (rows + dy - 2).clip(0, height - 1), (columns + dx - 2).clip(0, width - 1)
         off = np.einsum("ni,ni->n", _positions(seen, r, c) - centre, normal)

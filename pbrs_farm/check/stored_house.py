@@ -19,6 +19,7 @@ class StoredHouse:
     """One houses/<house_id> folder."""
 
     folder: Path
+    moved: dict[str, Any] | None = None  # house.json as it would be at another time
 
     @property
     def id(self) -> str:
@@ -27,8 +28,8 @@ class StoredHouse:
 
     @cached_property
     def house(self) -> dict[str, Any]:
-        """house.json."""
-        return _document(self.folder / "house.json")
+        """house.json; of a house at another time, as that would be."""
+        return self.moved if self.moved is not None else _document(self.folder / "house.json")
 
     @cached_property
     def cameras(self) -> dict[str, Any]:

@@ -1,13 +1,12 @@
 """The table's rows of instances against the triangles of house.glb: boxes, shares seen, truncation.
 
-Effects: reads house.json; holds Embree scenes of single items.
+Effects: holds Embree scenes of single items.
 """
 
 from __future__ import annotations
 
 import zlib
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
-from pbrs_farm.check.stored_files import BadFile, stored_object
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
@@ -30,7 +29,7 @@ _LENS = 0.1  # of the share, where the stored one is resampled from pin-holes (d
 class HouseItems:
     """The items of a house's triangles, each asked for when a view shows it. State: what was asked."""
 
-    def __init__(self, house: Path, triangles: Triangles) -> None:
+    def __init__(self, house: StoredHouse, triangles: Triangles) -> None:
         self._house, self._triangles = house, triangles
         self._alone: dict[int, tuple[Floats, Rays]] = {}
 
@@ -62,9 +61,8 @@ class HouseItems:
     def stored_boxes(self) -> dict[int, dict[str, Any]]:
         """Instance id -> the box in house.json, of items that have one; {} without the file."""
         try:
-            rows = stored_object(self._house / "house.json")["items"]
-            return {int(row["instance"]): row["box"] for row in rows if row.get("box")}
-        except (BadFile, KeyError, TypeError, ValueError):
+            return {k: row["box"] for k, row in self._house.items.items() if row.get("box")}
+        except (KeyError, TypeError, ValueError):
             return {}
 
 

@@ -11,6 +11,7 @@ import itertools
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,8 @@ from pbrs_farm.check.light_checks import check_developed, may_be_halved
 from pbrs_farm.check.lit_checks import LitScene, check_lit
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.mirror_rays import MirrorRays
-from pbrs_farm.check.motion_checks import MOTION_LAYERS, check_motion, check_partners
+from pbrs_farm.check.motion_checks import MOTION_LAYERS, Then, check_motion, check_partners, stay
+from pbrs_farm.check.moved_house import MovedHouse, check_motion_table, check_motions, house_at
 from pbrs_farm.check.pair_checks import check_pairs
 from pbrs_farm.check.picture_checks import check_edges, check_histogram
 from pbrs_farm.check.pixel_checks import RAY_LAYERS, PixelChecks, judge, of_another_colour
@@ -60,6 +62,7 @@ from pbrs_farm.core.errors import BadInput
 
 SAMPLE = 2000  # pixels of each view that are recomputed by default
 MOST_COINCIDENT = 3  # of those, by chance: an edge where two things meet
+_MOST_TIMES = 4  # of a house in which things move: at rest, a frame and its neighbours
 DENOISED = 8  # of so many views the light of one is denoised again, which costs most of all
 # What reading a document raises that does not have what it should.
 FAULTS = (KeyError, TypeError, ValueError, IndexError, AttributeError, np.linalg.LinAlgError)
@@ -75,6 +78,38 @@ class Scenes:
     items: HouseItems
     house: StoredHouse
     lit: LitScene
+    moved: MovedHouse
+
+
+class ScenesInTime:
+    """The scenes of a house at one time after another. State: those of the last times."""
+
+    def __init__(self, house: StoredHouse, triangles: Triangles) -> None:
+        self._house, self._triangles = house, triangles
+        self._kept: dict[float | None, Scenes] = {}
+
+    def at(self, time_s: float | None) -> Scenes:
+        """The scenes at a time in seconds, None: at rest; a house in which nothing moves has one."""
+        time_s = time_s if self._house.house.get("motions") else None
+        if time_s not in self._kept:
+            while len(self._kept) >= _MOST_TIMES:
+                del self._kept[next(iter(self._kept))]
+            moved = house_at(self._house, self._triangles, time_s)
+            triangles = moved.triangles
+            self._kept[time_s] = Scenes(
+                (triangles, Rays(triangles)), (triangles, Rays(triangles, ~triangles.see_through)),
+                HouseItems(moved.house, triangles), moved.house, LitScene(moved.house, triangles), moved,
+            )  # fmt: skip
+        return self._kept[time_s]
+
+    def then(self, now: Scenes, time_s: float | None) -> Then:
+        """The house at a partner's time, and where points of the scenes now are in it."""
+        there = self.at(time_s)
+        if there is now:
+            return Then(now.all[1], stay)
+        return Then(
+            there.all[1], lambda points, faces: there.moved.carried(now.moved, points, faces)
+        )
 
 
 def verify(
@@ -134,11 +169,8 @@ def _check_house(
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.name, False, f"house.glb {error}")
         return [], 0
-    opaque = Rays(triangles, ~triangles.see_through)
-    scenes = Scenes(
-        (triangles, Rays(triangles)), (triangles, opaque), HouseItems(house, triangles), stored,
-        LitScene(stored, triangles),
-    )  # fmt: skip
+    times = ScenesInTime(stored, triangles)
+    scenes = times.at(None)
     _check_documents(stored, glb, scenes, tally)
     # Check each view by itself; a damaged one fails and the rest goes on.
     seen: list[SeenView] = []
@@ -146,13 +178,15 @@ def _check_house(
     for view in views:
         try:
             is_halved = view.place in halved
-            arrays = _check_view(view, scenes, n_pixels, tally, is_halved=is_halved)
+            now = times.at(view.table.get("time_s"))
+            arrays = _check_view(view, now, times, n_pixels, tally, is_halved=is_halved)
         except FAULTS as error:
             tally.expect("layers", f"{view.place}/view.json", False, _fault(error))
             arrays = None
         tell()
         if arrays is not None:
-            seen.append(SeenView(view, arrays["depth"], arrays["normal"]))
+            moves = np.isin(arrays["instance"], list(now.moved.instances))
+            seen.append(SeenView(view, arrays["depth"], arrays["normal"], moves))
     check_reprojection(seen, tally)
     check_partners([one.view for one in seen], tally)
     check_pairs(house, scenes.all[1], tally)
@@ -168,6 +202,7 @@ def _check_documents(house: StoredHouse, glb: bytes, scenes: Scenes, tally: Tall
         ("house.json", lambda: check_models(house, triangles, tally)),
         ("house.json", lambda: check_solids(house, triangles, rays, tally)),
         ("house.json", lambda: check_joints(house, triangles, tally)),
+        ("house.json", lambda: check_motions(house, tally)),
         ("illuminance.json", lambda: check_illuminance(house, tally)),
         ("cameras.json", lambda: check_choice(house, rays, triangles, tally)),
     )
@@ -183,9 +218,15 @@ def _fault(error: Exception) -> str:
 
 
 def _check_view(
-    view: StoredView, scenes: Scenes, n_pixels: int | None, tally: Tally, *, is_halved: bool
+    view: StoredView,
+    scenes: Scenes,
+    times: ScenesInTime,
+    n_pixels: int | None,
+    tally: Tally,
+    *,
+    is_halved: bool,
 ) -> dict[str, NDArray[Any]] | None:
-    """Check one view; its layers by name, None when its labels cannot be read."""
+    """Check one view; its layers by name, None when its labels cannot be read. scenes: at its time."""
     check_pose(view, tally)
     arrays = read_labels(view, tally)
     if arrays is None:
@@ -198,6 +239,7 @@ def _check_view(
     check_typed_boundaries(view, arrays, tally)
     check_derived(view, arrays, tally)
     check_articulation(view, scenes.house, arrays, tally)
+    check_motion_table(view, scenes.house, tally)
     if "projector" in arrays:
         check_projector(view, arrays["projector"], _chosen(view, n_pixels), scenes.all, tally)
     channels = read_radiance(view, tally)
@@ -216,7 +258,9 @@ def _check_view(
     check_rows(view, arrays["instance"], scenes.items, n_pixels, tally)
     _check_rays(view, arrays, scenes, n_pixels, tally)
     if MOTION_LAYERS & arrays.keys():
-        check_motion(view, arrays, scenes.all[1], _chosen(view, n_pixels), tally)
+        check_motion(
+            view, arrays, scenes.all[1], _chosen(view, n_pixels), tally, partial(times.then, scenes)
+        )
     return arrays
 
 

@@ -305,6 +305,10 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     # Where surfaces lie in the next and the previous frame, and in the other picture of a pair.
     *_flow("forward", "next"),
     *_flow("backward", "previous"),
+    _between(
+        "scene_flow", "next", "X Y Z", "float32", "m, world: what things themselves move to the next frame",
+        "0, 0, 0", "exr", shown_as="range",
+    ),
     _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows", shown_as="disparity", resized="pixels"),
     _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask"),
 )  # fmt: skip

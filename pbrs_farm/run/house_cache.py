@@ -6,10 +6,12 @@ Effects: reads the store, holds a GL context and Mitsuba scenes; one house at a 
 from __future__ import annotations
 
 import gc
+from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.house import Geometry, House, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import views_from_json
+from pbrs_farm.geometry.moving import MovingHouse
 from pbrs_farm.prepare.finished_house import HouseBeforeEdits
 from pbrs_farm.regular_files import fault_of, read_regular
 from pbrs_farm.store.object_store import Store
@@ -32,6 +35,18 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.scene_tables.sky import Sky
 
 
+_TIMES: Final = 3  # that are kept of a moving house: a frame's and its neighbours'
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A house at one time: what stands where, as labels see it."""
+
+    house: House
+    geometry: Geometry
+    caster: Caster
+
+
 class CachedHouse:
     """A repaired house from the store and what is built from it, each at its first use."""
 
@@ -41,6 +56,7 @@ class CachedHouse:
         self.recipe = recipe
         self.house_id = house_id
         self._views: tuple[str, dict[str, View]] | None = None  # cameras digest, views by id
+        self._moments: OrderedDict[float, Moment] = OrderedDict()
 
     @cached_property
     def house(self) -> House:
@@ -75,6 +91,26 @@ class CachedHouse:
         return Caster.of_house(self.house, self.geometry)
 
     @cached_property
+    def moving(self) -> MovingHouse:
+        """The house with what of it moves told apart, and where that is at any time."""
+        return MovingHouse(self.house, self.geometry)
+
+    def at(self, time_s: float | None) -> Moment:
+        """The house at a time in seconds; None, and a house in which nothing moves: at rest.
+
+        What stands still is shared by all times; the last few times are kept.
+        """
+        if time_s is None or not self.house.motions:
+            return Moment(self.house, self.geometry, self.caster)
+        if time_s not in self._moments:
+            house, geometry = self.moving.at(time_s)
+            caster = self.caster.at(geometry, self.moving.moving_faces)
+            self._moments[time_s] = Moment(house, geometry, caster)
+            while len(self._moments) > _TIMES:
+                self._moments.popitem(last=False)
+        return self._moments[time_s]
+
+    @cached_property
     def rasterizer(self) -> Rasterizer:
         """The GL renderer.
 
@@ -84,6 +120,12 @@ class CachedHouse:
         from pbrs_farm.raster import Rasterizer
 
         return Rasterizer(self.house, self.textures, self.recipe.raster)
+
+    def rasterizer_at(self, time_s: float | None) -> Rasterizer:
+        """The GL renderer of the house at a time; the same object for all times."""
+        if self.house.motions:
+            self.rasterizer.draw_house(self.at(time_s).house)
+        return self.rasterizer
 
     @cached_property
     def light_scene(self) -> LightScene:
@@ -95,6 +137,11 @@ class CachedHouse:
         from pbrs_farm.transport.light_scene import LightScene
 
         return LightScene.load(self.house, self.textures, self.recipe, self.sky)
+
+    def light_scene_at(self, time_s: float | None) -> LightScene:
+        """The scene that carries light, of the house at a time; the same object for all times."""
+        self.light_scene.move_to(time_s)
+        return self.light_scene
 
     @cached_property
     def sky(self) -> Sky:
@@ -141,7 +188,8 @@ class CachedHouse:
         rasterizer = self.__dict__.pop("rasterizer", None)
         if rasterizer is not None:
             rasterizer.close()
-        for name in ("light_scene", "caster", "geometry", "house", "textures"):
+        self._moments.clear()
+        for name in ("light_scene", "caster", "moving", "geometry", "house", "textures"):
             self.__dict__.pop(name, None)
         gc.collect()
 

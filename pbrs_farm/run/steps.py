@@ -45,7 +45,7 @@ from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 if TYPE_CHECKING:
     from pbrs_farm.selection.quality import ViewPlace
     from pbrs_farm.transport.light_result import LightResult
-    from pbrs_farm.truth.optical_flow import Relation
+    from pbrs_farm.truth.optical_flow import OtherTime, Relation
 
 
 def _cached_house(work: Work) -> CachedHouse:
@@ -163,11 +163,14 @@ def _truth(work: Work) -> StepOutput:
     # Cast one ray through each pixel's centre: all labels come from this record (rule 8).
     cached = _cached_house(work)
     view, camera = _view_at_size(work, cached)
-    caster, house = cached.caster, cached.house
+    now = cached.at(view.time_s)
+    caster, house = now.caster, now.house
     hit = caster.hit_record(camera)
     # Derive the layers that every view has, and the table of what is seen.
     arrays = truth.layers_from_hit(hit, house, camera)
     table = truth.view_table(hit.item, house, camera, cut_outs=caster.cut_outs)
+    if house.motions and view.time_s is not None:
+        table["motion"] = truth.motion_table(house, view.time_s)
     room = room_of(house, view)
     if room is not None:
         table["layout"] = truth.layout_table(room, camera, hit.depth_z)
@@ -175,11 +178,11 @@ def _truth(work: Work) -> StepOutput:
     layers = work.layers_of("truth")
     if layers:
         seed = keys.seed(work.house_id, view.id, "truth", work.recipe.seed)
-        partners = _partners(work, cached, view, table)
+        partners, times = _partners(work, cached, view, table)
         inputs = truth.LabelInputs(
-            hit, house, cached.geometry, camera,
+            hit, house, now.geometry, camera,
             lambda skip: caster.hit_record(camera, skip_faces=skip), cached.textures, seed,
-            partners, caster.first_hit, max_albedo(work.recipe),
+            partners, caster.first_hit, times, max_albedo(work.recipe),
         )  # fmt: skip
         arrays |= truth.optional_layers(layers, inputs)
         table |= truth.optional_tables(layers, house)
@@ -195,25 +198,36 @@ def _truth(work: Work) -> StepOutput:
 
 def _partners(
     work: Work, cached: CachedHouse, view: View, table: dict[str, Any]
-) -> dict[Relation, Camera]:
-    """The cameras of the partners that the layers need; they are written into the table."""
+) -> tuple[dict[Relation, Camera], dict[Relation, OtherTime]]:
+    """The cameras of the partners that the layers need, and the house then, where it has moved.
+
+    They are written into the table.
+    """
     needed = {LAYER[name].partner for name in work.layers_of("truth")} - {""}
     if not needed:
-        return {}
-    from pbrs_farm.truth.optical_flow import partner_table, partners_of
+        return {}, {}
+    from pbrs_farm.truth.optical_flow import OtherTime, partner_table, partners_of
 
     found = partners_of(view, cached.views(work.inputs["cameras"]))
     kept = {relation: other for relation, other in found.items() if relation in needed}
     image = work.recipe.image
     cameras = {r: o.camera.with_size(image.width_px, image.height_px) for r, o in kept.items()}
     table["partners"] = partner_table(kept, cameras)
-    return cameras
+    times: dict[Relation, OtherTime] = {}
+    for relation, other in kept.items():
+        if cached.house.motions and other.time_s != view.time_s:
+            # Frames of a sequence have times.
+            assert view.time_s is not None
+            assert other.time_s is not None
+            moves = cached.moving.face_motions(view.time_s, other.time_s)
+            times[relation] = OtherTime(cached.at(other.time_s).caster.first_hit, *moves)
+    return cameras, times
 
 
 def _opengl(work: Work, mode: str) -> StepOutput:
     cached = _cached_house(work)
-    _view, camera = _view_at_size(work, cached)
-    rasterizer = cached.rasterizer
+    view, camera = _view_at_size(work, cached)
+    rasterizer = cached.rasterizer_at(view.time_s)
     # Light by three fixed lights (OpenGL-DL) or by the lamps (OpenGL-IL).
     draw = rasterizer.render_dl if mode == "opengl_dl" else rasterizer.render_il
     rgb = draw(camera)
@@ -238,14 +252,14 @@ def _light(work: Work) -> StepOutput:
     view, camera = _view_at_size(work, cached)
     views = cached.views(work.inputs["cameras"])
     if work.recipe.blur.is_on:
-        camera = blurred(camera, view, views, work.recipe.blur, cached.caster)
+        camera = blurred(camera, view, views, work.recipe.blur, cached.at(view.time_s).caster)
     digest = work.recipe.picture_digest(*plan.STEPS["light"].groups)
     seed = light_seed(view, work.house_id, digest)
     # Go on from what a killed render of this step has kept.
     unfinished = keys.unfinished_key(work.house_id, "light", view.id)
     checkpoint = LightCheckpoint(work.store, unfinished, work.digest, work.tell_share)
     fields, pilot = work.recipe.light, pilot_of_view(view, views, camera, work.house_id, digest)
-    scene, anchors = cached.light_scene, noise_anchors(view, views, camera)
+    scene, anchors = cached.light_scene_at(view.time_s), noise_anchors(view, views, camera)
     layers = work.layers_of("light")
     result = scene.render(
         camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors,
@@ -274,7 +288,8 @@ def _facts_of_light(
     facts = {**result.facts, "noise": result.noise}
     if result.spp:  # Metropolis counts mutations instead
         facts["spp"] = result.spp
-    variant = cached.light_scene.variant
+    scene = cached.light_scene_at(view.time_s)
+    variant = scene.variant
     facts |= {"n_nonfinite": result.n_nonfinite, "variant": variant}
     if llvm := llvm_of_variant(variant):
         facts["llvm"] = llvm
@@ -294,7 +309,7 @@ def _facts_of_light(
         dark += [darkness_of_room(room, facts["floor_lux"])] if facts["floor_lux"] else []
     if any(dark):
         facts["dark"] = [line for line in dark if line]
-    if cached.light_scene.n_lamps == 0:
+    if scene.n_lamps == 0:
         facts["note"] = "no lamps: indoor is black and mlt_il_ol equals mlt_ol"
     return facts
 

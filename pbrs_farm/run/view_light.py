@@ -113,7 +113,7 @@ def pilot_of_view(
         return None
     size = camera.intrinsics.width_px, camera.intrinsics.height_px
     seed = light_seed(lead, house_id, digest)
-    return Pilot(lead.camera.with_size(*size), seed)
+    return Pilot(lead.camera.with_size(*size), seed, lead.time_s)
 
 
 def noise_anchors(view: View, views: Mapping[str, View], camera: Camera) -> NoiseAnchors | None:

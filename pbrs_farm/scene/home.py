@@ -39,12 +39,14 @@ from pbrs_farm.core.edits import (
     AddLight,
     CoverItems,
     Edit,
+    KeyJoints,
     MoveItems,
     OpenJoints,
     PaintItems,
     PlaceModel,
     RemoveItems,
     SetLight,
+    StandAt,
     rows_of_matrix,
 )
 from pbrs_farm.core.errors import BadInput, BadRecipe
@@ -71,8 +73,17 @@ ItemLike = str | Item | Row | Iterable[str | Item | Row]
 Colour = str | Sequence[float]
 Flux = Annotated[float, Where("0 to 10,000,000 lumen", lambda lm: 0 <= lm < 1e7)]
 Kelvin = Annotated[float, Where("1,000 to 20,000 kelvin", lambda k: 1000 <= k <= 20_000)]
+Keys = Annotated[
+    Mapping[float, float],
+    Where("{seconds: share}, shares in 0..1", lambda at: len(at) > 0 and _are_keys(at)),
+]
 Angle = Annotated[float, Where("an angle above 0, 180 degrees at most", lambda a: 0 < a <= 180)]
 Edge = Annotated[int, Where(f"1 to {MAX_EDGE_PX} pixels", lambda px: 1 <= px <= MAX_EDGE_PX)]
+
+
+def _are_keys(at: Mapping[float, float]) -> bool:
+    return all(math.isfinite(t) and 0 <= share <= 1 for t, share in at.items())
+
 
 _WARM_WHITE_K = 3000.0  # of a bulb that is added
 
@@ -163,6 +174,23 @@ class Home:
         ('item', 'name', 'part', 'kind')
         """
         return Joints(self.house)
+
+    @property
+    def motions(self) -> Table:
+        """What of it moves with time as a table: the item, its name, part ("" = all of it), from when until when.
+
+        >>> len(home.motions)
+        0
+        """
+        names = {item.id: item.name for item in self.house.items}
+        rows = [
+            {
+                "item": m.item, "name": names[m.item], "part": m.part, "from_s": m.times_s[0],
+                "until_s": m.times_s[-1], "keys": len(m.times_s),
+            }
+            for m in self.house.motions
+        ]  # fmt: skip
+        return Table(("item", "name", "part", "from_s", "until_s", "keys"), rows)
 
     def __repr__(self) -> str:
         edits = f", {len(self.source.edits)} edits" if self.source.edits else ""
@@ -361,16 +389,29 @@ class Home:
         return self._edited(MoveItems(items=ids, world_from_world=rows_of_matrix(matrix)))
 
     @checked_call
-    def open(self, items: ItemLike, share: Share = 1.0, part: str = "*") -> Home:
+    def open(
+        self, items: ItemLike, share: Share = 1.0, part: str = "*", *, at: Keys | None = None
+    ) -> Home:
         """The home with doors, drawers and lids of items open by a share of their way; 0 shuts them.
 
         items: as of `without`; part: those of `home.joints` that are meant, "drawer*" for instance.
-        What a wall or a thing stands in the way of opens as far as it can, and is a warning. Raises
-        BadInput where nothing of the items opens.
+        at: seconds -> share instead, {0: 0, 2: 1}: they move evenly between these times, which films
+        show. What a wall or a thing stands in the way of opens as far as it can, and is a warning.
+        Raises BadInput where nothing of the items opens.
 
             >>> max(home.open("door*", 0.7).joints.column("open"))
             0.7
+            >>> home.open("door*", at={0: 0, 2: 1}).motions.column("until_s")[0]
+            2.0
         """
+        joints = self._joints_of(items, part)
+        if at is None:
+            return self._opened(OpenJoints(joints=joints, share=float(share)))
+        keys = tuple((float(t), float(at[t])) for t in sorted(at))
+        return self._opened(KeyJoints(joints=joints, keys=keys))
+
+    def _joints_of(self, items: ItemLike, part: str) -> tuple[tuple[str, str], ...]:
+        """(item, part) of the joints that are meant; BadInput where there is none."""
         ids = frozenset(self._ids(items))
         joints = tuple(
             (item.id, joint.part)
@@ -385,11 +426,24 @@ class Home:
             )
             text = f"no {part!r} of it opens" if known else "nothing of it opens"
             raise BadInput(self.id, shown(sorted(ids)[0]), text, hint=", ".join(known[:5]))
-        home = self._edited(OpenJoints(joints=joints, share=float(share)))
+        return joints
+
+    def _opened(self, edit: OpenJoints | KeyJoints) -> Home:
+        home = self._edited(edit)
         before = len(self.house.notes)
         for note in home.house.notes[before:]:
             warn_caller(f"{home.id}: {note.place} {note.text}")
         return home
+
+    @checked_call
+    def at(self, time_s: float) -> Home:
+        """The home as it stands at a time, seconds: what moves is there, and moves no more.
+
+        >>> moving = home.open("door*", at={0: 0, 2: 1})
+        >>> max(moving.at(1.0).joints.column("open"))
+        0.5
+        """
+        return self._edited(StandAt(time_s=float(time_s)))
 
     @checked_call
     def paint(self, items: ItemLike, colour: Colour, roughness: Share | None = None) -> Home:

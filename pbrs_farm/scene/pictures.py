@@ -11,6 +11,7 @@ from typing import Any, Final, overload
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.checked_calls import (
     Count,
+    Positive,
     Size,
     as_words,
     check_argument,
@@ -27,7 +28,7 @@ from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.sample.stored_cameras import OUTSIDE
 from pbrs_farm.scene.home import Home, recipe_of
-from pbrs_farm.scene.viewpoints import Viewpoint
+from pbrs_farm.scene.viewpoints import Viewpoint, film_viewpoints
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame, Views
 
@@ -91,6 +92,43 @@ def render(
     with _progress_of(home, found, observe, progress) as tell:
         frames = home.renderer.frames(home.source, recipe, found, want, tell)
     return frames[0] if isinstance(cameras, Camera | Viewpoint) else frames
+
+
+@checked_call
+def film(
+    home: Home,
+    cameras: AnyCamera | Sequence[AnyCamera],
+    fps: Positive = 24.0,
+    seconds: Positive = 2.0,
+    *,
+    from_s: float = 0.0,
+    modes: Words = (Mode.MLT_IL_OL,),
+    layers: Words = (),
+    size: Size | None = None,
+    observe: Callable[[str], None] | None = None,
+    progress: bool = False,
+) -> Views:
+    """The frames of a film of a home in memory: what moves in it (`home.open(at=)`, `home.drop`) moves.
+
+    cameras: one that stands still, or one a frame. fps: frames a second, of which seconds are filmed
+    from the time from_s on; the frames are `frame_00000` and so on. All else is as of `render`;
+    layers that need the next frame or the one before (flow_forward, scene_flow) are there, but for the
+    film's ends. Raises BadInput where there are not as many cameras as frames.
+
+        >>> moving = home.open("door*", at={0: 0, 1: 1})
+        >>> frames = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["scene_flow"])
+        >>> [frame.ref.view for frame in frames]
+        ['frame_00000', 'frame_00001']
+    """
+    n = max(1, round(fps * seconds))
+    given = [cameras] * n if isinstance(cameras, Camera | Viewpoint) else list(cameras)
+    if len(given) != n:
+        text = f"{fps:g} frames a second for {seconds:g} s are {n} frames, not {len(given)}"
+        raise BadInput(home.id, "cameras", text)
+    frames = film_viewpoints([home.viewpoint(camera) for camera in given], fps, from_s)
+    recipe = _recipe_of_view(home, frames, size)
+    with _progress_of(home, frames, observe, progress) as tell:
+        return home.renderer.frames(home.source, recipe, frames, _wanted(modes, layers), tell)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final, TypeVar
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
@@ -253,10 +253,12 @@ class Renderer:
         """Write cameras.json of cameras from Python, those of former calls among them."""
         key = keys.house_key(work.house_id, "cameras.json")
         views = {}
+        given = {one.id: one.view for one in viewpoints}
         if work.store.head(key) is not None:
             held = views_from_json(work.store.get(key), key)
             views = {name: view for name, view in held.items() if view.origin == "given"}
-        views |= {one.id: one.view for one in viewpoints}
+            views = _without_other_film(work, views, given)
+        views |= given
         found = [views[name] for name in sorted(views)]
         # Its digest says where they come from, not which they are: a view's own id does.
         work.store.delete(keys.marker_key(work.house_id, "cameras"))
@@ -264,6 +266,26 @@ class Renderer:
         data = cameras_json(found, {"source": "given", "n_views": len(found)})
         run_unless_done("cameras", work, lambda _work: StepOutput({"cameras.json": data}, facts))
         self._cached(work).forget_views()
+
+
+def _without_other_film(
+    work: Work, held: Mapping[str, View], given: Mapping[str, View]
+) -> dict[str, View]:
+    """The views that are held, without the frames of another film than is given.
+
+    Frames are named by their numbers: what was made of others of these names is taken away.
+    """
+    films = [
+        {name: cameras_json([v], {}) for name, v in views.items() if v.frame is not None}
+        for views in (held, given)
+    ]
+    if not films[1] or films[0] == films[1]:
+        return dict(held)
+    for name in films[0]:
+        for step in plan.STEPS.values():
+            if step.per_view:
+                work.store.delete(keys.marker_key(work.house_id, step.name, name))
+    return {name: view for name, view in held.items() if name not in films[0]}
 
 
 def _sketch_by_rays(cached: CachedHouse, camera: Camera) -> NDArray[np.uint8]:

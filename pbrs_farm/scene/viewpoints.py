@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
@@ -141,3 +141,18 @@ def viewpoint_of(camera: Camera, house: House, fields: CameraFields) -> Viewpoin
     mark = keys.digest(numbers, i.width_px, i.height_px, i.lens.table())[:8]
     view = View(f"{keys.view_id(room_id, sector)}_{mark}", room_id, sector, camera, "given")
     return Viewpoint(view)
+
+
+def film_viewpoints(
+    cameras: Sequence[Viewpoint], fps: float, from_s: float = 0.0
+) -> list[Viewpoint]:
+    """Viewpoints one after another as the frames of a film, fps a second, the first at from_s."""
+    return [
+        Viewpoint(
+            replace(
+                one.view, id=keys.frame_id(k), origin="given", score=0.0, objects={}, frame=k,
+                time_s=from_s + k / fps,
+            )
+        )
+        for k, one in enumerate(cameras)
+    ]  # fmt: skip

@@ -1,6 +1,6 @@
 """Ground truth: one hit record at pixel centres -> every label layer; no effects, no effects."""
 
-from pbrs_farm.truth.articulation import articulation_table
+from pbrs_farm.truth.articulation import articulation_table, motion_table
 from pbrs_farm.truth.boundary import typed_boundaries
 from pbrs_farm.truth.coverage import coverage
 from pbrs_farm.truth.depth_sensor import sensor_depth
@@ -24,6 +24,7 @@ __all__ = [
     "is_truncated",
     "layers_from_hit",
     "layout_table",
+    "motion_table",
     "normal_label",
     "optional_layers",
     "optional_tables",

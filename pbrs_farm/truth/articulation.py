@@ -70,3 +70,20 @@ def articulation_table(parts: NDArray[np.uint16], house: House, camera: Camera) 
             "box2d": [int(xs.start), int(ys.start), int(xs.stop), int(ys.stop)],
         })  # fmt: skip
     return {"parts": rows}
+
+
+def motion_table(house: House, time_s: float) -> dict[str, Any]:
+    """What view.json says of a home in which things move: of each that does, where it is.
+
+    house: at that time, seconds. Joints have their values, radians or metres from shut; whole items
+    a (4, 4) matrix from where house.glb has them to where they are, world axes, metres.
+    """
+    instance = {item.id: k for k, item in enumerate(house.items, 1)}
+    joints, bodies = [], []
+    for motion in house.motions:
+        row: dict[str, Any] = {"instance": instance[motion.item], "item": motion.item}
+        if motion.is_of_joint:
+            joints.append({**row, "part": motion.part, "value": motion.value_at(time_s)})
+        else:
+            bodies.append({**row, "world_from_rest": motion.matrix_at(time_s).tolist()})
+    return {"joints": joints, "bodies": bodies}

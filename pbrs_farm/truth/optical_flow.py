@@ -1,7 +1,7 @@
 """Where the surfaces of one view lie in another: flow, disparity, and what is hidden there.
 
-No effects of its own: rays are cast by the function that it is given. Nothing in a home moves, so that a
-surface point stays where it is and all motion is the camera's.
+No effects of its own: rays are cast by the function that it is given. In a home in which things move, a
+surface point moves rigidly with its face from the time of one view to that of the other.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F32, F64, I32, Bools, FirstHit, HitRecord
+from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools, FirstHit, HitRecord
 from pbrs_farm.core.camera import Camera, View
-from pbrs_farm.core.frames import opencv_world_from_camera
+from pbrs_farm.core.frames import opencv_world_from_camera, transform_points
 
 SEEN: Final = 0
 OUTSIDE: Final = 128  # outside the other picture, or behind the other camera
@@ -38,23 +38,30 @@ class Correspondence:
     in_front: Bools  # (H, W) the flow is defined
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherTime:
+    """The home when another view of it is taken, where things have moved until then."""
+
+    first_hit: FirstHit  # of the home at that time
+    number_of_face: I64  # (F,) of the matrix that takes the face there; 0 = it stands still
+    matrices: F64  # (M, 4, 4) rigid, world to world; the first is the identity
+
+
 def correspondence(
-    hit: HitRecord, camera: Camera, other: Camera, first_hit: FirstHit
-) -> Correspondence:
+    hit: HitRecord, camera: Camera, other: Camera, first_hit: FirstHit,
+    then: OtherTime | None = None,
+) -> Correspondence:  # fmt: skip
     """The surface points of a hit record, looked for in another camera's picture.
 
-    The hit record is camera's own, and both cameras have the scene at one moment: nothing moves but
-    the camera. Points behind the other camera count as outside.
+    The hit record is camera's own. then: the home when the other camera looks; None where nothing
+    has moved, and first_hit is of both. Points behind the other camera count as outside.
     """
     shape = hit.face.shape
     pixels = np.flatnonzero(hit.face.ravel() >= 0)
-    # Take the points in double precision, from the ray and the depth along the axis.
-    origin, directions = camera.exact_rays()
-    depth = hit.depth_z.ravel()[pixels].astype(np.float64)
-    rays = directions.reshape(-1, 3).take(pixels, axis=0)
-    points = np.empty((3, len(pixels))).T  # each axis lies together: half of the time
-    for axis in range(3):
-        points[:, axis] = origin[axis] + depth * rays[:, axis]
+    points = _points_of_pixels(hit, camera, pixels)
+    if then is not None:
+        first_hit = then.first_hit
+        _move_points(points, hit.face.ravel()[pixels], then)
     there, z = project_points(points, other)
     # Subtract the pixel's own centre.
     rows, columns = np.divmod(pixels, shape[1])
@@ -71,6 +78,41 @@ def correspondence(
     in_front = np.zeros(shape, bool)
     in_front.ravel()[pixels] = front
     return Correspondence(np.moveaxis(flow.reshape(2, *shape), 0, -1), states, in_front)
+
+
+def _points_of_pixels(hit: HitRecord, camera: Camera, pixels: I64) -> F64:
+    """(N, 3) surface points behind pixels, in double precision from the ray and the stored depth."""
+    origin, directions = camera.exact_rays()
+    depth = hit.depth_z.ravel()[pixels].astype(np.float64)
+    rays = directions.reshape(-1, 3).take(pixels, axis=0)
+    points = np.empty((3, len(pixels))).T  # each axis lies together: half of the time
+    for axis in range(3):
+        points[:, axis] = origin[axis] + depth * rays[:, axis]
+    return points
+
+
+def _move_points(points: F64, faces: I32, then: OtherTime) -> None:
+    """Move points (N, 3) in place with the faces (N,) that they lie on."""
+    number = then.number_of_face[faces]
+    for k in range(1, len(then.matrices)):
+        own = np.flatnonzero(number == k)
+        points[own] = transform_points(then.matrices[k], points[own])
+
+
+def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> F32:
+    """(H, W, 3) metres, world axes: by how far each pixel's surface point has moved then.
+
+    0 where it stands still, or nothing is seen. The position there is the layer position plus this.
+    """
+    moved = np.zeros((hit.face.size, 3))
+    if then is not None:
+        faces = hit.face.ravel()
+        pixels = np.flatnonzero((faces >= 0) & (then.number_of_face[faces] > 0))
+        points = _points_of_pixels(hit, camera, pixels)
+        begin = points.copy()
+        _move_points(points, faces[pixels], then)
+        moved[pixels] = points - begin
+    return moved.reshape(*hit.face.shape, 3).astype(np.float32)
 
 
 def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:

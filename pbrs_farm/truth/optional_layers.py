@@ -24,11 +24,13 @@ from pbrs_farm.truth.depth_sensor import sensor_depth
 from pbrs_farm.truth.mirrored_hits import mirror_faces, mirrored_hits
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
+    OtherTime,
     Relation,
     correspondence,
     disparity_label,
     flow_kitti,
     flow_label,
+    scene_flow_label,
 )
 from pbrs_farm.truth.projector import projector_label
 from pbrs_farm.truth.standard_layers import (
@@ -66,6 +68,9 @@ class LabelInputs:
     seed: int = 0  # of depth_sensor's noise
     partners: Mapping[Relation, Camera] = field(default_factory=dict)  # at this picture's size
     first_hit: FirstHit | None = None  # for the layers between views and behind mirrors
+    times: Mapping[Relation, OtherTime] = field(
+        default_factory=dict
+    )  # of partners when things moved
     max_albedo: float = 1.0  # that light holds diffuse colour times texture to
 
     @cached_property
@@ -93,7 +98,7 @@ class LabelInputs:
             return {}
         cast = self.first_hit
         return {
-            relation: correspondence(self.hit, self.camera, other, cast)
+            relation: correspondence(self.hit, self.camera, other, cast, self.times.get(relation))
             for relation, other in self.partners.items()
         }
 
@@ -210,6 +215,7 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "flow_forward": lambda s: flow_label(s.to_partners["next"]),
     "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),
     "occlusion_forward": lambda s: s.to_partners["next"].state,
+    "scene_flow": lambda s: scene_flow_label(s.hit, s.camera, s.times.get("next")),
     "flow_backward": lambda s: flow_label(s.to_partners["previous"]),
     "flow_backward_kitti": lambda s: flow_kitti(s.to_partners["previous"]),
     "occlusion_backward": lambda s: s.to_partners["previous"].state,

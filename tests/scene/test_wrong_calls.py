@@ -235,6 +235,13 @@ WRONG: list[tuple[str, Call, str]] = [
     ("Items.near", lambda g: g.home.items.near("sofaa"), "sofaa"),
     ("Home.open", lambda g: g.home.open("sofa"), "nothing of it opens"),
     ("Home.open", lambda g: g.home.open("sofa", 2), "open: share"),
+    ("Home.open", lambda g: g.home.open("door_*", at={0: 2}), "open: at: .*seconds"),
+    ("Home.open", lambda g: g.home.open("door_*", at={}), "open: at"),
+    ("Home.at", lambda g: g.home.at("noon"), "at: time_s"),
+    ("Home.at", lambda g: g.home.at(float("nan")), "at: time_s"),
+    ("film", lambda g: pf.film(g.home, g.camera, fps=0), "film: fps"),
+    ("film", lambda g: pf.film(g.home, [g.camera], 2, 2), "4 frames, not 1"),
+    ("film", lambda g: pf.film(g.home, g.camera, 2, 1, layers="albido"), "albedo"),
     ("Frame.layer", lambda g: g.frame.layer("depht"), "no layer depht"),
     ("Frame.layer", lambda g: g.frame.layer(3), "layer: name"),
     ("Frame.picture", lambda g: g.frame.picture("mlt_ol"), "no picture in mlt_ol"),
@@ -274,6 +281,7 @@ def _public_calls() -> set[str]:
     """Names of all that the package gives and that takes arguments."""
     found = {"Packing", "SampleRequest"}
     for name in (
+        "film",
         "load",
         "make",
         "model",

@@ -15,10 +15,12 @@ from pbrs_farm.truth.optical_flow import (
     HIDDEN,
     OUTSIDE,
     SEEN,
+    OtherTime,
     correspondence,
     disparity_label,
     flow_kitti,
     partners_of,
+    scene_flow_label,
 )
 
 WIDTH, HEIGHT, F = 64, 48, 40.0
@@ -51,6 +53,45 @@ def at(x: float, y: float = 0.0, z: float = 0.0, yaw: float = 0.0) -> Camera:
 
 def matched(caster: Caster, a: Camera, b: Camera):
     return correspondence(caster.hit_record(a), a, b, caster.first_hit)
+
+
+def moved_square(by: tuple[float, float, float]) -> tuple[Caster, OtherTime]:
+    """A wall at 4 m, and before it at 2 m a square of 0.5 m that has moved by the time of the other view."""
+    now = squares((9, 0, 0, 4), (0.25, 0, 0, 2))
+    then = squares((9, 0, 0, 4), (0.25, by[0], by[1], 2 - by[2]))
+    matrix = np.eye(4)
+    matrix[:3, 3] = by
+    return now, OtherTime(then.first_hit, np.array([0, 0, 1, 1]), np.stack([np.eye(4), matrix]))
+
+
+def test_what_moves_by_itself_flows_and_hides_what_it_comes_before() -> None:
+    now, then = moved_square((0.5, 0.0, 0.0))
+    view = at(0)
+    hit = now.hit_record(view)
+    found = correspondence(hit, view, view, now.first_hit, then)
+    square = hit.item == 2
+    assert square.sum() == 100  # 2 x 0.25 m at 20 pixels a metre, both ways
+    np.testing.assert_allclose(found.flow[square], [[F * 0.5 / 2, 0]] * 100, atol=1e-4)
+    np.testing.assert_allclose(found.flow[~square], 0, atol=1e-4)
+    # It covers ten columns to the right of where it was.
+    hidden = found.state == HIDDEN
+    assert hidden.sum() == 100
+    assert hidden[19:29, 37:47].all()
+    label = scene_flow_label(hit, view, then)
+    np.testing.assert_allclose(label[square], [[0.5, 0, 0]] * 100, atol=1e-6)
+    assert not label[~square].any()
+    assert not scene_flow_label(hit, view, None).any()
+
+
+def test_what_comes_nearer_spreads_from_the_middle() -> None:
+    now, then = moved_square((0.0, 0.0, 1.0))
+    view = at(0)
+    hit = now.hit_record(view)
+    found = correspondence(hit, view, view, now.first_hit, then)
+    rows, columns = np.nonzero(hit.item == 2)
+    # At half the distance a point lies twice as far from the axis.
+    centre = np.stack([columns + 0.5 - WIDTH / 2, rows + 0.5 - HEIGHT / 2], -1)
+    np.testing.assert_allclose(found.flow[rows, columns], centre, atol=1e-4)
 
 
 def test_a_wall_flows_by_focal_length_times_move_over_depth() -> None:

@@ -1,0 +1,170 @@
+"""A walk through the small home while its doors open: what is stored, and what verify says of it."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pbrs_farm as pf
+from pbrs_farm.check import verify
+from pbrs_farm.check.certificate import Certificate
+from pbrs_farm.images import exr_from_layers, layers_from_exr
+from tests.check.roots import sign
+
+LAYERS = [
+    "flow_forward", "flow_backward", "flow_forward_kitti", "occlusion_forward",
+    "occlusion_backward", "scene_flow", "part", "behind_glass_depth",
+]  # fmt: skip
+FIELDS = {
+    "image.width_px": 96, "image.height_px": 72, "cameras.source": "walk",
+    "cameras.walk_frames": 4, "cameras.walk_fps": 4,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def moving() -> pf.Home:
+    return pf.load("builtin", recipe="preview", **FIELDS).open("door_*", at={0: 0.1, 0.75: 1})
+
+
+@pytest.fixture(scope="module")
+def made(moving: pf.Home, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out")
+    pf.render_homes(moving, out, modes=["opengl_dl"], layers=LAYERS)
+    return out
+
+
+@pytest.fixture(scope="module")
+def certificate(made: Path) -> Certificate:
+    return verify(made, all_pixels=True)
+
+
+def view(root: Path, number: int) -> Path:
+    return next(root.glob("houses/*")) / f"views/frame_{number:05d}"
+
+
+def table(root: Path, number: int) -> dict:
+    return json.loads((view(root, number) / "view.json").read_text())
+
+
+def test_every_pixel_and_every_table_is_right(certificate: Certificate) -> None:
+    assert certificate.is_clean, certificate.text()
+    for name in ("flow_forward", "flow_backward", "occlusion_forward", "scene_flow"):
+        assert certificate.counts[f"motion: {name}"].checked == 3 * 96 * 72
+    assert certificate.counts["motions"].checked > 20
+
+
+def test_each_view_tells_the_time_and_how_far_doors_are_open(made: Path, moving: pf.Home) -> None:
+    for number, share in enumerate((0.1, 0.4, 0.7, 1.0)):
+        told = table(made, number)
+        assert told["time_s"] == number / 4
+        values = {row["item"]: row["value"] for row in told["motion"]["joints"]}
+        expected = {row["item"]: share * row["upper"] for row in moving.joints}
+        assert values == pytest.approx(expected)
+
+
+def test_a_door_that_is_seen_flows_and_its_frame_does_not(made: Path) -> None:
+    moved = {
+        k: np.stack([layers_from_exr((view(made, k) / "scene_flow.exr").read_bytes())[c] for c in "XYZ"])
+        for k in range(3)
+    }  # fmt: skip
+    shares = [(np.abs(m).max(0) > 1e-3).mean() for m in moved.values()]
+    assert max(shares) > 0.02
+    assert min(shares) < 0.9
+    # A hinge is upright: nothing of a door goes up or down.
+    assert max(np.abs(m[1]).max() for m in moved.values()) < 1e-6
+
+
+def test_ids_of_instances_stay_over_time(made: Path) -> None:
+    names = [{row["id"]: row["item"] for row in table(made, k)["instances"]} for k in range(4)]
+    for a, b in pairwise(names):
+        assert {k: a[k] for k in a.keys() & b.keys()} == {k: b[k] for k in a.keys() & b.keys()}
+
+
+def shift(file: str, channel: str, by: float) -> Callable[[Path], None]:
+    def plant(root: Path) -> None:
+        path = view(root, 1) / file
+        planes = {k: v.copy() for k, v in layers_from_exr(path.read_bytes()).items()}
+        planes[channel][20:40, 30:60] += np.float32(by)
+        path.write_bytes(exr_from_layers(planes))
+
+    return plant
+
+
+def change(file: Callable[[Path], Path], edit: Callable[[dict], None]) -> Callable[[Path], None]:
+    def plant(root: Path) -> None:
+        held = json.loads(file(root).read_text())
+        edit(held)
+        file(root).write_text(json.dumps(held))
+
+    return plant
+
+
+def further(held: dict) -> None:
+    held["motion"]["joints"][0]["value"] += 0.01
+
+
+def faster(held: dict) -> None:
+    for motion in held["motions"]:
+        motion["times_s"][1] = 0.7
+
+
+def house_json(root: Path) -> Path:
+    return next(root.glob("houses/*")) / "house.json"
+
+
+FALSEHOODS = {
+    "flow": (shift("flow_forward.exr", "X", 0.3), "motion: flow_forward"),
+    "scene flow": (shift("scene_flow.exr", "Z", 0.002), "motion: scene_flow"),
+    "state": (change(lambda r: view(r, 2) / "view.json", further), "motions"),
+    "keys": (change(house_json, faster), "motions"),
+}
+
+
+@pytest.mark.parametrize("name", FALSEHOODS)
+def test_a_falsehood_about_motion_is_found(made: Path, tmp_path: Path, name: str) -> None:
+    plant, check = FALSEHOODS[name]
+    root = tmp_path / "root"
+    shutil.copytree(made, root)
+    plant(root)
+    sign(root, house_json(root).parent)
+    counts = verify(root, sample=2000).counts
+    assert counts[check].failed > 0
+
+
+def test_a_film_in_memory_shows_what_each_time_shows(moving: pf.Home) -> None:
+    camera = moving.viewpoint(moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera)
+    frames = pf.film(moving, camera.camera, fps=4, seconds=0.75, modes=[], layers=["part"])
+    assert [frame.ref.view for frame in frames] == ["frame_00000", "frame_00001", "frame_00002"]
+    # The home stopped at a frame's time, rendered by itself, has the same labels.
+    stopped = pf.render(moving.at(0.5), camera.camera, modes=[], layers=["part"])
+    np.testing.assert_array_equal(frames[2].depth, stopped.depth)
+    np.testing.assert_array_equal(frames[2].layer("part"), stopped.layer("part"))
+    assert (frames[0].depth != frames[2].depth).mean() > 0.02
+    # Another film of the same frames is another one.
+    later = pf.film(moving, camera.camera, 4, 0.75, from_s=0.5, modes=[], layers=["part"])
+    np.testing.assert_array_equal(later[0].depth, frames[2].depth)
+
+
+def test_pictures_of_opengl_follow(moving: pf.Home) -> None:
+    small = moving
+    camera = small.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera
+    modes = ["opengl_dl", "opengl_il"]
+    film = pf.film(small, camera, fps=2, seconds=1.0, modes=modes)
+    stopped = pf.render(small.at(0.5), camera, modes=modes)
+    for mode in modes:
+        np.testing.assert_array_equal(film[1].picture(mode), stopped.picture(mode))
+        assert (film[0].picture(mode) != film[1].picture(mode)).mean() > 0.02
+
+
+def test_a_wrong_film_is_told(moving: pf.Home) -> None:
+    camera = moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera
+    with pytest.raises(pf.BadInput, match="4 frames"):
+        pf.film(moving, [camera] * 3, fps=2, seconds=2, modes=[])
+    with pytest.raises(pf.BadInput, match="seconds: share"):
+        moving.open("door_*", at={0: 2})
