@@ -102,6 +102,10 @@ def add_verbs(verb: Verb) -> None:
     verb("coordinator", _coordinator)
     p = verb("worker", _worker)
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
+    text = "leave when no job had work for S seconds: a rented machine then ends"
+    p.add_argument("--until-idle", type=float, metavar="S", help=text)
+    text = "exit status where a signal made it leave, for schedulers that take 0 for the end"
+    p.add_argument("--preempted-code", type=int, metavar="CODE", help=text)
 
 
 def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> None:
@@ -335,4 +339,9 @@ def _coordinator(_args: argparse.Namespace) -> int:
 def _worker(args: argparse.Namespace) -> int:
     from workers.node.supervisor import main
 
-    return main([] if args.until is None else ["--until", str(args.until)])
+    given = {
+        "--until": args.until, "--until-idle": args.until_idle, "--preempted-code": args.preempted_code,
+    }  # fmt: skip
+    return main(
+        [word for name, value in given.items() if value is not None for word in (name, str(value))]
+    )

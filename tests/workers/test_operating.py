@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import signal
+import sys
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +24,7 @@ from workers.config import FarmConfig
 from workers.ids import log_key
 from workers.job import HouseEntry
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import Fault
+from workers.ledger.task_ledger import Fault, LedgerUnavailable
 from workers.ledger.worker_registry import Registry
 from workers.node import supervisor
 from workers.node.faults import without_numbers
@@ -330,3 +334,62 @@ def test_drain_offers_the_name_that_is_near(farm: Farm) -> None:
     registry_of(farm, worker="worker-12").heartbeat()
     with pytest.raises(BadInput, match=r"no such worker \(did you mean worker-12\?\)"):
         farm.drain("worker12")
+
+
+class FakeJobs:
+    """What a ledger says of jobs with work: an error where it says nothing."""
+
+    def __init__(self) -> None:
+        self.jobs: list[str] | None = []
+
+    def active_jobs(self) -> list[str]:
+        if self.jobs is None:
+            raise LedgerUnavailable("no Redis")
+        return self.jobs
+
+
+def test_a_worker_is_idle_since_no_job_had_work_and_never_while_redis_is_silent() -> None:
+    now, ledger = [100.0], FakeJobs()
+    idleness = supervisor.Idleness(ledger, clock=lambda: now[0])  # type: ignore[arg-type]
+    told: list[float] = []
+    steps: list[tuple[float, list[str] | None]] = [
+        (130.0, []), (135.0, ["j"]), (141.0, ["j"]), (200.0, []), (260.0, None), (280.0, []),
+    ]  # fmt: skip
+    for now[0], ledger.jobs in steps:
+        told.append(idleness.seconds())
+    # At 135 it does not ask yet: it asked at 130.
+    assert told == [30.0, 35.0, 0.0, 59.0, 0.0, 20.0]
+
+
+@pytest.fixture
+def handlers() -> Iterator[None]:
+    """Signals mean afterwards what they did before."""
+    before = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("handlers")
+@pytest.mark.parametrize(
+    ("says", "given", "code"),
+    [
+        ("pass", {"idle_s": 0.0, "preempted_code": 85}, -signal.SIGTERM),
+        ("os.kill(os.getppid(), signal.SIGTERM)", {"preempted_code": 85}, 85),
+        ("os.kill(os.getppid(), signal.SIGTERM)", {}, -signal.SIGTERM),
+    ],
+    ids=["idle", "preempted", "asked to leave"],
+)
+def test_a_worker_ends_when_it_is_idle_and_says_when_it_was_preempted(
+    farm: Farm,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    says: str,
+    given: dict[str, Any],
+    code: int,
+) -> None:
+    # In Celery's place: a process that waits until it is told to end.
+    program = f"import os, signal, time; {says}; time.sleep(60)"
+    monkeypatch.setattr(supervisor, "command", lambda _config: [sys.executable, "-c", program])
+    monkeypatch.setattr(supervisor, "_POLL_S", 0.02)
+    assert supervisor.supervise(replace(farm.config, scratch=tmp_path), **given) == code

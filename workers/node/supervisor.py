@@ -37,6 +37,7 @@ _PREEMPT_S: Final = 20.0  # what giving everything back may take
 _POLL_S: Final = 0.2
 _SEEN_EVERY_S: Final = 10.0  # of a worker that finishes what it runs
 _DRAINED_POLL_S: Final = 5.0  # between two looks of a drained worker whether it is wanted again
+_ASK_EVERY_S: Final = 10.0  # whether a job has work
 _STORE_S: Final = 5.0  # how long the store may take to say which it is
 # On scratch when a signal made the worker leave: deploy/slurm/worker.sbatch asks for it.
 PREEMPTED_NOTE: Final = "preempted"
@@ -104,17 +105,26 @@ def sweep(config: FarmConfig) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
+def supervise(
+    config: FarmConfig,
+    *,
+    until_s: float | None = None,
+    idle_s: float | None = None,
+    preempted_code: int | None = None,
+) -> int:
     """Run a worker until a signal asks it to leave; Celery's exit status.
 
     until_s: leave by itself after so many seconds, the grace before them (Slurm's wall time).
+    idle_s: leave when no job had work for so many seconds. preempted_code: the status in place of
+    Celery's where a signal made it leave, for schedulers that take 0 for the end.
     """
     orders = _Orders()
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, orders.on_signal)
     began = time.monotonic()
     seen_at = 0.0  # as one that leaves
-    registry = Registry(RedisLedger(config))
+    ledger = RedisLedger(config)
+    registry, idleness = Registry(ledger), Idleness(ledger)
     if not _wait_while_drained(config, orders):
         return 0
     # Celery's parent process never touches storage: name the store in its environment.
@@ -129,6 +139,8 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
             with contextlib.suppress(LedgerUnavailable):
                 registry.leave()
             sweep(config)
+            if orders.was_signalled and preempted_code is not None:
+                return preempted_code
             return code
         # Celery's own heartbeat ends while it leaves; what runs may take minutes more.
         if config.leaving_file.exists() and time.monotonic() >= seen_at + _SEEN_EVERY_S:
@@ -138,12 +150,35 @@ def supervise(config: FarmConfig, *, until_s: float | None = None) -> int:
                 registry.heartbeat(is_leaving=True, memory_mb=tree_mb(os.getpid()))
         if until_s is not None and time.monotonic() - began > until_s - config.grace_s:
             orders.leave_at = orders.leave_at or time.monotonic()
+        if idle_s is not None and idleness.seconds() >= idle_s:
+            orders.leave_at = orders.leave_at or time.monotonic()
         # A Slurm job that was preempted puts itself back into the queue, one that is over does not.
         if orders.was_signalled:
             touch(config.scratch / PREEMPTED_NOTE)
         if orders.leave_at is not None:
             _leave(config, celery, orders, time.monotonic() - orders.leave_at)
         time.sleep(_POLL_S)
+
+
+class Idleness:
+    """How long no job of the farm has had work, as far as Redis says; asks every ten seconds."""
+
+    def __init__(self, ledger: RedisLedger, clock: Callable[[], float] = time.monotonic) -> None:
+        self._ledger, self._clock = ledger, clock
+        self._since = self._asked_at = clock()
+
+    def seconds(self) -> float:
+        """Seconds since a job was last seen with work, or Redis did not answer."""
+        now = self._clock()
+        if now >= self._asked_at + _ASK_EVERY_S:
+            self._asked_at = now
+            try:
+                has_work = bool(self._ledger.active_jobs())
+            except LedgerUnavailable:
+                has_work = True  # nothing is known: stay
+            if has_work:
+                self._since = now
+        return now - self._since
 
 
 def _wait_while_drained(config: FarmConfig, orders: _Orders) -> bool:
@@ -223,9 +258,11 @@ def _reap(celery: subprocess.Popen[bytes]) -> int | None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """`python -m workers.node.supervisor [--until SECONDS]`: a worker, until a signal asks it to leave."""
+    """`python -m workers.node.supervisor`: a worker, until a signal asks it to leave; options as of supervise."""
     parser = argparse.ArgumentParser(prog="workers.node.supervisor", description=main.__doc__)
     parser.add_argument("--until", type=float, default=None, metavar="SECONDS")
+    parser.add_argument("--until-idle", type=float, default=None, metavar="SECONDS")
+    parser.add_argument("--preempted-code", type=int, default=None, metavar="CODE")
     args = parser.parse_args(arguments)
     log_to_stderr()
     try:
@@ -237,7 +274,9 @@ def main(arguments: list[str] | None = None) -> int:
     except PbrsError as error:
         sys.stderr.write(f"pbrs-farm: {error}\n")
         return 1
-    return supervise(config, until_s=args.until)
+    return supervise(
+        config, until_s=args.until, idle_s=args.until_idle, preempted_code=args.preempted_code
+    )
 
 
 if __name__ == "__main__":
