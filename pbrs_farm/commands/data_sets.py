@@ -26,7 +26,14 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("estimate", _estimate)
     p.add_argument("set", metavar="SET", help=SET)
+    p.add_argument(
+        "--cloud",
+        nargs="+",
+        metavar="NAME",
+        help="a bill of each of these clouds, of those in the table",
+    )
     p.add_argument("--json", action="store_true", help="as JSON")
+    p.epilog = 'example: pbrs-farm estimate indoor-10k --cloud AWS "Google Cloud"'
 
 
 def _make(args: argparse.Namespace) -> int:
@@ -81,9 +88,21 @@ def _make(args: argparse.Namespace) -> int:
 
 def _estimate(args: argparse.Namespace) -> int:
     from pbrs_farm.commands.set_file import set_from_word
-    from pbrs_farm.sets.estimate_set import estimate_set, estimate_text
+    from pbrs_farm.sets.estimate_set import bill_text, clouds_of, estimate_set, estimate_text
 
     estimate = estimate_set(set_from_word(args.set))
+    if args.cloud:
+        bills = {cloud: estimate.bill(cloud) for cloud in clouds_of(args.cloud)}
+        if args.json:
+            echo_json(
+                {
+                    cloud: [line.model_dump(mode="json") for line in bill]
+                    for cloud, bill in bills.items()
+                }
+            )
+        else:
+            echo("\n\n".join(f"{cloud}\n{bill_text(bill)}" for cloud, bill in bills.items()))
+        return 0
     if args.json:
         echo_json(estimate.model_dump(mode="json"))
     else:

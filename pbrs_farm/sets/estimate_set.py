@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.record import Record, read_csv
 from pbrs_farm.core.table import Table
 from pbrs_farm.run.costs import RunCost, cost_of_run, measured, megapixels
@@ -64,6 +65,17 @@ class CloudCost(Record):
     read_on: str  # the oldest date of its prices
 
 
+class BillLine(Record):
+    """What is bought of a cloud: an amount at a price, in US dollars; None where the price is not known."""
+
+    what: str
+    amount: float
+    usd_each: float | None
+    usd: float | None
+    of: str  # machine, region
+    read_on: str  # "" where no price was read
+
+
 class SetEstimate(Record):
     """What making a set takes: all parts and forms together, then by part, then in dollars."""
 
@@ -77,6 +89,25 @@ class SetEstimate(Record):
     files: int  # of the parts
     parts: Mapping[str, Mapping[str, int | float]]
     clouds: tuple[CloudCost, ...]
+
+    def bill(self, cloud: str) -> tuple[BillLine, ...]:
+        """What a set takes of a cloud, line by line: ways to get the light on lines of their own.
+
+        GPU hours are those of light on an H100 as measured on one scene, not of a farm of them.
+        """
+        amounts: tuple[tuple[str, float, PriceName, int], ...] = (
+            ("CPU hours", self.cpu_hours, "cpu_hour", 1),
+            ("CPU hours, spot", self.cpu_hours, "cpu_hour_spot", 1),
+            ("GPU hours of light in their place", self.gpu_hours, "gpu_hour", 1),
+            ("GPU hours of light, spot", self.gpu_hours, "gpu_hour_spot", 1),
+            ("CPU hours beside the GPU", self.cpu_hours_beside_gpu, "cpu_hour", 1),
+            ("GB stored for a month", self.gigabytes, "gb_month", 1),
+            ("objects written", self.files, "put_1000", 1000),
+        )
+        of = prices()[cloud]
+        return tuple(
+            _bill_line(what, amount, of.get(name), per) for what, amount, name, per in amounts
+        )
 
 
 def estimate_set(data_set: DataSet) -> SetEstimate:
@@ -140,6 +171,42 @@ def _on_cloud(
         writing=usd(("put_1000", whole.n_files / 1000)),
         read_on=min(price.date for price in of.values()).isoformat(),
     )
+
+
+def _bill_line(what: str, amount: float, price: Price | None, per: int) -> BillLine:
+    if price is None:
+        return BillLine(what=what, amount=amount, usd_each=None, usd=None, of="", read_on="")
+    return BillLine(
+        what=what, amount=amount, usd_each=price.usd / per, usd=round(amount * price.usd / per, 2),
+        of=price.of, read_on=price.date.isoformat(),
+    )  # fmt: skip
+
+
+def clouds_of(names: Sequence[str]) -> list[str]:
+    """The clouds of the table that words name, whatever their case; BadInput for one that is not there."""
+    known = {cloud.casefold(): cloud for cloud in prices()}
+    for name in names:
+        if name.casefold() not in known:
+            hint = f"of {', '.join(known.values())}: prices.csv has a row a price"
+            raise BadInput("--cloud", name, "no prices of this cloud", hint=hint)
+    return [known[name.casefold()] for name in names]
+
+
+def bill_text(bill: Sequence[BillLine]) -> str:
+    """A bill for people, a line a thing bought; "-" where the table has no price."""
+    columns = ("what", "amount", "US dollars each", "US dollars", "of", "read on")
+    rows = [
+        (
+            b.what,
+            b.amount,
+            f"{b.usd_each:.6g}" if b.usd_each else "-",
+            b.usd if b.usd_each else "-",
+            b.of,
+            b.read_on,
+        )
+        for b in bill
+    ]
+    return _text_of(columns, rows)
 
 
 def estimate_text(estimate: SetEstimate) -> str:

@@ -91,3 +91,33 @@ def test_every_shipped_set_has_an_estimate(name: str, capsys: pytest.CaptureFixt
     assert main(["estimate", name]) == 0
     told = capsys.readouterr().out
     assert all(word in told for word in ("CPU hours", *prices(), f"{estimate.views:,}"))
+
+
+def test_a_bill_is_amounts_times_prices(capsys: pytest.CaptureFixture[str]) -> None:
+    estimate = estimate_set(set_from_word("indoor-1k"))
+    for cloud, usd in prices().items():
+        lines = {line.what: line for line in estimate.bill(cloud)}
+        cpu = lines["CPU hours"]
+        assert cpu.amount == estimate.cpu_hours
+        assert cpu.usd == pytest.approx(cpu.amount * usd["cpu_hour"].usd, abs=0.01)
+        assert cpu.read_on == usd["cpu_hour"].date.isoformat()
+        written = lines["objects written"]
+        price = usd["put_1000"].usd if "put_1000" in usd else None
+        assert (written.usd is None) == (price is None)
+        if price is not None:
+            assert written.usd == pytest.approx(estimate.files * price / 1000, abs=0.01)
+    assert main(["estimate", "indoor-1k", "--cloud", "aws", "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)) == ["AWS"]
+
+
+def test_a_bill_says_a_dash_where_no_price_is_known(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "indoor-1k", "--cloud", "AWS"]) == 0
+    (line,) = [
+        x for x in capsys.readouterr().out.splitlines() if x.startswith("GPU hours of light, spot")
+    ]
+    assert line.split()[-2:] == ["-", "-"]
+
+
+def test_a_cloud_without_prices_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["estimate", "indoor-1k", "--cloud", "Azure"]) == 1
+    assert "Azure: no prices of this cloud (of AWS" in capsys.readouterr().err
