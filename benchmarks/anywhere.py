@@ -33,6 +33,7 @@ UNITS: Final = startup.UNITS | {
     "anywhere.install_s": "s of that for pip",
     "anywhere.installed_mb": "MB of that environment",
     "anywhere.posix_free": "1: import, help, demo, a run and its resumption end well where our modules lack POSIX, a view with the same bytes",
+    "anywhere.validators": "1: SkyPilot, Open Job Description and botocore find nothing wrong with any file of deploy/cloud",
 }
 NOTEBOOK: Final = REPO / "docs/notebooks/first_picture.ipynb"
 
@@ -123,6 +124,19 @@ def posix_free(bare: Bare) -> dict[str, Any]:
     return {"anywhere.posix_free": int(is_well and bool(files[0]) and files[0] == files[1])}
 
 
+def validators(bare: Bare) -> dict[str, Any]:
+    """What their own validators say of the files of deploy/cloud."""
+    python = bare.machine.environment("cloud")
+    install = [python, "-m", "pip", "install", "--quiet", "skypilot", "openjd-cli", "botocore"]
+    bare.machine.run(install, bare.variables).check_returncode()
+    script = REPO / "benchmarks/cloud_validators.py"
+    done = bare.machine.run([python, script, REPO / "deploy/cloud"], bare.variables)
+    said: dict[str, str] = json.loads(done.stdout.splitlines()[-1])
+    print(*(f"{file}: {wrong}" for file, wrong in said.items() if wrong), sep="\n")
+    n_files = sum(p.suffix in (".json", ".yaml") for p in (REPO / "deploy/cloud").rglob("*"))
+    return {"anywhere.validators": int(len(said) == n_files and not any(said.values()))}
+
+
 def _files_of_views(root: Path) -> dict[str, bytes]:
     """Bytes by path of the files of every view below a root."""
     found = [p for p in root.glob("houses/*/views/**/*") if p.is_file()]
@@ -138,6 +152,7 @@ def first_minute(_bare: Bare) -> dict[str, Any]:
 PARTS: Final[dict[str, Callable[[Bare], dict[str, Any]]]] = {
     "first_picture": first_picture, "pip_only": pip_only, "startup": first_minute,
     "posix_free": posix_free,
+    "validators": validators,
 }  # fmt: skip
 """What is measured, by name; each gives figures of UNITS."""
 
