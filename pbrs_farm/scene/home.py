@@ -44,6 +44,7 @@ from pbrs_farm.core.edits import (
     OpenJoints,
     PaintItems,
     PlaceModel,
+    RecordBodies,
     RemoveItems,
     SetLight,
     StandAt,
@@ -444,6 +445,38 @@ class Home:
         0.5
         """
         return self._edited(StandAt(time_s=float(time_s)))
+
+    @checked_call
+    def drop(
+        self,
+        items: ItemLike,
+        *,
+        push: Vector = (0.0, 0.0, 0.0),
+        spin: Vector = (0.0, 0.0, 0.0),
+        from_s: float = 0.0,
+        seconds: Positive = 5.0,
+    ) -> Home:
+        """The home in which items are let go at from_s: they fall, slide and come to rest, which films show.
+
+        By rigid-body simulation (extra `physics`), 60 keys a second; all else stands still. push: metres a
+        second that they have at first, spin: radians a second, both along the world's axes. A thing
+        without either that stands on something stays there: place it in the air, or push it.
+
+        Raises BadInput, naming the thing, where it begins inside of another, flies off, leaves the
+        home or still moves after so many seconds; MachineFailed where the extra is not installed.
+
+            >>> falling = home.place(can, at=(2.0, 1.0, 2.0)).drop("can 1")
+            >>> falling.motions[0]["part"] == "" and falling.motions[0]["keys"] > 20
+            True
+        """
+        from pbrs_farm.scene.falling import recorded_falls
+
+        house, ids = self.house, self._ids(items)
+        bodies = recorded_falls(
+            house, ids, seconds=seconds, from_s=float(from_s), push=np.asarray(push, np.float64),
+            spin=np.asarray(spin, np.float64),
+        )  # fmt: skip
+        return self._edited(RecordBodies(bodies=bodies))
 
     @checked_call
     def paint(self, items: ItemLike, colour: Colour, roughness: Share | None = None) -> Home:

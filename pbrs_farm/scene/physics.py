@@ -26,7 +26,7 @@ from pbrs_farm.installation import install_command
 from pbrs_farm.scene.models import Model
 from pbrs_farm.scene.placing import Target, TargetTops, level_tops_of
 
-_STEP_S: Final = 0.002
+STEP_S: Final = 0.002
 _LONGEST_S: Final = 8.0  # of simulated time until all lie still
 _STILL: Final = 0.004  # m/s, and tenths of rad/s: what is slower for _STILL_S is at rest
 _STILL_S: Final = 0.2
@@ -60,7 +60,7 @@ def settled_poses(
     target has a level top, where a thing has room above none, or where things do not come to rest,
     naming those that move.
     """
-    mujoco = _mujoco()
+    mujoco = mujoco_module()
     rng = np.random.default_rng([seed, 3])
     things = [_Body(models[int(rng.integers(len(models)))], None, np.eye(4)) for _ in range(n)]
     size = max(float(np.linalg.norm(t.model.size_m)) for t in things)
@@ -89,12 +89,12 @@ def penetration_m(
     Only solids of the home around the tops of the targets take part. BadInput where no target has a
     level top, MachineFailed without MuJoCo.
     """
-    mujoco = _mujoco()
+    mujoco = mujoco_module()
     things = [_Body(model, None, pose) for model, pose in placed]
     parts = {thing.model: _parts_of(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
     statics = _static_solids(house, level_tops_of(house, targets), size)
-    world = mujoco.MjModel.from_xml_string(_mjcf(things, parts, statics))
+    world = mujoco.MjModel.from_xml_string(world_xml([parts[t.model] for t in things], statics))
     state = mujoco.MjData(world)
     _set_poses(state, things)
     mujoco.mj_forward(world, state)
@@ -239,14 +239,14 @@ def _simulate(
     statics: Sequence[F64],
 ) -> list[int]:
     """Let things fall until they lie still, and take their poses; the numbers of those that move."""
-    world = mujoco.MjModel.from_xml_string(_mjcf(things, parts, statics))
+    world = mujoco.MjModel.from_xml_string(world_xml([parts[t.model] for t in things], statics))
     state = mujoco.MjData(world)
     _set_poses(state, things)
     still_for = 0.0
-    for _ in range(int(_LONGEST_S / _STEP_S)):
+    for _ in range(int(_LONGEST_S / STEP_S)):
         mujoco.mj_step(world, state)
         speed = np.abs(state.qvel.reshape(-1, 6)) * [1, 1, 1, 0.1, 0.1, 0.1]
-        still_for = still_for + _STEP_S if speed.max() < _STILL else 0.0
+        still_for = still_for + STEP_S if speed.max() < _STILL else 0.0
         if still_for >= _STILL_S:
             break
     for k, thing in enumerate(things):
@@ -264,23 +264,27 @@ def _set_poses(state: Any, things: Sequence[_Body]) -> None:
         state.qpos[7 * k : 7 * k + 7] = [*thing.pose[:3, 3], w, x, y, z]
 
 
-def _mjcf(
-    things: Sequence[_Body], parts: dict[Model, tuple[F64, ...]], statics: Sequence[F64]
-) -> str:
+def world_xml(bodies: Sequence[tuple[F64, ...]], statics: Sequence[F64]) -> str:
+    """A model of MuJoCo, y up, metres: free bodies of convex parts (V, 3), and convex solids that stand still.
+
+    Body k is the k-th free joint. Parts that bodies share, as one tuple, are written once.
+    """
     assets = [_mjcf_mesh(f"s{k}", solid) for k, solid in enumerate(statics)]
-    names = {model: f"m{j}" for j, model in enumerate(parts)}
-    for model, hulls in parts.items():
-        assets += [_mjcf_mesh(f"{names[model]}_{k}", hull) for k, hull in enumerate(hulls)]
-    bodies = [f'<geom type="mesh" mesh="s{k}"/>' for k in range(len(statics))]
-    for thing in things:
+    names: dict[int, str] = {}
+    for parts in bodies:
+        if id(parts) not in names:
+            name = names.setdefault(id(parts), f"m{len(names)}")
+            assets += [_mjcf_mesh(f"{name}_{k}", hull) for k, hull in enumerate(parts)]
+    lines = [f'<geom type="mesh" mesh="s{k}"/>' for k in range(len(statics))]
+    for parts in bodies:
         geoms = "".join(
-            f'<geom type="mesh" mesh="{names[thing.model]}_{k}" density="{_DENSITY}" class="thing"/>'
-            for k in range(len(parts[thing.model]))
+            f'<geom type="mesh" mesh="{names[id(parts)]}_{k}" density="{_DENSITY}" class="thing"/>'
+            for k in range(len(parts))
         )
-        bodies.append(f"<body><freejoint/>{geoms}</body>")
+        lines.append(f"<body><freejoint/>{geoms}</body>")
     return f"""<mujoco>
 <compiler inertiafromgeom="true" balanceinertia="true" boundmass="1e-4" boundinertia="1e-9"/>
-<option timestep="{_STEP_S}" gravity="0 -9.81 0" integrator="implicitfast" cone="elliptic"
+<option timestep="{STEP_S}" gravity="0 -9.81 0" integrator="implicitfast" cone="elliptic"
  iterations="60" noslip_iterations="4" impratio="5"/>
 <size memory="512M"/>
 <default><geom friction="0.8 0.01 0.002" solref="0.005 1" solimp="0.97 0.995 0.0005" condim="6"
@@ -288,7 +292,7 @@ def _mjcf(
 <default class="thing"><geom contype="1" conaffinity="1"/></default>
 <mesh inertia="convex"/></default>
 <asset>{"".join(assets)}</asset>
-<worldbody>{"".join(bodies)}</worldbody></mujoco>"""
+<worldbody>{"".join(lines)}</worldbody></mujoco>"""
 
 
 def _mjcf_mesh(name: str, points: F64) -> str:
@@ -311,7 +315,8 @@ def _radius(model: Model) -> float:
     return float(np.linalg.norm(model.shape.points - _middle(model), axis=1).max())
 
 
-def _mujoco() -> Any:
+def mujoco_module() -> Any:
+    """The package; MachineFailed, with the command that adds it, where it is not installed."""
     try:
         import mujoco
     except ImportError:

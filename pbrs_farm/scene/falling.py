@@ -1,0 +1,190 @@
+"""Things of a home that fall, slide and come to rest, recorded: rigid bodies by MuJoCo.
+
+No effects. What is named moves and all else stands still. Things collide as they are exported: convex
+parts within 5 mm of their faces; walls and floors as slabs behind their faces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.edits import BodyMotion
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import House
+from pbrs_farm.export.home_pieces import ExportedHome, Piece, exported_home
+from pbrs_farm.geometry.convex_parts import slabs
+from pbrs_farm.scene.physics import STEP_S, mujoco_module, world_xml
+
+KEYS_A_SECOND: Final = 60
+_STILL_MPS: Final = 0.01  # slower points of a thing are at rest
+_STILL_S: Final = 0.2
+_REACH_M: Final = 1.0  # around what moves: what stands farther away is met on a second try
+_TRIES: Final = 3
+_FASTEST_MPS: Final = 60.0  # beyond, it exploded
+_DEEPEST_M: Final = 0.03  # in another thing, at the beginning
+_QUIET_S: Final = 0.3  # in which what stands somewhere finds its rest before it is pushed
+_OUT_M: Final = 5.0  # beyond the home's box it is lost
+
+
+def recorded_falls(
+    house: House,
+    items: Sequence[str],
+    *,
+    seconds: float,
+    from_s: float = 0.0,
+    push: F64 | None = None,
+    spin: F64 | None = None,
+) -> tuple[BodyMotion, ...]:
+    """How items (ids) move from where they stand, let go at from_s, until they rest or seconds are over.
+
+    push: (3,) m/s that each has at first; spin: (3,) rad/s about its middle, world axes. Keys are 60 a
+    second. Raises BadInput, naming the item: of one that has no surface or begins inside of another,
+    that flies off or leaves the home, or still moves in the end. MachineFailed without MuJoCo.
+    """
+    mujoco = mujoco_module()
+    home = exported_home(house)
+    movers = [piece for name in items for piece in home.pieces if piece.item.id == name]
+    for name in items:
+        if not any(p.item.id == name and p.surfaces for p in movers):
+            raise BadInput(house.id, name, "has no surface that could fall")
+    reach = _REACH_M
+    for _ in range(_TRIES):
+        rows, pivots = _simulated(mujoco, home, movers, reach, (seconds, push, spin))
+        far = float(np.linalg.norm(rows[:, :, :3] - rows[:1, :, :3], axis=-1).max())
+        if far <= reach:
+            break
+        # Again, with what stands where they went.
+        reach = 2 * far
+    times = tuple(round(from_s + k / KEYS_A_SECOND, 6) for k in range(len(rows)))
+    return tuple(
+        BodyMotion(
+            item=piece.item.id, times_s=times, pivot=tuple(pivots[k].tolist()),
+            values=tuple(tuple(float(v) for v in row) for row in rows[:, k]),
+        )
+        for k, piece in enumerate(movers)
+    )  # fmt: skip
+
+
+def _simulated(
+    mujoco: Any, home: ExportedHome, movers: Sequence[Piece], reach_m: float,
+    how: tuple[float, F64 | None, F64 | None],
+) -> tuple[F64, F64]:  # fmt: skip
+    """(K, N, 7) of each key and mover: its middle, and its turn as a quaternion; (N, 3) middles at rest."""
+    seconds, push, spin = how
+    pivots = np.array([piece.item.bounds.mean(0) for piece in movers])
+    parts = [
+        tuple(part - pivot for part in _world_parts(piece))
+        for piece, pivot in zip(movers, pivots, strict=True)
+    ]
+    names, statics = _static_parts(home, movers, reach_m)
+    world = mujoco.MjModel.from_xml_string(world_xml(parts, statics))
+    state = mujoco.MjData(world)
+    state.qpos[:] = np.concatenate([np.concatenate([p, [1, 0, 0, 0]]) for p in pivots])
+    mujoco.mj_forward(world, state)
+    _check_begin(home.house, world, state, movers, names)
+    if state.ncon:
+        # What stands on convex parts a little beyond its own finds its rest, slowly.
+        for _ in range(int(_QUIET_S / STEP_S)):
+            mujoco.mj_step(world, state)
+            state.qvel *= 0.9
+        state.time = 0.0
+    velocity = state.qvel.reshape(-1, 6)
+    velocity[:, :3] += 0.0 if push is None else push
+    for k in range(len(movers)):
+        if spin is not None:
+            # Of a free joint, turning is about the body's own axes.
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, state.qpos[7 * k + 3 : 7 * k + 7])
+            velocity[k, 3:] += turn.reshape(3, 3).T @ spin
+
+    sizes = np.array([np.linalg.norm(np.ptp(p.item.bounds, axis=0)) / 2 for p in movers])
+    box = _box_of(home.house)
+    rows, still_for = [state.qpos.reshape(-1, 7).copy()], 0.0
+    steps_a_key = 1 / (KEYS_A_SECOND * STEP_S)
+    for k in range(1, int(seconds * KEYS_A_SECOND) + 1):
+        for _ in range(round(k * steps_a_key) - round((k - 1) * steps_a_key)):
+            mujoco.mj_step(world, state)
+        velocity = state.qvel.reshape(-1, 6)
+        speed = np.linalg.norm(velocity[:, :3], axis=1) + sizes * np.linalg.norm(
+            velocity[:, 3:], axis=1
+        )
+        rows.append(state.qpos.reshape(-1, 7).copy())
+        _check_flight(home.house, movers, rows[-1], speed, box, k / KEYS_A_SECOND)
+        still_for = still_for + 1 / KEYS_A_SECOND if speed.max() < _STILL_MPS else 0.0
+        if still_for >= _STILL_S:
+            break
+    else:
+        moving = [p.item.id for p, v in zip(movers, speed, strict=True) if v >= _STILL_MPS]
+        text = f"still moves after {seconds:g} s, by {speed.max():.2f} m/s"
+        raise BadInput(
+            home.house.id, ", ".join(moving[:5]) or movers[0].item.id, text, hint="longer: seconds="
+        )
+    return np.array(rows), pivots
+
+
+def _world_parts(piece: Piece) -> Iterator[F64]:
+    """Convex parts (V, 3) of a thing, in the world."""
+    for link in piece.links:
+        for part in link.colliders:
+            yield transform_points(piece.world_from_local, part)
+
+
+def _static_parts(
+    home: ExportedHome, movers: Sequence[Piece], reach_m: float
+) -> tuple[list[str], list[F64]]:
+    """(name and id, convex part) of all that stands still around the movers."""
+    bounds = np.array([piece.item.bounds for piece in movers])
+    low, high = bounds[:, 0].min(0) - reach_m, bounds[:, 1].max(0) + reach_m
+    low[1] = -np.inf  # things fall
+    names, parts = [], []
+    moving = {piece.instance for piece in movers}
+    for piece in home.pieces:
+        a, b = piece.item.bounds
+        if piece.instance in moving or not piece.surfaces or not ((a <= high) & (b >= low)).all():
+            continue
+        if piece.item.kind.is_structure:
+            found = [part for link in piece.links for part in slabs(link.triangles)]
+        else:
+            found = list(_world_parts(piece))
+        near = [p for p in found if ((p.min(0) <= high) & (p.max(0) >= low)).all()]
+        names += [f"{piece.item.name} ({piece.item.id})"] * len(near)
+        parts += near
+    return names, parts
+
+
+def _check_begin(
+    house: House, world: Any, state: Any, movers: Sequence[Piece], names: Sequence[str]
+) -> None:
+    """Raise BadInput where a mover begins deep inside of another thing."""
+    for contact in state.contact[: state.ncon]:
+        if contact.dist >= -_DEEPEST_M:
+            continue
+        bodies = [int(world.geom_bodyid[g]) for g in (contact.geom1, contact.geom2)]
+        who = [movers[b - 1].item.id for b in bodies if b > 0]
+        # Static parts come first, in their order.
+        other = who[1] if len(who) > 1 else names[min(int(contact.geom1), int(contact.geom2))]
+        text = f"begins {-1000 * contact.dist:.0f} mm inside of {other}"
+        raise BadInput(house.id, who[0], text, hint="place it where there is room for it")
+
+
+def _check_flight(
+    house: House, movers: Sequence[Piece], rows: F64, speed: F64, box: F64, time_s: float
+) -> None:
+    """Raise BadInput for a thing that exploded, or left the home."""
+    for piece, row, v in zip(movers, rows, speed, strict=True):
+        if not np.isfinite(row).all() or v > _FASTEST_MPS:
+            text = f"flies off by {v:.0f} m/s after {time_s:.2f} s: the simulation exploded"
+            raise BadInput(house.id, piece.item.id, text, hint="smaller push or spin")
+        if (row[:3] < box[0] - _OUT_M).any() or (row[:3] > box[1] + _OUT_M).any():
+            text = f"leaves the home after {time_s:.2f} s"
+            raise BadInput(house.id, piece.item.id, text, hint="smaller push; a floor below it")
+
+
+def _box_of(house: House) -> F64:
+    bounds = np.array([i.bounds for i in house.items if i.surfaces and not i.is_outside])
+    return np.array([np.nanmin(bounds[:, 0], 0), np.nanmax(bounds[:, 1], 0)])
