@@ -4,8 +4,8 @@
     python -m benchmarks.study.start_curve train --seconds 520 --together 6    trainings, while time is left
     python -m benchmarks.study.start_curve table                               what there is so far
 
-render: made homes at 160x120 by recipe fast, dressed from what the program generates (nothing is
-downloaded), those that judge first. train: normals by plan lite, from nothing and from ImageNet at
+render: made homes at 160x120 by recipe fast, those that judge first; `pbrs-farm homes --furniture`
+goes before. train: normals by plan lite, from nothing and from ImageNet at
 equal steps, most views first, judged on the homes that never train. What is cut off goes on with
 the same command. --copy FOLDER: few and small files of what is done so far, again after each part.
 
@@ -47,16 +47,7 @@ _FIELDS: Final = (
     "final_views=200",
     "threads=2",
 )
-_LIGHT: Final = (
-    "--size",
-    "160x120",
-    "--recipe",
-    "fast",
-    "--dress",
-    "1",
-    "--catalogue",
-    "generated",
-)
+_LIGHT: Final = ("--size", "160x120", "--recipe", "fast", "--dress", "1")
 # Views are looked at as large as they are made: what a home costs is halved by it.
 _SCORED: Final = ("--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120")
 _GRACE_S: Final = 15.0  # between asking a process to end and ending it
