@@ -5,9 +5,10 @@
     python -m benchmarks.study.start_curve table                               what there is so far
 
 render: made homes at 160x120 by recipe fast, those that judge first; `pbrs-farm homes --furniture`
-goes before. train: normals by plan lite, from nothing and from ImageNet at
-equal steps, most views first, judged on the homes that never train. What is cut off goes on with
-the same command. --copy FOLDER: few and small files of what is done so far, again after each part.
+goes before, or --generated furnishes and dresses them from what the program generates, which
+downloads nothing. train: normals by plan lite, from nothing and from ImageNet at equal steps, most
+views first, judged on the homes that never train. What is cut off goes on with the same command.
+--copy FOLDER: few and small files of what is done so far, again after each part.
 
 Effects: out/study/start (or PBRS_STUDY_FOLDER/start): homes, runs, results.json and table.md.
 """
@@ -48,10 +49,12 @@ _FIELDS: Final = (
     "threads=2",
 )
 _LIGHT: Final = ("--size", "160x120", "--recipe", "fast", "--dress", "1")
+# Behind homes that come empty.
+_GENERATED: Final = ("--furnish", "empty", "--catalogue", "generated")
 # Views are looked at as large as they are made: what a home costs is halved by it.
 _SCORED: Final = ("--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120")
 _GRACE_S: Final = 15.0  # between asking a process to end and ending it
-_SHARD: Final = 800  # views, about 11 MB
+_SHARD: Final = 600  # views, about 12 MB
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +95,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     render.add_argument("--judges", type=int, default=12, help="homes that judge")
     render.add_argument("--views", type=int, default=10, help="of a home, at most")
     render.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    render.add_argument("--generated", action="store_true", help="no furniture of the package")
     render.add_argument("--modes", nargs="+", default=["mlt_il_ol"])
     train = commands.add_parser("train")
     train.add_argument("--steps", type=int, default=3000, help="of each training")
@@ -114,22 +118,34 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
 
 def _render(args: argparse.Namespace) -> None:
     began = time.monotonic()
-    judges = f"made:{_FIRST_JUDGE}..{_FIRST_JUDGE + args.judges - 1}"
+    last = _FIRST_JUDGE + args.judges - 1
+    option, own = (",furniture=none", _GENERATED) if args.generated else ("", ())
+    homes = [f"made:{span}{option}" for span in (f"{_FIRST_JUDGE}..{last}", f"1..{args.homes}")]
     words = [
-        "run", judges, f"made:1..{args.homes}", *_LIGHT, *_SCORED, "--modes", *args.modes,
+        "run", *homes, *own, *_LIGHT, *_SCORED, "--modes", *args.modes,
         "--views", str(args.views), "--jobs", str(args.jobs), "--out", str(HOMES),
     ]  # fmt: skip
     code = _pbrs_farm(words, began + args.seconds if args.seconds else None)
+    views = list(HOMES.glob("houses/*/views/*/view.json"))
     row = {
-        "homes": len(list(HOMES.glob("houses/*/views"))),
-        "views": len(list(HOMES.glob("houses/*/views/*/view.json"))),
+        "homes": len({path.parents[2] for path in views}), "views": len(views),
         "seconds": round(time.monotonic() - began, 1), "jobs": args.jobs, "code": code,
+        "step_s": _seconds_a_step(),
     }  # fmt: skip
     with (START / "rendered.jsonl").open("a") as file:
         file.write(json.dumps(row) + "\n")
-    print(f"{row['views']} views of {row['homes']} homes, {row['seconds']:.0f} s", flush=True)
+    print(json.dumps(row), flush=True)
     if args.copy:
         _copy_views(args.copy)
+
+
+def _seconds_a_step() -> dict[str, float]:
+    """Step -> the median of its seconds, of homes and views alike."""
+    seconds: dict[str, list[float]] = {}
+    for path in HOMES.glob("houses/*/done/*.json"):
+        marker = json.loads(path.read_bytes())
+        seconds.setdefault(marker["step"], []).append(marker["seconds"])
+    return {step: round(statistics.median(values), 2) for step, values in sorted(seconds.items())}
 
 
 def _copy_views(out: Path) -> None:
