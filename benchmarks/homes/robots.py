@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,12 +20,14 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from benchmarks.figures import write_report
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.joints import Joint
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.export.forms.mjcf import body_name
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
-from pbrs_farm.geometry.opened import free_value
+from pbrs_farm.geometry.opened import free_value, part_triangles
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
 from pbrs_farm.prepare.finished_house import repaired_house
@@ -47,6 +50,8 @@ _REST_S: Final = 2.0
 _PUSH_S: Final = 4.0
 _PUSH: Final = 25.0  # newtons, or newton metres of hinges, beside friction
 _OVER_M: Final = 0.003
+_VALUES: Final = 8  # of a joint whose bounds are wanted
+_ROOM_M: Final = 0.05
 _NEAR: Final = 0.05  # share of its way by which a part may stop short
 
 
@@ -115,38 +120,59 @@ def pushed(model: Any, home: ExportedHome) -> tuple[int, list[str]]:
     """How many joints are pushed to their ends and back, and the names of those that jam.
 
     What geometry alone says stands in the way (`free_value`) is no jam: such joints are left out.
+    Joints whose ways lie apart are pushed at the same time.
     """
     # What lies still costs nothing until something wakes it.
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     scene = SceneTriangles(home.house.items)
-    free = []
+    ways: dict[str, F64] = {}
     for k, piece in enumerate(home.pieces):
         for link in piece.links[1:]:
-            joint = link.joint
-            assert joint is not None
+            joint = next(j for j in piece.item.joints if j.part == link.part)
             if free_value(scene, k, link.part, joint.upper)[1] == "":
-                free.append(body_name(piece, link.part))
-    jammed = [name for name in free if not _travels(model, name)]
-    return len(free), jammed
+                ways[body_name(piece, link.part)] = _way(piece.item, joint)
+    jammed: list[str] = []
+    left = list(ways)
+    while left:
+        batch: list[str] = []
+        for name in left:
+            apart = [
+                (ways[name][0] > ways[o][1]).any() | (ways[o][0] > ways[name][1]).any()
+                for o in batch
+            ]
+            if all(apart):
+                batch.append(name)
+        left = [name for name in left if name not in batch]
+        jammed += _jammed(model, batch)
+    return len(ways), jammed
 
 
-def _travels(model: Any, name: str) -> bool:
-    """Whether a joint reaches both of its limits when it is pushed."""
-    joint = model.joint(name)
-    low, high = joint.range
-    at, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
-    push = _PUSH + float(model.dof_frictionloss[dof])
-    state = mujoco.MjData(model)
+def _way(item: Item, joint: Joint) -> F64:
+    """(2, 3) bounds of all that a part sweeps, and some room around it."""
+    points = part_triangles(item, joint.part).reshape(-1, 3)
+    values = np.linspace(joint.lower, joint.upper, _VALUES)
+    swept = np.concatenate([transform_points(joint.motion(float(v)), points) for v in values])
+    return np.array([swept.min(0) - _ROOM_M, swept.max(0) + _ROOM_M])
+
+
+def _jammed(model: Any, names: Sequence[str]) -> list[str]:
+    """Which of some joints do not reach both of their limits when they are pushed."""
+    joints = [model.joint(name) for name in names]
+    low, high = np.array([joint.range for joint in joints]).T
+    at = np.array([joint.qposadr[0] for joint in joints])
+    dofs = np.array([joint.dofadr[0] for joint in joints])
+    push = _PUSH + model.dof_frictionloss[dofs]
+    state, stops = mujoco.MjData(model), np.zeros(len(names), bool)
     for sign, end in ((1.0, high), (-1.0, low)):
-        state.qfrc_applied[:] = 0
-        state.qfrc_applied[dof] = sign * push
+        state.qfrc_applied[dofs] = sign * push
+        there = np.zeros(len(names), bool)
         for _ in range(int(_PUSH_S / model.opt.timestep)):
             mujoco.mj_step(model, state)
-            if sign * (state.qpos[at] - end) > -_NEAR * (high - low):
+            there |= sign * (state.qpos[at] - end) > -_NEAR * (high - low)
+            if there.all():
                 break
-        else:
-            return False
-    return True
+        stops |= ~there
+    return [name for name, stop in zip(names, stops, strict=True) if stop]
 
 
 def hull_distances(home: ExportedHome) -> tuple[float, list[float]]:

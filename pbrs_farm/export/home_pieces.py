@@ -21,15 +21,20 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.export.home_links import Link, links_of
+from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.geometry.surface_points import surface_points
 
 COLLISION: Final = "convex parts within 5 mm, no more than 32"
 COLLIDES: Final = f"things collide as {COLLISION}"
 _MOST_KG: Final = 150.0
 _LARGE_M: Final = 0.5  # what opens and is larger stands still
 _RESTING_M: Final = 0.03  # between a thing and what it stands on
+_FOOT_M: Final = 0.01  # what of a thing is no higher is its feet
 WALKER_M: Final = 0.2  # radius of what moves on the navigable floor
 _HEAD_M: Final = 1.6  # the height of the walker: what hangs higher is walked under
 _STEP_M: Final = 0.05  # what is lower is stepped over: rugs
+_BORNE: Final = 0.25  # of its feet, of what stands on something
 
 # Kinds that are the building: they stand still and are met as they are.
 BUILDING: Final = (
@@ -39,7 +44,7 @@ BUILDING: Final = (
 # Classes that are screwed to the building.
 _FIXED: Final = frozenset({
     classes.NYU40_NAMES.index(name)
-    for name in ("cabinet", "counter", "sink", "toilet", "bathtub", "picture", "blinds", "curtain",
+    for name in ("cabinet", "counter", "sink", "toilet", "bathtub", "blinds", "curtain",
                  "mirror", "shower curtain", "otherstructure", "whiteboard", "bookshelf", "dresser",
                  "refrigerator", "floor mat", "wall", "floor", "ceiling", "door", "window")
     if name in classes.NYU40_NAMES
@@ -170,10 +175,9 @@ def exported_home(house: House) -> ExportedHome:
     ]
     house = replace(house, items=tuple(item for _number, item in numbered))
     names = _unique_names(house.items)
-    bounds = np.array([item.bounds for item in house.items]).reshape(-1, 2, 3)
-    floors = {room.id: room.floor_y for room in house.rooms}
+    scene = SceneTriangles(house.items)
     found = [
-        _piece(item, number, name, _rests(k, house.items, bounds, floors))
+        _piece(item, number, name, _rests(scene, k))
         for k, ((number, item), name) in enumerate(zip(numbered, names, strict=True))
     ]
     return ExportedHome(house, tuple(found))
@@ -234,20 +238,29 @@ def _lamp(light: LightPart) -> Lamp:
     return Lamp(position, flux, light.rgb_linear, light.radius_m, light.is_coloured, spot)
 
 
-def _rests(index: int, items: Sequence[Item], bounds: F64, floors: dict[str, float]) -> bool:
-    """Whether an item stands on its room's floor or on another item's highest place."""
-    low, high = bounds[index]
-    if not np.isfinite(low).all():
+def _rests(scene: SceneTriangles, index: int) -> bool:
+    """Whether an item stands on what is truly below it: a floor, a top, a shelf, the bottom of a drawer.
+
+    What bears it lies within 3 cm below or above its lowest places, below a quarter of them, and on
+    both sides of its middle along x or along z.
+    """
+    corners = scene.of_item(index)
+    if not len(corners):
         return False
-    floor = floors.get(items[index].room_id or "")
-    if floor is not None and abs(low[1] - floor) < _RESTING_M:
-        return True
-    below = np.abs(bounds[:, 1, 1] - low[1]) < _RESTING_M
-    plan = [0, 2]
-    meets = (bounds[:, 0][:, plan] < high[plan]) & (bounds[:, 1][:, plan] > low[plan])
-    below &= meets.all(1)
-    below[index] = False
-    return bool(below.any())
+    low, high = scene.bounds[index]
+    points = surface_points(corners[corners[:, :, 1].min(1) < low[1] + _FOOT_M], _FOOT_M)
+    feet = points[points[:, 1] < low[1] + _FOOT_M]
+    reach = np.array([0.0, _RESTING_M, 0.0])
+    below, owners = scene.in_box(low - reach, np.array([high[0], low[1], high[2]]) + reach)
+    below = below[owners != index]
+    places = feet[:, [0, 2]]
+    tops = highest_below(places, below, feet[:, 1] + _RESTING_M)
+    borne = places[tops > feet[:, 1] - _RESTING_M - _FOOT_M]
+    if len(borne) < _BORNE * len(places) or not len(borne):
+        return False
+    middle = (low + high)[[0, 2]] / 2
+    sides = (borne.min(0) <= middle + _FOOT_M) & (borne.max(0) >= middle - _FOOT_M)
+    return bool(sides.any())
 
 
 def _walkable(room: Room, pieces: Sequence[Piece]) -> list[F64]:

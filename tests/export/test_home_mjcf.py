@@ -107,6 +107,23 @@ def test_loose_things_are_at_rest_and_what_hovers_has_sunk(tmp_path: Path) -> No
     assert model.body("mug").dofnum[0] == 6
 
 
+def test_what_stands_in_each_other_is_parted_and_lies_still(tmp_path: Path) -> None:
+    # By 30 mm, as a chair's legs in a table's: left alone, they would be thrown apart.
+    table, chair = (
+        loose("table", (0, 0, 0), (1, 0.7, 1)), loose("chair", (0.97, 0, 0.2), (1.4, 0.9, 0.6))
+    )  # fmt: skip
+    model = model_of(small_home(table, chair), tmp_path)
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    before = state.xpos.copy()
+    assert corners(model, state, "table")[1, 0] == pytest.approx(1, abs=2e-3)
+    assert 0.03 <= corners(model, state, "chair")[0, 0] - 0.97 < 0.06
+    for _ in range(500):
+        mujoco.mj_step(model, state)
+    assert np.abs(state.xpos - before).max() < 1e-3
+    assert model.nv == 12
+
+
 def test_the_built_in_home_loads_with_its_textures_and_free_bodies(tmp_path: Path) -> None:
     house = repaired_home()
     model = model_of(house, tmp_path)

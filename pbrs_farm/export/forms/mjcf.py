@@ -2,15 +2,15 @@
 
 Metres, z up. Doors and drawers have limits, damping and friction; what touches a part along its way
 without being in it is passed through (clearances are below what convex parts keep). Loose things
-are let fall before the home is written, and stand where they came to rest.
+are let fall before the home is written, and stand where they came to rest (`mujoco_rest`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,18 +22,14 @@ from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.form import REMARKS, HomeForm
 from pbrs_farm.export.home_links import BODY, Link, effort_of
 from pbrs_farm.export.home_pieces import ExportedHome, Lamp, Piece, digest_name
+from pbrs_farm.export.mujoco_rest import rest_of
 from pbrs_farm.export.obj_files import obj_of_surfaces, png_textures, rgba_of, z_up_points
 from pbrs_farm.export.passing import passing_pairs
 from pbrs_farm.geometry.convex_parts import slabs
 from pbrs_farm.installation import need
 
 _STEP_S: Final = 0.002
-_FALL_S: Final = 3.0  # that loose things have to come to rest
-_STILL_M: Final = 2e-4  # that a thing at rest moves in _LOOK_S
-_LOOK_S: Final = 0.5
-_LOST_M: Final = 0.25  # a thing that fell farther had nothing to stand on: it is fixed where it was
-_TIPPED_RAD: Final = 0.35
-_ROUNDS: Final = 3
+_ROUNDS: Final = 5  # in which what finds no rest is fixed
 _ON_BOX_M: Final = 1e-4
 _Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -63,11 +59,12 @@ class _Model:
         self._home = home
         self.files: dict[str, bytes] = {}
         self.loose: dict[str, ET.Element] = {}  # name -> its body
+        self.areas_m2: dict[str, float] = {}  # in plan
         self._root = ET.Element("mujoco", model=home.house.id)
         compiler = {"angle": "radian", "meshdir": "meshes", "texturedir": "textures"}
         ET.SubElement(self._root, "compiler", compiler)
         option = {"timestep": f"{_STEP_S}", "integrator": "implicitfast", "cone": "elliptic"}
-        option |= {"impratio": "10", "noslip_iterations": "4"}
+        option["impratio"] = "10"
         ET.SubElement(self._root, "option", option)
         ET.SubElement(self._root, "size", memory="1G")
         visual = ET.SubElement(self._root, "visual")
@@ -122,6 +119,7 @@ class _Model:
         if not piece.is_fixed:
             ET.SubElement(body, "freejoint", name=piece.name)
             self.loose[piece.name] = body
+            self.areas_m2[piece.name] = float(piece.size[0] * piece.size[2])
         for link in piece.links:
             own = body
             if link.joint is not None:
@@ -239,64 +237,31 @@ def _light(body: ET.Element, lamp: Lamp, turn: F64, place: F64) -> None:
 
 
 def _settle(model: _Model, path: Path) -> list[str]:
-    """Let the loose bodies fall, and place them where they lie; the names of those fixed instead."""
+    """Place the loose bodies where they come to rest; the names of those fixed instead."""
     import mujoco
 
     fixed: list[str] = []
     for _ in range(_ROUNDS):
-        world = mujoco.MjModel.from_xml_path(str(path))
-        state = mujoco.MjData(world)
-        mujoco.mj_forward(world, state)
         names = list(model.loose)
         if not names:
             break
-        start = _poses(world, state, names)
-        _fall(mujoco, world, state, names)
-        before = _poses(world, state, names)
-        _run(mujoco, world, state, _LOOK_S)
-        after = _poses(world, state, names)
-        moves = np.linalg.norm(after[:, :3] - before[:, :3], axis=1) > _STILL_M
-        lost = np.linalg.norm(after[:, :3] - start[:, :3], axis=1) > _LOST_M
-        cosine = np.abs((after[:, 3:] * start[:, 3:]).sum(1))
-        tipped = 2 * np.arccos(np.clip(cosine, 0, 1)) > _TIPPED_RAD
-        bad = moves | lost | tipped | ~np.isfinite(after).all(1)
-        for k, name in enumerate(names):
+        world = mujoco.MjModel.from_xml_path(str(path))
+        rest = rest_of(world, names, [model.areas_m2[name] for name in names])
+        for name, pose, is_restless in zip(names, rest.poses, rest.restless, strict=True):
             body = model.loose[name]
-            if bad[k]:
+            if is_restless:
                 joint = body.find("freejoint")
                 assert joint is not None
                 body.remove(joint)
                 del model.loose[name]
                 fixed.append(name)
             else:
-                body.set("pos", _numbers(after[k, :3]))
-                body.set("quat", _numbers(after[k, 3:]))
+                body.set("pos", _numbers(pose[:3]))
+                body.set("quat", _numbers(pose[3:]))
         path.write_bytes(model.text)
-        if not bad.any():
+        if not rest.restless.any():
             break
     return fixed
-
-
-def _fall(mujoco: Any, world: Any, state: Any, names: Sequence[str]) -> None:
-    """Step until all lie still, slowed at first, so that what hovers sinks and nothing jumps."""
-    steps = int(_FALL_S / _STEP_S)
-    for k in range(steps):
-        mujoco.mj_step(world, state)
-        if k < steps // 2:
-            state.qvel *= 0.98
-        if k % 50 == 49 and np.abs(state.qvel).max() < 1e-3 and k > steps // 4:
-            break
-
-
-def _run(mujoco: Any, world: Any, state: Any, seconds: float) -> None:
-    for _ in range(int(seconds / _STEP_S)):
-        mujoco.mj_step(world, state)
-
-
-def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
-    """(N, 7) places and quaternions of free joints."""
-    at = [world.joint(name).qposadr[0] for name in names]
-    return np.array([state.qpos[k : k + 7] for k in at], np.float64).reshape(-1, 7)
 
 
 FORM = HomeForm(

@@ -1,0 +1,144 @@
+"""Where the loose bodies of a MuJoCo model come to rest: parted where they stand in each other, then let fall; no effects.
+
+A home's furniture may stand in each other by centimetres (a chair's leg in a table's): a simulation
+would throw such bodies about. Those are moved apart first, by as little as frees them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, Bools
+
+_DEEP_M: Final = 2e-3  # two bodies that penetrate deeper are moved apart
+_FREE_M: Final = 5e-4  # that a moved body may still penetrate
+_WAYS_M: Final = (0.005, 0.01, *np.arange(0.02, 0.16, 0.02))  # by which a body is moved
+_MOST_PARTED: Final = 60
+_FALL_S: Final = 4.0  # that bodies have to come to rest
+_SLOW_S: Final = 0.6  # at first they sink slowly, so that what hovers does not jump
+_SLOW: Final = (0.2, 0.7)  # m/s, rad/s
+_LOOK_S: Final = 0.4
+_STILL_M: Final = 2e-4  # that a body at rest moves in _LOOK_S
+_LOST_M: Final = 0.25  # a body that goes farther had nothing to stand on
+_TIPPED_RAD: Final = 0.35
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """Where bodies are, and which of them found no rest."""
+
+    poses: F64  # (N, 7) place and quaternion (w, x, y, z) of each body
+    restless: Bools  # (N,)
+
+
+def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest:
+    """Where the free bodies of a model (an mjModel) come to rest.
+
+    names: of their free joints. areas_m2: in plan; of two that stand in each other the smaller moves.
+    Restless is what stays in another body, still moves after 4 s, tips over or goes 25 cm.
+    """
+    import mujoco
+
+    state = mujoco.MjData(world)
+    mujoco.mj_forward(world, state)
+    start = _poses(world, state, names)
+    restless = _move_apart(mujoco, world, state, names, areas_m2)
+    if not restless.any():
+        _fall(mujoco, world, state)
+        before = _poses(world, state, names)
+        for _ in range(int(_LOOK_S / world.opt.timestep)):
+            mujoco.mj_step(world, state)
+        after = _poses(world, state, names)
+        restless = np.linalg.norm(after[:, :3] - before[:, :3], axis=1) > _STILL_M
+        restless |= np.linalg.norm(after[:, :3] - start[:, :3], axis=1) > _LOST_M
+        cosine = np.abs((after[:, 3:] * start[:, 3:]).sum(1))
+        restless |= 2 * np.arccos(np.clip(cosine, 0, 1)) > _TIPPED_RAD
+        restless |= ~np.isfinite(after).all(1)
+    return Rest(_poses(world, state, names), restless)
+
+
+def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
+    at = [int(world.joint(name).qposadr[0]) for name in names]
+    return np.array([state.qpos[k : k + 7] for k in at], np.float64).reshape(-1, 7)
+
+
+# Parting
+
+
+def _move_apart(
+    mujoco: Any, world: Any, state: Any, names: Sequence[str], areas_m2: Sequence[float]
+) -> Bools:
+    """Move bodies until none stands in another; which of them no small move frees."""
+    body_of = {int(world.body(name).id): k for k, name in enumerate(names)}
+    stuck = np.zeros(len(names), bool)
+    for _ in range(_MOST_PARTED):
+        pairs = {
+            pair: depth
+            for pair, depth in _depths(world, state).items()
+            if depth > _DEEP_M and not any(stuck[body_of[b]] for b in pair if b in body_of)
+        }
+        if not pairs:
+            break
+        pair = max(pairs, key=lambda p: (pairs[p], p))
+        loose = sorted((body_of[b] for b in pair if b in body_of), key=lambda k: areas_m2[k])
+        if not any(_freed(mujoco, world, state, names[k]) for k in loose):
+            stuck[loose[0]] = True
+    return stuck
+
+
+def _depths(world: Any, state: Any) -> dict[tuple[int, int], float]:
+    """How deep the bodies of each pair that meets penetrate, metres."""
+    found: dict[tuple[int, int], float] = {}
+    contact = state.contact
+    for geoms, distance in zip(contact.geom, contact.dist, strict=True):
+        low, high = sorted(int(world.geom_bodyid[g]) for g in geoms)
+        found[(low, high)] = max(found.get((low, high), 0.0), -float(distance))
+    return found
+
+
+def _freed(mujoco: Any, world: Any, state: Any, name: str) -> bool:
+    """Move a body by the least way, level or up, on which it meets nothing; whether there is one."""
+    at, body = int(world.joint(name).qposadr[0]), int(world.body(name).id)
+    home = state.qpos[at : at + 3].copy()
+    angles = np.arange(8) * np.pi / 4
+    ways = [np.array([np.cos(a), np.sin(a), 0.0]) for a in angles] + [np.array([0.0, 0.0, 1.0])]
+    for length in _WAYS_M:
+        for way in ways:
+            state.qpos[at : at + 3] = home + length * way
+            mujoco.mj_kinematics(world, state)
+            mujoco.mj_collision(world, state)
+            depths = _depths(world, state)
+            if max((d for pair, d in depths.items() if body in pair), default=0.0) < _FREE_M:
+                return True
+    state.qpos[at : at + 3] = home
+    mujoco.mj_kinematics(world, state)
+    mujoco.mj_collision(world, state)
+    return False
+
+
+# Falling
+
+
+def _fall(mujoco: Any, world: Any, state: Any) -> None:
+    """Step until all lie still."""
+    sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", None)
+    if sleep is not None:
+        world.opt.enableflags |= int(sleep)  # what lies still costs nothing
+    is_free = world.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    first = world.jnt_dofadr[is_free]
+    steps, slow = (int(s / world.opt.timestep) for s in (_FALL_S, _SLOW_S))
+    for k in range(steps):
+        mujoco.mj_step(world, state)
+        if k < slow:
+            for begin, most in zip((0, 3), _SLOW, strict=True):
+                dofs = first[:, None] + np.arange(begin, begin + 3)
+                speed = np.linalg.norm(state.qvel[dofs], axis=1, keepdims=True)
+                state.qvel[dofs] *= np.minimum(1.0, most / np.maximum(speed, 1e-9))
+        elif k % 50 == 0 and np.abs(state.qvel).max(initial=0.0) < 1e-3:
+            break
+    if sleep is not None:
+        world.opt.enableflags &= ~int(sleep)
