@@ -129,6 +129,9 @@ class _Scene:
 
 def _word(row: dict[str, Any]) -> str:
     name = str(row["class"])
+    own = re.search(r"\b(bench|stool|ottoman|pouf)\b", str(row["name"]).lower())
+    if name == "chair" and own:
+        return own[0]
     return re.sub(r"[\d ]+$", "", str(row["name"])).lower() if name.startswith("other") else name
 
 

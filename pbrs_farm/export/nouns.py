@@ -19,6 +19,11 @@ _VAGUE: Final = {
     "otherprop": "object", "otherfurniture": "piece of furniture", "otherstructure": "part of the building",
     "none": "",
 }  # fmt: skip
+# Classes that hold things which nobody calls so: a word of such a thing's own name -> what it is called.
+_OWN_WORDS: Final = {
+    "chair": {word: word for word in ("bench", "stool", "ottoman", "pouf")},
+    "curtain": {"curtains": "set of curtains"},
+}  # fmt: skip
 _NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
 _PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")
 _PLURALS: Final = {"person": "people", "bookshelf": "bookshelves", "shelf": "shelves"}
@@ -32,13 +37,15 @@ def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
     """What a thing is called; "" for one without a class.
 
     row is one of facts' instances. Where NYU40's class says little, as otherprop, the kind or the
-    thing's own short name is taken.
+    thing's own short name is taken; a bench of the class chair is a bench.
     """
     if view.choice.classes is not None:
         return str(row["own_class_name"])
     name = str(row["class"])
     if name not in _VAGUE:
-        return _COUNTED.get(name, name)
+        words = str(row["name"]).lower().split()
+        found = (noun for word, noun in _OWN_WORDS.get(name, {}).items() if word in words)
+        return next(found, _COUNTED.get(name, name))
     if row["kind"] in _NOUNS_OF_KINDS:
         return _NOUNS_OF_KINDS[row["kind"]]
     # A thing of no class is what it is called, where that is one word or two.

@@ -5,6 +5,7 @@ import json
 import math
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -14,10 +15,11 @@ import pytest
 
 import pbrs_farm as pf
 from benchmarks.question_check import wrong_answers
-from pbrs_farm.core.house import House, Item
+from pbrs_farm.core.house import House, Item, MaterialKind
 from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
-from pbrs_farm.export.questions import asking
+from pbrs_farm.export.nouns import noun_of
+from pbrs_farm.export.questions import asking, clips
 from pbrs_farm.export.questions.asking import Asker, blind_scores, mean_relative_accuracy
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind, bearing_deg
@@ -100,6 +102,73 @@ def test_a_direction_is_that_of_one_who_stands_and_faces(kind, at, answer):
 def test_a_direction_near_a_border_is_not_asked():
     clip = clip_of(thing(1, "sofa", 4, 4), thing(2, "bed", 4, 1), thing(3, "desk", 4.2, 2.4))
     assert not [d for d in drafts("object_rel_direction_hard", clip) if d.about == (1, 2, 3)]
+
+
+def test_a_direction_that_hangs_on_where_one_stands_by_a_thing_is_not_asked():
+    # From the middle the lamp is 33 degrees to the right; from the right front corner of a bed 3 m wide
+    # it is to the left of the way to the desk.
+    for width, answers in ((0.5, ["right"]), (3.0, [])):
+        bed = thing(1, "bed", 4, 4, (width, 0.5, 1))
+        clip = clip_of(bed, thing(2, "desk", 4, 1), thing(3, "lamp", 4.9, 2.6, (0.2, 1, 0.2)))
+        found = [d for d in drafts("object_rel_direction_easy", clip) if d.about == (1, 2, 3)]
+        assert [d.answer for d in found] == answers
+
+
+def view_of_wall(cx: float, row: Any = None) -> ChosenView:
+    """A camera at (4, 1, 0) that looks along +z, its world's y down: x of the picture is 50 x / z + cx."""
+    pose = np.eye(4)
+    pose[:3, 3] = (4.0, 1.0, 0.0)
+    facts = {
+        "width_px": 100, "height_px": 100, "K": [[50, 0, cx], [0, 50, 50], [0, 0, 1]],
+        "world_from_camera_opencv": pose.tolist(), "instances": [row] if row else [],
+    }  # fmt: skip
+    return cast(ChosenView, SimpleNamespace(facts=facts, choice=SimpleNamespace(classes=None)))
+
+
+def test_what_the_edge_of_the_picture_cuts_off_is_not_seen():
+    # A panel 2 m wide 4 m away: from 12.5 px left of cx to as far right of it.
+    panel = thing(1, "cabinet", 4, 4, (2, 1, 0.002), y=0.5)
+    assert panel.share_within(view_of_wall(50)) == 1.0
+    assert panel.share_within(view_of_wall(0)) == pytest.approx(0.5, abs=0.02)
+    assert panel.share_within(view_of_wall(-20)) == 0.0
+    row = {
+        "id": 1, "item": panel.item.id, "name": "Cabinet", "class": "cabinet", "kind": "object",
+        "fraction": 0.05, "visible_fraction": 1.0, "truncated": True,
+    }  # fmt: skip
+    for cx, is_seen in ((0, True), (-7.5, False)):  # a half and a fifth
+        clip = clips._clip("clip", [view_of_wall(cx, row)], house_of(panel.item))
+        assert bool(clip.single) is is_seen
+        # Its size is asked of neither.
+        assert drafts("object_size_estimation", clip) == []
+
+
+def test_things_that_some_would_count_together_are_not_counted():
+    shelves = [thing(1, "bookshelf", 1, 1), thing(2, "bookshelf", 3, 1)]
+    assert [d.answer for d in drafts("object_counting", clip_of(*shelves))] == ["2"]
+    assert drafts("object_counting", clip_of(*shelves, thing(3, "set of shelves", 5, 5))) == []
+
+
+def test_a_thing_whose_own_name_another_has_is_not_named():
+    racks = [thing(1, "coat rack", 1, 1), thing(2, "clothes rail", 5, 5)]
+    assert len(clip_of(*racks).single) == 2
+    racks[1].item = replace(racks[1].item, name=racks[0].item.name)
+    assert clip_of(*racks).single == []
+
+
+def test_the_size_of_a_sink_which_may_be_that_of_its_cabinet_is_not_asked():
+    assert drafts("object_size_estimation", clip_of(thing(1, "sink", 2, 2))) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "noun"),
+    [
+        ("chair", "Bench", "bench"), ("chair", "Bar stool 2", "stool"), ("chair", "Desk chair", "chair"),
+        ("curtain", "Curtains", "set of curtains"), ("curtain", "Curtain", "curtain"),
+    ],
+)  # fmt: skip
+def test_a_bench_is_called_a_bench(kind, name, noun):
+    row = {"class": kind, "kind": "object", "name": name}
+    assert noun_of(view_of_wall(0), row) == noun
 
 
 def test_only_what_is_seen_without_doubt_is_asked_about():
@@ -199,6 +268,31 @@ def test_a_phrase_fits_one_thing_alone():
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("kind", "rgb", "colour"),
+    [
+        (MaterialKind.OPAQUE, (181, 98, 59), "brown"), (MaterialKind.OPAQUE, (240, 130, 20), "orange"),
+        (MaterialKind.OPAQUE, (230, 230, 230), "white"), (MaterialKind.MIRROR, (230, 230, 230), ""),
+    ],
+)  # fmt: skip
+def test_a_phrase_names_the_colour_of_what_has_one(kind, rgb, colour):
+    row = {"id": 1, "box2d": [0, 0, 10, 10]}
+    clip = clip_of(thing(1, "cabinet", 1, 1), facts={"instances": [row]})
+    layers = {
+        "instance": np.ones((10, 10), np.uint16),
+        "albedo": np.full((10, 10, 3), rgb, np.uint8),
+    }
+    view = SimpleNamespace(
+        facts=clip.views[0].facts, array=layers.__getitem__,
+        entry=SimpleNamespace(file=lambda name: name if name == "albedo.png" else None),
+    )  # fmt: skip
+    house = replace(clip.house, materials=[replace(m, kind=kind) for m in clip.house.materials])
+    phrases = {
+        r.phrase for r in references_of(Clip("clip", [cast(ChosenView, view)], house, clip.things))
+    }
+    assert phrases == {"the cabinet"} | ({f"the {colour} cabinet"} if colour else set())
+
+
 def test_questions_of_a_real_view_are_right_by_a_checker_that_shares_no_code(tmp_path):
     home = small_home()
     frames = pf.render(home, home.cameras(n=3), modes=["opengl_dl"], layers=["albedo"])
@@ -242,9 +336,27 @@ def test_how_often_the_few_answers_of_a_kind_are_right_differs_by_two_at_most(
 
     kind = QuestionKind("side", drafts, ("Where is the {a} {here}?",), answers=("left", "right"))
     monkeypatch.setattr(asking, "KINDS", (kind,))
-    clips = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(12)]
-    asked = Asker().asked(clips)
+    own = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(12)]
+    asked = Asker().asked(own)
     # Two "left"; then nothing is asked until a "right" may be, which makes room for one "left".
     assert [(q.clip, q.answer) for q in asked] == [
         ("c0", "left"), ("c0", "left"), ("c7", "right"), ("c7", "left"),
     ]  # fmt: skip
+
+
+def test_no_number_is_the_answer_more_often_than_all_others_and_two(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def drafts(clip: Any, _rng: Any) -> Iterator[Draft]:
+        yield Draft({"a": "lamp"}, "3" if clip.name == "c5" else "2", (), (1,))
+
+    kind = QuestionKind("count", drafts, ("How many {a} {here}?",))
+    monkeypatch.setattr(asking, "KINDS", (kind,))
+    own = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(9)]
+    asked = Asker().asked(own)
+    assert [(q.clip, q.answer) for q in asked] == [
+        ("c0", "2"),
+        ("c1", "2"),
+        ("c5", "3"),
+        ("c6", "2"),
+    ]

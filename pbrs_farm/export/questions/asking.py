@@ -17,7 +17,7 @@ from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind
 DATASET: Final = "pbrs_farm"
 _OF_A_PICTURE: Final = 2  # questions of a kind
 _OF_A_WALK: Final = 8
-_MOST_APART: Final = 2  # how often one of few answers and another are right
+_MOST_APART: Final = 2  # how often one answer is right more often than another, or than all others
 _LETTERS: Final = "ABCD"
 
 
@@ -84,11 +84,13 @@ class Asker:
     def _rarest(self, kind: QuestionKind, drafts: Sequence[Draft]) -> Draft | None:
         """The first draft whose answer has been given least often; then it is counted.
 
-        None where that answer would become the usual one of a kind with few answers.
+        None where that answer would become the usual one: of a kind with few answers, two more often
+        right than another; of any other kind, two more often than all others together.
         """
         count = self._answers[kind.name]
         draft = min(drafts, key=lambda d: count[d.answer])
-        least = min((count[answer] for answer in kind.answers), default=count[draft.answer])
+        others = count.total() - count[draft.answer]
+        least = min((count[answer] for answer in kind.answers), default=others)
         if count[draft.answer] >= least + _MOST_APART:
             return None
         count[draft.answer] += 1

@@ -5,7 +5,7 @@ Effects: reads the house of a view and, on demand, its layers.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, Room
-from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.chosen_view import ChosenView, intrinsics_of
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.nouns import noun_of
 from pbrs_farm.export.sequences import frames_by_house, pose_opencv
@@ -27,11 +27,14 @@ from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 LEAST_FRACTION: Final = 0.003
 """Share of a picture's pixels from which a thing is seen."""
 LEAST_VISIBLE: Final = 0.3
-"""Share of a thing's own pixels that are seen, from which it is seen."""
+"""Share of a thing from which it is seen: neither hidden by others nor beyond the picture's edges."""
 WHOLE: Final = 0.7
-"""Share of a thing's own pixels from which its size can be judged."""
+"""Share of a thing from which its size can be judged."""
 _GLIMPSED: Final = 1e-4  # share of a picture's pixels from which a thing may be noticed
 _SPACING_M: Final = 0.03  # of the points that find the nearest places of two things
+_POINTS_ALONG: Final = (
+    16  # the longest side of a thing, where it is asked how much of it a picture holds
+)
 _STARTS: Final = 4  # pairs of points from which the nearest places are sought
 _STEPS: Final = 24  # from one thing to the other and back
 _BY_FLOOR_M: Final = 0.3  # between the floor and what stands on it
@@ -53,7 +56,7 @@ class Thing:
     item: Item
     first_glimpsed: int  # the first frame in which some pixels of it are there
     first_seen: int | None = None  # the first frame in which it counts as seen; None = never
-    most_visible: float = 0.0  # the largest share of its own pixels in a frame
+    most_visible: float = 0.0  # the largest share of it in a frame
 
     @cached_property
     def triangles(self) -> F64:
@@ -65,6 +68,19 @@ class Thing:
         """Points on its surface, corners of its triangles among them."""
         corners = self.triangles.reshape(-1, 3)
         return cKDTree(np.concatenate([corners, surface_points(self.triangles, _SPACING_M)]))
+
+    def share_within(self, view: ChosenView) -> float:
+        """The share of its surface that lies within the picture's edges, whether hidden or not."""
+        facts, pose = view.facts, pose_opencv(view)
+        x, y = intrinsics_of(facts).pixels((self._sparse_points - pose[:3, 3]) @ pose[:3, :3]).T
+        # NaN, what the lens does not see, is not within.
+        within = (x >= 0) & (x <= facts["width_px"]) & (y >= 0) & (y <= facts["height_px"])
+        return float(within.mean()) if len(within) else 0.0
+
+    @cached_property
+    def _sparse_points(self) -> F64:
+        """(N, 3) points on its surface, the longer its sides the farther apart."""
+        return surface_points(self.triangles, max(self.longest_m / _POINTS_ALONG, _SPACING_M / 4))
 
     @cached_property
     def plan(self) -> Any:
@@ -116,8 +132,13 @@ class Clip:
 
     @cached_property
     def single(self) -> list[Thing]:
-        """The things that their noun names without doubt: the only one of it that may be noticed."""
-        return [own[0] for own in self.by_noun.values() if len(own) == 1]
+        """The things that their noun names without doubt: the only one of it that may be noticed.
+
+        Nor is there another of the same own name: a coat rack that is furniture, and one of clothes.
+        """
+        names = Counter(thing.item.name for thing in self.things)
+        alone = (own[0] for own in self.by_noun.values() if len(own) == 1)
+        return [thing for thing in alone if names[thing.item.name] == 1]
 
     @cached_property
     def footprints(self) -> dict[str, list[tuple[Item, Any]]]:
@@ -250,6 +271,8 @@ def _clip(name: str, views: Sequence[ChosenView], house: House) -> Clip:
             thing = found.setdefault(row["id"], Thing(int(row["id"]), noun, item, k))
             share = row["visible_fraction"]
             share = 1.0 if share is None else float(share)
+            if row["truncated"]:
+                share *= thing.share_within(view)
             thing.most_visible = max(thing.most_visible, share)
             is_seen = share >= LEAST_VISIBLE and row["fraction"] >= LEAST_FRACTION
             if is_seen and thing.first_seen is None:

@@ -28,6 +28,14 @@ _CLEARLY_M: Final = 0.25  # ... and by so many metres
 _STEP_APART_M: Final = 0.7  # between the middles of things that a direction is asked of
 _MARGIN_DEG: Final = 15.0  # that a direction keeps from the border to the next one
 _LATER_FRAMES: Final = 5  # a thing that comes later is not even noticed so many frames before
+# Nouns that some would count together.
+_LOOK_ALIKE: Final = (
+    frozenset({"bookshelf", "set of shelves"}), frozenset({"table", "desk", "counter"}),
+    frozenset({"cabinet", "dresser", "nightstand"}), frozenset({"chair", "stool", "bench"}),
+    frozenset({"bag", "basket", "box"}),
+)  # fmt: skip
+# Nouns of which one means the whole, another a part: a sink's bowl or its cabinet, one curtain or both.
+_UNMEASURED: Final = frozenset({"sink", "curtain", "set of curtains"})
 _SIDES: Final = ("left", "right")
 _SIDES_OR_BACK: Final = ("left", "right", "back")
 _QUADRANTS: Final = ("front-left", "front-right", "back-left", "back-right")
@@ -79,9 +87,11 @@ def _tried(
 
 
 def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
-    """How many there are of a noun, from two on."""
+    """How many there are of a noun, from two on, where nothing that looks alike is called otherwise."""
+    nouns = {thing.noun for thing in clip.things}
     for noun, own in clip.by_noun.items():
-        if len(own) > 1:
+        is_alike = any(noun in group and len(group & nouns) > 1 for group in _LOOK_ALIKE)
+        if len(own) > 1 and not is_alike:
             yield Draft({"many": plural(noun)}, str(len(own)), (), tuple(t.instance for t in own))
 
 
@@ -97,6 +107,8 @@ def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
 def _sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
     """Centimetres of the longest side of a thing that is seen nearly whole."""
     for thing in clip.single:
+        if thing.noun in _UNMEASURED:
+            continue
         if thing.most_visible >= WHOLE and thing.longest_m >= 0.1:
             yield Draft({"a": thing.noun}, f"{100 * thing.longest_m:.0f}", (), (thing.instance,))
 
@@ -134,27 +146,31 @@ def _side(bearing: float) -> str:
     return "right" if bearing > 0 else "left"
 
 
-def _left_or_right(bearing: float) -> str:
+def _left_or_right(bearing: float, margin_deg: float) -> str:
     """ "" where it is too near to straight ahead or straight back."""
-    return _side(bearing) if _MARGIN_DEG <= abs(bearing) <= 180 - _MARGIN_DEG else ""
+    return _side(bearing) if margin_deg <= abs(bearing) <= 180 - margin_deg else ""
 
 
-def _left_right_or_back(bearing: float) -> str:
-    if abs(bearing) >= 135 + _MARGIN_DEG:
+def _left_right_or_back(bearing: float, margin_deg: float) -> str:
+    if abs(bearing) >= 135 + margin_deg:
         return "back"
-    return _side(bearing) if _MARGIN_DEG <= abs(bearing) <= 135 - _MARGIN_DEG else ""
+    return _side(bearing) if margin_deg <= abs(bearing) <= 135 - margin_deg else ""
 
 
-def _quadrant(bearing: float) -> str:
-    if abs(abs(bearing) - 90) < _MARGIN_DEG or not _left_or_right(bearing):
+def _quadrant(bearing: float, margin_deg: float) -> str:
+    if abs(abs(bearing) - 90) < margin_deg or not _left_or_right(bearing, margin_deg):
         return ""
     return f"{'front' if abs(bearing) < 90 else 'back'}-{_side(bearing)}"
 
 
 def _directions(
-    answer_of: Callable[[float], str], options: tuple[str, ...]
+    answer_of: Callable[[float, float], str], options: tuple[str, ...]
 ) -> Callable[[Clip, random.Random], Iterator[Draft]]:
-    """Where a third thing is for one who stands by a first and faces a second."""
+    """Where a third thing is for one who stands by a first and faces a second.
+
+    The answer is the same wherever by the first one stands: at its middle, by a margin, and at each of
+    its corners.
+    """
 
     def drafts(clip: Clip, rng: random.Random) -> Iterator[Draft]:
         for a, b, c in _tried(rng, clip.single, 3):
@@ -164,8 +180,11 @@ def _directions(
             is_crowded = a.plan.intersects(b.plan) or a.plan.intersects(c.plan)
             if min(apart) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
                 continue
-            answer = answer_of(bearing_deg(a.middle, b.middle, c.middle))
-            if answer:
+            answer = answer_of(bearing_deg(a.middle, b.middle, c.middle), _MARGIN_DEG)
+            if answer and all(
+                answer_of(bearing_deg(corner, b.middle, c.middle), 0) == answer
+                for corner in shapely.get_coordinates(a.plan)
+            ):
                 words = {"a": a.noun, "b": b.noun, "c": c.noun}
                 yield Draft(words, answer, options, (a.instance, b.instance, c.instance))
 
@@ -271,7 +290,7 @@ KINDS: Final = (
         "object_rel_distance", _nearest,
         (
             "Measured from the closest point of each, which of these is nearest to the {a}: {choices}?",
-            "Which of these things stands closest to the {a}: {choices}?",
+            "Which of these things is closest to the {a}: {choices}?",
             "Of {choices}, which has the smallest gap to the {a}?",
         ),
     ),

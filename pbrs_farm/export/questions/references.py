@@ -17,6 +17,9 @@ import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.gloss import coat_of
+from pbrs_farm.core.house import Material, MaterialKind
+from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 
 _APART: Final = (
@@ -26,6 +29,10 @@ _NEARER_M: Final = 0.3
 _ON_M: Final = 0.05  # between a thing's bottom and the top of what it stands on
 _OF_COLOUR: Final = 0.7  # share of a thing's pixels from which it has that colour
 _OF_ANOTHER: Final = 0.3  # another thing of its name has less of that colour
+_COLOURS_APART: Final = (
+    60.0  # of 255, between the mean colours of things of a name that colours tell apart
+)
+_OF_NO_COLOUR: Final = 0.3  # share of a thing's surface that is metal, mirror or glass, from which no albedo is its colour
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
@@ -78,12 +85,32 @@ class _Picture:
         return float(np.median(own)) if len(own) else float("nan")
 
     def colour_shares(self, thing: Thing) -> Counter[str]:
-        """Colour -> share of its pixels."""
-        if self.colour_words is None:
+        """Colour -> share of its pixels; none of what shows its surroundings or shines as a metal."""
+        if self.colour_words is None or self._mirrors(thing):
             return Counter()
         own = self.colour_words[self.instance == thing.instance]
         counts = np.bincount(own, minlength=len(_COLOURS)) / max(len(own), 1)
         return Counter({name: float(counts[k]) for k, name in enumerate(_COLOURS)})
+
+    def mean_colour(self, thing: Thing) -> F64:
+        """(3,) sRGB of 8 bits, the mean of its albedo."""
+        albedo = self.view.array("albedo")[..., :3]
+        return np.asarray(albedo[self.instance == thing.instance].mean(0), np.float64)
+
+    def _mirrors(self, thing: Thing) -> bool:
+        """Much of its surface is metal, mirror or glass, whose albedo is not what one sees."""
+        materials = self.clip.house.materials
+        areas = [
+            (float(face_areas(triangle_corners(s.positions, s.faces)).sum()), _is_colourless(materials[s.material]))
+            for s in thing.item.surfaces
+        ]  # fmt: skip
+        return sum(a for a, is_own in areas if is_own) >= _OF_NO_COLOUR * sum(a for a, _is in areas)
+
+
+def _is_colourless(material: Material) -> bool:
+    coat = coat_of(material)
+    clear = (MaterialKind.MIRROR, MaterialKind.GLASS, MaterialKind.PANE)
+    return material.kind in clear or (coat is not None and coat.is_metal)
 
 
 _COLOURS: Final = (
@@ -112,8 +139,10 @@ def _colour_word(*cell: int) -> str:
     if degrees < 15 or degrees >= 345:
         return "pink" if light > 0.7 else "red"
     if degrees < 45:
-        # Dark orange is brown, pale orange beige.
-        return "brown" if light < 0.45 else "beige" if chroma < 0.4 else "orange"
+        # Dark or dull orange is brown, pale orange beige.
+        if light < 0.45 or (light < 0.55 and chroma < 0.6):
+            return "brown"
+        return "beige" if chroma < 0.4 else "orange"
     if degrees < 70:
         return "beige" if chroma < 0.4 else "yellow"
     if degrees < 170:
@@ -184,8 +213,16 @@ def _by_colour(picture: _Picture, noun: str, own: Sequence[Thing]) -> Iterator[t
     for k, thing in enumerate(own):
         for colour in _COLOURS:
             others = [s[colour] for j, s in enumerate(shares) if j != k]
-            if shares[k][colour] >= _OF_COLOUR and max(others, default=0.0) < _OF_ANOTHER:
+            is_its = shares[k][colour] >= _OF_COLOUR and max(others, default=0.0) < _OF_ANOTHER
+            if is_its and _is_of_another_colour(picture, thing, own):
                 yield f"the {colour} {noun}", thing
+
+
+def _is_of_another_colour(picture: _Picture, thing: Thing, own: Sequence[Thing]) -> bool:
+    """Than all others of its name, so that no two shades beside a border of two words tell them apart."""
+    mean = picture.mean_colour(thing)
+    others = (picture.mean_colour(t) for t in own if t is not thing)
+    return all(np.linalg.norm(other - mean) >= _COLOURS_APART for other in others)
 
 
 def _by_support(
