@@ -61,6 +61,7 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "ply": ("point_clouds", ()),
     "questions": ("questions", ("real_view",)),
     "released": ("export", ("released",)),
+    "tapvid": ("tapvid", ()),
     "tum": ("sequences", ("tum",)),
     "webdataset": ("export", ("webdataset",)),
     "yolo": ("export", ("yolo_boxes", "data_yaml")),

@@ -55,7 +55,7 @@ HOW_OF_HOUSE: dict[str, str] = {
     "house.json": "each field has its check", "cameras.json": "each field has its check",
     "illuminance.json": "each field has its check; no light is traced",
     "repair.json": "rooms and lamps as house.json", "dress.json": "credits as ATTRIBUTION.txt",
-    "pairs.parquet": "followed by rays from view to view", "manifest.jsonl": "each file's size and hash",
+    "tracks.npz": "points followed by rays through up to twelve stored frames", "pairs.parquet": "followed by rays from view to view", "manifest.jsonl": "each file's size and hash",
     "recipe.json": "by the digest and the seeds of its views", "ATTRIBUTION.txt": "names what dress.json says must be",
 }  # fmt: skip
 

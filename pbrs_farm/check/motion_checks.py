@@ -126,7 +126,7 @@ def follow_points(
         inside = margin >= 0
     state = np.full(len(rows), OUTSIDE, np.int64)
     at = np.nonzero(inside)[0]
-    state[at] = np.where(_is_seen(points[at], other, rays), SEEN, HIDDEN)
+    state[at] = np.where(is_seen(points[at], other, rays), SEEN, HIDDEN)
     return Followed(px - np.stack([columns + 0.5, rows + 0.5], axis=1), state)
 
 
@@ -147,11 +147,11 @@ def near_edge(
     with np.errstate(invalid="ignore"):
         is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)
     # Ask again a little beside each point: where answers differ both are right.
-    seen = _is_seen(points, other, rays, slack_m=0.01)
+    seen = is_seen(points, other, rays, slack_m=0.01)
     for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         origin, beside = view.rays(rows + JITTER_PX * dy, columns + JITTER_PX * dx)
         moved = carry(origin + beside * z[:, None])
-        is_tie |= _is_seen(moved, other, rays, slack_m=0.01) != seen
+        is_tie |= is_seen(moved, other, rays, slack_m=0.01) != seen
     return is_tie
 
 
@@ -173,7 +173,7 @@ def _points_of(
     return points, px, margin
 
 
-def _is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:
+def is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:
     """(N,) whether nothing stands between the other eye and each point."""
     eye = other.world_from_camera[:3, 3]
     to = points - eye

@@ -49,6 +49,7 @@ from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, json_of_glb, triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 from pbrs_farm.check.table_checks import HouseItems, check_rows
+from pbrs_farm.check.track_checks import check_tracks
 from pbrs_farm.check.view_checks import (
     check_consistency,
     check_pictures,
@@ -190,6 +191,15 @@ def _check_house(
     check_reprojection(seen, tally)
     check_partners([one.view for one in seen], tally)
     check_pairs(house, scenes.all[1], tally)
+
+    def scene_at(time_s: float | None) -> tuple[MovedHouse, Rays]:
+        there = times.at(time_s)
+        return there.moved, there.all[1]
+
+    try:
+        check_tracks(stored, [one.view for one in seen], scene_at, tally)
+    except FAULTS as error:
+        tally.expect("tracks", f"{house.name}/tracks.npz", False, _fault(error))
     return views, len(halved)
 
 

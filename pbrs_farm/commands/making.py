@@ -165,7 +165,7 @@ def _described(args: argparse.Namespace, homes: list[str], sources: Sequence[Sou
     request = request_from(args, RunRequest)
     recipe = recipe_of(args)
     want = wanted_of(request)
-    if want.layers:
+    if want.layers or want.tracks:
         from pbrs_farm.run.plan import check_layers
 
         check_layers(want, recipe)

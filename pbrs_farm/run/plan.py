@@ -41,6 +41,7 @@ STEPS: Final = {
         Step("house", 1, passes.STEP_GROUPS, per_view=False),
         Step("cameras", 6, ("cameras", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("tracks", 1, ("image",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 3, ("image", "raster"), ("house", "cameras")),
@@ -73,8 +74,12 @@ def wanted(
 
 
 def check_layers(want: Wanted, recipe: Recipe) -> None:
-    """Raise BadInput for a layer that views under a recipe cannot have, before anything is rendered."""
+    """Raise BadInput for what views under a recipe cannot have, before anything is rendered."""
     from pbrs_farm.truth.optional_layers import check_lens
+
+    if want.tracks and recipe.cameras.source not in ("walk", "trajectory", "given"):
+        text = f"follows points through a film, and cameras are {recipe.cameras.source}"
+        raise BadInput("--tracks", "", text, hint="--cameras walk")
 
     check_lens(want.layers, recipe.lens.lens)
     of_light = [name for name in want.layers if name in LIGHT_LAYERS]
@@ -86,11 +91,11 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
 def house_steps(want: Wanted, house_id: str) -> tuple[str, ...]:
     """Steps of a house in the order they run, all before the steps of its views.
 
-    The order is one that satisfies what each step reads. Pairs are of houses only, not of objects.
+    The order is one that satisfies what each step reads. Pairs and tracks are of houses only, not of objects.
     """
     needed = [n for step in view_steps(want) for n in needed_of_house(step, house_id)]
-    pairs = ("pairs",) if want.pairs and not keys.is_object(house_id) else ()
-    return ("house", "cameras", *needed, *pairs)
+    asked = ("pairs",) * want.pairs + ("tracks",) * want.tracks
+    return ("house", "cameras", *needed, *(() if keys.is_object(house_id) else asked))
 
 
 def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:

@@ -204,6 +204,10 @@ class Wanted(Record):
         False, "pairs.parquet: what each two views of a room have in common (docs/motion.md)",
         group="what is made",
     )  # fmt: skip
+    tracks: bool = option(
+        False, "tracks.npz: surface points followed through the frames of a walk (docs/motion.md)",
+        group="what is made",
+    )  # fmt: skip
 
 
 def wanted_of(request: Wanted) -> Wanted:

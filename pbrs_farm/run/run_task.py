@@ -29,7 +29,7 @@ from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url
 
 # Steps that start Dr.Jit, whose number of threads is fixed from then on.
-_DRJIT_STEPS = ("house", "cameras", "pairs", "truth", "illuminance", "light", "develop")
+_DRJIT_STEPS = ("house", "cameras", "pairs", "tracks", "truth", "illuminance", "light", "develop")
 
 
 _OF_LIGHT = (

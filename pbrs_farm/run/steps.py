@@ -9,6 +9,7 @@ import functools
 import platform
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any, Final
@@ -154,6 +155,36 @@ def _pairs(work: Work) -> StepOutput:
     views = list(cached.views(work.inputs["cameras"]).values())
     rows = [asdict(row) for row in pair_rows(views, cached.caster.first_hit)]
     return StepOutput({FILE: pairs_parquet(rows)}, {"n_pairs": len(rows)})
+
+
+def _tracks(work: Work) -> StepOutput:
+    """tracks.npz: surface points followed through all frames of the house's film; none without frames."""
+    from pbrs_farm.formats.tracks_npz import FILE, tracks_npz
+    from pbrs_farm.truth.point_tracks import TrackFrame, point_tracks
+
+    cached = _cached_house(work)
+    views = cached.views(work.inputs["cameras"]).values()
+    film = sorted((v for v in views if v.frame is not None and not v.left_id), key=_number_of_frame)
+    if not film:
+        return StepOutput({}, {"n_points": 0})
+
+    def frame(view: View) -> TrackFrame:
+        _view, camera = _view_at_size(replace(work, view_id=view.id), cached)
+        return TrackFrame(
+            camera, view.time_s or 0.0, lambda: cached.at(view.time_s).caster.hit_record(camera),
+            lambda: cached.at(view.time_s).caster.first_hit,
+        )  # fmt: skip
+
+    moving, seed = cached.moving, keys.seed(work.house_id, "tracks", work.recipe.seed)
+    tracks = point_tracks(
+        [frame(view) for view in film], moving.moving_faces, moving.face_motions, seed
+    )
+    file = tracks_npz(tracks, [view.id for view in film])
+    return StepOutput({FILE: file}, {"n_points": len(tracks.points), "n_frames": len(film)})
+
+
+def _number_of_frame(view: View) -> int:
+    return view.frame or 0
 
 
 def _truth(work: Work) -> StepOutput:
@@ -403,6 +434,7 @@ _FUNCTIONS: Final[Mapping[str, Callable[[Work], StepOutput]]] = {
     "house": _house,
     "cameras": _cameras,
     "pairs": _pairs,
+    "tracks": _tracks,
     "truth": _truth,
     "opengl_dl": partial(_opengl, mode="opengl_dl"),
     "opengl_il": partial(_opengl, mode="opengl_il"),

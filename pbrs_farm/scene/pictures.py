@@ -104,6 +104,7 @@ def film(
     from_s: float = 0.0,
     modes: Words = (Mode.MLT_IL_OL,),
     layers: Words = (),
+    tracks: bool = False,
     size: Size | None = None,
     observe: Callable[[str], None] | None = None,
     progress: bool = False,
@@ -113,7 +114,8 @@ def film(
     cameras: one that stands still, or one a frame. fps: frames a second, of which seconds are filmed
     from the time from_s on; the frames are `frame_00000` and so on. All else is as of `render`;
     layers that need the next frame or the one before (flow_forward, scene_flow) are there, but for the
-    film's ends. Raises BadInput where there are not as many cameras as frames.
+    film's ends. tracks: follow surface points through all frames, for `.export(out, to="tapvid")` and
+    tracks.npz of `.save(out)`. Raises BadInput where there are not as many cameras as frames.
 
         >>> moving = home.open("door*", at={0: 0, 1: 1})
         >>> frames = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["scene_flow"])
@@ -128,7 +130,8 @@ def film(
     frames = film_viewpoints([home.viewpoint(camera) for camera in given], fps, from_s)
     recipe = _recipe_of_view(home, frames, size)
     with _progress_of(home, frames, observe, progress) as tell:
-        return home.renderer.frames(home.source, recipe, frames, _wanted(modes, layers), tell)
+        want = _wanted(modes, layers).model_copy(update={"tracks": tracks})
+        return home.renderer.frames(home.source, recipe, frames, want, tell)
 
 
 @contextmanager

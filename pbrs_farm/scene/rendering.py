@@ -281,6 +281,7 @@ def _without_other_film(
     ]
     if not films[1] or films[0] == films[1]:
         return dict(held)
+    work.store.delete(keys.marker_key(work.house_id, "tracks"))
     for name in films[0]:
         for step in plan.STEPS.values():
             if step.per_view:

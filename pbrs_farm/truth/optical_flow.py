@@ -58,7 +58,7 @@ def correspondence(
     """
     shape = hit.face.shape
     pixels = np.flatnonzero(hit.face.ravel() >= 0)
-    points = _points_of_pixels(hit, camera, pixels)
+    points = points_of_pixels(hit, camera, pixels)
     if then is not None:
         first_hit = then.first_hit
         _move_points(points, hit.face.ravel()[pixels], then)
@@ -80,7 +80,7 @@ def correspondence(
     return Correspondence(np.moveaxis(flow.reshape(2, *shape), 0, -1), states, in_front)
 
 
-def _points_of_pixels(hit: HitRecord, camera: Camera, pixels: I64) -> F64:
+def points_of_pixels(hit: HitRecord, camera: Camera, pixels: I64) -> F64:
     """(N, 3) surface points behind pixels, in double precision from the ray and the stored depth."""
     origin, directions = camera.exact_rays()
     depth = hit.depth_z.ravel()[pixels].astype(np.float64)
@@ -108,7 +108,7 @@ def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> 
     if then is not None:
         faces = hit.face.ravel()
         pixels = np.flatnonzero((faces >= 0) & (then.number_of_face[faces] > 0))
-        points = _points_of_pixels(hit, camera, pixels)
+        points = points_of_pixels(hit, camera, pixels)
         begin = points.copy()
         _move_points(points, faces[pixels], then)
         moved[pixels] = points - begin

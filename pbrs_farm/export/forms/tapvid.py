@@ -1,0 +1,85 @@
+"""TAP-Vid's form: films with point tracks, as its DAVIS file holds them. Effects: reads views, writes files.
+
+Doersch et al. 2022, TAP-Vid: A Benchmark for Tracking Any Point in a Video.
+"""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.form import Convention, ViewForm, name_left_out
+from pbrs_farm.export.sequences import frames_by_house, required_picture
+from pbrs_farm.formats import tracks_npz
+from pbrs_farm.images import array_from_png
+from pbrs_farm.regular_files import fault_of, read_regular
+
+_FILE: Final = "tapvid.pkl"
+_PROTOCOL: Final = 4
+
+
+def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> int:
+    """tapvid.pkl: house id -> "video", "points" and "occluded", as readers of TAP-Vid's DAVIS file take it.
+
+    video (T, H, W, 3) uint8; points (N, T, 2) float32, x and y as shares of the picture's width and
+    height from its upper left corner; occluded (N, T) bool. Frames that are exported alone; points that
+    none of them sees are left out. BadInput for a house without tracks.npz.
+    """
+    videos: dict[str, dict[str, Any]] = {}
+    others: list[ChosenView] = []
+    for house, moments in frames_by_house(views).items():
+        frames = [m.left for m in moments if m.left.facts.get("frame") is not None]
+        others += [m.left for m in moments if m.left.facts.get("frame") is None]
+        others += [m.right for m in moments if m.right is not None]
+        if frames:
+            videos[house] = _video(frames)
+    if not videos:
+        hint = "pbrs-farm run HOME --cameras walk --tracks"
+        raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
+    (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
+    return 1 + name_left_out(out, others, "is no frame of a film, or a right view")
+
+
+def _video(frames: list[ChosenView]) -> dict[str, Any]:
+    house = frames[0].house
+    path = frames[0].entry.folder.parents[1] / tracks_npz.FILE
+    try:
+        data = read_regular(path)
+    except OSError as error:
+        hint = "run it with --tracks"
+        raise BadInput(path, "", fault_of(error), hint=hint) from None
+    tracks = tracks_npz.tracks_from_npz(data, str(path))
+    number = {name: k for k, name in enumerate(tracks["frames"].tolist())}
+    unknown = [frame.id for frame in frames if frame.id not in number]
+    if unknown:
+        raise BadInput(path, unknown[0], "is no frame of these tracks")
+    at = [number[frame.id] for frame in frames]
+    pictures = [
+        array_from_png(frame.data(required_picture(frame, "tapvid")), f"{house.id}/{frame.id}")
+        for frame in frames
+    ]
+    rendered = frames[0].entry.facts
+    size = np.array([rendered["width_px"], rendered["height_px"]], np.float32)
+    occluded = tracks["occluded"][:, at]
+    seen = ~occluded.all(1)
+    return {
+        "video": np.stack(pictures)[..., :3],
+        "points": (tracks["points"][:, at] / size)[seen].astype(np.float32),
+        "occluded": occluded[seen],
+    }
+
+
+FORM = ViewForm(
+    "tapvid",
+    write_tapvid,
+    "`tapvid.pkl` as TAP-Vid's DAVIS: house id -> `video`, `points` (N, T, 2) as shares of width and height,"
+    " `occluded` (N, T); of films that were run with `--tracks`",
+    convention=Convention(
+        0.5, has_k=False, axes="x right, y down from the upper left corner, 0..1"
+    ),
+)
