@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from pbrs_farm.core.errors import ObjectMissing, PbrsError, StoreFailed
+from pbrs_farm.core.keys import house_key
 from pbrs_farm.regular_files import real_path
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import Store, check_key
@@ -49,6 +50,15 @@ class RootReader:
         """
         self._size_within(key, most_bytes)
         return self.store.get(key)
+
+    def has_house(self, house: str) -> bool:
+        """Whether the root has a file of a house; where the store does not answer, it may have."""
+        if self.size(house_key(house, "house.json")) is not None:
+            return True
+        try:
+            return next(iter(self.store.list(house_key(house, ""))), None) is not None
+        except StoreFailed:
+            return True
 
     def pieces(self, key: str, most_bytes: int) -> tuple[int, Iterator[bytes]]:
         """The object's size and its bytes piece by piece. Raises as get.

@@ -60,6 +60,7 @@ def _routes() -> list[Route]:
     return [
         Route("/", lists.homes),
         Route("/views", lists.views),
+        Route("/progress", lists.progress),
         Route("/homes/{house}", lists.home),
         Route("/homes/{house}/house.glb", house_scene.house_glb),
         Route("/homes/{house}/scene.json", house_scene.scene),
@@ -88,12 +89,15 @@ def _routes() -> list[Route]:
 
 def _not_found(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
-    return page(request, "message.html", error.status_code, text=error.detail)
+    # Of what is below a home, a way back to it.
+    house = request.path_params.get("house", "") if "view" in request.path_params else ""
+    home = house if request.app.state.board.queries.home(house) else ""
+    return page(request, "message.html", error.status_code, text=error.detail, home=home)
 
 
 def _failed(request: Request, error: Exception) -> Response:
     status = 404 if isinstance(error, BadInput) else 502
-    return page(request, "message.html", status, text=str(error))
+    return page(request, "message.html", status, text=str(error), home="")
 
 
 def _broken(_request: Request, _error: Exception) -> Response:

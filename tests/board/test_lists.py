@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gzip
+import html
 import json
+import shutil
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,29 +13,39 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
+from starlette.testclient import TestClient
 
+from pbrs_farm.board.board_state import new_board
 from pbrs_farm.board.index.house_rows import HouseRow, ViewRow
 from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
-from pbrs_farm.board.index.refresh import Refresher
+from pbrs_farm.board.index.refresh import Progress, Refresher
 from pbrs_farm.board.index.stored_houses import StoredHouses
 from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.options import BoardOptions
+from pbrs_farm.board.pages.words import OF_A_CANDIDATE, OF_A_SELECTION, OF_A_VIEW
 from pbrs_farm.board.root_reader import RootReader
+from pbrs_farm.board.serve import application
 from pbrs_farm.core import keys
 from pbrs_farm.core.keys import canonical_json
+from pbrs_farm.curate.teaching_rules import REASONS as RULE_REASONS
 from pbrs_farm.images import array_from_png, decode_photo
-from pbrs_farm.store import MemoryStore
+from pbrs_farm.sample.camera_report import Verdict
+from pbrs_farm.selection.verdicts import REASONS
+from pbrs_farm.store import MemoryStore, store_from_url
 from pbrs_farm.store.folder import FolderStore
+from pbrs_farm.store.secret import Secret
 from tests.board.roots import HEIGHT, WIDTH, label_arrays, write_house, write_root, write_view
+from tests.board.served import TOKEN, served
 
 VIEW = "/homes/a-1/views/0_0_1"
 
 
 def test_the_first_page_lists_homes_with_their_credit(client: httpx.Client) -> None:
-    html = client.get("/").text
-    assert "2 homes" in html
-    assert "Home a-1" in html
-    assert "3 views, 2 rooms" in html
-    assert html.count("by A. Person") == 1
+    page = client.get("/").text
+    assert "2 homes" in page
+    assert "Home a-1" in page
+    assert "3 views, 2 rooms" in page
+    assert page.count("by A. Person") == 1
     assert "No home is called so" in client.get("/?words=zzz").text
 
 
@@ -278,3 +290,65 @@ def test_what_is_not_there_is_told(client: httpx.Client) -> None:
         answer = client.get(path)
         assert answer.status_code == 404
         assert "All homes" in answer.text
+
+
+def test_a_home_that_is_gone_gets_a_page(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1",), "b-2": ("0_0_4",)})
+    with served(str(root), tmp_path / "cache") as client:
+        shutil.rmtree(root / "houses/b-2")
+        for path in ("/homes/b-2", "/homes/b-2/scene.json"):
+            answer = client.get(path)
+            assert answer.status_code == 404
+            assert "is not in the root any more" in answer.text or "no home b-2" in answer.text
+            assert "All homes" in answer.text
+        answer = client.get("/homes/a-1/views/9_9_9")
+        assert answer.status_code == 404
+        assert "no view 9_9_9 of this home" in answer.text
+        assert 'href="/homes/a-1"' in answer.text
+
+
+def test_the_head_names_the_root_and_no_path_of_the_machine(
+    client: httpx.Client, root: Path
+) -> None:
+    for path in ("/", "/views", "/homes/a-1", "/homes/a-1/views/0_0_1"):
+        text = client.get(path).text
+        assert f">{root.name}</span>" in text
+        assert str(root.parent) not in text
+
+
+def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {})
+    board = new_board(
+        store_from_url(str(root)), BoardOptions(cache=tmp_path, port=0, token=Secret(TOKEN))
+    )
+    client = TestClient(application(board), base_url="http://127.0.0.1")
+
+    def told(progress: Progress) -> tuple[str, str]:
+        board.refresher.progress = progress
+        return client.get("/progress").json()["text"], client.get("/").text
+
+    # Nothing was looked at yet: the root may be large, and is not called empty.
+    text, page = told(board.refresher.progress)
+    assert "Looking for homes" in text
+    assert text in page
+    assert "no home in this root yet" not in page
+    assert "reading.js" in page
+    text, page = told(Progress(1200, 7))
+    assert text.startswith("Reading homes: 7 of 1,200.")
+    assert text in page
+    board.refresher.refresh()
+    text, page = told(board.refresher.progress)
+    assert text == ""
+    assert "no home in this root yet" in page
+    assert "reading.js" not in page
+
+
+def test_words_of_the_board_are_explained(client: httpx.Client) -> None:
+    # Each rule of the sampler and each reason of a selection has a meaning.
+    assert set(OF_A_CANDIDATE) == {v.label.replace("_", " ") for v in Verdict}
+    assert set(OF_A_SELECTION) == {*REASONS, *RULE_REASONS.values()}
+    page = html.unescape(client.get("/homes/a-1/views/0_0_1").text)
+    for word in ("sector", "cut", "visible"):
+        assert f"<dt>{word}</dt><dd>{OF_A_VIEW[word]}</dd>" in page
+    assert "<dt>noise</dt>" not in page  # which this view does not tell
+    assert OF_A_CANDIDATE["below min score"] in html.unescape(client.get("/homes/a-1").text)

@@ -28,7 +28,17 @@ class Progress:
 
     n_houses: int = 0  # that are to be read, 0 when all are
     n_read: int = 0
+    is_listing: bool = False  # before the first look has found which homes there are
     fault: str = ""  # why the store cannot be read, or ""
+
+    @property
+    def text(self) -> str:
+        """What is being read, for people; "" when all is read, or nothing can be."""
+        if self.n_houses:
+            return f"Reading homes: {self.n_read:,} of {self.n_houses:,}. What is read already is shown."
+        return (
+            "Looking for homes in the root. A large one takes a while." if self.is_listing else ""
+        )
 
 
 class Refresher:
@@ -41,7 +51,7 @@ class Refresher:
         self._houses = StoredHouses(reader, finished)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="board-index", daemon=True)
-        self.progress = Progress()
+        self.progress = Progress(is_listing=True)
 
     def start(self) -> None:
         """Begin to look."""

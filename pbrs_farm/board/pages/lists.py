@@ -7,7 +7,7 @@ from typing import Final
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 
 from pbrs_farm.board.board_state import Board
 from pbrs_farm.board.index.queries import (
@@ -18,8 +18,11 @@ from pbrs_farm.board.index.queries import (
     page_number,
 )
 from pbrs_farm.board.pages.rendering import page
+from pbrs_farm.board.pages.words import OF_A_CANDIDATE, OF_A_SELECTION, listed
 from pbrs_farm.core.lighting import ALL_MODES
+from pbrs_farm.core.shown_text import shown
 
+_GONE: Final = "It was moved or removed, or the address is of another root."
 _MAX_VIEWS: Final = 120  # of a home that its own page lists
 
 
@@ -31,9 +34,14 @@ def board_of(request: Request) -> Board:
 
 def asked_home(request: Request) -> ListedHome:
     """The home that the path names; 404 when the index has none of that id."""
-    home = board_of(request).queries.home(request.path_params["house"])
+    house = request.path_params["house"]
+    board = board_of(request)
+    home = board.queries.home(house)
     if home is None:
-        raise HTTPException(404, "There is no such home.")
+        raise HTTPException(404, f"There is no home {shown(house)} in this root. {_GONE}")
+    # The index looks every few seconds or minutes.
+    if not board.reader.has_house(house):
+        raise HTTPException(404, f"The home {home.name} is not in the root any more. {_GONE}")
     return home
 
 
@@ -42,7 +50,7 @@ def asked_view(request: Request) -> ListedView:
     words = request.path_params
     view = board_of(request).queries.view(words["house"], words["view"])
     if view is None:
-        raise HTTPException(404, "There is no such view.")
+        raise HTTPException(404, f"There is no view {shown(words['view'])} of this home. {_GONE}")
     return view
 
 
@@ -59,6 +67,7 @@ def views(request: Request) -> Response:
     queries = board_of(request).queries
     wanted = filter_from_query(request.query_params)
     found = queries.views(wanted)
+    menus = queries.menus()
     # htmx asks for the results alone, but for the whole page when a reader goes back to it.
     headers = request.headers
     is_back = headers.get("hx-history-restore-request") == "true"
@@ -68,9 +77,10 @@ def views(request: Request) -> Response:
         "views_part.html" if is_part else "views.html",
         wanted=wanted,
         found=found,
-        menus=queries.menus(),
+        menus=menus,
         modes=[mode.value for mode in ALL_MODES],
         verdicts=VERDICTS,
+        words=listed((reason for reason, _text in menus["reason"]), OF_A_SELECTION),
         credits=sorted(_credits_of_homes(queries.home(h) for h in {v.house for v in found.rows})),
     )
     # The address leaves out what the form leaves empty.
@@ -87,4 +97,13 @@ def home(request: Request) -> Response:
     found = asked_home(request)
     views = board_of(request).queries.views_of(found.id)
     version = views[0].version if views else ""
-    return page(request, "home.html", home=found, views=views[:_MAX_VIEWS], version=version)
+    words = list(OF_A_CANDIDATE.items())
+    return page(
+        request, "home.html", home=found, views=views[:_MAX_VIEWS], version=version, words=words
+    )
+
+
+def progress(request: Request) -> Response:
+    """GET /progress: how far the root is read, as JSON; an empty text when it is."""
+    now = board_of(request).refresher.progress
+    return JSONResponse({"text": now.text, "fault": bool(now.fault)})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, Final
-from urllib.parse import quote, urlencode
+from urllib.parse import quote, unquote, urlencode
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.requests import Request
@@ -54,7 +54,7 @@ def page(request: Request, template: str, status: int = 200, **values: Any) -> H
     session = request.scope.get("session", "")
     common = {
         "request_path": request.url.path,
-        "root_name": shown(board.reader.url.removeprefix("file://"), 60),
+        "root_name": shown(_root_name(board.reader.url), 60),
         "progress": board.refresher.progress,
         "may_change": request.scope.get("may_change", False),
         "is_readonly": board.options.is_readonly,
@@ -64,6 +64,13 @@ def page(request: Request, template: str, status: int = 200, **values: Any) -> H
     }
     html = board.templates.get_template(template).render(common | values)
     return HTMLResponse(html, status)
+
+
+def _root_name(url: str) -> str:
+    """What a root is called: a folder by its own name, as whoever looks needs no path of this machine."""
+    if url.startswith("file://"):
+        return unquote(url.rstrip("/").rpartition("/")[2])
+    return url
 
 
 def home_url(house: str, rest: str = "") -> str:

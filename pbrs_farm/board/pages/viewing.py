@@ -20,6 +20,7 @@ from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
 from pbrs_farm.board.pages.recipe_words import recipe_words
 from pbrs_farm.board.pages.rendering import page
+from pbrs_farm.board.pages.words import OF_A_VIEW, listed
 from pbrs_farm.board.pictures import PLANES, packet, shown_png, thumbnail_jpeg
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
@@ -59,6 +60,7 @@ def view(request: Request) -> Response:
         files=_stored_file_rows(board.reader, found),
         before=before,
         after=after,
+        words=_words(facts),
         packed=json.dumps({"layers": layers, "instances": _packed_instances(facts)}),
     )
 
@@ -246,6 +248,14 @@ def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
         ("recipe's digest", facts.get("recipe")),
     ]
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
+
+
+def _words(facts: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the words of a view's page mean, of those that it shows."""
+    named = {name for name, _text in _camera_facts(facts)}
+    if _instances(facts):
+        named |= {"share", "visible", "cut"}
+    return listed(named, OF_A_VIEW)
 
 
 def _object(holder: dict[str, Any], name: str) -> dict[str, Any]:

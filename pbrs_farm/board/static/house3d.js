@@ -8,7 +8,7 @@ const box = by("scene");
 // As the map of `pbrs-farm cameras` has them.
 const REASONS = {
   outside_room: "#9a9a9a", near_obstacle: "#e6701d", not_above_floor: "#7b3ff2", enclosed: "#4a4a4a", filled_by_one: "#c2a500",
-  few_objects: "#d7263d", weak: "#e8a0bf", twin: "#8fd3fe", lower_score: "#5aa469", winner: "#0b5fff",
+  few_objects: "#d7263d", below_min_score: "#e8a0bf", near_duplicate: "#8fd3fe", lower_score: "#5aa469", winner: "#0b5fff",
 };
 if (box) start().catch((error) => (by("scene-status").textContent = `The home cannot be shown in 3D: ${error.message}`));
 
@@ -24,7 +24,7 @@ async function got(name) {
   const answer = await fetch(`${box.dataset.base}/${name}`);
   if (answer.ok) return answer;
   const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-  throw new Error(page.querySelector(".nothing")?.firstChild?.textContent || `answer ${answer.status}`);
+  throw new Error(page.querySelector(".nothing > p")?.textContent || `answer ${answer.status}`);
 }
 
 class HousePage {

@@ -14,7 +14,12 @@ export class Plane {
     this.onChange = () => {};
     this.element = document.createElement("div");
     this.element.className = "plane";
-    stage.append(this.element);
+    // A mark at a pixel, as large whatever the zoom.
+    this.mark = document.createElement("div");
+    this.mark.className = "pixel-mark";
+    this.mark.hidden = true;
+    this.marked = null;
+    stage.append(this.element, this.mark);
     this.pointers = new Map();
     stage.addEventListener("wheel", (event) => this.#wheel(event), { passive: false });
     stage.addEventListener("pointerdown", (event) => this.#down(event));
@@ -78,6 +83,18 @@ export class Plane {
     return isIn ? { x: column, y: row } : null;
   }
 
+  // Marks a pixel, null for none; the plane moves where it lies beside the stage.
+  setMark(point) {
+    this.marked = point;
+    if (point) {
+      const { clientWidth, clientHeight } = this.stage;
+      const x = ((point.x + 0.5) / this.width) * clientWidth * this.scale, y = ((point.y + 0.5) / this.height) * clientHeight * this.scale;
+      this.x = Math.min(-x + 0.95 * clientWidth, Math.max(-x + 0.05 * clientWidth, this.x));
+      this.y = Math.min(-y + 0.95 * clientHeight, Math.max(-y + 0.05 * clientHeight, this.y));
+    }
+    this.#draw();
+  }
+
   #draw() {
     // The plane never leaves the stage's edges.
     const { clientWidth: width, clientHeight: height } = this.stage;
@@ -86,6 +103,11 @@ export class Plane {
     this.element.style.transform = `translate(${this.x}px, ${this.y}px) scale(${this.scale})`;
     const perPixel = (width * this.scale) / this.width;
     this.element.classList.toggle("sharp", perPixel > 2);
+    this.mark.hidden = !this.marked;
+    if (this.marked) {
+      this.mark.style.left = `${this.x + (this.marked.x + 0.5) * perPixel}px`;
+      this.mark.style.top = `${this.y + (this.marked.y + 0.5) * perPixel}px`;
+    }
     this.onChange();
   }
 

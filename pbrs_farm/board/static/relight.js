@@ -25,7 +25,7 @@ async function start() {
   if (said.has("denoise")) by("denoise").checked = said.get("denoise") !== "0";
   let light;
   try {
-    light = await load(by("denoise").checked);
+    light = await load(by("denoise").checked, (text) => (by("status").textContent = text));
     plane.setSize(light.width, light.height);
     new Relight(canvas, light, said);
   } catch (error) {
@@ -33,14 +33,36 @@ async function start() {
   }
 }
 
-async function load(denoise) {
+// tell: is told what is being done, once a second and at every piece that comes.
+async function load(denoise, tell) {
   const { base, version } = stage.dataset;
-  const answer = await fetch(`${base}/light?denoise=${denoise ? 1 : 0}&v=${encodeURIComponent(version)}`);
+  const began = Date.now();
+  const made = denoise ? "Denoising the layers of light, once" : "Preparing the layers of light";
+  tell(`${made}…`);
+  const telling = setInterval(() => tell(`${made}: ${Math.round((Date.now() - began) / 1000)} s…`), 1000);
+  let answer;
+  try {
+    answer = await fetch(`${base}/light?denoise=${denoise ? 1 : 0}&v=${encodeURIComponent(version)}`);
+  } finally {
+    clearInterval(telling);
+  }
   if (!answer.ok) {
     const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-    throw new Error(page.querySelector(".nothing")?.firstChild?.textContent || `answer ${answer.status}`);
+    throw new Error(page.querySelector(".nothing > p")?.textContent || `answer ${answer.status}`);
   }
-  return packetOf(await answer.arrayBuffer());
+  return packetOf(await bytesOf(answer, tell));
+}
+
+async function bytesOf(answer, tell) {
+  const size = Number(answer.headers.get("content-length")), reader = answer.body.getReader();
+  const chunks = [];
+  let n = 0;
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    chunks.push(part.value);
+    n += part.value.length;
+    tell(`Loading the light: ${(n / 1e6).toFixed(1)} of ${(size / 1e6).toFixed(1)} MB…`);
+  }
+  return new Blob(chunks).arrayBuffer();
 }
 
 let lastState = [];

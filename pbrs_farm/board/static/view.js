@@ -40,7 +40,11 @@ function start() {
     image.hidden = true;
     image.alt = "";
   }
-  plane.onMove = (point) => probe.show(point);
+  plane.onMove = (point) => {
+    plane.setMark(null);
+    probe.show(point);
+  };
+  addPixelKeys(plane, probe);
   plane.onChange = show;
 
   // Controls write the state; show() draws it and keeps it in the address.
@@ -178,6 +182,39 @@ function markRows(boxes) {
     row.addEventListener("pointerenter", () => mark(row, true));
     row.addEventListener("pointerleave", () => mark(row, false));
   }
+}
+
+// The keyboard's pointer: a mark on the picture, moved by the arrow keys while the picture has the focus.
+function addPixelKeys(plane, probe) {
+  const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+  const ZOOMS = { "+": 1.6, "=": 1.6, "-": 1 / 1.6 };
+  const middle = () => ({ x: Math.floor(plane.width / 2), y: Math.floor(plane.height / 2) });
+  const show = (point) => {
+    plane.setMark(point);
+    probe.show(point);
+  };
+  stage.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const at = plane.marked ?? probe.last ?? middle();
+    const step = STEPS[event.key], far = event.shiftKey ? 10 : 1;
+    if (step) {
+      const within = (value, most) => Math.min(most - 1, Math.max(0, value));
+      show({ x: within(at.x + far * step[0], plane.width), y: within(at.y + far * step[1], plane.height) });
+    } else if (ZOOMS[event.key]) {
+      plane.zoomBy(ZOOMS[event.key]);
+      show(at);
+    } else if (event.key === "0") {
+      plane.fit();
+    } else if (event.key === "Escape") {
+      plane.setMark(null);
+    } else return;
+    event.preventDefault();
+    event.stopPropagation();
+  });
+  stage.addEventListener("focus", () => {
+    if (stage.matches(":focus-visible")) show(probe.last ?? middle());
+  });
+  stage.addEventListener("blur", () => plane.setMark(null));
 }
 
 function addKeys() {

@@ -114,6 +114,69 @@ def test_the_probe_tells_class_instance_metres_and_normal(tab: Any, base: str) -
         assert said in text
 
 
+def test_the_probe_is_moved_by_the_keyboard(tab: Any, base: str) -> None:
+    tab.goto(base + VIEW, wait_until="networkidle")
+    for _ in range(40):
+        tab.keyboard.press("Tab")
+        if tab.evaluate("document.activeElement.id") == "stage":
+            break
+    until(
+        tab, f"document.getElementById('probe').textContent.includes('{WIDTH // 2}, {HEIGHT // 2}')"
+    )
+    # Ten right, past the edge by as much, and one up: the chair's upper row is HEIGHT / 2.
+    for key in ["Shift+ArrowRight"] * 3 + ["ArrowUp"]:
+        tab.keyboard.press(key)
+    text = tab.inner_text("#probe")
+    assert f"{WIDTH - 1}, {HEIGHT // 2 - 1}" in text
+    assert "Wall, 7" in text
+    tab.keyboard.press("ArrowDown")
+    assert "Chair, 300" in tab.inner_text("#probe")
+    # The mark is on the pixel, also where the picture is zoomed.
+    for _ in range(3):
+        tab.keyboard.press("+")
+    place = tab.evaluate(
+        """() => {
+          const [mark, plane] = [".pixel-mark", ".plane"].map((s) => document.querySelector(s).getBoundingClientRect());
+          return [(mark.x + mark.width / 2 - plane.x) / plane.width, (mark.y + mark.height / 2 - plane.y) / plane.height];
+        }"""
+    )
+    assert place == pytest.approx([(WIDTH - 0.5) / WIDTH, (HEIGHT // 2 + 0.5) / HEIGHT], abs=0.004)
+    assert tab.url.endswith(VIEW)
+    tab.keyboard.press("Escape")
+    assert not tab.is_visible(".pixel-mark")
+
+
+def test_relighting_says_what_it_does_until_it_is_there(tab: Any, base: str) -> None:
+    tab.route("**/light?*", lambda route: (tab.wait_for_timeout(1500), route.continue_()))
+    tab.goto(base + VIEW + "/relight")
+    until(
+        tab, "/layers of light.*: [1-9]\\d* s/.test(document.getElementById('status').textContent)"
+    )
+    tab.wait_for_selector("#stage[data-settled=yes]")
+    assert tab.inner_text("#status") == ""
+
+
+def test_a_page_of_a_root_that_is_read_shows_what_came_by_itself(tab: Any, base: str) -> None:
+    said = ["Reading homes: 3 of 9."]
+    page = httpx.get(base + "/").text
+    strip = '<p class="strip" id="reading" role="status">Looking for homes</p></header>'
+    script = '<script type="module" src="/static/reading.js"></script></head>'
+    reading = page.replace("</header>", strip, 1).replace("</head>", script, 1)
+
+    def progress(route: Any) -> None:
+        route.fulfill(json={"text": said[0], "fault": False})
+
+    def first(route: Any) -> None:
+        route.fulfill(body=reading if said[0] else page, content_type="text/html")
+
+    tab.route("**/progress", progress)
+    tab.route(base + "/", first)
+    tab.goto(base + "/")
+    tab.wait_for_selector("#reading:has-text('3 of 9')")
+    said[0] = ""
+    tab.wait_for_selector("#reading", state="detached")
+
+
 def test_a_wheel_zooms_to_the_pixel_and_fit_comes_back(tab: Any, base: str) -> None:
     tab.goto(base + VIEW, wait_until="networkidle")
     tab.hover("#stage")
