@@ -136,7 +136,7 @@ def values_of_table(table: Mapping[str, Any], model: type[Record], file: str) ->
     for written, value in table.items():
         name = written.replace("-", "_")
         if name not in known:
-            hint = did_you_mean(flag(name), [flag(one) for one in known])
+            hint = did_you_mean(name, known)
             raise BadInput(file, written, "no such option", hint=hint)
         field, shown = known[name]
         info = model.model_fields[field]

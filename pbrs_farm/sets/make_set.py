@@ -84,6 +84,9 @@ def claim_folder(out: Path, data_set: DataSet) -> None:
     others = [path.name for path in sorted(out.iterdir())] if out.is_dir() else []
     ours = (_PARTS, data_set.file)
     others = [name for name in others if name not in ours and not name.startswith(".")]
+    sets = [name for name in others if name.endswith(".toml")]
+    if sets:
+        raise BadInput(out, sets[0], "is another set's file", hint="name a new folder")
     if others:
         raise BadInput(out, others[0], "is no part of this set", hint="name a new folder")
     FolderStore(out).put(data_set.file, data_set.data)

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+import pbrs_farm
 from pbrs_farm.core import keys
 from pbrs_farm.core.house_split import SPLITS, home_of, split_of_house
 from pbrs_farm.curate.teaching_rules import RuleVerdict
@@ -36,7 +37,7 @@ def card_text(data_set: DataSet, made: Sequence[MadeViews]) -> str:
         "## Made again, and checked",
         _COMMAND.format(file=data_set.file, name=data_set.name),
         f"The file has the digest `{keys.sha256(data_set.data)}` (SHA-256). Files are equal to the last bit by one version of "
-        "pbrs_farm on processors of one kind; another kind may round a last digit otherwise.",
+        f"pbrs_farm (here {pbrs_farm.__version__}) on processors of one kind; another kind may round a last digit otherwise.",
         _credits(made),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import pbrs_farm
 from pbrs_farm.cli import main
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from tests.sets.small_sets import digests, small_set, sums
@@ -69,6 +70,7 @@ def test_the_forms_have_the_views_that_are_kept(made: Path) -> None:
 
 def test_the_card_counts_what_there_is(made: Path) -> None:
     card = (made / "README.md").read_text()
+    assert f"pbrs_farm (here {pbrs_farm.__version__})" in card
     assert card.startswith("# Small\n")
     assert "## views: 4 views" in card
     assert "## panoramas: 1 view\n" in card
@@ -142,6 +144,10 @@ def test_another_folder_is_refused_in_one_line(
     other.write_text(file.read_text() + "# more\n")
     assert main(["make", str(other), "--out", str(made)]) == 1
     assert "small.toml: holds another set: the file differs" in capsys.readouterr().err
+    renamed = tmp_path / "renamed.toml"
+    renamed.write_text(file.read_text())
+    assert main(["make", str(renamed), "--out", str(made)]) == 1
+    assert "small.toml: is another set's file" in capsys.readouterr().err
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
     assert main(["make", str(file), "--out", str(tmp_path / "mine")]) == 1
