@@ -41,6 +41,7 @@ class Result(Record):
 
     batches: tuple[tuple[str, ...], ...] = ()  # of views to be made, only after geometry
     n_views: int = 0
+    left_out: str = ""  # why pictures that this machine cannot make were left out
 
 
 @dataclass(frozen=True, slots=True)

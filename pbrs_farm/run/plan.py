@@ -105,6 +105,11 @@ def needed_of_house(step: str, house_id: str) -> tuple[str, ...]:
     return tuple(name for name in STEPS[step].needs if not STEPS[name].per_view)
 
 
+def has_light(want: Wanted) -> bool:
+    """Whether pictures are made besides those of OpenGL, which a machine without it then leaves out."""
+    return any(mode.groups for mode in want.modes)
+
+
 def view_steps(want: Wanted) -> tuple[str, ...]:
     """Steps of one view in the order they run. Either light mode makes both: one trace fills both.
 
@@ -113,7 +118,7 @@ def view_steps(want: Wanted) -> tuple[str, ...]:
     """
     names = ["truth"]
     names += [name for name in OPENGL_STEPS if Mode(name) in want.modes]
-    if any(m.groups for m in want.modes):
+    if has_light(want):
         names += ["light", "develop"]
     return (*names, "view")
 

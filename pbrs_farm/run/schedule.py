@@ -138,7 +138,7 @@ class Schedule:
         summary.peak_mb = max(summary.peak_mb, event.peak_mb)
         key = (event.house_id, event.view_id or "")
         # What a machine lacks is a fault where nothing else was asked for.
-        if event.kind == "lacking" and not any(m.groups for m in self._run.want.modes):
+        if event.kind == "lacking" and not plan.has_light(self._run.want):
             event = replace(event, kind="failed")
         if event.kind in ("done", "kept"):
             self._take_done(event)

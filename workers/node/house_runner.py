@@ -72,6 +72,7 @@ class HouseRunner:
         self._store = store
         self._n_threads = n_threads
         self._house_cache = HouseCache()
+        self._lacks_opengl = ""  # why this machine makes no pictures of OpenGL, once it is known
         self._spec: Callable[[str], JobSpec] = lru_cache(maxsize=4)(self._read_spec)
 
     def run(self, request: TaskRequest, on_step: OnText) -> Result:
@@ -95,7 +96,7 @@ class HouseRunner:
                     self._step(store, request, spec, on_step, step)
             for view in request.views:
                 for step in steps_of_stage(spec, request.stage):
-                    self._step(store, request, spec, on_step, step, view=view)
+                    self._view_step(store, request, spec, on_step, step, view)
         elif request.stage == REDUCE:
             on_step("finish")
             finish_house(store, request.house)
@@ -108,7 +109,8 @@ class HouseRunner:
             merge_job(self._store, spec, on_step)
             if spec.reference:
                 self._select(spec, on_step)
-        return Result(n_views=len(request.views))
+        left_out = self._lacks_opengl if request.stage == GL else ""
+        return Result(n_views=len(request.views), left_out=left_out)
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
         """What the markers' names say of a house: see workers.runner.Survey.
@@ -183,6 +185,29 @@ class HouseRunner:
         chosen = plan.chosen_views(rows, spec.n_views, spec.recipe)
         placed = [(v, rooms[v]) for v in chosen]
         return batches_from_views(placed, spec.seconds_per_view, spec.min_batches)
+
+    def _view_step(
+        self,
+        store: Store,
+        request: TaskRequest,
+        spec: JobSpec,
+        on_step: OnText,
+        step: str,
+        view: str,
+    ) -> None:
+        """A step of a view; where there is no OpenGL, its pictures are left out, if there are others.
+
+        As a run on one machine does. Every further view would find the same: it is not tried again.
+        """
+        may_lack = step in plan.OPENGL_STEPS and plan.has_light(want_of(spec))
+        if may_lack and self._lacks_opengl:
+            return
+        try:
+            self._step(store, request, spec, on_step, step, view=view)
+        except MachineFailed as error:
+            if not may_lack:
+                raise
+            self._lacks_opengl = str(error)
 
     def _step(
         self,

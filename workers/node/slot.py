@@ -125,6 +125,7 @@ class Slot:
         self._sleep = sleep
         self._store: Store | None = None
         self._numbers = itertools.count()
+        self._is_lack_told = False  # that this machine leaves pictures out
         self._heartbeat_at = 0.0  # next heartbeat of the leases
         self._ended: dict[str, Finished] = {}  # done, and the ledger does not know yet
         self._report_at = 0.0  # when done tasks are reported at the latest
@@ -170,6 +171,9 @@ class Slot:
                     held = []
                 continue
             result = Result.model_validate(ended.body)
+            if result.left_out and not self._is_lack_told:
+                self._is_lack_told = True
+                _log.warning("pictures of OpenGL are left out here: %s", result.left_out)
             end = Finished(ended.seconds, result.batches, result.n_views or len(request.views))
             self._ended[str(first.task)] = end
             _log.info("%s of job %s: done in %.1f s", first.task, first.job, ended.seconds)
