@@ -75,7 +75,7 @@ def _export(args: argparse.Namespace) -> int:
         n_views, n_files = export(
             folder, out, args.to, selection=args.selection, choice=choice, shares=shares
         )
-    echo(f"{out}: {n_views} views, {n_files} files")
+    echo(f"{out}: {counted(n_views, 'view')}, {counted(n_files, 'file')}")
     for remark in remarks_of(out):
         warn(remark)
     return 0

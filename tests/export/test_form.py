@@ -77,7 +77,7 @@ FORM = ViewForm("my-lines", write, "`lines.txt`: a line a view", has_classes=Tru
 
 @pytest.mark.kinds("form")
 def test_a_file_is_all_that_a_new_form_takes(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "forms"
     folder.mkdir()
@@ -90,6 +90,7 @@ def test_a_file_is_all_that_a_new_form_takes(
     (tmp_path / "mine.csv").write_text("from,id,name\nchair,1,seat\n")
     words = ["--to", "my-lines", "--classes", str(tmp_path / "mine.csv"), "--out"]
     assert main(["export", str(root), *words, str(tmp_path / "out")]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'out'}: 2 views, 1 file\n"
     lines = (tmp_path / "out/lines.txt").read_text().splitlines()
     assert [line.split()[1] for line in lines] == ["seat", "seat"]
     choice = Choice(classes=class_map(tmp_path / "mine.csv"))

@@ -97,7 +97,9 @@ def test_a_scene_is_a_home_through_one_pinhole_and_the_table_has_the_splits(root
     assert sorted({p.name for p in written.iterdir() if p.is_dir()}) == [
         f.scene.name for f in frames
     ]
-    assert "does NOT hold" in (written / "README.md").read_text()
+    card = (written / "README.md").read_text()
+    assert "Frames: 4. Scenes: 4." in card
+    assert "does NOT hold" in card
 
 
 def test_depth_lies_along_the_ray_and_positions_where_the_camera_sees_them(root, written):

@@ -344,7 +344,7 @@ def _card(out: Path) -> str:
         )  # fmt: skip
     return f"""# Views of pbrs_farm in the layout of Hypersim
 
-{frames} frames of {len(rows)} scenes. `index.csv` says which view each is, `{_CREDITS}` whom to name.
+Frames: {frames}. Scenes: {len(rows)}. `index.csv` says which view each is, `{_CREDITS}` whom to name.
 
 - The camera that readers assume (1024 x 768, 886.81 px) {camera}; `{hypersim.CAMERAS_CSV}` has the right one of each.
 - `depth_meters` is the distance along the ray, NaN where nothing is; `position` and normals are 0 there, `semantic`, `semantic_instance` and `render_entity_id` -1.
