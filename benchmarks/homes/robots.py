@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import mujoco
 import numpy as np
 import trimesh
+from pxr import Usd, UsdGeom, UsdPhysics
 from scipy.spatial import ConvexHull, cKDTree
+from scipy.spatial.transform import Rotation
 
 from benchmarks.figures import write_report
 from pbrs_farm.core.arrays import F64
@@ -44,6 +47,8 @@ UNITS: Final = {
     "joints.hull_mm": "mm that a face of a thing lies beyond its collision parts at most",
     "joints.over_mm": "mm that collision parts reach beyond their thing, 95th percentile of things",
     "joints.fixed": "loose things that found no rest and stand fixed",
+    "joints.joints": "joints that homes have",
+    "joints.roundtrip": "share of them that MuJoCo reads of MJCF and URDF, and OpenUSD of USD, as ours",
 }
 HOMES: Final = tuple(f"made:{70201 + k}" for k in range(20))
 _REST_S: Final = 2.0
@@ -53,6 +58,18 @@ _OVER_M: Final = 0.003
 _VALUES: Final = 8  # of a joint whose bounds are wanted
 _ROOM_M: Final = 0.05
 _NEAR: Final = 0.05  # share of its way by which a part may stop short
+_SAME: Final = 1e-4  # metres, radians, and of unit axes
+_Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+@dataclass(frozen=True, eq=False)
+class ReadJoint:
+    """A joint as another program read it, in the world, z up."""
+
+    kind: str  # revolute or prismatic
+    point: F64  # (3,) on its axis
+    axis: F64  # (3,) unit
+    limits: F64  # (2,) radians or metres
 
 
 def main() -> None:
@@ -80,6 +97,8 @@ def figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "joints.hull_mm": round(max(row["hull_mm"] for row in rows), 2),
         "joints.over_mm": round(float(np.percentile([x for r in rows for x in r["over"]], 95)), 2),
         "joints.fixed": sum(row["fixed"] for row in rows),
+        "joints.joints": (n := sum(row["joints"] for row in rows)),
+        "joints.roundtrip": round(1 - sum(len(row["unlike"]) for row in rows) / max(n, 1), 4),
     }
 
 
@@ -89,13 +108,16 @@ def measured(house: House) -> dict[str, Any]:
     short, over = hull_distances(home)
     row: dict[str, Any] = {"hull_mm": short, "over": over, "loads": 0, "pushed": 0, "jammed": []}
     row |= {"settle_mm": np.inf, "deepest_mm": np.inf, "fixed": 0}
+    row |= {"joints": sum(len(p.links) - 1 for p in home.pieces), "unlike": []}
     with tempfile.TemporaryDirectory() as scratch:
-        export_house(house, Path(scratch) / "home", "mjcf")
-        (path,) = (Path(scratch) / "home").glob("*.xml")
+        folders = {form: Path(scratch) / form for form in ("mjcf", "urdf", "usd")}
+        for form, folder in folders.items():
+            export_house(house, folder, form)
         try:
-            model = mujoco.MjModel.from_xml_path(str(path))
+            model = mujoco.MjModel.from_xml_path(str(next(folders["mjcf"].glob("*.xml"))))
         except ValueError as error:
             return row | {"fault": str(error)}
+        row["unlike"] = unlike(home, folders)
     row["loads"] = 1
     loose = sum(bool(p.surfaces) and not p.is_fixed for p in home.pieces)
     row["fixed"] = loose - int((model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).sum())
@@ -173,6 +195,78 @@ def _jammed(model: Any, names: Sequence[str]) -> list[str]:
                 break
         stops |= ~there
     return [name for name, stop in zip(names, stops, strict=True) if stop]
+
+
+def unlike(home: ExportedHome, folders: Mapping[str, Path]) -> list[str]:
+    """The joints that one of the forms' files does not hold as the home has them, and the form."""
+    read = {
+        "mjcf": joints_of_mujoco(next(folders["mjcf"].glob("*.xml"))),
+        "urdf": joints_of_mujoco(next(folders["urdf"].glob("*.urdf"))),
+        "usd": joints_of_usd(next(folders["usd"].glob("*.usdc"))),
+    }
+    found = []
+    for piece in home.pieces:
+        for k, link in enumerate(piece.links[1:], 1):
+            joint = next(j for j in piece.item.joints if j.part == link.part)
+            for form, rows in read.items():
+                name = f"{piece.name}/{k}" if form == "usd" else body_name(piece, link.part)
+                # A loose thing of MJCF has moved to where it rests.
+                placed = form != "mjcf" or piece.is_fixed
+                if not _is_same(joint, rows.get(name), placed):
+                    found.append(f"{form}: {body_name(piece, link.part)}")
+    return found
+
+
+def joints_of_mujoco(path: Path) -> dict[str, ReadJoint]:
+    """What MuJoCo reads of a model or a URDF, by the joint's name."""
+    model = mujoco.MjModel.from_xml_path(str(path))
+    state = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, state)
+    found = {}
+    for k in range(model.njnt):
+        kind = {2: "prismatic", 3: "revolute"}.get(int(model.jnt_type[k]))
+        if kind:
+            row = ReadJoint(kind, state.xanchor[k], state.xaxis[k], model.jnt_range[k])
+            found[model.joint(k).name] = row
+    return found
+
+
+def joints_of_usd(path: Path) -> dict[str, ReadJoint]:
+    """What OpenUSD reads of a stage, by item and number: `Fridge/1`."""
+    stage = Usd.Stage.Open(str(path))
+    found = {}
+    for prim in stage.Traverse():
+        kind = prim.GetTypeName().removeprefix("Physics").removesuffix("Joint").lower()
+        if kind not in ("revolute", "prismatic"):
+            continue
+        joint = UsdPhysics.Joint(prim)
+        (body,) = joint.GetBody0Rel().GetTargets()
+        xform = UsdGeom.Xformable(stage.GetPrimAtPath(body))
+        world = np.array(xform.ComputeLocalToWorldTransform(Usd.TimeCode.Default())).T
+        turn = joint.GetLocalRot0Attr().Get()
+        towards = Rotation.from_quat([*turn.GetImaginary(), turn.GetReal()]).apply([1.0, 0, 0])
+        point = world[:3, :3] @ np.array(joint.GetLocalPos0Attr().Get()) + world[:3, 3]
+        limits = [prim.GetAttribute(f"physics:{end}Limit").Get() for end in ("lower", "upper")]
+        limits = np.radians(limits) if kind == "revolute" else np.array(limits)
+        name = f"{prim.GetParent().GetName()}/{prim.GetName().removeprefix('Joint_')}"
+        found[name] = ReadJoint(kind, point, world[:3, :3] @ towards, limits)
+    return found
+
+
+def _is_same(joint: Joint, read: ReadJoint | None, is_placed: bool) -> bool:
+    """Whether a joint of the home (y up) is what was read (z up)."""
+    if read is None or read.kind != joint.kind.value:
+        return False
+    if np.abs(read.limits - (joint.lower, joint.upper)).max() > _SAME:
+        return False
+    if not is_placed:
+        return True
+    axis = _Z_UP @ np.array(joint.axis)
+    if np.abs(read.axis - axis).max() > _SAME:
+        return False
+    # A slide may be told anywhere; a hinge lies anywhere on its axis.
+    off = np.cross(read.point - _Z_UP @ np.array(joint.point), axis)
+    return read.kind == "prismatic" or float(np.linalg.norm(off)) < _SAME
 
 
 def hull_distances(home: ExportedHome) -> tuple[float, list[float]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
 from pbrs_farm.export.form import HomeForm, form_names, form_of, new_folder
+from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
@@ -57,6 +58,9 @@ def _home_form(name: str) -> HomeForm:
 def _write_home(home: ExportedHome, folder: Path, form: HomeForm) -> int:
     folder.mkdir(exist_ok=True)
     n_files = form.write(home, folder)
+    if form.up:
+        (folder / GRASPS).write_bytes(grasps_json(home, form.up))
+        n_files += 1
     if home.credit:
         (folder / "ATTRIBUTION.txt").write_text(f"{home.credit}\n", "utf-8")
         n_files += 1

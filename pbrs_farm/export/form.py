@@ -89,7 +89,8 @@ class HomeForm:
     """A form of homes, as scenes of other simulators; it is listed as a ViewForm is.
 
     write: called with each home and its own empty folder; returns the number of files. remark: what
-    a user should know of each home that was written, "" for nothing.
+    a user should know of each home that was written, "" for nothing. up: the axis that is up in the
+    frames of its bodies, "y" or "z", so that a grasps.json can be written beside them; "" for none.
     """
 
     of: ClassVar[str] = "homes"
@@ -98,6 +99,7 @@ class HomeForm:
     write: WriteHome
     help: str
     remark: str = ""
+    up: str = ""
 
 
 Form: TypeAlias = ViewForm | HomeForm

@@ -93,11 +93,6 @@ def links_of(
     return tuple(found)
 
 
-def travel(joint: Joint) -> tuple[float, float]:
-    """How far a joint goes from where its part stands: (back, on), radians or metres, back <= 0."""
-    return min(joint.lower - joint.value, 0.0), max(joint.upper - joint.value, 0.0)
-
-
 def effort_of(joint: Joint) -> tuple[float, float]:
     """(damping, friction) of a joint as furniture has them: N s/m and N of slides, N m s and N m of hinges.
 

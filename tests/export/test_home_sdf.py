@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -12,13 +13,17 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import corners_of_surfaces
+from pbrs_farm.core.house import Box, corners_of_surfaces
+from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.export.forms.sdf import write_sdf
 from pbrs_farm.export.home_pieces import ExportedHome, Piece, exported_home
 from pbrs_farm.formats.glb import gltf_from_glb
 from pbrs_farm.geometry.convex_parts import hull_faces
+from pbrs_farm.geometry.opened import item_at, moved_surface
 from tests.export.homes import repaired_home, stored
+from tests.export.test_home_mjcf import small_home
+from tests.geometry.test_opened import cupboard
 
 _HOME = exported_home(repaired_home())
 
@@ -91,36 +96,49 @@ def test_the_verb_writes_a_world_whose_models_are_the_building_and_the_things(
     assert ET.parse(path).getroot().get("version") == "1.9"
     assert numbers(world_of(path), "gravity") == [0.0, 0.0, -9.81]
     models = {m.get("name"): m for m in world_of(path).findall("model")}
-    assert list(models) == ["building", *(piece.name for piece in _HOME.things)]
+    doors = [piece.name for piece in _HOME.building if len(piece.links) > 1]
+    assert list(models) == ["building", *doors, *(piece.name for piece in _HOME.things)]
     assert models["building"].findtext("static") == "true"
     for piece in _HOME.things:
         static = models[piece.name].findtext("static")
-        assert static == ("true" if piece.is_fixed else "false")
+        stands = piece.is_fixed and len(piece.links) == 1
+        assert static == ("true" if stands else "false")
+        if len(piece.links) > 1:
+            kinds = [joint.get("type") for joint in models[piece.name].findall("joint")]
+            assert kinds.count("fixed") == piece.is_fixed
+            assert len(kinds) == len(piece.links) - 1 + piece.is_fixed
     assert {m.findtext("static") for m in models.values()} == {"true", "false"}
 
 
 def test_every_link_has_what_it_needs_and_every_mesh_exists(written: Path) -> None:
     pieces = {piece.name: piece for piece in _HOME.things}
     for model in world_of(written).findall("model"):
-        (link,) = model.findall("link")
-        names = [child.get("name") for child in link if child.get("name")]
-        assert len(names) == len(set(names))
+        links = model.findall("link")
+        for link in links:
+            names = [child.get("name") for child in link if child.get("name")]
+            assert len(names) == len(set(names))
+            assert len(link.findall("visual")) <= 1
+        assert len(model.findall("link/visual")) >= 1
         piece = pieces.get(model.get("name") or "")
         if piece is not None:
+            assert len(links) == len(piece.links)
+            masses = [numbers(link, "inertial/mass")[0] for link in links]
+            assert min(masses) > 0
+        if piece is not None and len(links) == 1:
+            (link,) = links
             assert len(link.findall("collision")) == len(piece.colliders) > 0
             assert numbers(link, "inertial/mass") == pytest.approx([piece.mass_kg])
             moments = [numbers(link, f"inertial/inertia/{k}")[0] for k in ("ixx", "iyy", "izz")]
             assert min(moments) > 0
             assert 2 * max(moments) <= sum(moments) * (1 + 1e-6)
-        assert len(link.findall("visual")) == 1
     uris = {uri.text or "" for uri in world_of(written).iter("uri")}
     assert all((written.parent / uri).stat().st_size > 0 for uri in uris)
     assert uris == {f"meshes/{p.name}" for p in (written.parent / "meshes").iterdir()}
 
 
 def test_poses_put_the_vertices_of_a_mesh_where_the_item_has_them(tmp_path: Path) -> None:
-    things = tuple(turned(piece) for piece in _HOME.things[:4])
-    home = ExportedHome(_HOME.house, (*_HOME.building, *things))
+    things = tuple(turned(piece) for piece in _HOME.things if len(piece.links) == 1)[:4]
+    home = ExportedHome(_HOME.house, (*_HOME.building[:1], *things))
     write_sdf(home, tmp_path)
     models = world_of(tmp_path / f"{home.house.id}.sdf").findall("model")
     for piece, model in zip(things, models[1:], strict=True):
@@ -184,6 +202,53 @@ def test_a_spot_looks_where_its_lamp_looks(tmp_path: Path) -> None:
     got = (pose(model) @ pose(light))[:3, :3] @ direction
     assert np.allclose(got, z_up(np.array(looks)), atol=1e-6)
     assert numbers(light, "spot/outer_angle") == [1.0]
+
+
+@pytest.mark.parametrize("kind", list(JointKind))
+@pytest.mark.parametrize("stands_at", [0.0, 0.2])
+def test_a_part_moves_by_its_joint_as_the_homes_does(
+    tmp_path: Path, kind: JointKind, stands_at: float
+) -> None:
+    frame = np.eye(4)
+    frame[:3, :3] = Rotation.from_euler("y", 0.6).as_matrix()
+    frame[:3, 3] = [0.2, 0.0, 0.4]
+    shut = cupboard(kind)
+    assert shut.box is not None
+    shut = replace(
+        shut, surfaces=tuple(moved_surface(s, frame) for s in shut.surfaces),
+        joints=tuple(joint.placed(frame) for joint in shut.joints),
+        box=Box(placed(frame, shut.box.centre), shut.box.half, frame[:3, :3]),
+    )  # fmt: skip
+    write_sdf(exported_home(small_home(item_at(shut, "front", stands_at))), tmp_path)
+    model = world_of(tmp_path / "small.sdf").findall("model")[1]
+    body, part = model.findall("link")
+    at, joint = model.findall("joint")
+    assert model.findtext("static") == "false"
+    assert (at.get("type"), at.findtext("parent")) == ("fixed", "world")
+    assert at.findtext("child") == joint.findtext("parent") == body.get("name")
+    assert joint.findtext("child") == part.get("name")
+    assert joint.get("type") == str(kind)
+    limits = [numbers(joint, f"axis/limit/{end}")[0] for end in ("lower", "upper")]
+    assert limits == pytest.approx([0, shut.joints[0].upper])
+    point, axis = np.array(numbers(joint, "pose")[:3]), np.array(numbers(joint, "axis/xyz"))
+    visual = part.find("visual")
+    assert visual is not None
+    mesh = bounds_of_glb(tmp_path / (visual.findtext("geometry/mesh/uri") or ""))
+    box_corners = np.array(list(itertools.product(*mesh.T)))
+    for value in (0.0, 0.3):
+        moved = placed(pose(visual), box_corners)
+        if kind is JointKind.PRISMATIC:
+            moved = moved + value * axis
+        else:
+            moved = Rotation.from_rotvec(value * axis).apply(moved - point) + point
+        expected = item_at(shut, "front", value).surfaces[1].positions
+        got = placed(pose(model), moved)
+        assert max(np.abs(got - w).max(1).min() for w in z_up(expected)) < 1e-4
+    masks = {c.findtext("surface/contact/collide_bitmask") for c in part.findall("collision")}
+    assert masks == {"2"}
+    still = {c.findtext("surface/contact/collide_bitmask") for c in body.findall("collision")}
+    assert still == {"1"}
+    assert part.findtext("gravity") == "false"
 
 
 def test_no_model_has_a_name_that_sdf_or_the_building_has(tmp_path: Path) -> None:

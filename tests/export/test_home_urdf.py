@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -9,11 +10,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.geometry.opened import item_at
 from tests.export.test_home_mjcf import loose, small_home
-from tests.geometry.test_opened import cupboard
+from tests.geometry.test_opened import cupboard, thing
 
 
 @pytest.mark.parametrize("kind", list(JointKind))
@@ -41,6 +43,32 @@ def test_mujoco_reads_a_part_that_moves_as_the_homes_does(
         expected = item_at(shut, "front", value).surfaces[1].positions
         assert got.min(0) == pytest.approx(expected.min(0), abs=1e-5)
         assert got.max(0) == pytest.approx(expected.max(0), abs=1e-5)
+
+
+def test_a_floor_of_no_thickness_and_a_wall_with_a_doorway_load_and_stay_open(
+    tmp_path: Path,
+) -> None:
+    home = small_home(
+        replace(thing("left", (-1, 0, 0), (-0.5, 2, 0.1)), kind=ItemKind.WALL),
+        loose("mug", (1, 0, 1), (1.1, 0.1, 1.1)),
+    )
+    right = thing("right", (0.5, 0, 0), (1, 2, 0.1)).surfaces
+    floor, wall, *others = home.items
+    (top,) = floor.surfaces
+    level = top.positions[top.faces][..., 1].min(1) > -0.01
+    floor = replace(floor, surfaces=(replace(top, faces=top.faces[level]),))
+    wall = replace(wall, surfaces=wall.surfaces + right)
+    export_house(replace(home, items=(floor, wall, *others)), tmp_path, "urdf")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "small.urdf"))
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    # A ray through the doorway, z up, meets nothing; one beside it meets the wall.
+    for x, is_open in ((0.0, True), (0.7, False)):
+        far = mujoco.mj_ray(
+            model, state, np.array([x, 1.0, 1.0]), np.array([0, -1.0, 0]), None, 1, -1,
+            np.zeros(1, np.int32),
+        )  # fmt: skip
+        assert (far < 0) == is_open
 
 
 def test_every_file_is_there_and_loose_things_float(tmp_path: Path) -> None:

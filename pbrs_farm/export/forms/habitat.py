@@ -124,4 +124,5 @@ FORM = HomeForm(
     "a Habitat data set: the building as stage, an object with collision parts for each thing,"
     " regions, and `navigable/<id>.json`, the outlines where a disc of 0.2 m can stand",
     remark=COLLIDES,
+    up="y",
 )

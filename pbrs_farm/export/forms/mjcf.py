@@ -269,4 +269,5 @@ FORM = HomeForm(
     write_mjcf,
     "a model of MuJoCo (extra `physics`): `<id>/<id>.xml`, `meshes/` and `textures/`, metres, z up; doors"
     " and drawers have joints, loose things are free bodies at rest",
+    up="z",
 )

@@ -2,11 +2,14 @@
 
 Metres, z up, gravity; a static model for the building, a model a thing with visual, convex collision
 parts, mass and lamps. Meshes stay y up, as glTF asks and Gazebo reads them: their poses turn them.
+What opens has a link and a joint for each part, and stands shut: a world tells joints no state.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
@@ -15,10 +18,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import Surface
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_glb import glb_of_pieces
+from pbrs_farm.export.home_links import BODY, effort_of
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, digest_name
 from pbrs_farm.geometry.convex_parts import hull_faces
+from pbrs_farm.geometry.opened import moved_surface
 
 # (x, y, z) with y up -> (x, -z, y) with z up.
 _Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
@@ -27,6 +35,8 @@ _BRIGHT_CD: Final = 100.0  # is intensity 1: Gazebo's pictures have no exposure
 _FAINT: Final = 0.01  # a light ends where this is left of intensity 1 at a metre
 _LEAST_RANGE_M: Final = 1.0
 _BUILDING: Final = "building"
+# What stands still meets all but the parts that open: these meet loose things alone.
+_STILL, _MOVING = 1, 2
 _RESERVED: Final = (_BUILDING, "world")
 
 
@@ -51,12 +61,17 @@ class _World:
         world = ET.SubElement(self.document, "world", name=home.house.id)
         _put(world, "gravity", *_GRAVITY)
         self._building(world)
-        for piece, name in zip(home.things, _model_names(home.things), strict=True):
-            self._thing(world, piece, name)
+        doors = tuple(piece for piece in home.building if len(piece.links) > 1)
+        pieces = (*doors, *home.things)
+        for piece, name in zip(pieces, _model_names(pieces), strict=True):
+            if len(piece.links) > 1:
+                self._opening(world, piece, name)
+            else:
+                self._thing(world, piece, name)
         ET.indent(self.document)
 
     def _building(self, world: ET.Element) -> None:
-        pieces = self._home.building
+        pieces = [piece for piece in self._home.building if len(piece.links) == 1]
         model = ET.SubElement(world, "model", name=_BUILDING)
         ET.SubElement(model, "static").text = "true"
         link = ET.SubElement(model, "link", name="link")
@@ -64,26 +79,55 @@ class _World:
             data = glb_of_pieces(self._home.house, pieces, with_lamps=False)
             uri = self._mesh(_BUILDING, ".glb", data)
             _shape(link, "visual", "visual", uri)
-            _shape(link, "collision", "collision", uri)
+            _shape(link, "collision", "collision", uri, _STILL)
         lamps = [lamp for piece in pieces for lamp in piece.lamps]
         _lights(link, _BUILDING, lamps, np.eye(4))
 
     def _thing(self, world: ET.Element, piece: Piece, name: str) -> None:
-        model = ET.SubElement(world, "model", name=name)
-        world_from_model = _Z_UP @ piece.world_from_local @ _Z_UP.T
-        _put_pose(model, world_from_model)
+        model, world_from_model = _model(world, piece, name)
         ET.SubElement(model, "static").text = "true" if piece.is_fixed else "false"
         link = ET.SubElement(model, "link", name="link")
-        _inertial(link, piece)
-        word = piece.class_name.replace(" ", "_")
-        if piece.surfaces:
-            house = self._home.house
-            data = glb_of_pieces(house, [piece], with_lamps=False, in_place=False)
-            _shape(link, "visual", "visual", self._mesh(word, ".glb", data))
-        for k, part in enumerate(piece.colliders):
-            data = _obj(part)
-            _shape(link, "collision", f"collision_{k}", self._mesh(f"{word}_part", ".obj", data))
+        _inertial(link, np.array([0, piece.size[1] / 2, 0]), piece.mass_kg, np.diag(piece.inertia))
+        mask = _STILL if piece.is_fixed else None
+        self._shapes(link, piece, piece.surfaces, piece.colliders, mask)
         _lights(link, name, piece.lamps, np.asarray(np.linalg.inv(world_from_model), np.float64))
+
+    def _opening(self, world: ET.Element, piece: Piece, name: str) -> None:
+        """A model whose body stands still, where the piece does, by a joint to the world."""
+        model, world_from_model = _model(world, piece, name)
+        ET.SubElement(model, "static").text = "false"
+        for part in piece.links:
+            link = ET.SubElement(model, "link", name=link_name(part.part))
+            shut = np.eye(4) if part.joint is None else part.joint.motion(0.0)
+            tensor = shut[:3, :3] @ np.diag(part.inertia) @ shut[:3, :3].T
+            _inertial(link, transform_points(shut, part.middle[None])[0], part.mass_kg, tensor)
+            mask = None if not piece.is_fixed else _STILL if part.joint is None else _MOVING
+            surfaces = tuple(moved_surface(s, shut) for s in part.surfaces)
+            colliders = tuple(transform_points(shut, c) for c in part.colliders)
+            self._shapes(link, piece, surfaces, colliders, mask)
+            if part.joint is not None:
+                ET.SubElement(link, "gravity").text = "false"  # counterbalanced
+                _joint(model, link_name(part.part), part.joint)
+                continue
+            inverse = np.asarray(np.linalg.inv(world_from_model), np.float64)
+            _lights(link, name, piece.lamps, inverse)
+            if piece.is_fixed:
+                row = ET.SubElement(model, "joint", name="at", type="fixed")
+                ET.SubElement(row, "parent").text = "world"
+                ET.SubElement(row, "child").text = link_name(BODY)
+
+    def _shapes(
+        self, link: ET.Element, piece: Piece, surfaces: tuple[Surface, ...],
+        colliders: Iterable[F64], mask: int | None,
+    ) -> None:  # fmt: skip
+        word = piece.class_name.replace(" ", "_")
+        if surfaces:
+            own = replace(piece, surfaces=surfaces)
+            data = glb_of_pieces(self._home.house, [own], with_lamps=False, in_place=False)
+            _shape(link, "visual", "visual", self._mesh(word, ".glb", data))
+        for k, part in enumerate(colliders):
+            uri = self._mesh(f"{word}_part", ".obj", _obj(part))
+            _shape(link, "collision", f"collision_{k}", uri, mask)
 
     def _mesh(self, word: str, suffix: str, data: bytes) -> str:
         """The URI of a mesh; equal ones are one file."""
@@ -116,24 +160,58 @@ def _put_pose(parent: ET.Element, b_from_a: F64) -> None:
     child.set("rotation_format", "quat_xyzw")
 
 
-def _shape(link: ET.Element, tag: str, name: str, uri: str) -> None:
-    """A visual or a collision: a mesh with y up, turned to z up."""
+def link_name(part: str) -> str:
+    """The name of a part's link and joint in its model: `door_1`; `link` of the body."""
+    return "link" if part == BODY else f"part_{re.sub(r'[^A-Za-z0-9]+', '_', part).strip('_')}"
+
+
+def _model(world: ET.Element, piece: Piece, name: str) -> tuple[ET.Element, F64]:
+    """A model at its place, and (4, 4) the world from it."""
+    model = ET.SubElement(world, "model", name=name)
+    world_from_model = _Z_UP @ piece.world_from_local @ _Z_UP.T
+    _put_pose(model, world_from_model)
+    return model, world_from_model
+
+
+def _joint(model: ET.Element, name: str, joint: Joint) -> None:
+    """The joint of a part's link, in the piece's frame."""
+    kind = "prismatic" if joint.kind is JointKind.PRISMATIC else "revolute"
+    row = ET.SubElement(model, "joint", name=f"{name}_joint", type=kind)
+    pose = _put(row, "pose", *(_Z_UP[:3, :3] @ joint.point), 0, 0, 0)
+    pose.set("relative_to", "__model__")
+    ET.SubElement(row, "parent").text = link_name(BODY)
+    ET.SubElement(row, "child").text = name
+    axis = ET.SubElement(row, "axis")
+    _put(axis, "xyz", *(_Z_UP[:3, :3] @ joint.axis))
+    limit = ET.SubElement(axis, "limit")
+    _put(limit, "lower", joint.lower)
+    _put(limit, "upper", joint.upper)
+    dynamics = ET.SubElement(axis, "dynamics")
+    for tag, value in zip(("damping", "friction"), effort_of(joint), strict=True):
+        _put(dynamics, tag, value)
+
+
+def _shape(link: ET.Element, tag: str, name: str, uri: str, mask: int | None = None) -> None:
+    """A visual or a collision: a mesh with y up, turned to z up; mask: what it meets."""
     shape = ET.SubElement(link, tag, name=name)
     _put_pose(shape, _Z_UP)
     mesh = ET.SubElement(ET.SubElement(shape, "geometry"), "mesh")
     ET.SubElement(mesh, "uri").text = uri
+    if mask is not None:
+        contact = ET.SubElement(ET.SubElement(shape, "surface"), "contact")
+        ET.SubElement(contact, "collide_bitmask").text = str(mask)
 
 
-def _inertial(link: ET.Element, piece: Piece) -> None:
-    """Mass in the middle of its box, which stands on the link's origin."""
+def _inertial(link: ET.Element, middle: F64, mass_kg: float, tensor: F64) -> None:
+    """Mass in the middle (3,), and (3, 3) kg m2 about it; both of y up."""
     inertial = ET.SubElement(link, "inertial")
-    _put(inertial, "pose", 0, 0, piece.size[1] / 2, 0, 0, 0)
-    _put(inertial, "mass", piece.mass_kg)
+    _put(inertial, "pose", *(_Z_UP[:3, :3] @ middle), 0, 0, 0)
+    _put(inertial, "mass", mass_kg)
     inertia = ET.SubElement(inertial, "inertia")
-    along_x, along_y, along_z = piece.inertia
-    rows = {"ixx": along_x, "ixy": 0, "ixz": 0, "iyy": along_z, "iyz": 0, "izz": along_y}
-    for tag, value in rows.items():
-        _put(inertia, tag, value)
+    turned = _Z_UP[:3, :3] @ tensor @ _Z_UP[:3, :3].T
+    for a in range(3):
+        for b in range(a, 3):
+            _put(inertia, f"i{'xyz'[a]}{'xyz'[b]}", turned[a, b])
 
 
 def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world: F64) -> None:
@@ -174,6 +252,8 @@ def _obj(part: F64) -> bytes:
 FORM = HomeForm(
     "sdf",
     write_sdf,
-    "a world of Gazebo, SDF 1.9: `<id>/<id>.sdf` and `meshes/`, metres, z up, gravity",
+    "a world of Gazebo, SDF 1.9: `<id>/<id>.sdf` and `meshes/`, metres, z up, gravity; doors and drawers have"
+    " joints and stand shut",
     remark=COLLIDES,
+    up="z",
 )

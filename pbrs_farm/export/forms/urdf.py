@@ -22,7 +22,7 @@ from pbrs_farm.export.forms.mjcf import body_name
 from pbrs_farm.export.home_links import BODY, Link, effort_of
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Piece, digest_name
 from pbrs_farm.export.obj_files import obj_of_surfaces, png_textures, rgba_of, z_up_points
-from pbrs_farm.geometry.convex_parts import hull_faces
+from pbrs_farm.geometry.convex_parts import hull_faces, slabs
 from pbrs_farm.geometry.opened import moved_surface
 
 _WORLD: Final = "world"
@@ -50,8 +50,8 @@ class _Document:
         self._house = home.house
         self.files: dict[str, bytes] = {}
         self.root = ET.Element("robot", name=home.house.id)
-        # What MuJoCo needs to read it, and others pass over.
-        options = {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}
+        # What MuJoCo needs to read it, and others pass over: flat meshes have no volume, `mjcf` shows them.
+        options = {"strippath": "false", "fusestatic": "false", "discardvisual": "true"}
         ET.SubElement(ET.SubElement(self.root, "mujoco"), "compiler", options)
         ET.SubElement(self.root, "link", name=_WORLD)
         self._write_materials(home)
@@ -120,17 +120,12 @@ class _Document:
             f"i{'xyz'[a]}{'xyz'[b]}": f"{tensor[a, b]:.6g}" for a in range(3) for b in range(a, 3)
         }
         ET.SubElement(inertial, "inertia", rows)
-        names = []
         for material in sorted({s.material for s in link.surfaces}):
             own = [moved_surface(s, matrix) for s in link.surfaces if s.material == material]
             data = obj_of_surfaces(own, f"material_{material}", _MATERIALS)
-            names.append(self._mesh(data))
-            _shape(element, "visual", names[-1])
-        if piece.item.kind.is_structure:
-            for name in names:
-                _shape(element, "collision", name)
-            return
-        for part in link.colliders:
+            _shape(element, "visual", self._mesh(data))
+        is_wall = piece.item.kind.is_structure
+        for part in slabs(link.triangles) if is_wall else link.colliders:
             points = z_up_points(transform_points(matrix, part))
             rows_ = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points]
             rows_ += [f"f {a} {b} {c}" for a, b, c in hull_faces(points) + 1]
@@ -157,4 +152,5 @@ FORM = HomeForm(
     "a URDF: `<id>/<id>.urdf`, `meshes/` and `textures/`, metres, z up; doors and drawers have joints and"
     " stand shut, loose things have floating joints",
     remark=COLLIDES,
+    up="z",
 )

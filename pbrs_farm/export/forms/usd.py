@@ -416,4 +416,5 @@ FORM = HomeForm(
     "an OpenUSD stage (extra `usd`): `<id>/<id>.usdc` and `textures/`, metres, z up, gravity, for Isaac"
     " Sim and others",
     remark=COLLIDES,
+    up="y",
 )

@@ -1,0 +1,130 @@
+"""Where two fingers can hold a home's small things: antipodal pairs of contacts; no effects.
+
+A pair lies on one line through the thing, at its outermost places, and the line is within the cones
+of friction of both (Nguyen, Constructing force-closure grasps, 1988). Whether a hand gets there, past
+what stands around, is not asked.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core import keys
+from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.house import corners_of_surfaces
+from pbrs_farm.core.mesh import lengths, unit_normals
+from pbrs_farm.export.home_pieces import ExportedHome, Piece
+from pbrs_farm.export.obj_files import z_up_points
+from pbrs_farm.geometry.surface_points import spread_points
+
+GRASPS: Final = "grasps.json"
+LARGEST_M: Final = 0.12  # of the second largest side of a thing, and of what fingers span
+FRICTION: Final = 0.3
+_LEAST_M: Final = 0.002  # between fingers
+_MOST: Final = 32  # pairs of a thing
+_TRIES: Final = 256
+_SPACING_M: Final = 0.004
+_PAIRS: Final = 2_000_000  # of line and triangle at once: bounds memory
+_EDGE: Final = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grasps:
+    """Pairs of contacts on a thing, metres."""
+
+    points: F64  # (N, 2, 3)
+    normals: F64  # (N, 2, 3) unit, outwards
+
+    @property
+    def widths_m(self) -> F64:
+        """(N,) between the two contacts."""
+        return np.asarray(np.linalg.norm(self.points[:, 0] - self.points[:, 1], axis=1))
+
+
+def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
+    """Pairs of contacts by which two fingers hold a mesh (F, 3, 3), no more than 12 cm apart.
+
+    From places drawn by the seed a line goes along the normal, or near it; its outermost crossings are
+    the pair.
+    """
+    points, which = spread_points(triangles, _SPACING_M)
+    if not len(points):
+        return Grasps(np.zeros((0, 2, 3)), np.zeros((0, 2, 3)))
+    rng = np.random.default_rng(seed)
+    drawn = rng.permutation(len(points))[:_TRIES]
+    normals = unit_normals(triangles)
+    along = normals[which[drawn]]
+    # Every other line leans, within the cone of friction: what tapers is held so.
+    aside = np.cross(along, rng.normal(size=along.shape))
+    aside /= np.maximum(lengths(aside), 1e-12)[:, None]
+    along = along + (np.arange(len(along)) % 2 * FRICTION * rng.random(len(along)))[:, None] * aside
+    along /= lengths(along)[:, None]
+    ways, faces = _outermost(points[drawn], along, triangles)
+    width = ways[:, 1] - ways[:, 0]
+    cosine = (normals[faces] * along[:, None]).sum(2)
+    # Outwards is away from the other contact, however a stranger's faces are wound.
+    outwards = normals[faces] * (np.sign(cosine) * [-1.0, 1.0])[..., None]
+    holds = (np.abs(cosine) >= np.cos(np.arctan(FRICTION))).all(1)
+    holds &= (width > _LEAST_M) & (width <= LARGEST_M)
+    kept = np.flatnonzero(holds)[:most]
+    pairs = points[drawn][kept, None] + ways[kept, :, None] * along[kept, None]
+    return Grasps(pairs, outwards[kept])
+
+
+def _outermost(points: F64, along: F64, triangles: F64) -> tuple[F64, I64]:
+    """(N, 2) metres from points along lines to the first and last triangle that they cross, and which."""
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    ways, faces = np.zeros((len(points), 2)), np.zeros((len(points), 2), np.int64)
+    step = max(1, _PAIRS // len(triangles))
+    for k in range(0, len(points), step):
+        part = slice(k, k + step)
+        # Moeller and Trumbore, 1997, for every line and triangle.
+        p = np.cross(along[part, None], v)
+        scale = (p * u).sum(2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            s = points[part, None] - a
+            first = (s * p).sum(2) / scale
+            q = np.cross(s, u)
+            second = (q * along[part, None]).sum(2) / scale
+            way = (q * v).sum(2) / scale
+            meets = (first >= -_EDGE) & (second >= -_EDGE) & (first + second <= 1 + _EDGE)
+        for end, (fill, pick) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
+            row = np.where(meets, way, fill)
+            faces[part, end] = pick(row, axis=1)
+            ways[part, end] = np.take_along_axis(row, faces[part, end, None], 1)[:, 0]
+    return ways, faces
+
+
+def grasps_json(home: ExportedHome, up: str) -> bytes:
+    """Pairs of every loose thing whose second largest side is below 12 cm, in its own frame.
+
+    up: "z" or "y", the axis that is up in the things' frames; the origin is the middle of the bottom
+    of a thing's box.
+    """
+    things = {}
+    for piece in home.things:
+        if piece.surfaces and not piece.is_fixed and np.sort(piece.size)[1] < LARGEST_M:
+            things[piece.name] = _row(piece, up)
+    told = {"unit": "metres", "up": up, "friction": FRICTION, "things": things}
+    return json.dumps(told, indent=1, allow_nan=False).encode()
+
+
+def _row(piece: Piece, up: str) -> dict[str, Any]:
+    triangles = corners_of_surfaces(piece.surfaces)
+    found = antipodal_pairs(triangles, keys.seed("grasps", piece.class_name))
+    turned = (lambda x: x) if up == "y" else z_up_points
+    rows = [
+        {
+            "points": turned(points).round(5).tolist(),
+            "normals": turned(normals).round(4).tolist(),
+            "width_m": round(float(width), 5),
+        }
+        for points, normals, width in zip(
+            found.points, found.normals, found.widths_m, strict=True
+        )
+    ]  # fmt: skip
+    return {"class": piece.class_name, "grasps": rows}
