@@ -53,11 +53,23 @@ def noun_of(view: ChosenView, row: dict[str, Any]) -> str:
     return own.lower() if _VAGUE[name] and _PLAIN_NAME.fullmatch(own) else _VAGUE[name]
 
 
+def is_plural(noun: str) -> bool:
+    """It names many already, as a thing of the name Plates does.
+
+    >>> [is_plural(noun) for noun in ("plates", "glass", "set of shelves")]
+    [True, False, False]
+    """
+    head = noun.partition(" of ")[0]
+    return head.endswith("s") and not head.endswith(("ss", "us"))
+
+
 def plural(noun: str) -> str:
     """Many of a noun: "chairs", "boxes", "sets of shelves", "people".
 
     English, for the nouns that captions use; only the last word before "of" changes.
     """
+    if is_plural(noun):
+        return noun
     head, of, rest = noun.partition(" of ")
     first, space, last = head.rpartition(" ")
     if last in _PLURALS:
@@ -76,7 +88,11 @@ def counted(n: int, noun: str) -> str:
 
     >>> [counted(n, "armchair") for n in (1, 3)]
     ['an armchair', 'three armchairs']
+    >>> counted(2, "plates")
+    'some plates'
     """
+    if is_plural(noun):
+        return f"some {noun}"
     if n == 1:
         return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
     return f"{_NUMBERS[n] if n < len(_NUMBERS) else n} {plural(noun)}"

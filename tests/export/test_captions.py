@@ -54,6 +54,7 @@ def text(*rows: dict, **fields) -> str:
         ("chair", "chairs"), ("box", "boxes"), ("bookshelf", "bookshelves"), ("person", "people"),
         ("set of shelves", "sets of shelves"), ("dish", "dishes"), ("lady", "ladies"), ("tray", "trays"),
         ("wine glass", "wine glasses"), ("piece of furniture", "pieces of furniture"),
+        ("glass", "glasses"),
     ],
 )  # fmt: skip
 def test_nouns_have_plurals_and_articles(noun, many):
@@ -62,6 +63,15 @@ def test_nouns_have_plurals_and_articles(noun, many):
     assert counted(13, noun) == f"13 {many}"
     assert counted(1, noun) == f"a {noun}"
     assert counted(1, "armchair") == "an armchair"
+
+
+def test_a_thing_that_is_called_by_a_plural_is_some():
+    table = thing(1, "table", (0, 0, 3), (1, 0.8, 1))
+    plates = thing(2, "otherprop", (0, -0.45, 3), (0.2, 0.1, 0.2), name="Plates")
+    assert text(table, plates).endswith(
+        "a table and some plates. The plates are on top of the table."
+    )
+    assert (plural("plates"), counted(2, "plates")) == ("plates", "some plates")
 
 
 def test_things_are_counted_and_named_by_what_they_are():

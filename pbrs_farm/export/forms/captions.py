@@ -23,7 +23,7 @@ from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
 from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.export.nouns import counted, listed, noun_of
+from pbrs_farm.export.nouns import counted, is_plural, listed, noun_of
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import RoomOutline
 from pbrs_farm.home.room_use import RoomKind, named_kind
@@ -254,7 +254,8 @@ def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, s
     sentences = []
     for row in list(first.values())[:_SAID]:
         subject, relation, other = titles[row["subject"]], row["relation"], titles[row["object"]]
-        sentences.append(f"{subject[0].upper()}{subject[1:]} is {relation} {other}.")
+        verb = "are" if is_plural(subject.partition(" from the left")[0]) else "is"
+        sentences.append(f"{subject[0].upper()}{subject[1:]} {verb} {relation} {other}.")
     return sentences
 
 

@@ -20,7 +20,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.export.chosen_view import ChosenView, intrinsics_of
 from pbrs_farm.export.export_homes import stored_house
-from pbrs_farm.export.nouns import noun_of
+from pbrs_farm.export.nouns import is_plural, noun_of
 from pbrs_farm.export.sequences import frames_by_house, pose_opencv
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
@@ -211,8 +211,7 @@ def is_countable(noun: str) -> bool:
     [True, True, True, False, False]
     """
     first = noun.partition(" of ")[0]
-    is_plural = first.endswith("s") and not first.endswith(("ss", "us"))
-    return noun not in _VAGUE and first not in _UNCOUNTED and not is_plural
+    return noun not in _VAGUE and first not in _UNCOUNTED and not is_plural(noun)
 
 
 def _gap_m(a: Thing, b: Thing) -> float:
