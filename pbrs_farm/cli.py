@@ -111,12 +111,13 @@ def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
 
 def _start_early(words: Sequence[str]) -> None:
     """Start the demo's process that makes the house, before the modules of the verb are loaded."""
+    from pbrs_farm.operating_system import OPEN_FILES_MOVE
     from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, start_early
     from pbrs_farm.run.processes.limits import is_room_for_two
 
     options = {word.partition("=")[0] for word in words}
-    # Other numbers of processes have other processes.
-    if is_room_for_two() and not options & {"-h", "--help", "--jobs"}:
+    # Other numbers of processes have other processes; the run moves the log of the one it takes.
+    if OPEN_FILES_MOVE and is_room_for_two() and not options & {"-h", "--help", "--jobs"}:
         # What cannot start now cannot later either, and is told then.
         with suppress(OSError):
             start_early(FINISHING_HANDLER)

@@ -305,6 +305,10 @@ def open_unwaiting(path: Path) -> int:
     return os.open(path, os.O_RDONLY | _OF_WINDOWS)
 
 
+OPEN_FILES_MOVE: Final = _POSIX
+"""Whether a file can be moved while a process has it open."""
+
+
 def create_new(path: Path) -> int:
     """The descriptor of a file that was not there, opened to be written; FileExistsError where it was."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)

@@ -44,6 +44,19 @@ def test_our_modules_lack_the_names() -> None:
     assert _said(python_without_posix(["-c", _NAMES])) == "False False False\n"
 
 
+def test_memory_is_told_by_psutil_where_there_is_no_proc() -> None:
+    code = "from pbrs_farm.operating_system import *; print(resident_mb(1), tree_mb(1), give_back_memory())"
+    assert _said(python_without_posix(["-c", code], "proc")) == "100.0 100.0 None\n"
+
+
+def test_no_process_starts_whose_log_could_not_be_moved() -> None:
+    code = (
+        "from pbrs_farm import cli; from pbrs_farm.run.processes import early_start, limits; "
+        "limits.is_room_for_two = lambda: True; cli._start_early(['demo']); print(early_start._STARTED)"
+    )
+    assert _said(python_without_posix(["-c", code])) == "{}\n"
+
+
 def test_the_help_is_printed() -> None:
     assert "pbrs-farm VERB --help" in _said(pbrs_farm("--help"))
 
@@ -57,11 +70,12 @@ def test_a_run_makes_its_view_and_goes_on_where_it_stopped(tmp_path: Path) -> No
     assert list((tmp_path / "out").rglob("depth.png"))
 
 
+@pytest.mark.parametrize("lacks", ["posix", "proc"])
 def test_a_render_process_ends_after_its_parent(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lacks: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    pid = int(_said(python_without_posix(["-c", _ORPHAN])))
+    pid = int(_said(python_without_posix(["-c", _ORPHAN], lacks)))
     until = time.monotonic() + 60.0
     while is_running(pid) and time.monotonic() < until:
         time.sleep(0.1)

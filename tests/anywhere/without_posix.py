@@ -13,10 +13,15 @@ REPO: Final = Path(__file__).parents[2]
 SITE: Final = Path(__file__).parent / "site"
 
 
-def python_without_posix(words: Sequence[str | Path]) -> subprocess.CompletedProcess[str]:
-    """A Python with words, and every one it starts, without POSIX; its output is kept."""
+def python_without_posix(
+    words: Sequence[str | Path], lacks: str = "posix"
+) -> subprocess.CompletedProcess[str]:
+    """A Python with words, and every one it starts, without POSIX; its output is kept.
+
+    lacks: "posix" as on Windows, "proc" as on macOS, which has POSIX and no /proc.
+    """
     path = os.pathsep.join(map(str, [SITE, REPO, *filter(None, sys.path)]))
-    environment = {**os.environ, "PYTHONPATH": path}
+    environment = {**os.environ, "PYTHONPATH": path, "PBRS_TEST_LACKS": lacks}
     command = [sys.executable, *map(str, words)]
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 

@@ -1,5 +1,7 @@
 """What a process lacks where there is no POSIX: its folder on PYTHONPATH takes the names from our modules.
 
+PBRS_TEST_LACKS says which: posix (as on Windows), or proc, the files of Linux alone (as on macOS).
+
 Python imports this file at its start, so it holds in every process that is started below one. The standard
 library and other packages keep their names, as theirs have implementations of their own on each system.
 Effects: __import__, and the files of /proc and /sys, which are there for nobody.
@@ -172,4 +174,5 @@ vars(_psutil).update(
 sys.modules["psutil"] = _psutil
 os.stat, os.scandir = _no_such_file(os.stat), _no_such_file(os.scandir)
 io.open = builtins.open = _no_such_file(io.open)
-builtins.__import__, importlib.import_module = _imported, _module
+if os.environ["PBRS_TEST_LACKS"] == "posix":
+    builtins.__import__, importlib.import_module = _imported, _module
