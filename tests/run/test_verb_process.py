@@ -55,6 +55,21 @@ def test_a_verb_that_is_killed_before_any_file_is_named_by_its_words() -> None:
     assert said == ["die SIGSEGV: its process was killed by SIGSEGV"]
 
 
+def test_nothing_is_left_behind_and_no_room_costs_the_place_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    said: list[str] = []
+    words = ["die", "SIGSEGV", "a.glb", "read"]
+    assert run_watched(TARGET, words, said.append) == 1
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+    assert run_watched(TARGET, words, said.append) == 1
+    assert run_watched(TARGET, ["end", "0"], said.append) == 0
+    fault = "its process was killed by SIGSEGV"
+    assert said == [f"a.glb: read: {fault}", f"die SIGSEGV: {fault}"]
+
+
 def test_a_file_name_of_many_lines_stays_one_short_line() -> None:
     said: list[str] = []
     words = ["die", "SIGSEGV", "a\nCLEAN\n" + "b" * 5000, "read"]

@@ -5,6 +5,7 @@ Effects: starts a process, reads what it tells of its work from a temporary file
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pkgutil
@@ -33,29 +34,41 @@ def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -
 
     Where the child is killed: 1, after one line through say with the file and the step it was at.
     """
-    # A file and no pipe: not every system hands descriptors on.
-    with tempfile.TemporaryDirectory(prefix="pbrs-farm-") as folder:
-        notes = Path(folder) / "notes"
-        notes.touch()
-        command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), str(notes), target]
-        # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.
-        before = signal.signal(signal.SIGINT, lambda _number, _frame: None)
+    # A file and no pipe: not every system hands descriptors on. The child removes its name at once.
+    handle, notes = _new_file()
+    command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), notes, target]
+    # The terminal sends Ctrl-C to both: the child decides. A handler of ours ends with its exec.
+    before = signal.signal(signal.SIGINT, lambda _number, _frame: None)
+    with os.fdopen(handle, "rb") as file:
         try:
             code = subprocess.Popen([*command, *words]).wait()
+            file.seek(max(0, file.seek(0, os.SEEK_END) - _TAIL_BYTES))
+            notices = file.read() if has_crashed(code) else b""
         finally:
             signal.signal(signal.SIGINT, before)
-        if not has_crashed(code):
-            return code
-        with notes.open("rb") as file:
-            file.seek(max(0, file.seek(0, os.SEEK_END) - _TAIL_BYTES))
-            notices = file.read()
+    if notes:
+        Path(notes).unlink(missing_ok=True)
+    if not has_crashed(code):
+        return code
     lines = notices.decode("utf-8", "replace").splitlines()
     say(f"{lines[-1] if lines else ' '.join(words[:2])}: {ending(code)}")
     return 1
 
 
+def _new_file() -> tuple[int, str]:
+    """A new file, opened, and its name; nothing and "" where there is no room for one."""
+    try:
+        return tempfile.mkstemp(prefix="pbrs-farm-")
+    except OSError:
+        return os.open(os.devnull, os.O_RDONLY), ""
+
+
 def main(notes: str, target: str, words: Sequence[str]) -> int:
-    """The child: run the function that target names; its notices are added to a file."""
+    """The child: run the function that target names; its notices are added to a file, "" for none."""
     die_with_parent()
-    send_notes_to(os.open(notes, os.O_WRONLY | os.O_APPEND))
+    if notes:
+        send_notes_to(os.open(notes, os.O_WRONLY | os.O_APPEND))
+        # Whoever is killed then leaves nothing behind; Windows keeps the name of an open file.
+        with contextlib.suppress(OSError):
+            Path(notes).unlink()
     return int(pkgutil.resolve_name(target)(words))
