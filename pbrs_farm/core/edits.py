@@ -157,6 +157,18 @@ Edit = Annotated[
     Field(discriminator="do"),
 ]
 
+
+class SavedHome(Record):
+    """A home with its edits as a file holds it: which home, how it is dressed, what is changed of it."""
+
+    format: Literal["pbrs_farm home 1"] = "pbrs_farm home 1"
+    home: str  # a word of a command line; files by their whole path
+    house_id: str  # which it is then: another one means that a file has changed
+    models: str = ""
+    dress_seed: Annotated[int, Field(ge=0)] = 0
+    edits: tuple[Edit, ...] = ()
+
+
 SUFFIX: Final = "-e"
 """Before the digest of the edits in an edited house's id."""
 

@@ -14,11 +14,12 @@ from pydantic import TypeAdapter
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.checked_json import checked
-from pbrs_farm.core.edits import Edit, edited_id, edits_digest
+from pbrs_farm.core.edits import Edit, SavedHome, edited_id, edits_digest
 from pbrs_farm.core.errors import BadHouse, MachineFailed
 from pbrs_farm.core.made_home import expanded, is_made, made_homes
 from pbrs_farm.core.plugins import is_plugin, marks_in_digest, plugin_homes
 from pbrs_farm.core.record import Record
+from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.formats import (
     format_of_file,
     format_of_kind,
@@ -43,6 +44,8 @@ _UNREAD_SUFFIXES: Final = frozenset({
 })  # fmt: skip
 _LONGEST_ID: Final = 255  # bytes of a folder's name
 _DEFAULT_KIND: Final = "sweethome3d"  # of a path that says nothing: its reader tells what is wrong
+SAVED_SUFFIX: Final = ".home.json"
+"""Of a file of a home with its edits: `saved_home` writes it, `resolve` reads it."""
 WORD_KINDS: Final = ("builtin", "made", "example", "plugin", "object")
 """Kinds of sources that are no file of a format."""
 
@@ -135,6 +138,8 @@ def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
     """
     if source.kind == "object":
         return [source]
+    if source.edits and any(seeds):
+        raise BadHouse(source.word, "", "has edits: a home is dressed before it is edited")
     return [
         source.model_copy(
             update={"house_id": keys.dressed_id(source.house_id, seed), "dress_seed": seed}
@@ -182,6 +187,8 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     path = Path(word)
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is no UTF-8", hint="rename the file or its folder")
+    if path.name.endswith(SAVED_SUFFIX):
+        return _of_saved_home(path, files)
     # Go by the word's form first, then by what lies at the path.
     if word.startswith('{"'):  # its JSON; a name may begin with a brace, too
         kind = "object"
@@ -205,6 +212,29 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
         raise BadHouse(word, f"#{part}", "names a part of a file that is no floor plan")
     folder = models and str(real_path(Path(models)))
     return _reference(kind, word, files or SourceFiles(), folder, part)
+
+
+def saved_home(source: SourceRef) -> bytes:
+    """The file of a home with its edits; equal sources give equal bytes."""
+    return json_bytes(
+        SavedHome(
+            home=source.word, house_id=source.house_id, models=source.models,
+            dress_seed=source.dress_seed, edits=source.edits,
+        )
+    )  # fmt: skip
+
+
+def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
+    """The source that saved_home wrote; BadHouse for a damaged file and for a home that has changed."""
+    held = checked(SavedHome, text_given(path, error=BadHouse).encode(), str(path), error=BadHouse)
+    if held.home.endswith(SAVED_SUFFIX):
+        raise BadHouse(path, "home", "names another file of a home with edits")
+    (dressed,) = variants(resolve(held.home, files, models=held.models), [held.dress_seed])
+    source = dressed.edited(*held.edits) if held.edits else dressed
+    if source.house_id != held.house_id:
+        text = f"{held.home} is another home now than when this was saved"
+        raise BadHouse(path, "house_id", text, hint="save it again")
+    return source
 
 
 def _format_at(path: Path) -> Format:

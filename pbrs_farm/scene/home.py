@@ -57,7 +57,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.core.shown_text import did_you_mean, shown
 from pbrs_farm.core.table import Table
 from pbrs_farm.formats.cameras_json import views_from_json
-from pbrs_farm.prepare.source import SourceRef, resolve, variants
+from pbrs_farm.prepare.source import SAVED_SUFFIX, SourceRef, resolve, saved_home, variants
 from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 from pbrs_farm.run import plan
 from pbrs_farm.sample.camera_report import CameraReport
@@ -246,6 +246,26 @@ class Home:
 
         export_house(self.house, Path(folder), to)
         return Path(folder)
+
+    @checked_call
+    def save(self, path: str | Path) -> Path:
+        """Write the home as a small file, <name>.home.json, which every command takes for a home.
+
+        It names the source, how the home is dressed and its edits, with all that moves; files by their
+        place on this machine. Fields of the recipe are the command's. Raises BadInput for another ending.
+
+            >>> moving = home.open("door*", at={0: 0, 2: 1})
+            >>> pf.load(moving.save("moving.home.json")).id == moving.id
+            True
+        """
+        file = Path(path)
+        if not file.name.endswith(SAVED_SUFFIX):
+            raise BadInput("save", str(path), f"expected a name that ends in {SAVED_SUFFIX}")
+        try:
+            file.write_bytes(saved_home(self.source))
+        except OSError as error:
+            raise BadInput(file, "", fault_of(error)) from None
+        return file
 
     @checked_call
     def set(self, **fields: Any) -> Home:

@@ -238,6 +238,8 @@ WRONG: list[tuple[str, Call, str]] = [
     ("Home.open", lambda g: g.home.open("door_*", at={0: 2}), "open: at: .*seconds"),
     ("Home.open", lambda g: g.home.open("door_*", at={}), "open: at"),
     ("Home.drop", lambda g: g.home.drop("sofaa"), "sofaa"),
+    ("Home.save", lambda g: g.home.save("home.json"), r"ends in .home.json"),
+    ("Home.save", lambda g: g.home.save("/nowhere/at/all/a.home.json"), "a.home.json: "),
     ("Home.drop", lambda g: g.home.drop("sofa", push=2), "drop: push"),
     ("Home.drop", lambda g: g.home.drop("sofa", seconds=0), "drop: seconds"),
     ("Home.at", lambda g: g.home.at("noon"), "at: time_s"),
