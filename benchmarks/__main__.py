@@ -51,6 +51,7 @@ OWN_TARGET: Final = {
     "tone": "study.picture_tone",
     "board": "board.board_pages",
     "motion": "motion.motion",
+    "moving": "motion.moving",
     "python": "python_api",
     "truth": "truth",
     "sets": "sets",

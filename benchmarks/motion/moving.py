@@ -1,0 +1,132 @@
+"""Films of homes that move: `make bench NAME=moving` -> out/bench/moving.json.
+
+A walk through an example home while its doors open and a crate falls. Flow and tracks are followed again by
+the caster of check/, over triangles that it moves by itself; the cost of a frame is compared with that of the
+same walk through the home at rest, in CPU seconds of one process.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import trimesh
+
+import pbrs_farm as pf
+from benchmarks.figures import write_report
+from benchmarks.motion.between_views import layer
+from pbrs_farm.check import verify
+from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.motion_checks import SEEN, follow_points, half_step, other_view
+from pbrs_farm.check.moved_house import MovedHouse, house_at
+from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.stored_mesh import triangles_from_glb
+from pbrs_farm.check.stored_view import StoredView, views_of_house
+
+UNITS: Final = {
+    "motion.flow_error": "steps of the format by which flow of what moves is off, at most",
+    "motion.flow_pixels": "pixels of it that were compared",
+    "motion.tracks_wrong": "places of tracked points, and whether they are seen, that are wrong",
+    "motion.tracks": "of so many",
+    "film.overhead": "cost of a frame over that of the walk at rest: labels, flow and OpenGL",
+    "film.overhead_light": "the same with physical light",
+    "film.frame_s": "CPU seconds of a frame of the moving home: labels, flow and OpenGL",
+}
+HOME: Final = "Studio"
+N_FRAMES: Final = int(os.environ.get("FRAMES", "12"))
+_FPS: Final = 6
+_LAYERS: Final = ("flow_forward", "occlusion_forward", "scene_flow", "depth_z")
+
+
+def main() -> None:
+    """Measure and write out/bench/moving.json."""
+    with tempfile.TemporaryDirectory() as scratch:
+        rest, moving = _homes(Path(scratch))
+        root = Path(scratch) / "root"
+        seconds = N_FRAMES / _FPS
+        walk = moving.set(**{
+            "cameras.source": "walk", "cameras.walk_frames": N_FRAMES, "cameras.walk_fps": _FPS,
+        })  # fmt: skip
+        pf.render_homes(walk, root, modes=["opengl_dl"], layers=_LAYERS, tracks=True)
+        figures: dict[str, Any] = _flow(root)
+        counts = verify(root, sample=500).counts["tracks"]
+        figures |= {"motion.tracks_wrong": counts.failed, "motion.tracks": counts.checked}
+        cameras = [c.camera for c in walk.cameras()]
+        for name, modes in (("", ["opengl_dl"]), ("_light", ["mlt_il_ol"])):
+            # One after the other, so that both have the machine of the same minutes.
+            costs: dict[str, list[float]] = {"rest": [], "moving": []}
+            for _ in range(3 if not name else 1):
+                for word, home in (("rest", rest), ("moving", moving)):
+                    costs[word] += _frame_costs(home, cameras, seconds, modes)
+            a, b = (float(np.median(costs[word])) for word in ("rest", "moving"))
+            figures[f"film.overhead{name}"] = round(b / a, 3)
+            if not name:
+                figures["film.frame_s"] = round(b, 3)
+    write_report("moving", figures, UNITS)
+
+
+def _homes(scratch: Path) -> tuple[pf.Home, pf.Home]:
+    """The home at rest, and as its doors open and a crate falls."""
+    trimesh.creation.box((0.2, 0.15, 0.25)).export(scratch / "crate.glb")
+    rest = pf.load(HOME, recipe="fast", **{"light.spp": 16})
+    room = max(rest.house.rooms, key=lambda r: float(np.ptp(r.polygon, axis=0).prod()))
+    x, z = room.polygon.mean(0)
+    rest = rest.place(pf.model(scratch / "crate.glb"), at=(x, 1.6, z))
+    moving = rest.open("*", at={0: 0, N_FRAMES / _FPS: 1}).drop("crate 1", from_s=0.2)
+    return rest, moving
+
+
+def _frame_costs(
+    home: pf.Home, cameras: list[pf.Camera], seconds: float, modes: list[str]
+) -> list[float]:
+    """CPU seconds of each frame but the first two, in which scenes are loaded."""
+    ends: list[float] = []
+    pf.film(
+        home, cameras, fps=_FPS, seconds=seconds, modes=modes, layers=_LAYERS,
+        observe=lambda _view: ends.append(time.process_time()),
+    )  # fmt: skip
+    return np.diff(ends)[1:].tolist()
+
+
+def _flow(root: Path) -> dict[str, Any]:
+    """How far stored flow of what moves is from points followed by another caster, in steps of float16."""
+    (folder,) = root.glob("houses/*")
+    house = StoredHouse(folder)
+    triangles = triangles_from_glb((folder / "house.glb").read_bytes())
+    views, _faults = views_of_house(folder)
+    worst, n = 0.0, 0
+    for view in views[:-1]:
+        times = (view.table["time_s"], view.table["partners"]["next"]["time_s"])
+        now, then = (house_at(house, triangles, t) for t in times)
+        errors = _flow_errors(view, now, then)
+        worst, n = max(worst, float(errors.max(initial=0.0))), n + len(errors)
+    return {"motion.flow_error": round(worst, 3), "motion.flow_pixels": n}
+
+
+def _flow_errors(view: StoredView, now: MovedHouse, then: MovedHouse) -> Any:
+    moves = (np.abs(layer(view, "scene_flow")) > 0).any(-1) & (layer(view, "depth_z") > 0)
+    rows, columns = np.nonzero(moves)
+    other = other_view(view, "next")
+    assert other is not None
+    origin, directions = view.rays(rows, columns)
+    rays = Rays(now.triangles)
+    face = rays.first(origin, directions)
+    z = rays.distance(face, origin, directions)
+    # Pixels whose ray meets an edge show another surface here.
+    same = np.abs(z - layer(view, "depth_z")[rows, columns]) < 1e-4 * (1 + z)
+    rows, columns, face, z = rows[same], columns[same], face[same], z[same]
+    found = follow_points(
+        view, other, rows, columns, z, Rays(then.triangles),
+        lambda points: then.carried(now, points, face),
+    )  # fmt: skip
+    seen = (found.state == SEEN) & (layer(view, "occlusion_forward")[rows, columns] == SEEN)
+    off = np.abs(layer(view, "flow_forward")[rows, columns] - found.motion)[seen]
+    return (off / (2 * half_step(found.motion[seen]))).max(axis=1, initial=0.0)
+
+
+if __name__ == "__main__":
+    main()
