@@ -15,7 +15,15 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I64, Bools, Matrix4, triple
 from pbrs_farm.core.edits import rows_of_matrix
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import Box, Geometry, House, Item, LightPart, geometry_from_house
+from pbrs_farm.core.house import (
+    Box,
+    Geometry,
+    House,
+    Item,
+    LightPart,
+    MaterialKind,
+    geometry_from_house,
+)
 from pbrs_farm.core.motions import Motion
 from pbrs_farm.geometry.opened import box_around, moved_surface
 
@@ -118,18 +126,22 @@ class MovingHouse:
     """
 
     house: House
-    geometry: Geometry  # of the house at rest, panes included
+    geometry: Geometry  # of the house at rest
+    with_panes: bool = True  # as geometry_from_house was asked
 
     @staticmethod
-    def of(house: House) -> MovingHouse:
-        """The house with the triangles that rays see."""
-        return MovingHouse(house, geometry_from_house(house))
+    def of(house: House, *, with_panes: bool = True) -> MovingHouse:
+        """The house with its triangles; without panes as light meets them."""
+        return MovingHouse(house, geometry_from_house(house, with_panes=with_panes), with_panes)
 
     @cached_property
     def _moving(self) -> tuple[tuple[int, int, str, slice], ...]:
         """(surface number, item's index, part, its rows of positions) of the surfaces that move."""
         of_item, found, begin = motions_by_item(self.house), [], 0
+        is_pane = [m.kind is MaterialKind.PANE for m in self.house.materials]
         for number, (instance, item, _j, surface) in enumerate(self.house.surfaces()):
+            if not self.with_panes and is_pane[surface.material]:
+                continue
             own = of_item.get(item.id, {})
             if "" in own or surface.part in own:
                 rows = slice(begin, begin + len(surface.positions))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import BadHouse, MachineFailed, RenderFailed
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.geometry.moving import MovingHouse
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.view_emitters import ViewEmitters
 
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
-
-
-def _without_panes(house: House) -> MovingHouse:
-    return MovingHouse(house, geometry_from_house(house, with_panes=False))
 
 
 def _moved(
@@ -126,7 +122,8 @@ class LightScene:
         panes = None if glass is None else tables_from_house(glass, {}, recipe)
         moving = None
         if inside.motions:
-            moving = _without_panes(inside), None if glass is None else _without_panes(glass)
+            panes_then = None if glass is None else MovingHouse.of(glass, with_panes=False)
+            moving = MovingHouse.of(inside, with_panes=False), panes_then
         return LightScene(tables, sky, portals_of_house(house), name, outside, panes, moving)
 
     def move_to(self, time_s: float | None) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import House, geometry_from_house
+from pbrs_farm.core.house import House, MaterialKind, geometry_from_house
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.motions import Motion
 from pbrs_farm.geometry.moving import MovingHouse, house_at
@@ -79,3 +79,18 @@ def test_faces_are_taken_from_one_time_to_another() -> None:
         assert corners == pytest.approx(b.positions[b.faces[face]], abs=1e-6)
     assert matrices[0] == pytest.approx(np.eye(4))
     assert (numbers[~moving.moving_faces] == 0).all()
+
+
+def test_panes_that_light_passes_are_left_out_wherever_they_stand() -> None:
+    rest = home(PULL, SLIDE)
+    pane = replace(rest.materials[0], kind=MaterialKind.PANE)
+    window = thing("window", (0, 1, 0), (1, 2, 0.01))
+    surfaces = tuple(replace(s, material=1) for s in window.surfaces)
+    rest = replace(
+        rest, items=(replace(window, surfaces=surfaces), *rest.items),
+        materials=(rest.materials[0], pane),
+    )  # fmt: skip
+    then, geometry = MovingHouse.of(rest, with_panes=False).at(1.5)
+    expected = geometry_from_house(then, with_panes=False)
+    np.testing.assert_array_equal(geometry.positions, expected.positions)
+    assert len(geometry.positions) < len(geometry_from_house(then).positions)
