@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, I32, Bools
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
-from pbrs_farm.raycast.tracer import RayTracer, counted_labels, faces_as_picture, rays_of_pixels
+from pbrs_farm.raycast.tracer import RayTracer, counted_labels, rays_of_pixels
 
 Build = Callable[[F32, I32], RayTracer]  # positions (V, 3) and faces (F, 3) of a mesh -> its tracer
 
@@ -46,16 +46,24 @@ class PartTracer:
 
 
 class NearestTracer:
-    """The RayTracer of two meshes: of their first hits the nearer one."""
+    """The RayTracer of two meshes: of their first hits the nearer one.
+
+    The first is the larger: rays of cameras are traced as packets in both, and again alone only
+    where both are met.
+    """
 
     def __init__(self, first: RayTracer, second: RayTracer) -> None:
         self._first, self._second = first, second
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        origins, directions, blind = rays_of_pixels(camera)
-        reach = np.full(len(directions), np.inf, np.float32)
-        _t, face = self.first_hit(origins, directions, reach)
-        return faces_as_picture(face, camera, blind)
+        face, other = (t.faces_of_camera(camera) for t in (self._first, self._second))
+        found = np.where(face >= 0, face, other)
+        both = np.flatnonzero((face >= 0) & (other >= 0))
+        if len(both):
+            origins, directions, _blind = rays_of_pixels(camera)
+            reach = np.full(len(both), np.inf, np.float32)
+            _t, found.ravel()[both] = self.first_hit(origins[both], directions[both], reach)
+        return found
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
         t, face = self._first.first_hit(origins, directions, max_distance)
