@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Final
 
 from numpy import pi
 
@@ -39,6 +40,8 @@ from pbrs_farm.dress.things.materials import (
     plain,
 )
 from pbrs_farm.dress.things.outlines import bent, d_shape, oval, rect, rings
+
+_LID_RAD: Final = pi / 2  # of a toilet, close before its cistern
 
 
 @family(group="toilet", nyu40=TOILET, place=Place.FLOOR, variants=36,
@@ -84,11 +87,13 @@ def toilet(m: Maker, size: Size) -> None:
                 (bw, bd - 0.05, 0.014), (bw - 0.02, bd - 0.07, 0.018)], power=power)),
                 turn=rotation_x(-1.65), at=(0.0, rim + bd / 2 - 0.01, back + tank + 0.065))  # fmt: skip
         else:
-            m.add(loft(rings(oval, [(bw - 0.02, bd - 0.05, rim + 0.001),
-                (bw, bd - 0.03, rim + 0.005), (bw, bd - 0.03, rim + 0.018),
-                (bw - 0.01, bd - 0.04, rim + 0.02), (bw, bd - 0.03, rim + 0.022),
-                (bw, bd - 0.03, rim + 0.034), (bw - 0.05, bd - 0.08, rim + 0.042)], z=zc + 0.01,
-                power=power)))  # fmt: skip
+            m.add(hoop(oval(bw - 0.06, bd - 0.09, z=zc + 0.005, power=power), rim + 0.012, 0.022,
+                n=6))  # fmt: skip
+            with m.hinged("lid", at=(0.0, rim + 0.032, zc + 0.025 - bd / 2), axis=(-1.0, 0.0, 0.0),
+                upper_rad=_LID_RAD):  # fmt: skip
+                m.add(loft(rings(oval, [(bw - 0.01, bd - 0.04, rim + 0.0315),
+                    (bw, bd - 0.03, rim + 0.0335), (bw, bd - 0.03, rim + 0.043),
+                    (bw - 0.05, bd - 0.08, rim + 0.049)], z=zc + 0.01, power=power)))  # fmt: skip
     button = m.pick(CHROME, CHROME, WHITE_STEEL, BLACK_STEEL)
     match form:
         case 0:  # a cistern on the bowl

@@ -106,4 +106,32 @@ def test_families_with_fronts_are_all_known_here() -> None:
         for name in families()
         if name not in _CLOSED and any(s.joints for s in shapes_of(name))
     }
-    assert with_joints <= {"open_bookcase", "coffee_table", "desk", "nightstand", "hall_bench"}
+    assert with_joints <= {
+        "open_bookcase",
+        "coffee_table",
+        "desk",
+        "nightstand",
+        "hall_bench",
+        "toilet",
+    }
+
+
+def test_a_shut_toilets_lid_stands_up_before_its_cistern_over_an_open_bowl() -> None:
+    shut = [shape for shape in shapes_of("toilet", 12) if shape.joints]
+    assert len(shut) >= 4
+    for shape in shut:
+        (joint,) = shape.joints
+        low, wide = moved(shape, joint)
+        assert 0.3 < joint.mass_kg < 12
+        assert np.ptp(low[:, 1]) < 0.03 < 0.3 < np.ptp(wide[:, 1])
+        body = [s for s in shape.surfaces if s.part == ""]
+        corners = np.concatenate([s.positions[s.faces] for s in body]).astype(np.float64)
+        mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(len(corners) * 3).reshape(-1, 3))
+        # A ray down through the lid's middle ends deep in the bowl.
+        eye = [0.0, low[:, 1].max() + 0.2, low[:, 2].mean()]
+        (place, *_), _, _ = mesh.ray.intersects_location([eye], [[0, -1.0, 0]], multiple_hits=False)
+        assert low[:, 1].min() - place[1] > 0.12
+        # Upright, it leans at nothing: backwards from each of its points there is a gap, or nothing.
+        back = wide[wide[:, 2] < wide[:, 2].min() + 0.02]
+        hit, rays, _ = mesh.ray.intersects_location(back, np.tile([0, 0, -1.0], (len(back), 1)))
+        assert (back[rays][:, 2] - hit[:, 2] > 0.001).all()
