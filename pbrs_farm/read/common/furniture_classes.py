@@ -304,6 +304,13 @@ def _fits_its_size(label: str, place: PieceSize | None) -> bool:
     return long_min <= side <= long_max and height_min <= place.height <= height_max
 
 
+def _is_a_bench_alone(label: str, place: PieceSize | None) -> bool:
+    """A catalogue's television with its bench, of which only the bench is left: deep, and twice as wide as high."""
+    if place is None or label != "television":
+        return False
+    return place.depth >= place.height and place.width >= 2 * place.height
+
+
 def _by_words(name: str, place: PieceSize | None, rule: str) -> PieceClass:
     # The class of the first candidate that fits the piece; "size" if only misfits are known.
     refused = False
@@ -336,7 +343,8 @@ def class_of_piece(
             own = _by_words(group, place, "group")
         return own if own.nyu40 is not None else PieceClass(known, "catalogue")
     # The catalogue is the surest, as long as the size agrees.
-    if known is not None and _fits_its_size(NYU40_NAMES[known], place):
+    is_fit = known is not None and _fits_its_size(NYU40_NAMES[known], place)
+    if known is not None and is_fit and not _is_a_bench_alone(NYU40_NAMES[known], place):
         word = next((c.label for c in (*_candidates(inner), *_candidates(name))), "")
         return PieceClass(known, "catalogue", word)
     own = _by_words(name, place, "name")

@@ -65,7 +65,11 @@ def piece_item(
         replace(placed_surface(m, p, frame, at, matrix), part=part) for m, p, at, part in shown
     ]
     emitting = [k for k, (_, p, _, _) in enumerate(shown) if p.emits]
-    by_rule = _piece_class(piece)
+    # Where the home hides a part, as the television of its bench, the rest is judged.
+    height = piece.size[2]
+    if shown and len(shown) < len(found):
+        height = float(np.ptp(np.concatenate([at[:, 1] for _, _, at, _ in shown])))
+    by_rule = _piece_class(piece, height)
     nyu40, tags = _label_of_piece(piece, by_rule, model, materials)
     lights = light_parts(piece, frame, tuple(emitting))
     if not surfaces and not lights:
@@ -91,10 +95,10 @@ def piece_item(
     return item, frame
 
 
-def _piece_class(piece: PlanPiece) -> PieceClass:
+def _piece_class(piece: PlanPiece, height: float) -> PieceClass:
     # Openings and lights are what their element says; a tilted piece has no size to check.
     is_checked = piece.frame is None and piece.tag != "light" and not (piece.pitch or piece.roll)
-    width, depth, height = piece.size
+    width, depth, _whole = piece.size
     place = PieceSize(width, height, depth, piece.elevation) if is_checked else None
     return class_of_piece(piece.catalogue_id, piece.name, piece.group, place)
 

@@ -119,6 +119,16 @@ def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
     assert class_of_piece("eTeks#squareTable", "Table").rule == "catalogue"
 
 
+def test_a_television_unit_without_its_television_is_a_cabinet() -> None:
+    whole, bench = PieceSize(1.0, 0.93, 0.52), PieceSize(1.0, 0.417, 0.52)
+    for place, label in ((whole, "television"), (None, "television"), (bench, "cabinet")):
+        found = class_of_piece("eTeks#tvUnit", "TV unit", "", place).nyu40
+        assert found == NYU40_NAMES.index(label)
+    # A flat one is wide, too, but not deep.
+    flat = class_of_piece("eTeks#flatTV", "Flat TV", "", PieceSize(1.6, 0.7, 0.2)).nyu40
+    assert flat == NYU40_NAMES.index("television")
+
+
 def test_a_name_of_megabytes_is_its_beginning() -> None:
     assert class_of_piece("", "chair " + "a" * 2**21).nyu40 == class_of_piece("", "chair").nyu40
 

@@ -15,6 +15,7 @@ import shapely
 import trimesh
 
 from pbrs_farm.assets import homes_package
+from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, ItemKind, MaterialKind
 from pbrs_farm.core.recipe import ReadFields
@@ -45,6 +46,13 @@ def test_an_example_home_is_read_whole(name: str) -> None:
     assert any(i.lights for i in house.items)
     assert any(m.kind is MaterialKind.PANE for m in house.materials)
     assert len({i.id for i in house.items}) == len(house.items)
+
+
+@pytest.mark.homes
+def test_what_a_home_hides_of_a_piece_names_it_no_more() -> None:
+    # Studio hides the television of its TV unit and sets a flat one on the bench.
+    classes = {i.name: NYU40_NAMES[i.nyu40] for i in example("Studio").items}
+    assert (classes["TV unit"], classes["Flat TV"]) == ("cabinet", "television")
 
 
 @pytest.mark.homes
