@@ -199,8 +199,8 @@ def bill_text(bill: Sequence[BillLine]) -> str:
         (
             b.what,
             b.amount,
-            f"{b.usd_each:.6g}" if b.usd_each else "-",
-            b.usd if b.usd_each else "-",
+            "-" if b.usd_each is None else f"{b.usd_each:.6g}",
+            "-" if b.usd is None else b.usd,
             b.of,
             b.read_on,
         )

@@ -13,7 +13,7 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.run.costs import cost_of_run, measured, megasamples
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.sets.data_set import shipped_sets
-from pbrs_farm.sets.estimate_set import estimate_set, prices
+from pbrs_farm.sets.estimate_set import BillLine, bill_text, estimate_set, prices
 
 SET = """
 [render]
@@ -116,6 +116,14 @@ def test_a_bill_says_a_dash_where_no_price_is_known(capsys: pytest.CaptureFixtur
         x for x in capsys.readouterr().out.splitlines() if x.startswith("GPU hours of light, spot")
     ]
     assert line.split()[-2:] == ["-", "-"]
+
+
+def test_a_bill_says_what_costs_nothing_in_numbers() -> None:
+    free = BillLine(what="a", amount=2.0, usd_each=0.0, usd=0.0, of="x", read_on="2026-01-01")
+    unknown = BillLine(what="b", amount=2.0, usd_each=None, usd=None, of="", read_on="")
+    _head, *lines = bill_text([free, unknown]).splitlines()
+    assert lines[0].split()[:4] == ["a", "2.00", "0", "0.00"]
+    assert lines[1].split() == ["b", "2.00", "-", "-"]
 
 
 def test_a_cloud_without_prices_is_told(capsys: pytest.CaptureFixture[str]) -> None:
