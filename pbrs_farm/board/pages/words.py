@@ -26,7 +26,7 @@ OF_A_CANDIDATE: Final = {
     "few objects": "too few objects, or each too small",
     "below min score": "weak: its score is below the least that the recipe takes",
     "near duplicate": "a better camera shows the same",
-    "lower score": "keeps every rule; another camera of its sector is better",
+    "lower score": "breaks no rule; another camera of its sector is better",
     "winner": "the camera that was taken",
 }
 OF_A_SELECTION: Final = {
@@ -37,7 +37,7 @@ OF_A_SELECTION: Final = {
     "too-dark": "darker than photographs are", "blown": "too much of it is white",
     "one-surface": "one surface fills the picture", "inside-object": "the camera stands in a thing",
     "too-few-objects": "too few objects are seen", "too-noisy": "its light has too much noise",
-    "missing-textures": "pictures of its surfaces are missing",
+    "missing-textures": "texture files of its surfaces are missing",
     "unlike-colour": "its colours are unlike those of the photographs compared with",
     "unlike-depth": "its depths are unlike those of the photographs compared with",
     "room-cap": "the room has enough views already", "class-balance": "the set has enough of its classes",
