@@ -8,7 +8,7 @@ from pathlib import Path
 from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
 from pbrs_farm.commands.options import add_options, request_from
 
-SET = "a set that is shipped, indoor-1k, indoor-10k or indoor-60k, or your own FILE.toml (docs/sets.md)"
+SET = "a shipped set (indoor-1k, indoor-10k or indoor-60k) or your own FILE.toml (docs/sets.md)"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -18,7 +18,7 @@ def add_verbs(verb: Verb) -> None:
     p = verb("make", _make)
     p.add_argument("set", metavar="SET", help=SET)
     p.add_argument("--out", required=True, help="the set's folder")
-    text = "render every N-th home alone; then, with all in OUT, without it: the forms and the rest"
+    text = "render every N-th home from the K-th on; when OUT has all shards, run again without it"
     p.add_argument("--shard", metavar="K/N", help=text)
     add_options(p, ProcessLimitOptions)
     p.add_argument("--json", action="store_true", help="a JSON line per event")
@@ -30,7 +30,7 @@ def add_verbs(verb: Verb) -> None:
         "--cloud",
         nargs="+",
         metavar="NAME",
-        help="a bill of each of these clouds, of those in the table",
+        help="print each of these clouds' bill, line by line; `estimate SET` lists the clouds",
     )
     p.add_argument("--json", action="store_true", help="as JSON")
     p.epilog = 'example: pbrs-farm estimate indoor-10k --cloud AWS "Google Cloud"'

@@ -102,9 +102,9 @@ def add_verbs(verb: Verb) -> None:
     verb("coordinator", _coordinator)
     p = verb("worker", _worker)
     p.add_argument("--until", type=float, metavar="S", help="leave after S seconds")
-    text = "leave when no job had work for S seconds: a rented machine then ends"
+    text = "leave when no job has had work for S seconds, so that a rented machine ends"
     p.add_argument("--until-idle", type=float, metavar="S", help=text)
-    text = "exit status where a signal made it leave, for schedulers that take 0 for the end"
+    text = "exit status after a signal; a scheduler that sees it starts the worker again"
     p.add_argument("--preempted-code", type=int, metavar="CODE", help=text)
 
 

@@ -231,14 +231,14 @@ class ProcessLimitOptions(Record):
     """How many processes this machine has for a run, and what each may take."""
 
     jobs: int = option(
-        1, "processes (default 1, and a second one for most of all but light; each view uses all cores)",
+        1, "processes (default 1, with a second one beside it for most steps but light); each view uses all cores",
         group="the run", metavar="N", least=1,
     )  # fmt: skip
     step_timeout: float = option(
         3600.0, "seconds a step may take (default 3600)", group="the run", metavar="S"
     )
     silence: float = option(
-        0.0, "seconds a process may say nothing (default: those of a step)",
+        0.0, "seconds a process may be silent (default: as --step-timeout)",
         group="the run", metavar="S", least=0,
     )  # fmt: skip
     memory: float = option(
