@@ -170,7 +170,11 @@ def _homes_in(folder: Path) -> list[str]:
 
 
 def _is_home_file(path: Path) -> bool:
-    if path.name.startswith(".") or is_beside_homes(path):
+    if path.name.startswith("."):
+        return False
+    if path.name.endswith(SAVED_SUFFIX):
+        return True
+    if is_beside_homes(path):
         return False
     entry = format_of_file(path, surely=True)
     is_named = plugin_of_file(path) is not None

@@ -11,7 +11,7 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.prepare.source import resolve, variants
+from pbrs_farm.prepare.source import resolve, variants, words_of_homes
 from tests.scene.homes import crate, small_home
 
 
@@ -37,6 +37,13 @@ def test_a_saved_home_is_the_same_home(saved: Path) -> None:
 def test_a_home_without_edits_is_saved_too(tmp_path: Path) -> None:
     home = small_home()
     assert pf.load(home.save(tmp_path / "a.home.json")).id == home.id
+
+
+def test_a_folder_of_saved_homes_is_all_of_them(tmp_path: Path) -> None:
+    for name in ("b", "a"):
+        small_home().save(tmp_path / f"{name}.home.json")
+    found = words_of_homes([str(tmp_path)])
+    assert [Path(word).name for word in found] == ["a.home.json", "b.home.json"]
 
 
 def test_a_walk_through_it_from_the_command_line_shows_what_moves(
