@@ -29,7 +29,7 @@ from pbrs_farm.check.stored_mesh import triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView, views_of_house
 
 UNITS: Final = {
-    "motion.flow_error": "steps of the format by which flow of what moves is off, at most",
+    "motion.flow_error": "steps of 16-bit floats by which flow of what moves is off at most, a step of 1e-4 px at least",
     "motion.flow_pixels": "pixels of it that were compared",
     "motion.tracks_wrong": "places of tracked points, and whether they are seen, that are wrong",
     "motion.tracks": "of so many",
@@ -40,6 +40,7 @@ UNITS: Final = {
 HOME: Final = "Studio"
 N_FRAMES: Final = int(os.environ.get("FRAMES", "12"))
 _FPS: Final = 6
+_LEAST_PX: Final = 1e-4
 _LAYERS: Final = ("flow_forward", "occlusion_forward", "scene_flow", "depth_z")
 
 
@@ -132,7 +133,9 @@ def _flow_errors(view: StoredView, now: MovedHouse, then: MovedHouse) -> Any:
     )  # fmt: skip
     seen = (found.state == SEEN) & (layer(view, "occlusion_forward")[rows, columns] == SEEN)
     off = np.abs(layer(view, "flow_forward")[rows, columns] - found.motion)[seen]
-    return (off / (2 * half_step(found.motion[seen]))).max(axis=1, initial=0.0)
+    # A step as that of the larger of both components, where it is more than what 32-bit floats lose.
+    step = 2 * half_step(np.abs(found.motion[seen]).max(axis=1, initial=0.0))
+    return off.max(axis=1, initial=0.0) / np.maximum(step, _LEAST_PX)
 
 
 if __name__ == "__main__":
