@@ -241,7 +241,7 @@ def predict() -> Image.Image:
 
 
 def train() -> Image.Image:
-    frame = pf.open("out/homes")[2]
+    frame = pf.open("out/homes")[0]
     seen = first(f"viewseen/{frame.id.replace('/', '_')}_normal.png")
     truth = (frame.layer("normal") // 257).astype(np.uint8)
     return row(frame.colour, truth, normals_of(seen))

@@ -1,8 +1,10 @@
 """The weights that come with the package: trained, judged and packed; and what they are worth.
 
     python -m benchmarks.study.shipped                    homes, trainings, cards: two hours of a core
-    python -m benchmarks.study.shipped --tasks normals    one of them
+    python -m benchmarks.study.shipped --tasks boundaries one of them
 
+Normals come from benchmarks/study/start_curve.py; those that are trained here are what segmentation
+starts from, and do not ship.
 Effects: out/study/curve (homes of the learning curve, rendered where they are missing),
 out/study/shipped/<task>, and with --install pbrs_farm/study/weights/<task>. What is trained is kept.
 """
@@ -75,7 +77,9 @@ def main(words: Sequence[str] = ()) -> None:
     parser.add_argument("--install", action="store_true", help="into pbrs_farm/study/weights")
     args = parser.parse_args(words)
     judges = {name: rendered(name, args.jobs) for name in JUDGES}
-    for task in args.tasks:
+    # Segmentation starts from normals of the same homes.
+    first = ["normals"] if "segmentation" in args.tasks and "normals" not in args.tasks else []
+    for task in [*first, *args.tasks]:
         run = RUNS / task
         homes = [rendered(name, args.jobs) for name in roots_of_homes(HOMES[task])]
         for line in (_training(task, run, homes, judges), _judging(run, judges)):
@@ -83,17 +87,15 @@ def main(words: Sequence[str] = ()) -> None:
                 raise RuntimeError(f"{' '.join(line[:2])} failed; what is done is kept")
         from pbrs_farm.study.judging.packed_weights import SHIPPED, pack_weights
 
-        packed = pack_weights(run, run / "packed")
-        if args.install:
+        packed = pack_weights(run, run / "packed", made_by=("python -m benchmarks.study.shipped",))
+        if args.install and task != "normals":
             shutil.copytree(packed.root, SHIPPED / task, dirs_exist_ok=True)
 
 
 def _training(task: str, run: Path, homes: Sequence[str], judges: dict[str, str]) -> list[str]:
     words = ["train", task, *homes, "--hold-out", "none", "--out", str(run)]
     if task == "segmentation":  # few views show enough of each class
-        from pbrs_farm.study.judging.packed_weights import shipped_run
-
-        words += ["--init", str(shipped_run("normals"))]
+        words += ["--init", str(RUNS / "normals")]
     if judge := _CHOOSES.get(task):
         words += ["--on", f"{judge}={judges[judge]}", "--stop-on", judge]
     return words + [word for field in (*_COMMON, *PLANS[task]) for word in ("--set", field)]

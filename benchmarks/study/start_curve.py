@@ -3,6 +3,7 @@
     python -m benchmarks.study.start_curve render --seconds 480 --jobs 16      homes, while time is left
     python -m benchmarks.study.start_curve train --seconds 520 --together 6    trainings, while time is left
     python -m benchmarks.study.start_curve table                               what there is so far
+    python -m benchmarks.study.start_curve table --install                     its best normals ship with the package
 
 render: made homes at 160x120 by recipe fast, those that judge first; `pbrs-farm homes --furniture`
 goes before, or --generated furnishes and dresses them from what the program generates, which
@@ -39,6 +40,11 @@ START: Final = FOLDER / "start"
 HOMES: Final = START / "homes"
 POINTS: Final = (1600, 400, 100)
 INITS: Final = ("imagenet", "none")
+MADE_BY: Final = (
+    "pbrs-farm homes --furniture",
+    "python -m benchmarks.study.start_curve render",
+    "python -m benchmarks.study.start_curve train",
+)
 _FIRST_JUDGE: Final = 60101  # seeds of made homes that judge begin here, as the learning curve's do
 _HELD_OUT: Final = "made"
 _FIELDS: Final = (
@@ -85,6 +91,8 @@ def main(words: Sequence[str]) -> None:
         _train(args)
     else:
         print(_tell(args.copy))
+        if args.install:
+            _install()
 
 
 def _arguments(words: Sequence[str]) -> argparse.Namespace:
@@ -107,6 +115,7 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
     train.add_argument("--set", nargs="+", default=[], metavar="FIELD=VALUE", help="of the plan")
     train.add_argument("--place", default="", help="shards of these homes, packed before")
     table = commands.add_parser("table")
+    table.add_argument("--install", action="store_true", help="into pbrs_farm/study/weights")
     for command in (render, train, table):
         command.add_argument(
             "--copy", type=Path, metavar="FOLDER", help="results, at most 16 MB each"
@@ -294,17 +303,28 @@ def _tell(copy: Path | None) -> str:
 
 def _copy_best(rows: Sequence[dict[str, Any]], out: Path) -> None:
     """The run that errs least of those on most views: packed with its card, and its page."""
+    packed = _packed_best(rows)
+    shutil.copy(START / "runs" / packed.name / "evaluation/index.html", out / "best.html")
+    beside = out / "best.tar.part"
+    with tarfile.open(beside, "w") as tar:
+        tar.add(packed, packed.name)
+    beside.replace(out / "best.tar")
+
+
+def _packed_best(rows: Sequence[dict[str, Any]]) -> Path:
+    """The folder of the packed run, which is called as the run."""
     from pbrs_farm.study.judging.packed_weights import pack_weights
 
     most = max(row["views"] for row in rows)
     best = min((row for row in rows if row["views"] == most), key=_held_out_deg)
-    run = START / "runs" / best["run"]
-    packed = pack_weights(run, START / "packed")
-    shutil.copy(run / "evaluation/index.html", out / "best.html")
-    beside = out / "best.tar.part"
-    with tarfile.open(beside, "w") as tar:
-        tar.add(packed.root, best["run"])
-    beside.replace(out / "best.tar")
+    out = START / "packed" / best["run"]
+    return pack_weights(START / "runs" / best["run"], out, made_by=MADE_BY).root
+
+
+def _install() -> None:
+    from pbrs_farm.study.judging.packed_weights import SHIPPED
+
+    shutil.copytree(_packed_best(_rows()), SHIPPED / "normals", dirs_exist_ok=True)
 
 
 def _held_out_deg(row: dict[str, Any], part: str = "") -> float:

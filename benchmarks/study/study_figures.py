@@ -30,6 +30,7 @@ from benchmarks.study.loading import loading_figures
 from benchmarks.study.rendered import FOLDER, HELD_OUT, rendered
 from benchmarks.study.shipped import UNITS as SHIPPED_UNITS
 from benchmarks.study.shipped import shipped_figures
+from benchmarks.study.start_curve import START, start_figures
 from pbrs_farm.study.metrics.confusion import Confusion
 from pbrs_farm.study.metrics.edge_scores import edge_counts, n_matched
 
@@ -55,6 +56,10 @@ UNITS = (
         "study.boundary_core_s": "CPU-s a 425x560 picture at 33 thresholds",
         "study.dressed_gain": "degrees by which training on dressed homes beats bare on dressed held-out homes",
         "study.dressed_gain_spread": "degrees, its standard deviation over seeds",
+        "study.curve_views": "views of the largest training of benchmarks/study/start_curve.py",
+        "study.init_gain": "degrees by which ImageNet's start beats nothing on them, held-out homes, equal steps",
+        "study.init_gain_low": "its lower bound: 90 % of resamples of the homes lie in between",
+        "study.init_gain_high": "its upper bound",
         "study.bench_cpu_s": "CPU-s of all parts, homes rendered before",
     }
 )
@@ -93,7 +98,7 @@ def main() -> None:
             continue
         figures |= found
         cpu_s += seconds
-    figures |= _dressed_gain() | {"study.bench_cpu_s": round(cpu_s, 1)}
+    figures |= _dressed_gain() | _init_gain() | {"study.bench_cpu_s": round(cpu_s, 1)}
     write_report("study", figures, UNITS)
     if failed:
         raise RuntimeError(f"failed: {', '.join(failed)}")
@@ -279,6 +284,20 @@ def _dressed_gain() -> Figures:
     gains = np.subtract(bare, dressed)
     spread = float(gains.std(ddof=1)) if len(gains) > 1 else float("nan")
     return {"study.dressed_gain": float(gains.mean()), "study.dressed_gain_spread": spread}
+
+
+def _init_gain() -> Figures:
+    """From the trainings of benchmarks/study/start_curve.py, where they were run."""
+    path = START / "results.json"
+    if not path.exists():
+        text = "left out, run python -m benchmarks.study.start_curve render, then train, first"
+        print(f"study.init_gain: {text}", file=sys.stderr)
+        return {}
+    found = start_figures(json.loads(path.read_text())["rows"])
+    views = found["study.curve_views"]
+    own = f"study.init_gain_{views:.0f}"
+    gains = {f"study.init_gain{end}": own + end for end in ("", "_low", "_high")}
+    return {"study.curve_views": views} | {a: found[b] for a, b in gains.items() if b in found}
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """A finished run as small as it can be handed on: half floats, their sha256, a model card. Effects: files.
 
-What is packed is a run itself: `predict`, `evaluate` and `--init` take it. The best ones of plan tiny
+What is packed is a run itself: `predict`, `evaluate` and `--init` take it. The best ones
 ship with the package, below study/weights.
 """
 
@@ -43,10 +43,11 @@ def shipped_run(task: str) -> Path:
     return folder
 
 
-def pack_weights(root: Path, out: Path) -> RunFolder:
+def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFolder:
     """Write a finished run's weights as half floats, with what is known of them, into out.
 
-    What `evaluate` left in RUN/evaluation is on the card. Raises BadInput for any other folder.
+    What `evaluate` left in RUN/evaluation is on the card, and made_by, the command lines that make
+    the run again. Raises BadInput for any other folder.
     """
     run, packed = open_run(root), RunFolder(make_folder(out))
     tensors, position = read_tensors(run.folder.weights)
@@ -60,6 +61,7 @@ def pack_weights(root: Path, out: Path) -> RunFolder:
     origin = {k: v for k, v in run.record["init_origin"].items() if k != "file"}
     record = run.record | {"source": " + ".join(names), "weights_sha256": digest}
     record |= {"init": PurePosixPath(record["init"]).name, "init_origin": origin}
+    record |= {"made_by": list(made_by)} if made_by else {}
     packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
     evaluations = _evaluations(root)
     # Each view's own error is of no use without the views.
@@ -81,6 +83,8 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     homes = record["homes"]["train"]
     stop = record.get("stop_on", "")
     chosen = f"step {record['step']:,} of {plan.steps:,}"
+    machine = f"; {record['machine']}" if "machine" in record else ""
+    commands = "\n".join(record.get("made_by", ()))
     chosen += f", chosen by the error on {stop.removeprefix('on_')}" if stop else ""
     said = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
@@ -92,7 +96,8 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         "## What it was trained on",
         _seen(record, homes),
         f"First weights: {record['init_origin']['source']}. Weights of {chosen}; seed {record['seed']};"
-        f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}.",
+        f" pbrs_farm {record['versions']['pbrs_farm']}, torch {record['versions']['torch']}{machine}.",
+        *([f"Made by:\n\n```\n{commands}\n```"] if commands else []),
         f"Truth: {record['truth']}.",
         "## Figures",
         _figures(run, evaluations),
@@ -112,12 +117,14 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
     """What the weights saw, their first ones included."""
     n, first = record["views"]["train"], record["init_origin"].get("mode", "")
     if record["mode"] == NYU_LIGHT:
-        return f"{n} photographs of NYU Depth v2 (Silberman et al., 2012), labelled there."
+        return f"{n:,} photographs of NYU Depth v2 (Silberman et al., 2012), labelled there."
     named = f"{', '.join(homes[:_MOST_HOMES])}{' and others' if len(homes) > _MOST_HOMES else ''}"
-    said = f"{n} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
+    said = f"{n:,} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
     if first == NYU_LIGHT:
         return f"{said} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
-    return f"{said} No photograph was trained on."
+    seen = record["init_origin"].get("photographs")
+    first = f"; the first weights saw {seen}" if seen else ""
+    return f"{said} No photograph was trained on{first}."
 
 
 def _training_credits(record: Mapping[str, Any]) -> list[str]:

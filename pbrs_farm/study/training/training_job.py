@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -135,8 +136,16 @@ def _record(
             "torch": torch.__version__,
             "python": platform.python_version(),
         },
+        "machine": _machine(job.plan),
         **job.facts,
     }
+
+
+def _machine(plan: TrainingPlan) -> str:
+    """What does the work: the GPU's name, or the processor's kind; and how many cores there are."""
+    device = device_of(plan)
+    name = torch.cuda.get_device_name(device) if device.type == "cuda" else platform.machine()
+    return f"{name}, {os.cpu_count()} cores"
 
 
 def _judge_of_curve(

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.study import start_curve
+from benchmarks.study import start_curve, study_figures
 
 pytestmark = pytest.mark.study
 
@@ -47,6 +47,25 @@ def test_the_gain_is_of_equal_seeds_and_its_interval_over_homes() -> None:
     assert (figures["study.init_gain_100_low"], figures["study.init_gain_100_high"]) == (3, 5)
     assert "study.init_gain_400" not in figures
     assert figures["study.curve_views"] == 400
+
+
+def test_the_bench_tells_the_gain_of_the_most_views_from_where_it_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(study_figures, "START", tmp_path)
+    assert study_figures._init_gain() == {}
+    assert "start_curve render" in capsys.readouterr().err
+    rows = [row for row in ROWS if row["views"] == 100]
+    (tmp_path / "results.json").write_text(json.dumps({"rows": rows}))
+    found = study_figures._init_gain()
+    assert found == {
+        "study.curve_views": 100, "study.init_gain": pytest.approx(4),
+        "study.init_gain_low": 3, "study.init_gain_high": 5,
+    }  # fmt: skip
+    assert found.keys() <= study_figures.UNITS.keys()
+    # From one start alone nothing is said of a gain.
+    (tmp_path / "results.json").write_text(json.dumps({"rows": ROWS}))
+    assert study_figures._init_gain() == {"study.curve_views": 400}
 
 
 def test_the_table_has_a_row_a_start_and_what_knows_no_picture() -> None:
