@@ -28,6 +28,7 @@ _DEPTH: Final = 1e-4  # of the depth, and metres
 _BESIDE_M: Final = (
     0.002  # of a point: where its surroundings are seen and it is not, either is right
 )
+_EDGE_ON: Final = 0.01  # cosine of a face's normal to the ray
 _SHAPES: Final = {"points": 3, "occluded": 2, "depth_m": 2, "query_frame": 1, "instance": 1}
 
 Scene = tuple[MovedHouse, Rays]
@@ -150,6 +151,11 @@ def _check_frame(
     seen[inside] = is_seen(moved[inside], other, rays)
     wrong = np.flatnonzero(hidden == seen)
     wrong = wrong[~_may_be_either(moved[wrong], other, margin[wrong], rays)]
+    # A face that is seen edge-on hides its own points, or does not.
+    towards = moved[wrong] - other.world_from_camera[:3, 3]
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    slant = np.einsum("ni,ni->n", rays.normal(face[wrong], towards), towards)
+    wrong = wrong[np.abs(slant) > _EDGE_ON]
     tally.add("tracks", len(own))
     for k in wrong[:20]:
         word = "hidden" if hidden[k] else "seen"
