@@ -63,7 +63,7 @@ class FarmOptions(Record):
         choices=tuple(range(LEAST_URGENT + 1)),
     )  # fmt: skip
     max_slots: int = option(
-        0, "tasks of it in flight at once, at most (0: as many as there are slots)", ge=0,
+        0, "at most N of its tasks in flight at once (0: as many as there are slots)", ge=0,
         metavar="N", least=0,
     )  # fmt: skip
     budget_h: float = option(
@@ -85,7 +85,7 @@ class FarmAccess(Record):
 
 class _HousesOption(Record):
     houses: str | None = option(
-        None, "file with a SUNCG house id a line (HOME: root)", metavar="LIST"
+        None, "file with one SUNCG house id per line; HOME is their root folder", metavar="LIST"
     )
 
 
@@ -99,9 +99,7 @@ class SubmitRequest(
     """What `submit` takes beside the words of homes, from its options or a job's file."""
 
     like: str = option(
-        "",
-        "a job.toml as a template: its options, for the homes that are named here",
-        metavar="FILE",
+        "", "take the options of this job.toml for the homes named here", metavar="FILE"
     )
     part: str = option("", "of a data set with several parts: the one to render", metavar="NAME")
     update: bool = option(False, "give the store this recipe")

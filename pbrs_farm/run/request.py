@@ -80,7 +80,7 @@ class DressOptions(Record):
     """By which seeds each home is dressed, and with what."""
 
     dress: str | None = option(
-        None, "dress each home by each seed, a house of its own each: 3, 1..20 or 1,4,7",
+        None, "dress each home once by each seed, as a house of its own: 3, 1..20 or 1,4,7",
         group="dressing", metavar="SEEDS",
     )  # fmt: skip
     furnish: Literal["none", "empty", "sparse"] | None = option(
@@ -99,7 +99,7 @@ class RecipeOptions(Record):
         (), "override a field", group="recipe", metavar="GROUP.FIELD=VALUE"
     )
     size: str | None = option(None, "picture size, e.g. 640x480", group="recipe", metavar="WxH")
-    strict: bool = option(False, "recoverable faults of a home are errors", group="recipe")
+    strict: bool = option(False, "treat recoverable faults of a home as errors", group="recipe")
 
 
 class SeededRecipeOptions(RecipeOptions):
@@ -131,11 +131,11 @@ class CameraOptions(Record):
     """Where viewpoints come from."""
 
     cameras: Literal["sampled", "stored", "walk"] | None = option(
-        None, "where viewpoints come from; walk: frames along a person's way (docs/motion.md)",
+        None, "where viewpoints come from; walk: frames along a path through the home (docs/motion.md)",
         group="viewpoints", sets="cameras.source",
     )  # fmt: skip
     trajectory: Path | None = option(
-        None, "your own way: TUM rows t x y z qx qy qz qw (docs/motion.md)",
+        None, "your own walk, as TUM rows t x y z qx qy qz qw (docs/motion.md)",
         group="viewpoints", metavar="FILE",
     )  # fmt: skip
     frames: int | None = option(
@@ -151,7 +151,7 @@ class CameraOptions(Record):
         group="viewpoints", sets="read.doors",
     )  # fmt: skip
     stereo: float | None = option(
-        None, "a second view to the right of each, so many metres off, e.g. 0.065",
+        None, "a second view B metres to the right of each, e.g. 0.065",
         group="viewpoints", metavar="B", sets="cameras.stereo_m",
     )  # fmt: skip
 
@@ -193,7 +193,7 @@ class Wanted(Record):
         group="what is made", metavar="MODE", many_words=True,
     )  # fmt: skip
     layers: tuple[str, ...] = option(
-        (), "optional layers to write beside those that are there",
+        (), "optional layers to write besides the usual ones; `layers` lists them",
         group="what is made", metavar="LAYER", many_words=True,
     )  # fmt: skip
     n_views: int = option(
