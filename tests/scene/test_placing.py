@@ -75,7 +75,9 @@ targets = st.lists(st.sampled_from(sorted(LARGEST)), min_size=1, max_size=5, uni
 
 @given(names=names, on=targets, n=st.integers(1, 2), seed=st.integers(0, 1000))
 @settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=60,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 def test_every_model_that_fits_somewhere_is_placed_there(
     models: dict[str, pf.Model], names: list[str], on: list[str], n: int, seed: int
@@ -106,7 +108,9 @@ def test_every_model_that_fits_somewhere_is_placed_there(
 
 @given(name=st.sampled_from(sorted(EDGES_M)), on=targets, seed=st.integers(0, 1000))
 @settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=40,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 def test_one_model_finds_the_target_that_takes_it(
     models: dict[str, pf.Model], name: str, on: list[str], seed: int
