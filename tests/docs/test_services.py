@@ -109,9 +109,15 @@ def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None
     alone = ["--no-build-isolation", "--no-index", "--quiet", "--disable-pip-version-check"]
     pip = [sys.executable, "-m", "pip"]
     subprocess.run([*pip, *build[1:], *alone], cwd=source, check=True)
-    (wheel,) = (str(p) for p in source.glob(install[-1]))
+    shown = subprocess.run(
+        ["sh", "-c", f'echo "{install[-1]}"'],
+        cwd=source,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     site = tmp_path / "site"
-    words = ["install", wheel, "--no-deps", "--target", str(site), *alone[1:]]
+    words = ["install", shown.stdout.strip(), "--no-deps", "--target", str(site), *alone[1:]]
     subprocess.run([*pip, *words], cwd=source, check=True)
     env = {**os.environ, "PYTHONPATH": str(site), "PBRS_REDIS_URL": "redis://127.0.0.1:1/0"}
     told = run(
