@@ -9,7 +9,7 @@
 #   scripts/gpu_check.sh --only views [FOLDER]      the second half: within 300 seconds, too
 #   scripts/gpu_check.sh --wheels FOLDER [VERSION]  makes the folder for a version of Python, where there is a network
 #
-# The folder's wheels-VERSION.tar.xz (58.5 MB) holds the libraries of the published wheels as cut copies, for this check
+# The folder's wheels-VERSION.tar.xz (60 MB) holds the libraries of the published wheels as cut copies, for this check
 # only: gpu_wheels.txt says which files are left out because nothing here opens them, gpu_wheels.py what is blanked in
 # the others (debug data, and the networks of Open Image Denoise that pbrs_farm does not ask for), CUT.txt in the
 # archive in which. Take libraries for anything else from the wheels. PYTHON names the interpreter; else it is the first of
