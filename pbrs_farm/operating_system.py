@@ -22,6 +22,7 @@ from pathlib import Path, PureWindowsPath
 from typing import IO, Any, Final, Protocol
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.installation import pip_command
 
 NOT_REGULAR: Final = "is no regular file (a device or a pipe)"
 _PR_SET_PDEATHSIG: Final = 1  # of linux/prctl.h
@@ -376,6 +377,5 @@ def _psutil() -> Any:
     try:
         return import_module("psutil")
     except ImportError as error:
-        raise MachineFailed(
-            "this system tells of processes by psutil", hint="pip install psutil"
-        ) from error
+        hint = f"{pip_command()} install psutil"
+        raise MachineFailed("this system tells of processes by psutil", hint=hint) from error
