@@ -63,7 +63,7 @@ _N_PHOTOGRAPHS: Final = 4
 
 UNITS: Final = {
     "study.weights_mb": "MB, the largest of the weights that come with the package",
-    "study.weights_deg": "degrees, mean, of the shipped normals on made homes that neither trained nor chose",
+    "study.weights_deg": "degrees, mean, of the shipped normals on made homes that never trained; of two seeds they chose the better",
     "study.predict_s": "CPU-s a 640x480 picture, shipped normals; <= 1",
     "study.onnx_equal": "1 = ONNX says what the shipped normals say, within 1e-4",
 }
