@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gzip
 import html
 import json
@@ -13,7 +14,6 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-from starlette.testclient import TestClient
 
 from pbrs_farm.board.board_state import new_board
 from pbrs_farm.board.index.house_rows import HouseRow, ViewRow
@@ -321,11 +321,17 @@ def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
     board = new_board(
         store_from_url(str(root)), BoardOptions(cache=tmp_path, port=0, token=Secret(TOKEN))
     )
-    client = TestClient(application(board), base_url="http://127.0.0.1")
+    # Asked without a server, which would begin to read.
+    transport = httpx.ASGITransport(application(board))
+
+    async def answers() -> tuple[str, str]:
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1") as client:
+            progress, page = await client.get("/progress"), await client.get("/")
+        return progress.json()["text"], page.text
 
     def told(progress: Progress) -> tuple[str, str]:
         board.refresher.progress = progress
-        return client.get("/progress").json()["text"], client.get("/").text
+        return asyncio.run(answers())
 
     # Nothing was looked at yet: the root may be large, and is not called empty.
     text, page = told(board.refresher.progress)
