@@ -1,6 +1,6 @@
 """Occlusion and crease edges from stored depth and normals, as far as their rounding lets one say; no effects.
 
-docs/formats.md tells the rules. Depth is known to half a millimetre and normals to 16 bits: where a rule
+docs/formats/layer_rules.md tells the rules. Depth is known to half a millimetre and normals to 16 bits: where a rule
 hangs on less, either value is right.
 """
 

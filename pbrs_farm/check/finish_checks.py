@@ -1,6 +1,6 @@
 """Gloss of surfaces as house.json and house.glb say it: roughness, reflectance at right angles, metal; no effects.
 
-Formulas are written again here from docs/formats.md and the sources it names; the stages' code is not used.
+Formulas are written again here from docs/formats/pixels.md and the sources it names; the stages' code is not used.
 """
 
 from __future__ import annotations

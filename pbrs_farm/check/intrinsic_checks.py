@@ -1,6 +1,6 @@
 """Shading and residual against albedo, radiance.exr and materials. Effects: none.
 
-Formulas are written again here from docs/formats.md; the stages' code is not used.
+Formulas are written again here from docs/formats/layer_rules.md; the stages' code is not used.
 """
 
 from __future__ import annotations

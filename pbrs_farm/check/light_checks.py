@@ -1,6 +1,6 @@
 """Pictures in the light modes: radiance.exr through denoiser, white balance and tone again. Effects: reads files.
 
-Formulas are written again here from docs/formats.md and the sources named; the stages' code is not used.
+Formulas are written again here from docs/light.md and the sources named; the stages' code is not used.
 """
 
 from __future__ import annotations

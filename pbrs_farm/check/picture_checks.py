@@ -1,6 +1,6 @@
 """Pictures against what they were made of: light developed again, edges of labels, histograms.
 
-Effects: reads files. Formulas are written again here from docs/formats.md and the sources named;
+Effects: reads files. Formulas are written again here from docs/formats/layer_rules.md and the sources named;
 only the denoiser is the same program, since nothing else gives its values.
 """
 

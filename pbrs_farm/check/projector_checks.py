@@ -1,4 +1,4 @@
-"""The dots of an infrared projector, thrown again at some pixels (docs/formats.md). Effects: none."""
+"""The dots of an infrared projector, thrown again at some pixels (docs/formats/layer_rules.md). Effects: none."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Layers that follow from depth and normals: hha by its formula, depth sensors by their statistics.
 
-Effects: none. The numbers are those that docs/formats.md tells; where noise is, a pixel is held
+Effects: none. The numbers are those that docs/formats/layer_rules.md tells; where noise is, a pixel is held
 against what its neighbours allow, and the mean over flat surfaces against none.
 """
 

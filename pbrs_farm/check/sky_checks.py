@@ -16,7 +16,7 @@ SKY_LX = 0.06  # of illuminances stored to a tenth
 SKY_SHARE = 0.02  # of the dome's: it is summed over texels
 SUN_SHARE = 0.005  # of the sun's: its direction is rounded to a texel or not
 DIRECTION = 2e-6  # of a direction stored to six digits
-EXPECTED_LX = {"outdoor": [20.0, 5000.0], "indoor": [30.0, 1000.0]}  # docs/formats.md
+EXPECTED_LX = {"outdoor": [20.0, 5000.0], "indoor": [30.0, 1000.0]}  # docs/formats/view_json.md
 DARK_LX = 1.0
 
 
@@ -49,7 +49,7 @@ def check_illuminance(house: StoredHouse, tally: Tally) -> None:
 
 
 def _warnings(row: Mapping[str, Any], *, is_day: bool) -> list[str]:
-    """Lines for what is out of range: docs/formats.md."""
+    """Lines for what is out of range: docs/formats/view_json.md."""
     lit, lines = set(row["lit_by"]), []
     has = {
         "outdoor": is_day and bool(lit & {"windows", "sky"}),

@@ -26,7 +26,12 @@ def add_verbs(verb: Verb) -> None:
     p = verb("export", _export)
     add = p.add_argument
     add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
-    add("--to", required=True, choices=form_names(), help="docs/formats.md describes the forms")
+    add(
+        "--to",
+        required=True,
+        choices=form_names(),
+        help="docs/formats/export.md describes the forms",
+    )
     add("--out", type=Path, help="new folder (default FOLDER_<form>)")
     add("--selection", metavar="RUN", help="only what this run keeps")
     add_options(p, ExportOptions)

@@ -177,7 +177,7 @@ class Box:
 
     centre: F64  # (3,) metres, world
     half: F64  # (3,) half extents, metres
-    axes: F64  # (3, 3), unit columns; view.json has them as rows (docs/formats.md)
+    axes: F64  # (3, 3), unit columns; view.json has them as rows (docs/formats/view_json.md)
 
     @property
     def corners(self) -> F64:

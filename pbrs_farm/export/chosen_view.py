@@ -231,7 +231,7 @@ def k_of_whole_centres(k: list[list[float]]) -> list[list[float]]:
     """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel.
 
     Ours have centres at +0.5. For forms whose readers count pixels from their centres, as BOP's and
-    KITTI's; docs/formats.md has the convention of each form.
+    KITTI's; docs/formats/export.md has the convention of each form.
     """
     (fx, skew, cx), (_zero, fy, cy), last = k
     return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]

@@ -27,6 +27,6 @@ class ExportOptions(Record):
     )
     shard_size: int = option(500, "views a tar (webdataset)", metavar="N", least=1)
     lidar: str = option(
-        "vlp16", "whose scans the form lidar has (default vlp16; docs/formats.md has them all)",
+        "vlp16", "whose scans the form lidar has (default vlp16; docs/formats/lidar.md has them all)",
         metavar="SCANNER",
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """`pbrs-farm export`: a finished output folder in the forms other tools read.
 
 Effects: reads an output folder, writes a new folder; it appears whole or not at all. The forms are
-the modules of `forms/`; docs/formats.md describes them.
+the modules of `forms/`; docs/formats/export.md describes them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a form of export is, and the table of all forms: the modules of `forms/` and plugins.
 
 Effects: a form's module is imported when it is first asked for; new_folder writes. The table of
-docs/formats.md is printed from it (`python -m pbrs_farm.export.form`).
+docs/formats/export.md is printed from it (`python -m pbrs_farm.export.form`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ WriteHome: TypeAlias = "Callable[[ExportedHome, Path], int]"
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """How a form counts pixels and points its axes: a row of the table in docs/formats.md.
+    """How a form counts pixels and points its axes: a row of the table in docs/formats/export.md.
 
     first_pixel: where the centre of the first pixel lies in K and in pixel coordinates, along x and
     along y: 0.5 as in view.json, 0 of forms whose readers count from it; None of a form with neither.
@@ -62,7 +62,7 @@ class ViewForm:
     """A form of finished views: what `pbrs-farm export --to NAME` writes of them.
 
     A module `forms/<name>.py` ends with one, its dashes written `_`; a plugin's entry point names
-    one. Nothing else lists forms: the choices of --to, messages and docs/formats.md read the table.
+    one. Nothing else lists forms: the choices of --to, messages and docs/formats/export.md read the table.
 
         FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view")
 

@@ -1,4 +1,4 @@
-"""view.json: which view this is, its camera, tables and facts (docs/formats.md), written by `view`; no effects."""
+"""view.json: which view this is, its camera, tables and facts (docs/formats/view_json.md), written by `view`; no effects."""
 
 from __future__ import annotations
 

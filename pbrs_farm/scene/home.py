@@ -236,7 +236,7 @@ class Home:
     def export(self, folder: str | Path, to: str = "gltf") -> Path:
         """Write the home itself for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
 
-        Each thing is one node, prim or model with a collider and its lamps; docs/formats.md describes
+        Each thing is one node, prim or model with a collider and its lamps; docs/formats/simulators.md describes
         the forms, and `pf.load` reads each of them but mjcf, sdf and urdf. Raises BadInput where the folder holds something.
 
             >>> home.export("as_gltf").is_dir()

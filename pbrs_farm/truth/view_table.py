@@ -1,4 +1,4 @@
-"""Tables of view.json (docs/formats.md): the camera, and each visible instance; no effects."""
+"""Tables of view.json (docs/formats/view_json.md): the camera, and each visible instance; no effects."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Normals as stored (16 bits) -> unit vectors in camera axes by name; no effects.
 
-Stored normals are round((n + 1) 65535 / 2) in the published axes (docs/formats.md).
+Stored normals are round((n + 1) 65535 / 2) in the published axes (docs/formats/pixels.md).
 """
 
 from __future__ import annotations

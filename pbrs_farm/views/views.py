@@ -69,7 +69,7 @@ class ViewSource(Protocol):
         ...
 
     def table(self, ref: ViewRef) -> dict[str, Any]:
-        """view.json as it is stored (docs/formats.md); of shards the part that was packed."""
+        """view.json as it is stored (docs/formats/view_json.md); of shards the part that was packed."""
         ...
 
     def read(self, ref: ViewRef, request: SampleRequest) -> Sample:
@@ -168,7 +168,7 @@ class Frame:
 
     @property
     def table(self) -> dict[str, Any]:
-        """view.json: instances with their boxes and classes, sky, seeds (docs/formats.md).
+        """view.json: instances with their boxes and classes, sky, seeds (docs/formats/view_json.md).
 
         >>> len(frame.table["instances"]) == len(frame.instances)
         True
@@ -258,7 +258,7 @@ class Frame:
 
     @checked_call
     def classes_by(self, table: str | Path | ClassMap) -> NDArray[np.uint16]:
-        """(H, W) classes of your own, 0 = none: a CSV file with columns from,id,name (docs/formats.md).
+        """(H, W) classes of your own, 0 = none: a CSV file with columns from,id,name (docs/formats/export.md).
 
         Raises BadInput for a table that is wrong, naming its line, and for a frame of shards, which
         have no table of instances.
@@ -436,7 +436,7 @@ class Views(Sequence[Frame]):
     ) -> Path:
         """Write them in a form that other tools read into the new folder out, and give that.
 
-        to: coco, yolo, kitti, bop and the other forms of views of docs/formats.md. layers and modes: one
+        to: coco, yolo, kitti, bop and the other forms of views of docs/formats/export.md. layers and modes: one
         or several, None = all; size: (width, height), None = as rendered; classes: a CSV file of your own
         classes; shares: a folder a split; lidar: the scanner of the form lidar. Raises BadInput for a form there is not, views it cannot hold,
         an out that holds something, and frames of shards.
@@ -455,7 +455,7 @@ class Views(Sequence[Frame]):
     def questions(self) -> list[dict[str, Any]]:
         """Questions about space: a dict with question_type, question, ground_truth, options, instances.
 
-        The kinds and columns are those of VSI-Bench (docs/formats.md, form `questions`). Frames of a walk
+        The kinds and columns are those of VSI-Bench (docs/formats/export.md, form `questions`). Frames of a walk
         are asked about as one film, every other frame by itself; of one that shows too little there
         are none. Raises BadInput for frames of shards.
 

@@ -14,7 +14,7 @@ COMMANDS = (REPO / "docs/commands.md").read_text(encoding="utf-8")
 
 
 def test_the_layers_table_is_the_one_of_layers_py() -> None:
-    assert layer_table() in (REPO / "docs/formats.md").read_text(encoding="utf-8")
+    assert layer_table() in (REPO / "docs/formats/layers.md").read_text(encoding="utf-8")
 
 
 def test_every_verb_shown_exists() -> None:

@@ -138,7 +138,7 @@ def _pcd(records: NDArray[Any], words: Iterable[str]) -> bytes:
 
 
 def scanners_table() -> str:
-    """The scanners as a Markdown table: that of docs/formats.md."""
+    """The scanners as a Markdown table: that of docs/formats/lidar.md."""
     rows = [
         "| scanner | rings, degrees | beams a ring | range in m | noise |",
         "|---|---|---|---|---|",

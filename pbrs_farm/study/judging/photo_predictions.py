@@ -117,7 +117,7 @@ def predict_photographs(run: Trained, files: Sequence[Path], out: Path) -> Itera
     """Write each photograph's prediction below out, and the page last; a row a photograph as it is done.
 
     A picture that cannot be read is a row with an "error", and the rest goes on. The files are
-    docs/formats.md's: normal.png (16 bits), semantic.png or nyu13.png (ids), depth.png (mm), or edges.png (255 x how likely
+    docs/formats/layers.md's: normal.png (16 bits), semantic.png or nyu13.png (ids), depth.png (mm), or edges.png (255 x how likely
     an edge is), each behind the photograph's name; NAME_shown.png is for eyes. Raises BadInput where
     out cannot be written to.
     """

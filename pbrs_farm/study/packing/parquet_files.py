@@ -27,7 +27,7 @@ def write_parquet(source: StoredRoot, plan: ShardPlan, packing: Packing, out: Pa
     """data/<split>-<number>-of-<number>.parquet: a row a view.
 
     Pictures are columns of type Image, labels of type Array2D (normals Array3D) in the type they are
-    stored in. camera is JSON: size, K and pose as in docs/formats.md. Raises BadInput where the views
+    stored in. camera is JSON: size, K and pose as in docs/formats/view_json.md. Raises BadInput where the views
     of a file are not of one size: an array column has one shape.
     """
     file = out / "data" / f"{plan.split}-{plan.number:05d}-of-{plan.n_shards:05d}.parquet"
