@@ -49,7 +49,7 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
     text = (
-        "a floor plan in any format of docs/houses.md, furnished by the seed: JSON, GeoJSON, CSV, "
+        "a floor plan in any format of docs/houses/plans.md, furnished by the seed: JSON, GeoJSON, CSV, "
         "SVG, TXT"
     )
     add("--plan", type=Path, metavar="FILE", help=text)

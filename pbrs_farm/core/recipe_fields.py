@@ -50,7 +50,8 @@ class ReadFields(FieldGroup):
         description="for what a source tells by class and box alone: furniture, plain boxes, nothing",
     )
     strict: bool = Field(
-        False, description="notes of a source are errors but the harmless kinds, docs/houses.md"
+        False,
+        description="notes of a source are errors but the harmless kinds, docs/houses/notes.md",
     )
 
 

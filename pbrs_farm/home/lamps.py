@@ -9,7 +9,7 @@ from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
 
 # Share of a ceiling lamp's flux that a furnished floor gets; rooms measure 0.12 to 0.40
-# (docs/houses.md).
+# (docs/houses/repair.md).
 UTILISATION: Final = 0.3
 
 

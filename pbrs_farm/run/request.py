@@ -160,7 +160,7 @@ class ModelsOption(Record):
     """Where the models lie that a home's file names."""
 
     models: str = option(
-        "", "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses.md)",
+        "", "folder of the models that a scene of HSSD, 3D-FRONT or Holodeck names (docs/houses/data_sets.md)",
         metavar="DIR",
     )  # fmt: skip
 

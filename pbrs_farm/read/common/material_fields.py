@@ -1,6 +1,6 @@
 """What glTF, USD and MTL can say of a surface and its pictures, and what becomes of each: one table.
 
-`python -m pbrs_farm.read.common.material_fields` prints the rows of docs/houses.md. Effect: reads the table.
+`python -m pbrs_farm.read.common.material_fields` prints the rows of docs/houses/surfaces.md. Effect: reads the table.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def noted_fields(of_format: str) -> tuple[str, ...]:
 
 
 def rows_of_docs() -> str:
-    """The table as docs/houses.md has it."""
+    """The table as docs/houses/surfaces.md has it."""
     cells = (
         f"| {r.format} | `{'`, `'.join(r.field.split('; '))}` | {r.use} | {r.text} |"
         for r in material_fields()

@@ -40,7 +40,7 @@ class Notes:
     def add(self, kind: str, place: str, text: str) -> None:
         """Remember a fault of the source, at most once; raise it as BadHouse when reading is strict.
 
-        kind: a word of docs/houses.md; what is in HARMLESS is never raised. place: where in the file, as
+        kind: a word of docs/houses/notes.md; what is in HARMLESS is never raised. place: where in the file, as
         a reader finds it there: `nodes[3] (Sofa)`, `line 12`. text: what was left out or guessed.
         """
         if self._strict and kind not in HARMLESS:
