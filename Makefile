@@ -60,7 +60,7 @@ test-farm: export PBRS_SETUP_ALSO := faketime
 test-farm: setup ## the farm's tests that really kill processes
 	$(BIN)/pytest -m chaos
 
-test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm.md)
+test-infra: setup ## real S3, Docker, Slurm: endpoints from the environment (docs/farm/settings.md)
 	$(BIN)/pytest -m infra -rs
 
 test-kube: setup ## the manifests on the cluster that kubectl reaches: jobs, kills, drains, a roll-out (tests/infra/README.md)

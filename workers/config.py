@@ -77,7 +77,7 @@ class Limits:
 class FarmConfig:
     """Everything a coordinator, a worker or a client needs to know.
 
-    `config_from_environment` makes it from PBRS_* and PBRS_FARM_* (docs/farm.md lists them);
+    `config_from_environment` makes it from PBRS_* and PBRS_FARM_* (docs/farm/settings.md lists them);
     tests give the fields. Only redis_url is needed to look at a farm; what stores something
     needs store_url. Raises BadInput for a value out of its range.
     """
@@ -209,7 +209,9 @@ def _read_setting(
         setting = _FORMER_NAMES.get(setting, setting)
         kind = kinds.get(setting)
         if kind is None:
-            raise BadInput("environment", name, "no such setting", hint="docs/farm.md lists them")
+            raise BadInput(
+                "environment", name, "no such setting", hint="docs/farm/settings.md lists them"
+            )
         try:
             values[setting] = _READERS[kind](text)
         except ValueError:

@@ -12,7 +12,7 @@ from workers.config import FarmConfig, Limits, config_from_environment, make_scr
 
 
 def test_every_setting_stands_in_the_docs() -> None:
-    docs = (Path(__file__).parents[2] / "docs/farm.md").read_text()
+    docs = (Path(__file__).parents[2] / "docs/farm/settings.md").read_text()
     elsewhere = {"redis_url", "store_url", "store", "limits", "webhook", "token"}
     names = {f"_{f.name.upper()}" for f in fields(FarmConfig) if f.name not in elsewhere}
     names |= {f"_{f.name.upper()}" for f in fields(Limits)}

@@ -1,4 +1,4 @@
-"""Against real infrastructure, named by the environment (docs/farm.md says how to start it).
+"""Against real infrastructure, named by the environment (docs/farm/settings.md says how to start it).
 
 S3: PBRS_S3_ENDPOINT, PBRS_S3_ACCESS_KEY, PBRS_S3_SECRET_KEY, PBRS_S3_ALLOW_HTTP, PBRS_S3_BUCKET.
 Redis with TLS and ACL: PBRS_TEST_TLS_REDIS (URL), PBRS_FARM_REDIS_CA.  Slurm: PBRS_TEST_SLURM=1.

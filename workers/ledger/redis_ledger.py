@@ -259,7 +259,7 @@ class RedisLedger:
 
         tasks: of one job, "<house>/<unit>/<stage>". token: of this claim; what was claimed by it is kept and
         ended by it. recipe: digest that this worker renders by. direct: tasks without a message, too. A verdict
-        other than "run" changes nothing, but that a task may be sent again later; docs/farm.md has a
+        other than "run" changes nothing, but that a task may be sent again later; docs/farm/inside.md has a
         table of verdicts. A task that failed before is claimed alone: it may take others with it.
         """
         from workers.job import work_version

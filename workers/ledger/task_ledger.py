@@ -56,7 +56,7 @@ class LedgerUnavailable(PbrsError, Transient):
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """The answer to a claim of one task; only verdict "run" grants it. docs/farm.md explains each verdict."""
+    """The answer to a claim of one task; only verdict "run" grants it. docs/farm/inside.md explains each verdict."""
 
     verdict: ClaimAnswer
     detail: str = ""  # the attempt's number for "run", otherwise the reason

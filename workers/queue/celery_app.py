@@ -2,7 +2,7 @@
 
 Celery carries the work; whether it is done, and whether it is tried again, the ledger decides. So
 there are no results, no chords, no countdowns and no Celery retries. Why each setting is as it is
-stands in docs/farm.md.
+stands in docs/farm/inside.md.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ register(
 )
 
 
-# Why each stands as it does: docs/farm.md.
+# Why each stands as it does: docs/farm/inside.md.
 _SETTINGS: Final[dict[str, Any]] = {
     "accept_content": ["pbrs-json"],
     "task_serializer": "pbrs-json",
