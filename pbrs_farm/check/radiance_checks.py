@@ -126,7 +126,7 @@ def _is_released(house: StoredHouse) -> bool:
 
 
 def coated_materials(house: StoredHouse) -> NDArray[np.bool_]:
-    """(M,) whether a material shines at all, be it ever so rough (docs/light.md); the published ones never do."""
+    """(M,) whether a material shines at all, be it ever so rough (docs/light_methods.md); the published ones never do."""
     rows = house.house["materials"]
     if _is_released(house):
         return np.zeros(len(rows), bool)

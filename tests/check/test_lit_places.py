@@ -1,4 +1,4 @@
-"""What a coated surface sends back of a light, as `verify` expects it, against the model of docs/light.md."""
+"""What a coated surface sends back of a light, as `verify` expects it, against the model of docs/light_methods.md."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ class DeviceScene:
     def intersect(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
         """The first surface along a ray, by the faster test where there is a tree for it.
 
-        It takes one ray of two million through an edge to the face behind (docs/light.md).
+        It takes one ray of two million through an edge to the face behind (docs/light_methods.md).
         """
         ray = _ray(o, d, dr.inf)
         first = self._all if self._fast is None else self._fast
