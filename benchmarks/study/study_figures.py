@@ -46,6 +46,7 @@ UNITS = (
         "study.normals_train": "degrees, mean on its training views",
         "study.matching_equal": "share of 24 fixtures whose count is the min-cost assignment's",
         "study.iou_equal": "share of 8 fixtures whose mIoU is torchmetrics' within 1e-6",
+        "study.compare": "1 = a root is at no distance from itself and farther from darker photographs; a test that must pass",
         "study.resume_equal": "1 = a killed run went on to the same weights",
         "study.ablation_s": "s: the built-in home rendered and its four lights compared; a test that must pass",
         "study.overfit_deg": "degrees, 4 views at 80x60 by heart in 300 steps",
@@ -82,7 +83,7 @@ def main() -> None:
     folder = folder_of_code()
     _root()
     measures: dict[str, Callable[[], Figures]] = {
-        "matching": _matching, "iou": _iou, "boundary": _boundary_seconds, "resume": _resume, "builtin": _builtin,
+        "matching": _matching, "iou": _iou, "boundary": _boundary_seconds, "resume": _resume, "compare": _compare, "builtin": _builtin,
         "loading": loading_figures, "heart": lambda: _by_heart(folder),
         "normals": lambda: _normals(folder), "classes": lambda: _classes(folder),
         "edges": lambda: _edges(folder), "shipped": shipped_figures,
@@ -253,6 +254,11 @@ def _resume() -> Figures:
     """The test that kills a run; its verdict."""
     test = "training/test_training.py::test_a_killed_run_goes_on_to_the_same_weights"
     return {"study.resume_equal": float(_passes(test))}
+
+
+def _compare() -> Figures:
+    """The tests of `compare`; their verdict."""
+    return {"study.compare": float(_passes("comparing"))}
 
 
 def _builtin() -> Figures:

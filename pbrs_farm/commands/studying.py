@@ -1,4 +1,4 @@
-"""Verbs of the study: train, evaluate, predict, ablation. Effects: read views, write runs; they need torch."""
+"""Verbs of the study: train, evaluate, predict, ablation, compare. Effects: read views, write runs; they need torch."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from pbrs_farm.commands.arguments import (
     echo,
     echo_json,
     fields_set,
+    warn,
 )
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
@@ -33,7 +34,7 @@ _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs 
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add train, evaluate, predict and ablation."""
+    """Add train, evaluate, predict, ablation and compare."""
     p = verb("train", _train)
     p.add_argument("task", choices=TASKS, help="what the network learns to see")
     roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
@@ -95,6 +96,19 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--objects", metavar="ROOT", help="models without context, a row more")
     p.add_argument("--seeds", type=int, default=3, metavar="N", help="of each row (default 3)")
     _add_exact(p)
+
+    p = verb("compare", _compare)
+    p.add_argument("root", metavar="ROOT", help="output folder or shards: our views")
+    text = "folder of photographs, with depth or without; or another output folder"
+    p.add_argument("photographs", type=Path, metavar="PHOTOGRAPHS", help=text)
+    text = "folder of compare.json and index.html"
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help=text)
+    p.add_argument(
+        "--mode", default="", help="lighting of our pictures (default: the best there is)"
+    )
+    text = "at most N of each set, spread over all (default 1000; 0 = all)"
+    p.add_argument("--views", type=int, default=1000, metavar="N", help=text)
+    p.add_argument("--json", action="store_true", help="the report as JSON")
 
 
 def _add_exact(p: argparse.ArgumentParser) -> None:
@@ -359,4 +373,43 @@ def _ablation(args: argparse.Namespace) -> int:
     (args.out / "table.md").write_text(text, "utf-8")
     (args.out / "ablation.json").write_text(json.dumps(result, indent=1) + "\n", "utf-8")
     echo(f"\n{text}\n{args.out / 'table.md'}")
+    return 0
+
+
+def _compare(args: argparse.Namespace) -> int:
+    _need_torch()
+    from pbrs_farm.study.comparing.compare_page import write_comparison
+    from pbrs_farm.study.comparing.compared_pictures import (
+        read_photographs,
+        read_views,
+        size_of_views,
+    )
+    from pbrs_farm.study.comparing.comparison import compare_sets
+    from pbrs_farm.study.training.run_folder import make_folder
+
+    at_least("--views", args.views, 0)
+    size = size_of_views(args.root)
+    make_folder(args.out)  # before anything is read
+    photographs = read_photographs(args.photographs, size, most=args.views)
+    ours = read_views(args.root, size, mode=args.mode, most=args.views)
+    for line in (*photographs.left_out, *ours.left_out):
+        warn(f"left out: {line}")
+    comparison = compare_sets(ours, photographs)
+    path = write_comparison(args.out, comparison)
+    if args.json:
+        echo_json(comparison.report)
+        return 0
+    far, found = comparison.report["appearance"], comparison.report["histograms"]
+    value, low, high = (far["kernel_distance"][key] for key in ("value", "low", "high"))
+    sizes = (
+        f"{counted(len(ours.pictures), 'view')}, {counted(len(photographs.pictures), 'photograph')}"
+    )
+    echo(f"{sizes}, {size[0]}x{size[1]} pixels")
+    darker = f"the photographs a stop darker: {far['photographs_a_stop_darker']:.1f}"
+    echo(f"kernel distance {value:.1f} [{low:.1f}, {high:.1f}] in thousandths; {darker}")
+    for row in found.values():
+        value, low, high = (row["shared"][key] for key in ("value", "low", "high"))
+        halves = "" if row["halves"] is None else f"; halves of the photographs {row['halves']:.3f}"
+        echo(f"{row['title']}: {value:.3f} [{low:.3f}, {high:.3f}] shared{halves}")
+    echo(str(path))
     return 0

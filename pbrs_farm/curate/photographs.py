@@ -57,6 +57,19 @@ class PhotoFiles:
     depth: Path
 
 
+def has_depth(folder: Path) -> bool:
+    """Some picture below a folder is one of depth, by its name or that of its folder."""
+    return any(
+        path.name.lower() in _DEPTH_NAMES if path.is_dir() else _names_depth(path)
+        for path in folder.rglob("*")
+    )
+
+
+def _names_depth(path: Path) -> bool:
+    match = _SUFFIX.fullmatch(path.stem)
+    return match is not None and match[2].lower() == "depth" and path.suffix.lower() in _DEPTH_FILES
+
+
 def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
     """Every pair below folder, by id (its path below folder).
 

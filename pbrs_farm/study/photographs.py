@@ -38,10 +38,16 @@ def crop_to_plan(
     rgb: NDArray[np.uint8], plan: TrainingPlan
 ) -> tuple[NDArray[np.uint8], slice, slice]:
     """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
-    height, width = rgb.shape[:2]
-    share = plan.width_px / plan.height_px
+    rows, columns = middle_of_form(rgb.shape[0], rgb.shape[1], plan.width_px, plan.height_px)
+    return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
+
+
+def middle_of_form(
+    height: int, width: int, form_width: int, form_height: int
+) -> tuple[slice, slice]:
+    """Rows and columns of the largest part in the middle that is as wide to high as the form."""
+    share = form_width / form_height
     new_width = min(width, round(height * share))
     new_height = min(height, round(width / share))
     top, left = (height - new_height) // 2, (width - new_width) // 2
-    rows, columns = slice(top, top + new_height), slice(left, left + new_width)
-    return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
+    return slice(top, top + new_height), slice(left, left + new_width)

@@ -61,18 +61,17 @@ def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
     """
     pairs, has_labels = pairs_in(folder), plan.task == "segmentation"
     if has_labels:
-        pairs = tuple(pair for pair in pairs if _label_of(pair).is_file())
+        pairs = tuple(pair for pair in pairs if has_labels_of(pair))
     if plan.task not in ("normals", "depth", "segmentation") or not pairs:
         text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
         raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
     ids, colours, truths = [], [], []
     for pair in pairs:
         camera = camera_of(pair.rgb.parent, folder)
-        is_sun = _is_of_sun_rgbd(pair)
-        photo = photo_from_pair(pair, depth_scale=camera.depth_scale, sun_rgbd=is_sun)
+        photo = read_pair(pair, camera.depth_scale)
         colour, rows, columns = crop_to_plan(photo.rgb, plan)
         if has_labels:
-            truth = {"labels": classes_of(_labels(pair, photo), plan)}
+            truth = {"labels": classes_of(nyu40_of(pair, photo), plan)}
         else:
             truth = photo_truth(photo, camera.matrix(), plan)
         ids.append(pair.id)
@@ -82,13 +81,25 @@ def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
     return JudgedViews(name, said, tuple(ids), np.stack(colours), tuple(truths))
 
 
+def read_pair(pair: PhotoFiles, depth_scale: float | None) -> Photo:
+    """The photograph, its depth in mm as its layout stores it; BadInput naming the file that is wrong.
+
+    depth_scale: units a metre where its camera says so.
+    """
+    return photo_from_pair(pair, depth_scale=depth_scale, sun_rgbd=_is_of_sun_rgbd(pair))
+
+
+def has_labels_of(pair: PhotoFiles) -> bool:
+    """The photograph has classes where ScanNet has them."""
+    return _label_of(pair).is_file()
+
+
 def _label_of(pair: PhotoFiles) -> Path:
-    """Where ScanNet has the classes of a picture."""
     return pair.rgb.parent.parent / _LABELS / f"{pair.rgb.stem}.png"
 
 
-def _labels(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
-    """(H, W) NYU40 ids at the photograph's size, 0 = none."""
+def nyu40_of(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
+    """(H, W) NYU40 ids at the photograph's size, 0 = none; BadInput for a file of other labels."""
     file = _label_of(pair)
     stored = array_from_png(read_given(file), str(file))
     if stored.ndim != 2 or int(stored.max(initial=0)) > 40:

@@ -48,7 +48,7 @@ def open_judged_place(
     path = Path(place)
     if path.suffix == ".mat":
         return nyu_views(path, plan, label or "NYUv2", trained_on)
-    if path.is_dir() and not _is_root(path):
+    if path.is_dir() and not is_root(path):
         return pair_views(path, plan, label or path.name)
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)
@@ -86,7 +86,8 @@ def homes_that_train(sources: Sequence[TrainingSource]) -> frozenset[str]:
     )
 
 
-def _is_root(path: Path) -> bool:
+def is_root(path: Path) -> bool:
+    """A folder of views, an output root or shards: no photographs."""
     return any((path / name).exists() for name in ("houses", "objects", "dataset.json"))
 
 

@@ -24,6 +24,7 @@ _STAGES: Final = (
 )  # fmt: skip
 _STEM: Final = 32
 _EPSILON: Final = 1e-3  # of normalisation, as it was trained
+N_FEATURES: Final = 1280  # of what its classifier looks at
 _AFTER: Final = (0, 1, 2, 4)  # stages whose outputs are skip connections: a 2nd to a 16th
 _DEEPEST: Final = 160  # channels of the cells that attend
 _UP: Final = (128, 96, 64, 48)  # of the decoder, from coarse to fine
@@ -77,6 +78,19 @@ class LiteEncoder(nn.Module):  # type: ignore[misc]
             if k in _AFTER:
                 skips.append(x)
         return x, skips
+
+
+class LiteFeatures(nn.Module):  # type: ignore[misc]
+    """(B, 3, H, W) -> (B, 1280) features, 0 to 6: what EfficientNet-Lite0's classifier looks at."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.encoder = LiteEncoder()
+        self.head = _unit(_STAGES[-1][-1], N_FEATURES, 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Means over the picture."""
+        return self.head(self.encoder(x)[0]).mean((2, 3))
 
 
 class _Inverted(nn.Module):  # type: ignore[misc]

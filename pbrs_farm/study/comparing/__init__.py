@@ -1,0 +1,1 @@
+"""Our views beside photographs: what differs, and in which views most."""

@@ -1,0 +1,86 @@
+"""A comparison as a folder: compare.json, and a page of histograms and the most unlike views. Effects: files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from markupsafe import Markup
+
+from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.shown_text import MAX_PLACE, shown
+from pbrs_farm.curate.charts import mirrored
+from pbrs_farm.gallery.gallery_page import data_url, small_jpeg
+from pbrs_farm.gallery.html_page import page
+from pbrs_farm.study.comparing.comparison import Comparison, Unlike
+from pbrs_farm.study.comparing.picture_facts import PictureFacts, bands_of_height
+from pbrs_farm.study.training.run_folder import make_folder
+
+_MOST_BYTES: Final = 14_000  # of a picture in the page
+_MOST_CLASSES: Final = 12
+_MOST_LINES: Final = 20  # of pictures that were left out
+
+
+def write_comparison(out: Path, comparison: Comparison) -> Path:
+    """Write compare.json and index.html; the page's path. Raises BadInput where they cannot be written."""
+    make_folder(out)
+    text = json.dumps(comparison.report, indent=1)
+    (out / "compare.json").write_text(text + "\n", "utf-8")
+    path = out / "index.html"
+    path.write_text(comparison_page(comparison), "utf-8")
+    return path
+
+
+def comparison_page(comparison: Comparison) -> str:
+    """HTML without scripts; every picture is inside it."""
+    ours, photographs = comparison.ours, comparison.photographs
+    left_out = [*ours.left_out, *photographs.left_out]
+    return page(
+        "pbrs_farm.study.comparing",
+        "compare_page.html",
+        report=comparison.report,
+        charts=_charts(ours.pictures, photographs.pictures),
+        classes=comparison.report["classes"][:_MOST_CLASSES],
+        cards=[_card(one) for one in comparison.unlike],
+        left_out=[shown(line, 3 * MAX_PLACE) for line in left_out[:_MOST_LINES]],
+        n_left_out=len(left_out),
+        credits=[*ours.credits, *photographs.credits],
+    )
+
+
+def _charts(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[tuple[str, Markup]]:
+    """(title, chart) of what can be drawn as bars, where both sets have it."""
+    drawn = []
+    for name, title in (
+        ("luma", "Luma, from dark to bright"),
+        ("depth", "Depth, 0 to 10 m"),
+        ("normals", "Surfaces, from those that face down to those that face up"),
+    ):
+        ours, photographs = _mean(a, name), _mean(b, name)
+        if ours is not None and photographs is not None:
+            if name == "normals":
+                ours, photographs = bands_of_height(ours), bands_of_height(photographs)
+            drawn.append((title, mirrored(ours, photographs, title)))
+    return drawn
+
+
+def _mean(pictures: Sequence[PictureFacts], name: str) -> F64 | None:
+    found = [one.histograms[name] for one in pictures if name in one.histograms]
+    return np.asarray(np.mean(found, axis=0)) if found else None
+
+
+def _card(one: Unlike) -> dict[str, Any]:
+    return {
+        "view": shown(one.view.id, MAX_PLACE),
+        "photograph": shown(one.photograph.id, MAX_PLACE),
+        "times": f"{one.times:.1f}",
+        "reasons": one.reasons,
+        "pictures": [_url(one.view.colour), _url(one.photograph.colour)],
+    }
+
+
+def _url(picture: Srgb8Image) -> str:
+    return data_url(small_jpeg(picture, _MOST_BYTES), "jpeg")

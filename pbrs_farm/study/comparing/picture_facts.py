@@ -1,0 +1,120 @@
+"""What is counted of one picture to compare it: histograms, shares, a few plain numbers; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.recipe import HistogramFields
+from pbrs_farm.selection.histograms import coarser_colour, coarser_depth, histogram, normalised
+from pbrs_farm.selection.quality import picture_quality
+from pbrs_farm.study.metrics.error_parts import surface_kinds
+from pbrs_farm.study.plane_normals import normals_of_depth
+
+FIELDS: Final = HistogramFields()
+COLOUR_BINS: Final = (4, 4, 4)  # of red, green and blue
+DEPTH_BINS: Final = 32  # over 0 to 10 m
+_DIRECTION_BINS: Final = 8  # along elevation and along azimuth, of equal area
+_LUMA: Final = (0.2126, 0.7152, 0.0722)  # Rec. 709
+_LEAST_PIXELS: Final = 50  # whose normal is known, to count a picture's normals
+
+# Each plain number: its name, title, and how a picture is that has less of it, or more.
+NUMBERS: Final = (
+    ("luma", "median luma, 0 to 1", "darker", "brighter"),
+    ("contrast", "spread of luma", "of less contrast", "of more contrast"),
+    ("colourful", "mean distance of channels from grey", "greyer", "more colourful"),
+    ("warmth", "red minus blue", "bluer", "redder"),
+    ("detail", "mean step of luma from pixel to pixel", "smoother", "with more fine detail"),
+    ("burnt", "share of pixels with a full channel", "with less that is burnt", "with more that is burnt"),
+    ("depth_m", "median depth, m", "nearer", "farther"),
+    ("up", "share of surfaces that face up", "with less floor and table top", "with more floor and table top"),
+    ("frontal", "share of walls seen straight", "with less wall seen straight", "with more wall seen straight"),
+    ("oblique", "share of walls seen from the side", "with less wall seen from the side", "with more wall seen from the side"),
+    ("slanted", "share of slanted surfaces", "with less that is slanted", "with more that is slanted"),
+    ("down", "share of surfaces that face down", "with less ceiling", "with more ceiling"),
+)  # fmt: skip
+KINDS: Final = ("up", "frontal", "oblique", "slanted", "down")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PictureFacts:
+    """One picture, in the form and at the size in which all are compared."""
+
+    id: str
+    group: str  # pictures of one home, or of one folder, are alike
+    colour: Srgb8Image  # (H, W, 3)
+    histograms: dict[str, F64] = field(default_factory=dict)  # name -> shares that sum to 1
+    numbers: dict[str, float] = field(default_factory=dict)  # by the names of NUMBERS
+
+
+def facts_of(
+    id: str, group: str, colour: Srgb8Image, depth_m: NDArray[Any] | None = None,
+    K: F64 | None = None, class40: NDArray[np.uint8] | None = None,
+) -> PictureFacts:  # fmt: skip
+    """Count a picture (H, W, 3) uint8 and what is known beside it, all of one size.
+
+    depth_m: (H, W) metres, 0 = unknown. K: (3, 3) pixels; without it nothing is said of normals.
+    class40: (H, W) NYU40 ids, 0 = none.
+
+    Histograms: colour (joint bins), luma, depth (0 to 10 m), normals (of planes fitted to depth, by
+    direction) and classes, each where it is known.
+    """
+    depth_mm = np.zeros((1, 1), np.uint16) if depth_m is None else _millimetres(depth_m)
+    counted = histogram(colour, depth_mm, FIELDS)
+    luma = colour @ np.array(_LUMA) / 255
+    shares = {
+        "colour": _shares(coarser_colour(counted.colour, COLOUR_BINS)),
+        "luma": _shares(np.histogram(luma, 32, (0, 1))[0]),
+    }
+    numbers = _numbers(colour, luma)
+    if depth_m is not None and counted.depth.any():
+        shares["depth"] = _shares(coarser_depth(counted.depth, DEPTH_BINS))
+        numbers["depth_m"] = float(np.median(depth_m[depth_m > 0]))
+    if depth_m is not None and K is not None:
+        normal, known = normals_of_depth(depth_m, K)
+        if int(known.sum()) >= _LEAST_PIXELS:
+            shares["normals"] = _shares(_directions(normal[known]))
+            numbers |= {kind: float(m.mean()) for kind, m in surface_kinds(normal[known]).items()}
+    if class40 is not None and class40.any():
+        shares["classes"] = _shares(np.bincount(class40[class40 > 0], minlength=41)[:41])
+    return PictureFacts(id, group, colour, shares, numbers)
+
+
+def _millimetres(depth_m: NDArray[Any]) -> NDArray[np.uint16]:
+    return np.clip(np.rint(np.asarray(depth_m, np.float64) * 1000), 0, 65535).astype(np.uint16)
+
+
+def _shares(counts: NDArray[Any]) -> F64:
+    return np.asarray(normalised(counts), np.float64)
+
+
+def _numbers(colour: Srgb8Image, luma: F64) -> dict[str, float]:
+    channels = colour.astype(np.float64) / 255
+    steps = np.abs(np.diff(luma, axis=0)).mean() + np.abs(np.diff(luma, axis=1)).mean()
+    quality = picture_quality(colour)
+    return {
+        "luma": quality.brightness,
+        "contrast": float(luma.std()),
+        "colourful": float(np.abs(channels - channels.mean(-1, keepdims=True)).mean()),
+        "warmth": float((channels[..., 0] - channels[..., 2]).mean()),
+        "detail": float(steps / 2),
+        "burnt": quality.blown,
+    }
+
+
+def _directions(normal: NDArray[Any]) -> NDArray[np.intp]:
+    """(64,) counts of normals (n, 3): eight bands of height from down to up, eight sectors from left to right."""
+    up = np.clip((1 - normal[:, 1]) / 2 * _DIRECTION_BINS, 0, _DIRECTION_BINS - 1)
+    azimuth = np.arctan2(normal[:, 0], np.maximum(-normal[:, 2], 0))
+    side = np.clip((azimuth / np.pi + 0.5) * _DIRECTION_BINS, 0, _DIRECTION_BINS - 1)
+    at = up.astype(np.intp) * _DIRECTION_BINS + side.astype(np.intp)
+    return np.bincount(at, minlength=_DIRECTION_BINS**2)
+
+
+def bands_of_height(normals: F64) -> F64:
+    """(8,) shares by height alone, from surfaces that face down to those that face up."""
+    return np.asarray(normals.reshape(_DIRECTION_BINS, _DIRECTION_BINS).sum(1))
