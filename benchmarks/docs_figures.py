@@ -20,11 +20,13 @@ from typing import Any, Final
 
 from benchmarks.api_examples import faults, public_names
 from benchmarks.figures import write_report
+from benchmarks.manual_pages import REPO, manual_pages, without_code
+from benchmarks.quoted_figures import faults_of_pages
 
-REPO: Final = Path(__file__).parents[1]
 UNITS: Final = {
     "docs.hashes": "commits named in README.md and docs/ outside docs/lab",
     "docs.dates": "dates there, YYYY-MM-DD",
+    "docs.stale": "figures there that are in no line of docs/lab (benchmarks/quoted_figures.py)",
     "docs.words_a_sentence": "words of a sentence there, mean; tables, headings and code apart",
     "docs.readme_lines": "lines of README.md",
     "docs.dead_links": "warnings of `mkdocs build --strict`",
@@ -32,7 +34,6 @@ UNITS: Final = {
     "docs.api_examples": "share of the public Python names whose docstring has an example that ran here and was right",
 }
 
-_CODE: Final = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
 # Seven to forty digits of base 16, one of 0..9 among them; a house's id has a hyphen before its own.
 _HASH: Final = re.compile(r"(?<![\w/.-])(?=[a-f]*[0-9])[0-9a-f]{7,40}(?![\w.-]*\w)")
@@ -52,6 +53,7 @@ def main() -> None:
     figures: dict[str, Any] = {
         "docs.hashes": sum(len(commits_named(t)) for t in texts.values()),
         "docs.dates": sum(len(_DATE.findall(t)) for t in texts.values()),
+        "docs.stale": len(faults_of_pages()),
         "docs.words_a_sentence": round(statistics.mean(map(word_count, prose)), 2),
         "docs.readme_lines": len((REPO / "README.md").read_text(encoding="utf-8").splitlines()),
         "docs.dead_links": dead_links(),
@@ -59,12 +61,6 @@ def main() -> None:
         "docs.api_examples": share_of_examples(),
     }
     write_report("docs", figures, UNITS)
-
-
-def manual_pages(repo: Path) -> list[Path]:
-    """README.md and every page of docs/ but the lab book's."""
-    pages = sorted((repo / "docs").rglob("*.md"))
-    return [repo / "README.md", *(p for p in pages if repo / "docs/lab" not in p.parents)]
 
 
 def commits_named(text: str) -> list[str]:
@@ -90,7 +86,7 @@ def _is_commit(word: str) -> bool:
 
 def sentences(text: str) -> Iterator[str]:
     """The prose of a page, sentence by sentence; an item of a list ends one."""
-    text = _COMMENT.sub("", _CODE.sub("", text))
+    text = _COMMENT.sub("", without_code(text))
     block: list[str] = []
     for line in [*text.splitlines(), ""]:
         ends = not line.strip() or _NO_PROSE.match(line) is not None

@@ -14,7 +14,8 @@ from typing import Any
 import pytest
 
 import pbrs_farm
-from benchmarks.docs_figures import commits_named, dates_named, manual_pages, sentences, word_count
+from benchmarks.docs_figures import commits_named, dates_named, sentences, word_count
+from benchmarks.manual_pages import manual_pages
 from pbrs_farm.cli import MODULES, build_parser
 from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.core.recipe import Recipe, field_paths

@@ -1,0 +1,98 @@
+"""A figure on a page outside the lab book is a number of the line of the lab book that it names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.light.table_rows import CYCLES_WAYS, RENDERED_HOMES, compare_lines, cycles_lines
+from benchmarks.manual_pages import REPO, manual_pages
+from benchmarks.quoted_figures import faults_of_pages, stale
+
+LAB = """# Lab book: views
+
+## A run
+| what | value |
+|---|---|
+| a `fast` view of 640x480 | 6.8 s (6.5 to 7.9 s at load 2) |
+| furniture | 118.6 MB |
+
+A home of 118 views takes 0.83 of it.
+
+## On a GPU
+| a `fast` view of 640x480 | 1.3 s |
+"""
+FAST = "<!-- figure: views.md#a-run: a `fast` view -->"
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    (tmp_path / "views.md").write_text(LAB)
+    return tmp_path
+
+
+def test_every_figure_of_every_page_stands_in_the_lab_book() -> None:
+    assert len(manual_pages(REPO)) > 70
+    assert faults_of_pages() == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"| a view | 6.8 s {FAST} |",
+        f"| a view | 6 to 8 s {FAST} |",
+        f"some 7 seconds, `--time-budget 30 s` {FAST}",
+        "120 MB of furniture <!-- figure: views.md: furniture -->",
+        "0.8 of it, at 118 views <!-- figure: views.md#a-run: A home of -->",
+        "on a GPU 1.3 s <!-- figure: views.md#on-a-gpu: a `fast` view -->",
+        "a step of 5 cm, 20 times, a share of 30 %, 640x480, version 5.0.1",
+        "```sh\nsleep 30 s\n```",
+        "a limit of 45 s",
+    ],
+)
+def test_what_the_lab_book_has_and_what_is_no_measurement_is_no_fault(lab: Path, line: str) -> None:
+    assert list(stale(line, {"45 s"}, lab)) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("a view takes 6.8 s", "'6.8 s'"),
+        ("2,755 views/h", "'2,755 views/h'"),
+        ("5 % more CPU", "'5 %'"),
+        ("twice, or 2.5 times the time", "'2.5 times the'"),
+        (f"| a view | 6.9 s {FAST} |", "'6.9 s'"),
+        (f"| a view | 6 to 9 s {FAST} |", "'6 to 9 s'"),
+        (f"| a view | 1.3 s {FAST} |", "'1.3 s'"),
+        ("130 MB <!-- figure: views.md: furniture -->", "'130 MB'"),
+        ("0.9 of it <!-- figure: views.md: A home of -->", "'0.9'"),
+        ("83 % of it <!-- figure: views.md: A home of -->", "'83 %'"),
+        ("of a chair <!-- figure: views.md: chair -->", "no row or line 'chair'"),
+        ("of a sofa <!-- figure: sofas.md: sofa -->", "docs/lab/sofas.md has no row"),
+    ],
+)
+def test_a_figure_that_the_lab_book_does_not_have_is_told_with_its_line(
+    lab: Path, line: str, told: str
+) -> None:
+    ((number, what),) = stale(f"# Page\n\n{line}\n", set(), lab)
+    assert number == 3
+    assert told in what
+
+
+def test_the_table_of_other_renderers_names_rows_of_the_lab_book_that_have_its_figures(
+    tmp_path: Path,
+) -> None:
+    figures = {"light.vs_cycles": 4.25, "light.vs_cycles_median": 3.5, "light.vs_cycles_metropolis": 18}  # fmt: skip
+    for number, home in enumerate(f"{home}_{k}" for home in RENDERED_HOMES for k in (0, 1)):
+        of_view = {"ratio": 3.5 + number, "ratio_median": 2.5, "ratio_metropolis": 7, "relmse": 0.1,
+                   "median": 0.1, "cpu_s": 2.0, "mean_luminance": 1.0, "block_ratio_median": 1.0,
+                   "mean_luminance_cycles": 1 - 0.003 * number}  # fmt: skip
+        for way in CYCLES_WAYS:
+            of_view |= {f"relmse_{way}": 0.2, f"median_{way}": 0.2, f"cpu_s_{way}": 3.0}
+        figures |= {f"light.cycles_{home}_{name}": value for name, value in of_view.items()}
+    (tmp_path / "light.md").write_text("\n".join(["## Against Cycles", *cycles_lines(figures)]))
+    lines = compare_lines(figures)
+    assert sum("<!-- figure: " in line for line in lines) == 4
+    assert "(3.5, 8.5)" in lines[2]
+    assert list(stale("\n".join(lines), set(), tmp_path)) == []
