@@ -20,6 +20,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Srgb8Image
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.resampling import resized_by_area
+from pbrs_farm.curate import tum_frames
 from pbrs_farm.installation import install_command
 from pbrs_farm.regular_files import (
     MAX_DIGEST_BYTES,
@@ -55,12 +56,15 @@ class PhotoFiles:
     id: str
     rgb: Path
     depth: Path
+    depth_scale: float | None = None  # units a metre, where the layout says so
 
 
 def has_depth(folder: Path) -> bool:
     """Some picture below a folder is one of depth, by its name or that of its folder."""
     return any(
-        path.name.lower() in _DEPTH_NAMES if path.is_dir() else _names_depth(path)
+        path.name.lower() in _DEPTH_NAMES
+        if path.is_dir()
+        else path.name == tum_frames.DEPTH_LIST or _names_depth(path)
         for path in folder.rglob("*")
     )
 
@@ -79,6 +83,14 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
         raise BadInput(folder, "", "no such folder")
     pairs: list[PhotoFiles] = []
     for inner in sorted({folder, *(p for p in folder.rglob("*") if p.is_dir())}):
+        # Lists of times and files pair what two cameras took at their own times (TUM RGB-D).
+        if tum_frames.is_sequence(inner):
+            place = inner.relative_to(folder)
+            pairs += [
+                PhotoFiles((place / rgb.stem).as_posix(), rgb, depth, tum_frames.DEPTH_SCALE)
+                for rgb, depth in tum_frames.frames_of(inner)
+            ]
+            continue
         # Look for a folder of pictures beside one of depth.
         names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
         rgb = next((names[n] for n in _RGB_NAMES if n in names), None)
@@ -151,7 +163,7 @@ def _pairs_by_suffix(root: Path, inner: Path) -> list[PhotoFiles]:
 def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bool) -> Photo:
     """The photograph of two files; BadInput naming the file that is wrong.
 
-    depth_scale: depth units per metre; None = 1000 for whole numbers, 1 for .npy and .exr. A picture
+    depth_scale: depth units per metre; None = the layout's, else 1000 for whole numbers, 1 for .npy and .exr. A picture
     of another size than depth, in the same form, is brought to depth's (ScanNet's are).
     """
     rgb = images.decode_photo(read_given(pair.rgb), str(pair.rgb))
@@ -170,7 +182,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
             raise BadInput(pair.depth, "", "SUN RGB-D's depth has 16 bits; this file has not")
         stored = sun_rgbd_depth(stored)
     is_float = np.issubdtype(stored.dtype, np.floating)
-    scale = depth_scale or (1.0 if is_float else 1000.0)
+    scale = depth_scale or pair.depth_scale or (1.0 if is_float else 1000.0)
     return Photo(pair.id, rgb, _depth_mm(stored, scale, str(pair.depth), ""))
 
 

@@ -6,7 +6,8 @@ nine of K, beside the pictures or in a folder above. The truth of normals is pla
 
 ScanNet: <scene>/{color,depth,label}/NAME and the depth camera's 4 x 4, where its tools put it; depth
 is in mm, label NYU40's ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt, extrinsics;
-its depth has rotated bits.
+its depth has rotated bits. TUM RGB-D: <sequence>/{rgb.txt,depth.txt,groundtruth.txt,rgb,depth}; its cameras
+are known by the sequence's name.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
+from pbrs_farm.curate import tum_frames
 from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import read_given, text_given
@@ -33,7 +35,8 @@ from pbrs_farm.study.training_plan import TrainingPlan
 _FILES: Final = (
     "intrinsics.json", "intrinsics.txt",
     # ScanNet's: of its 25,000 frames, and of what its reader writes of a scan.
-    "intrinsics_depth.txt", "intrinsic/intrinsic_depth.txt", "intrinsics/intrinsic_depth.txt",
+    "intrinsics_depth.txt", "intrinsic_depth.txt", "intrinsic/intrinsic_depth.txt",
+    "intrinsics/intrinsic_depth.txt",
 )  # fmt: skip
 _LABEL_TRUTH: Final = "NYU40 classes of the picture's own label, where labelled"
 _LABELS: Final = "label"  # ScanNet's folder of classes, beside the pictures'
@@ -129,6 +132,9 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
         for name in _FILES:
             if (place / name).is_file():
                 return _read_camera(place / name)
+        K = tum_frames.camera_of_sequence(place)
+        if K is not None:
+            return PhotoCamera(K, None)
     text = "photographs without intrinsics: normals cannot be taken from their depth"
     hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
     raise BadInput(folder, "", text, hint=hint)

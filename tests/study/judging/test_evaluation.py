@@ -25,6 +25,7 @@ from pbrs_farm.study.photographs import crop_to_plan
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
+from tests.curate.tum_sequence import write_sequence
 from tests.study.training.made_views import TINY, small_plan
 from tests.views.small_roots import fill
 
@@ -184,7 +185,9 @@ def write_scene(scene: Path, camera_file: str, *, label: bool = True) -> None:
     (scene / camera_file).write_text(rows)
 
 
-@pytest.mark.parametrize("camera", ["intrinsics_depth.txt", "intrinsic/intrinsic_depth.txt"])
+@pytest.mark.parametrize(
+    "camera", ["intrinsics_depth.txt", "intrinsic_depth.txt", "intrinsic/intrinsic_depth.txt"]
+)
 def test_scannets_scenes_are_judged(tmp_path: Path, camera: str) -> None:
     for scene in ("scene0000_00", "scene0001_00"):
         write_scene(tmp_path / scene, camera)
@@ -211,6 +214,25 @@ def test_scannets_labels_must_be_nyu40s(tmp_path: Path) -> None:
     (tmp_path / "s/label/000100.png").write_bytes(png_from_array(raw))
     with pytest.raises(BadInput, match="NYU40 ids, 0 to 40"):
         open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
+
+
+def test_sequences_of_tum_are_judged(tmp_path: Path) -> None:
+    name = "rgbd_dataset_freiburg1_desk"
+    write_sequence(tmp_path / name, [1.0, 1.2, 3.0], [1.01, 1.21, 3.01])
+    assert camera_of(tmp_path / name / "rgb", tmp_path).K == (517.3, 516.5, 318.6, 255.3)
+    # The camera that a user names goes before the benchmark's, whose pictures are larger.
+    (tmp_path / name / "intrinsics.txt").write_text("80 80 45 30")
+    views = open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
+    assert views.ids == (f"{name}/1.000000", f"{name}/3.000000")
+    truth = views.truths[0]
+    wanted = [[0, 0, -32767]] * truth["valid"].sum()
+    np.testing.assert_allclose(truth["normal"][truth["valid"]], wanted, atol=40)
+    depth = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
+    assert float(depth.truths[0]["depth"].mean()) == pytest.approx(2.0, abs=1e-3)
+    (tmp_path / name / "intrinsics.txt").unlink()
+    (tmp_path / name).rename(tmp_path / "desk")
+    with pytest.raises(BadInput, match="without intrinsics"):
+        open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
 
 
 def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
