@@ -97,7 +97,7 @@ gpu-check: ## what an NVIDIA GPU does here, end to end: out/bench/gpu_tests.txt,
 
 bench: setup ## the short benches, under 25 minutes; NAME=hostile, or any of `python -m benchmarks --list`, for one
 	@$(if $(filter study lived_in loading,$(NAME)),$(study-packages))
-	@$(if $(filter release,$(NAME)),$(call extra,build twine,release))
+	@$(if $(filter release,$(NAME)),$(call extra,build twine cyclonedx_py,release))
 	@$(if $(filter docs,$(NAME)),$(call extra,mkdocstrings material,docs))
 	@$(if $(filter denoised,$(NAME)),$(call extra,flip_evaluator,bench))
 	@$(if $(filter cycles,$(NAME)),$(cycles-packages))
@@ -121,7 +121,7 @@ bench-farm: setup ## queue, ledger, coordinator (FULL=1 for the whole job)
 	$(BIN)/python -m benchmarks farm
 
 dist: setup ## sdist and wheel into dist/, dated as the last commit: a second build gives the same bytes
-	@$(call extra,build twine,release)
+	@$(call extra,build twine cyclonedx_py,release)
 	rm -rf dist
 	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build
 	$(BIN)/python -m twine check --strict dist/*

@@ -1,12 +1,13 @@
 """What a stranger gets: the wheel builds twice alike, installs into an empty environment, and renders there.
 
 Effects: builds in a folder of its own, asks the package index for the dependencies, renders the built-in
-home, and writes out/bench/release.json.
+home, and writes out/bench/release.json and the bill of materials, out/release/sbom.cdx.json.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import statistics
 import subprocess
@@ -24,12 +25,14 @@ UNITS: Final = {
     "release.twine": "1: `twine check --strict` passes",
     "release.wheel_mb": "MB of the wheel",
     "release.installed_mb": "MB of an environment with the wheel and what it needs",
+    "release.sbom_parts": "parts of that environment's bill of materials: out/release/sbom.cdx.json",
     "release.wheel_demo": "1: `pbrs-farm demo` of the wheel in an empty environment ends with a sheet",
     "release.demo_s": "seconds that it takes: the built-in home, one view",
     "release.import_ms": "CPU ms of `import pbrs_farm` there, median of 15, the interpreter's start apart",
     "release.image_mb": "MB of the image cpu of docker/Dockerfile; -1 where it was not built here",
 }
 IMAGE: Final = "pbrs-farm"
+BILL: Final = REPO / "out/release/sbom.cdx.json"
 _IMPORT: Final = (
     "import time; t = time.process_time(); import pbrs_farm; print(1e3 * (time.process_time() - t))"
 )
@@ -73,6 +76,7 @@ def of_empty_environment(wheel: Path, folder: Path) -> dict[str, Any]:
     pip = [str(home / "bin/pip"), "install", "--quiet", "--disable-pip-version-check", str(wheel)]
     # Not beside the clone on PYTHONPATH, which pip would take for the installed package.
     told(pip, folder).check_returncode()
+    parts = write_bill(Path(home / "bin/python"), BILL)
     size = sum(p.stat().st_size for p in home.rglob("*") if p.is_file() and not p.is_symlink())
     python = str(home / "bin/python")
     times = [float(told([python, "-c", _IMPORT], folder).stdout) for _ in range(15)]
@@ -82,12 +86,32 @@ def of_empty_environment(wheel: Path, folder: Path) -> dict[str, Any]:
     done = told([str(home / "bin/pbrs-farm"), *words], folder)
     return {
         "release.installed_mb": round(size / 1e6),
+        "release.sbom_parts": parts,
         "release.import_ms": round(statistics.median(times), 2),
         "release.wheel_demo": int(
             done.returncode == 0 and (folder / "demo/sheet.png").stat().st_size > 10_000
         ),
         "release.demo_s": round(time.monotonic() - began, 1),
     }
+
+
+def write_bill(python: Path, bill: Path) -> int:
+    """Write what is installed beside that Python as CycloneDX, the same bytes each time; the number of parts.
+
+    Needs cyclonedx-bom of the extra release. A part has name, version, licence and package URL.
+    """
+    bill.parent.mkdir(parents=True, exist_ok=True)
+    words = [
+        "-m",
+        "cyclonedx_py",
+        "environment",
+        "--output-reproducible",
+        "-o",
+        str(bill),
+        str(python),
+    ]
+    told([sys.executable, *words], bill.parent).check_returncode()
+    return len(json.loads(bill.read_text(encoding="utf-8"))["components"])
 
 
 def image_mb() -> float:
