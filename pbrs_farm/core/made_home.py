@@ -11,7 +11,7 @@ from pbrs_farm.core.number_ranges import range_of
 from pbrs_farm.core.plugins import is_plugin, plugin_homes
 
 PREFIX: Final = "made:"
-VERSION: Final = 10
+VERSION: Final = 11
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
 VERSION_OF_STOREYS: Final = 3

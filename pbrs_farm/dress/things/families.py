@@ -43,7 +43,7 @@ from pbrs_farm.dress.things import (
 from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.dress.things.maker import Family, described_in
 
-VERSION: Final = 6
+VERSION: Final = 7
 """Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
 # The order decides which piece a seed draws.

@@ -40,6 +40,7 @@ from pbrs_farm.dress.things.joints import (
     fronts_of,
     hollow,
     opens,
+    panel,
     pull,
     shell,
 )
@@ -65,8 +66,8 @@ from pbrs_farm.dress.things.outlines import bent, d_shape, oval, rect, rings
 _OVEN: Final = glossy("oven enamel", (0.09, 0.09, 0.095), 0.35)
 CLEAR_PLASTIC: Final = glass((0.93, 0.96, 0.96), 0.25)
 _FALLING_RAD: Final = radians(88)  # of doors that fall open
-_FRIDGE_RAD: Final = radians(120)
-_MACHINE_RAD: Final = radians(150)  # of a washing machine's round door
+_FRIDGE_RAD: Final = radians(95)  # beside a wall it opens no farther
+_MACHINE_RAD: Final = radians(110)  # of a washing machine's round door
 _BACK_M: Final = 0.008  # of a unit's back
 _HOB_M: Final = {"gas": 0.044, "ceramic": 0.006, "plates": 0.019}  # that a hob is high
 
@@ -140,6 +141,17 @@ def drawer_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """The same with drawers alone, as a second unit of the kitchen."""
     unit(m, size, k, m.pick([("low", "drawer", "drawer")], [("drawer", "drawer")],
         [("low", "low", "drawer", "drawer")], [("low", "door")]))  # fmt: skip
+
+
+@family(group="blind_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_blind_cabinet",
+    variants=32, of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))  # fmt: skip
+def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
+    """What stands in the corner of a kitchen, and strips beside it: a front that nothing opens."""
+    w, h = size[0], size[2]
+    # It is drawn like its neighbours, whose pulls reach 12 mm before their worktop.
+    unit_body(m, (w, 0.6, h), k.top_h, k)
+    m.add(slab((-w / 2, h - k.top_t, -0.3), (w / 2, h, 0.288)), of=k.worktop)
+    panel(m, "flat", (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), 0.251, k.look.front)
 
 
 @family(group="upper_cabinet", nyu40=CABINET, place=Place.WALL, called="kitchen_wall_cabinet",

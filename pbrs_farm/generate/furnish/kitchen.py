@@ -15,17 +15,28 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.generate.floor_plan import Rect
-from pbrs_farm.generate.furnish.kitchen_walls import DEPTH_M, MODULE_M, Arm, run_shapes
+from pbrs_farm.generate.furnish.kitchen_walls import (
+    CORNER_M,
+    DEPTH_M,
+    FILLER_M,
+    MODULE_M,
+    PULL_M,
+    WORKTOP_M,
+    Arm,
+    run_shapes,
+)
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import allowed, frames_array
 from pbrs_farm.generate.furnish.room_space import FurnishSpace
 from pbrs_farm.generate.furnish.template import PieceSlot, Standing, Template
 
 UPPER_M: Final = 1.45  # lower edge of wall cabinets
+UPPER_DEPTH_M: Final = 0.36
 _BUILT_IN: Final = 0.6  # share of homes that have the oven built into the units
 _FRONT_M: Final = 0.8  # free before the run
 _GAP: Final = 0.005  # behind the units
 _HUNG_GAP: Final = 0.001  # and behind what touches the wall that it hangs on
+_STRIP: Final = 0.02  # between a front and what is deeper beside it: the fridge, the hood
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,20 +51,15 @@ class Units:
     hood: Piece | None = None
     uppers: tuple[Piece, ...] = ()
     dishwasher: Piece | None = None
-
-    @property
-    def fixed_width(self) -> float:
-        """Of what a kitchen cannot do without."""
-        return self.fridge.size[0] + self.sink.size[0] + self.cooker.size[0]
+    blind: Piece | None = None  # what no front opens: the corner, strips beside it
 
 
 @dataclass(frozen=True, slots=True)
 class _Module:
-    kind: str  # "fridge", "sink", "cooker", "base"
+    kind: str  # "fridge", "sink", "cooker", "base", "corner", "filler"
     arm: int
     low: float  # along its wall
     width: float
-    is_blind: bool = False  # in the corner, half hidden
 
     @property
     def high(self) -> float:
@@ -75,11 +81,13 @@ def units_of(shelf: Shelf) -> Units | None:
         own = _sold_with(sink, uppers, alone=True)
         hoods = shelf.of("hood", width=(0.5, 0.7), height=(0.1, 0.95))
         washers = _sold_with(sink, shelf.of("dishwasher", width=(0.55, 0.65)))
+        blinds = _sold_with(sink, shelf.of("blind_cabinet"), alone=True)
         # Most who buy a set build the oven into it.
         built_in = [p for p in cookers if p.of_set and shelf.likes(p, _BUILT_IN)]
         return Units(
             fridges[0], sink, (built_in or [p for p in cookers if not p.of_set] or cookers)[0], tuple(bases[:3]), bases[0].size[2],
             hoods[0] if hoods else None, tuple(own or uppers)[:2], washers[0] if washers else None,
+            blinds[0] if blinds else None,
         )  # fmt: skip
     return None
 
@@ -145,12 +153,13 @@ def _orders(
     fridge_arm, fridge_high, sink_arm, cooker_arm = where
     rows = []
     for k, arm in enumerate(arms):
-        fixed = [units.fridge.size[0]] * (k == fridge_arm)
+        fixed = [units.fridge.size[0] + _STRIP] * (k == fridge_arm)
         movable = ["sink"] * (k == sink_arm) + ["cooker"] * (k == cooker_arm)
         widths = {"sink": units.sink.size[0], "cooker": units.cooker.size[0]}
-        left = arm.length - sum(fixed) - sum(widths[m] for m in movable)
-        blind = k == 0 and len(arms) > 1
-        if left < -1e-6 or (blind and left < 0.5):
+        # Where two arms meet nothing opens: fronts and what opens them would be in each other's way.
+        blind = 0.0 if len(arms) == 1 else (CORNER_M, FILLER_M)[k]
+        left = arm.length - blind - sum(fixed) - sum(widths[m] for m in movable)
+        if left < -1e-6:
             return
         n = int(left / MODULE_M + 0.5) if left > 0.28 else 0
         # A rest that is too narrow for a cabinet stays open at the free end.
@@ -172,31 +181,37 @@ def _orders(
 
 def _arm_rows(
     k: int, arm: Arm, movable: list[str], widths: dict[str, float], bases: tuple[int, float],
-    units: Units, has_fridge: bool, fridge_high: bool, blind: bool,
+    units: Units, has_fridge: bool, fridge_high: bool, blind: float,
 ) -> Iterator[list[_Module]]:  # fmt: skip
     n, width = bases
     total = n + len(movable)
+    fridge = units.fridge.size[0] + _STRIP
+    fixed = {"base": width, "fridge": fridge, "corner": blind, "filler": blind}
     for spots in permutations(range(total), len(movable)):
         kinds = ["base"] * total
         for spot, kind in zip(spots, movable, strict=True):
             kinds[spot] = kind
-        if blind and (not kinds or kinds[-1] != "base"):
-            continue
         if has_fridge:
             kinds = [*kinds, "fridge"] if fridge_high else ["fridge", *kinds]
-        if blind and kinds[-1] == "fridge":
+        if blind:
+            kinds = ["filler", *kinds] if k else [*kinds, "corner"]
+        # A fridge stands farther out than the filler beside it is wide.
+        if kinds[:2] == ["filler", "fridge"]:
             continue
         at, row = arm.low, []
-        for i, kind in enumerate(kinds):
-            w = {"base": width, "fridge": units.fridge.size[0]}.get(kind, widths.get(kind, width))
-            row.append(_Module(kind, k, at, w, blind and i == len(kinds) - 1))
-            at += w
+        if kinds[-1] == "corner":
+            # What is left over stays open at the free end.
+            at = arm.high - sum((fixed | widths)[kind] for kind in kinds)
+        for kind in kinds:
+            row.append(_Module(kind, k, at, (fixed | widths)[kind]))
+            at = row[-1].high
         yield row
 
 
 def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: FurnishSpace) -> float | None:
     """How well one can cook there; None where a hood would hang before a window."""
-    kinds = [m.kind for m in modules]
+    modules = [m for m in modules if m.kind != "filler"]
+    kinds = ["base" if m.kind == "corner" else m.kind for m in modules]
     sink, cooker, fridge = (kinds.index(k) for k in ("sink", "cooker", "fridge"))
     score = 0.0
     if _below_window(modules[cooker], arms, space) > 0.02 or (
@@ -210,7 +225,7 @@ def _run_score(modules: list[_Module], arms: tuple[Arm, ...], space: FurnishSpac
     neighbours = [kinds[i] for i in (cooker - 1, cooker + 1) if 0 <= i < len(kinds)]
     score += 0.4 * neighbours.count("base") - 0.6 * ("fridge" in neighbours)
     score -= 0.1 * abs(fridge - sink)
-    if modules[sink].arm == 1 and modules[sink].low < arms[1].low + 0.05:
+    if modules[sink].arm == 1 and modules[sink].low < arms[1].low + FILLER_M + 0.05:
         score -= 0.3
     return score
 
@@ -235,53 +250,88 @@ def _template(
     sink = kinds.index("sink")
     for i, module in enumerate(modules):
         piece: Piece = units.bases[n_base % len(units.bases)]
-        height = units.top
+        height, depth, gap = units.top, DEPTH_M, _GAP
         if module.kind == "fridge":
             piece, height = units.fridge, units.fridge.size[2]
+            depth = max(piece.size[1], 0.5)
+            # What opens it stands before what opens the others: its door turns before theirs.
+            gap = max(_GAP, DEPTH_M + _GAP + PULL_M + 0.01 - depth)
+            # The strip between it and its neighbour.
+            is_last = i > 0 and modules[i - 1].arm == module.arm
+            low = module.low + _STRIP * is_last
+            module = replace(module, low=low, width=module.width - _STRIP)
         elif module.kind == "sink":
             piece, height = units.sink, units.sink.size[2]
         elif module.kind == "cooker":
             piece = units.cooker
-        else:
+        elif module.kind == "base":
             n_base += 1
             # The dishwasher stands beside the sink.
-            fits = 0.55 <= module.width <= 0.66 and not module.is_blind
-            if dishes is not None and abs(i - sink) == 1 and fits:
+            if dishes is not None and abs(i - sink) == 1 and 0.55 <= module.width <= 0.66:
                 piece, dishes = dishes, None
-        depth = DEPTH_M if module.kind != "fridge" else max(piece.size[1], 0.5)
-        slots.append(_place_unit(PieceSlot(piece, 0, 0, module.width, depth, height), module, arms))
-        slots += [
-            _place_unit(s, module, arms) for s in _above(module, units, arms, space, n_base + i)
-        ]
+        else:
+            # A set without one has a cabinet there that nobody can open.
+            piece, depth = units.blind or piece, WORKTOP_M
+        unit = PieceSlot(piece, 0, 0, module.width, depth, height)
+        slots.append(_place_unit(unit, module, arms, gap))
+    slots += _hung(modules, units, arms, space)
     clear, fronts = _rects(modules, arms)
     name = f"kitchen of {len(arms)} arms, {len(modules)} modules"
     return Template(name, tuple(slots), clear, fronts)
 
 
+def _hung(
+    modules: list[_Module], units: Units, arms: tuple[Arm, ...], space: FurnishSpace
+) -> list[PieceSlot]:
+    """The hood and the wall cabinets, and no two of them before each other's fronts."""
+    found: list[tuple[_Module, PieceSlot]] = []
+    for number, module in enumerate(modules):
+        slot = _above(module, units, arms, space, number)
+        if slot is None:
+            continue
+        if slot.piece is not units.hood:
+            # A strip beside what is deeper: the hood, the fridge; beside the wall in the corner.
+            near = [m.kind for m in modules if m.arm == module.arm and m.high == module.low]
+            far = [m.kind for m in modules if m.arm == module.arm and m.low == module.high]
+            left, right = (_STRIP * bool({"fridge", "cooker"} & set(k)) for k in (near, far))
+            right = _STRIP if module.kind == "corner" else right
+            module = replace(module, low=module.low + left, width=module.width - left - right)
+            slot = replace(slot, width=module.width)
+        found.append((module, slot))
+    # In a corner the main arm's cabinet opens before where the side arm's would hang.
+    reach = UPPER_DEPTH_M + CORNER_M + PULL_M
+    is_cooked_there = any(m.kind == "cooker" and m.arm == 1 and m.low < reach for m, _ in found)
+    kept = [
+        (m, s) for m, s in found
+        if not (m.kind == "corner" and is_cooked_there)
+        and not (m.kind != "cooker" and m.arm == 1 and m.low < reach and not is_cooked_there)
+    ]  # fmt: skip
+    return [_place_unit(slot, module, arms, _HUNG_GAP) for module, slot in kept]
+
+
 def _above(
     module: _Module, units: Units, arms: tuple[Arm, ...], space: FurnishSpace, number: int
-) -> list[PieceSlot]:
+) -> PieceSlot | None:
     """The hood or the wall cabinet over a module."""
     # A run never puts its cooker below a window.
     beside = _below_window(module, arms, space) <= (0.02 if module.kind == "cooker" else 0.0)
     if module.kind == "fridge" or not beside:
-        return []
+        return None
     if module.kind == "cooker":
         if units.hood is None:
-            return []
+            return None
         w, d, h = units.hood.size
         h = min(h, space.height - 1.5 - 0.02)
-        return [PieceSlot(units.hood, 0, 0, min(w, module.width), d, h, 1.5)]
+        return PieceSlot(units.hood, 0, 0, min(w, module.width), d, h, 1.5)
     if not units.uppers or module.width < 0.3:
-        return []
-    upper = units.uppers[number % len(units.uppers)] if module.kind == "base" else units.uppers[0]
+        return None
+    upper = units.uppers[0 if module.kind == "sink" else number % len(units.uppers)]
     _, d, h = upper.size
-    return [PieceSlot(upper, 0, 0, module.width, min(d, 0.36), min(h, 0.72), UPPER_M)]
+    return PieceSlot(upper, 0, 0, module.width, min(d, UPPER_DEPTH_M), min(h, 0.72), UPPER_M)
 
 
-def _place_unit(slot: PieceSlot, module: _Module, arms: tuple[Arm, ...]) -> PieceSlot:
-    """A unit with its back at its arm's wall, in the frame of the main arm's wall."""
-    gap = _GAP if slot.elevation < UPPER_M else _HUNG_GAP
+def _place_unit(slot: PieceSlot, module: _Module, arms: tuple[Arm, ...], gap: float) -> PieceSlot:
+    """A unit with its back a gap before its arm's wall, in the frame of the main arm's wall."""
     along, across = (module.low + module.high) / 2, gap + slot.depth / 2
     u, v = _in_main(along, across, arms[module.arm])
     return replace(slot, u=u, v=v, turns=arms[module.arm].turns)
@@ -299,10 +349,10 @@ def _rects(
     clear, fronts = [], []
     for k, arm in enumerate(arms):
         low = arm.low
-        high = arm.high - (DEPTH_M if k == 0 and len(arms) > 1 else 0.0)
+        high = arm.high - (CORNER_M if k == 0 and len(arms) > 1 else 0.0)
         clear.append(_rect((low, DEPTH_M + 0.02, high, DEPTH_M + _FRONT_M), arm))
     for module in modules:
-        if module.kind != "base":
+        if module.kind in ("fridge", "sink", "cooker"):
             box = (module.low - 0.2, DEPTH_M + 0.2, module.high + 0.2, DEPTH_M + _FRONT_M)
             fronts.append(_rect(box, arms[module.arm]))
     return tuple(clear), tuple(fronts)

@@ -10,7 +10,13 @@ from pbrs_farm.generate.floor_plan import Rect
 from pbrs_farm.generate.furnish.room_space import FurnishSpace, RoomWall
 
 DEPTH_M: Final = 0.62
+WORKTOP_M: Final = 0.608  # of a unit without what opens it
 MODULE_M: Final = 0.60
+PULL_M: Final = 0.03  # that what opens a front sticks out of it
+CORNER_M: Final = DEPTH_M + PULL_M + 0.02  # of the main arm's end, which no front opens
+FILLER_M: Final = 0.06  # of the side arm's beginning, likewise
+_SIDE_LOW_M: Final = 0.615  # from the corner: where the main arm's worktop ends
+_BESIDE_WALL_M: Final = 0.03  # a strip between a unit and the wall at the run's end
 _LONGEST_ARM_M: Final = 3.9
 _LEAST_M: Final = 1.75  # fridge, sink and cooker
 
@@ -36,7 +42,7 @@ def run_shapes(space: FurnishSpace) -> Iterator[tuple[Arm, ...]]:
     free = [_free(space, wall) for wall in space.walls]
     for k, wall in enumerate(space.walls):
         for low, high in free[k]:
-            for a, b in _cuts(low, high, wall):
+            for a, b in _cuts(_off_wall(low, wall), _off_wall(high, wall), wall):
                 yield (Arm(wall, a, b, 0, 0.0),)
         right = _next(space, k)
         if right is None:
@@ -47,10 +53,11 @@ def run_shapes(space: FurnishSpace) -> Iterator[tuple[Arm, ...]]:
             for s_low, s_high in free[right]:
                 if s_low > 0.01 or s_high < DEPTH_M + 0.9:
                     continue
-                for a in _starts(low, high):
-                    for b in _starts(-s_high, -(DEPTH_M + 0.02)):
+                far = _off_wall(s_high, space.walls[right])
+                for a in _starts(_off_wall(low, wall), high, CORNER_M):
+                    for b in _starts(-far, -_SIDE_LOW_M, FILLER_M):
                         main = Arm(wall, a, wall.length, 0, 0.0)
-                        side = Arm(space.walls[right], DEPTH_M + 0.02, -b, 1, wall.length)
+                        side = Arm(space.walls[right], _SIDE_LOW_M, -b, 1, wall.length)
                         yield main, side
 
 
@@ -66,11 +73,18 @@ def _next(space: FurnishSpace, k: int) -> int | None:
     return None
 
 
-def _starts(low: float, high: float) -> list[float]:
+def _off_wall(at: float, wall: RoomWall) -> float:
+    """Where units end that would end at a place along a wall: a strip before the wall that meets it."""
+    if wall.is_left_corner:
+        at = max(at, _BESIDE_WALL_M)
+    return min(at, wall.length - _BESIDE_WALL_M) if wall.is_right_corner else at
+
+
+def _starts(low: float, high: float, corner: float) -> list[float]:
     # Whole stretches first, then shorter ones that keep their far end in the corner.
     cuts = [low] if high - low <= _LONGEST_ARM_M else []
-    cuts += [high - n * MODULE_M for n in (2, 3, 4, 5, 6) if low < high - n * MODULE_M - 0.01]
-    return cuts
+    ends = [high - corner - n * MODULE_M for n in (1, 2, 3, 4, 5)]
+    return cuts + [end for end in ends if low < end - 0.01]
 
 
 def _cuts(low: float, high: float, wall: RoomWall) -> list[tuple[float, float]]:
