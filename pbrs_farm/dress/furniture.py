@@ -27,6 +27,7 @@ from pbrs_farm.dress.things import case_goods
 from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.case_goods import CASE_GOODS
 from pbrs_farm.dress.walls.hanging import next_id
+from pbrs_farm.geometry.swept import swept_by
 from pbrs_farm.home.room_use import RoomKind, is_cooked_in
 
 Range = tuple[float, float]
@@ -173,7 +174,10 @@ def _find_spot(
     if floor.is_too_full(w * d):
         return None
     y = floor.room.room.floor_y
-    depth = min(OUT_M + d + kind.before_m, _FREE_BEFORE_M)
+    # As far as its own doors and drawers come out.
+    swept = [s.area.bounds[3] for s in swept_by(made[1].surfaces, made[1].joints)]
+    before_m = max(kind.before_m, max(swept, default=0.0) - float(high[2]) + _SIDE_M)
+    depth = min(OUT_M + d + before_m, _FREE_BEFORE_M)
     places: list[tuple[int, float, float]] = []
     for k, face in enumerate(floor.faces):
         starts = face.starts(w + 2 * _SIDE_M, y + LOWER_M, y + h + 0.05, depth)
@@ -188,7 +192,7 @@ def _find_spot(
     n = min(_TRIES, int(np.count_nonzero(weights)))
     for j in rng.choice(len(places), n, replace=False, p=weights / weights.sum()):
         k, s, _ = places[int(j)]
-        spot = spot_at(floor.faces[k], s, w, d, kind.before_m)
+        spot = spot_at(floor.faces[k], s, w, d, before_m)
         if floor.allows(spot.body, spot.front):
             return spot
     return None

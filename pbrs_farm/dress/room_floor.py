@@ -17,6 +17,7 @@ from pbrs_farm.dress.space.flights import flights_of
 from pbrs_farm.dress.space.floor_bitmaps import doors_are_joined, floor_bitmap, with_body
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.walls.hanging import Hanging
+from pbrs_farm.geometry.swept import floor_swept
 
 OUT_M = 0.015  # distance from a wall to a back: skirting boards are between
 LOWER_M = 0.1  # height above the floor from which a wall must be free
@@ -72,7 +73,9 @@ class RoomFloor:
     faces: Sequence[WallFace]
     bitmap: FloorBitmap
     free: BaseGeometry  # its floor without walls
-    kept: BaseGeometry  # doors' swings, and where one stands before doors and windows
+    kept: (
+        BaseGeometry  # what doors and drawers sweep, and where one stands before doors and windows
+    )
     has_ways: bool  # one way joins its doors
     walkable: int  # cells of its largest way, before anything was put
     wall_m: float  # length of wall that furniture may still stand at
@@ -97,6 +100,8 @@ class RoomFloor:
                 zones += [] if passage.is_window else [passage.swing(side)]
         flights = flights_of(house, room.room, room.area)
         zones += [flights.under, flights.before]
+        here = [house.items[n] for n in room.items]
+        zones.append(floor_swept(here, room.room.floor_y))
         # Count the wall before which one could stand something.
         faces = Hanging(house, room, "furniture").faces
         low, high = room.room.floor_y + LOWER_M, room.room.floor_y + 0.9

@@ -11,6 +11,7 @@ import shapely
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.furniture import KINDS, add_furniture
 from pbrs_farm.dress.mutable_house import MutableHouse
@@ -122,6 +123,25 @@ def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
         bitmap = floor_bitmap(space, room)
         assert doors_are_joined(bitmap, room)
         assert (bitmap.occupied & bitmap.inside).sum() < 0.6 * bitmap.inside.sum()
+
+
+def test_furniture_leaves_free_what_drawers_of_the_room_come_out_into() -> None:
+    # Half of a wall of the living room has chests whose drawers come out by a metre.
+    home = builtin_home()
+    bare = [i for i in home.items if not i.id.startswith("piece_")]
+    body = solid("Chest", [0.3, 0, 0.05], [3.3, 0.8, 0.5])
+    front = replace(solid("", [0.3, 0.1, 0.5], [3.3, 0.7, 0.52]).surfaces[0], part="drawer")
+    joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 1.0)
+    chest = replace(body, surfaces=(*body.surfaces, front), joints=(joint,))
+    kept, n = shapely.box(0.3, 0.5, 3.3, 1.52), 0
+    for seed in range(4):
+        mutable = MutableHouse(replace(home, items=(*bare, chest)), seed)
+        add_furniture(mutable, EMPTY, STYLE, 1.0)
+        for item in _added(mutable):
+            low, high = item.bounds
+            n += item.room_id == "0_0"
+            assert not shapely.box(low[0], low[2], high[0], high[2]).intersects(kept), item.name
+    assert n > 0
 
 
 def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:

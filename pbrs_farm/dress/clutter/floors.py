@@ -28,6 +28,7 @@ from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.worktop import LIFT_M
 from pbrs_farm.geometry.plan_grid import PlanGrid
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.geometry.swept import floor_swept
 
 _WALK_M = 0.65  # width of the ways that stay open
 _REACH_M = 0.35  # greatest distance from a thing's edge to a wall or furniture
@@ -103,7 +104,8 @@ def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) ->
             continue
         zone = passage.before(side, _DOOR_M).union(passage.swing(side)).buffer(CELL_M)
         kept |= shapely.contains_xy(zone, plan[..., 0], plan[..., 1])
-    fronts = shapely.union_all([_before_front(scene.items[k], y) for k in room.items])
+    here = [scene.items[k] for k in room.items]
+    fronts = shapely.union_all([floor_swept(here, y), *(_before_front(item, y) for item in here)])
     kept |= shapely.contains_xy(fronts, plan[..., 0], plan[..., 1])
     joined = doors_are_joined(bitmap, room)
     return _Floor(room, bitmap, grid, inside & ~low & ~kept, walkable, joined)

@@ -16,6 +16,7 @@ import numpy as np
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.gates.bodies import Body, bodies_of, piece_id
+from pbrs_farm.dress.gates.fronts import blocked_fronts
 from pbrs_farm.dress.gates.penetration import MOST_M, near_pairs, penetration_m
 from pbrs_farm.dress.gates.plumb import Plumb
 from pbrs_farm.dress.gates.shells import Solids
@@ -29,8 +30,10 @@ from pbrs_farm.dress.space import HouseSpace, floor_space
 _ROUNDS: Final = 12
 _LARGE_M: Final = 0.35  # smaller added things off the floor stand in nobody's way
 _ON_FLOOR_M: Final = 0.1
-_WAYS: Final = {"doors": blocked_doors, "windows": covered_windows, "path": closed_ways}
-_NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path")
+_WAYS: Final = {
+    "doors": blocked_doors, "windows": covered_windows, "path": closed_ways, "fronts": blocked_fronts,
+}  # fmt: skip
+_NAMES: Final = ("must_haves", "penetration", "support", "doors", "windows", "path", "fronts")
 CONTACT: Final = ("penetration", "support")
 """The gates of what touches what: doors, windows and ways are where they were."""
 _REASONS: Final = {
@@ -40,6 +43,7 @@ _REASONS: Final = {
     "doors": "stood before a door",
     "windows": "covered a window",
     "path": "closed a way",
+    "fronts": "stood before a front",
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from pbrs_farm.dress.things.assembly import hanging_piece
 from pbrs_farm.dress.things.materials import metal, plain
 from pbrs_farm.dress.walls.hanging import GAP_M, next_id
 from pbrs_farm.geometry.solids import box, sphere
+from pbrs_farm.geometry.swept import Swept, swept_by_item
 from pbrs_farm.home.names import RADIATORS, words_of_item
 
 PASS = "textiles"
@@ -147,6 +149,7 @@ def _panel_place(
     without = [n for n, i in enumerate(house.items) if i.kind is ItemKind.WINDOW]
     heaters = [n for n, i in enumerate(house.items) if words_of_item(i) & RADIATORS]
     free = shapely.difference(room.area, room.walls)
+    swept = [s for n in room.items for s in swept_by_item(house.items[n])]
     for beyond in (_BESIDE_M, 0.34, 0.25, 0.17, 0.12, 0.07):
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
@@ -164,6 +167,8 @@ def _panel_place(
                 continue
             # It hangs down to the floor, or over a radiator or nothing: not onto a worktop.
             low, high = seen.bounds(x0, x1, bottom, rod_y + 0.02, out)
+            if _is_opened_into(swept, low, high):
+                continue
             least = low.copy()
             least[1] = max(seen.floor_y + _FROM_FLOOR_M, bottom - _OVER_THINGS_M)
             if space.is_free(low, high, without=without) and space.is_free(
@@ -171,6 +176,15 @@ def _panel_place(
             ):
                 return x0, x1, bottom
     return None
+
+
+def _is_opened_into(swept: Sequence[Swept], low: F64, high: F64) -> bool:
+    """Whether a door or drawer of furniture would open into the box low..high (3,)."""
+    ground = shapely.box(low[0], low[2], high[0], high[2])
+    return any(
+        s.low_y < high[1] and s.high_y > low[1] and shapely.intersects(s.area, ground)
+        for s in swept
+    )
 
 
 def is_flat(free: BaseGeometry, seen: WindowSide, x: float) -> bool:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import Piece, Place, Shape
+from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import House, Item, ItemKind, Material
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.dress.gates import keep_gates
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import Gate
@@ -184,3 +186,44 @@ def test_people_are_no_obstacle():
     with_box(mutable, "cup", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
     gates_of(mutable)
     assert "cup" in names(mutable)
+
+
+def drawer_chest(x: float, z: float) -> Item:
+    """60 cm wide, 50 deep, 70 high; its front at z comes out by 40 cm."""
+    body = solid("chest", [x, 0, z - 0.5], [x + 0.6, 0.7, z])
+    front = replace(solid("", [x, 0.002, z], [x + 0.6, 0.698, z + 0.02]).surfaces[0], part="drawer")
+    joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 0.4)
+    return replace(body, surfaces=(*body.surfaces, front), joints=(joint,))
+
+
+@pytest.mark.parametrize(
+    ("ahead", "kind", "stays"),
+    [
+        (0.30, piece("box"), False),
+        (0.39, piece("box"), True),  # it opens by nine tenths
+        (0.30, piece("chair", Place.FLOOR, CHAIR), True),  # one pushes it aside
+    ],
+    ids=["in the way", "beyond", "a chair"],
+)
+def test_what_stands_before_a_drawer_goes(ahead: float, kind: Piece, stays: bool) -> None:
+    mutable = MutableHouse(house(drawer_chest(1.0, 1.0)), 1)
+    z = 1.02 + ahead
+    with_box(mutable, "thing", [1.1, 0.0, z], [1.5, 0.5, z + 0.4], kind)
+    with_box(mutable, "beside", [1.7, 0.0, 1.1], [2.1, 0.5, 1.5])
+    (gate,) = keep_gates(mutable, mutable.used, ("fronts",))
+    assert ("thing" in names(mutable)) is stays
+    assert "beside" in names(mutable)
+    assert gate.n_taken_out == (not stays)
+
+
+def test_a_new_chest_that_cannot_open_goes_itself() -> None:
+    bed = solid("bed", [1.0, 0.0, 1.2], [2.0, 0.5, 3.0])
+    mutable = MutableHouse(house(bed), 1)
+    chest = replace(
+        drawer_chest(1.1, 1.0), id="dress-test-chest", tags=("dressed:generated#chest",)
+    )
+    mutable.add(chest, "test", piece("chest", Place.FLOOR))
+    (gate,) = keep_gates(mutable, mutable.used, ("fronts",))
+    assert "chest" not in names(mutable)
+    assert mutable.refused["test: stood before a front"] == 1
+    assert gate.n_left == 0

@@ -1,0 +1,69 @@
+"""What doors and drawers sweep when they open, seen from above: the ground that stays free; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from typing import Final
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import Item, ItemKind, Surface
+from pbrs_farm.core.joints import Joint
+
+_STEPS: Final = 9  # of a way, shut and wide open among them
+_OVERHEAD_M: Final = 1.4  # above the floor; what is swept higher is in nobody's way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swept:
+    """The space that a part sweeps from shut to wide open."""
+
+    part: str
+    area: BaseGeometry  # plan (x, z), metres
+    low_y: float
+    high_y: float
+
+
+def swept_by(
+    surfaces: Sequence[Surface], joints: Sequence[Joint], axes: F64 | None = None
+) -> list[Swept]:
+    """What each part sweeps, in the frame of the surfaces; parts without a face are left out.
+
+    axes: (3, 3) columns along which a part's box is taken; x, y, z by default.
+    """
+    axes = np.eye(3) if axes is None else axes
+    found = []
+    for joint in joints:
+        own = [s.positions for s in surfaces if s.part == joint.part and len(s.positions)]
+        if not own:
+            continue
+        local = np.concatenate(own).astype(np.float64) @ axes
+        ends = np.stack([local.min(0), local.max(0)], -1)
+        corners = np.array(list(product(*ends))) @ axes.T
+        values = (joint.lower, *np.linspace(joint.value, joint.upper, _STEPS))
+        at = [transform_points(joint.motion(float(v)), corners) for v in values]
+        hulls = [
+            shapely.MultiPoint(np.concatenate(pair)[:, [0, 2]]).convex_hull for pair in pairwise(at)
+        ]
+        y = np.array([points[:, 1] for points in at])
+        found.append(Swept(joint.part, shapely.union_all(hulls), float(y.min()), float(y.max())))
+    return found
+
+
+def swept_by_item(item: Item) -> list[Swept]:
+    """What doors and drawers of furniture sweep; none of doorways and windows, which have rules of their own."""
+    if item.kind is not ItemKind.OBJECT or not item.joints:
+        return []
+    return swept_by(item.surfaces, item.joints, item.box.axes if item.box is not None else None)
+
+
+def floor_swept(items: Sequence[Item], floor_y: float) -> BaseGeometry:
+    """The ground that nothing may stand on which stays: under all that opens below a man's chest."""
+    swept = (s for item in items for s in swept_by_item(item))
+    return shapely.union_all([s.area for s in swept if s.low_y < floor_y + _OVERHEAD_M])
