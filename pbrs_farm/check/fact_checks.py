@@ -18,6 +18,7 @@ from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES
+from pbrs_farm.core.house import FLOATING
 
 SAME = 1e-9  # of numbers that two files repeat
 POSE = 1e-6  # of a product of two poses: metres, and parts of a rotation
@@ -139,6 +140,9 @@ def _check_names(view: StoredView, house: StoredHouse, row: dict[str, Any], tall
     for own, stored in ROW_FIELDS.items():
         what = f"{own} is {row[own]}, in house.json {item[stored]}"
         tally.expect("names", place, row[own] == item[stored], what)
+    told, floats = row.get("floating", False), FLOATING in item["tags"]
+    what = f"floating is {told}, the tags of house.json say {floats}"
+    tally.expect("names", place, told is floats, what)
 
 
 def _check_model_pose(

@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Floats, Rays
 from pbrs_farm.check.fact_checks import is_rigid
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.core.house import FLOATING
 
 MODEL_M = (
     1e-4  # between two instances of one model, in its own frame: what float32 keeps in the world
@@ -41,6 +43,39 @@ def check_solids(house: StoredHouse, triangles: Triangles, rays: Rays, tally: Ta
             share = _share_of_floor(room, rays)
             what = f"its floor lies elsewhere below {1 - share:.0%} of it"
             tally.expect("rooms", f"{house.id} room {name}", share >= FLOOR_SHARE, what)
+
+
+def check_floating(house: StoredHouse, triangles: Triangles, tally: Tally) -> None:
+    """What hangs in the air touches nothing that stands: no edge of either passes through a face of the other."""
+    hung = [n for n, row in house.items.items() if FLOATING in row["tags"]]
+    if not hung:
+        return
+    floats = np.isin(triangles.instance, hung)
+    begin, along = _edges(triangles, floats)
+    owner = np.repeat(triangles.instance[floats], 3)
+    touches = set(owner[_met(Rays(triangles, ~floats), begin, along) >= 0].tolist())
+    # Of what stands, look at what is near.
+    corners = triangles.vertices[triangles.faces].astype(np.float64)
+    low, high = begin.min(0), begin.max(0)
+    near = ~floats & ((corners.max(1) >= low) & (corners.min(1) <= high)).all(1)
+    met = _met(Rays(triangles, floats), *_edges(triangles, near))
+    touches |= set(triangles.instance[met[met >= 0]].tolist())
+    for instance in hung:
+        place = f"{house.id} item {house.items[instance]['id']}"
+        tally.expect("floating", place, instance not in touches, "is said to hang, and touches")
+
+
+def _edges(triangles: Triangles, which: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """(3 F, 3) begins of the edges of some triangles, face by face, and the ways to their ends."""
+    corners = triangles.vertices[triangles.faces[which]].astype(np.float64)
+    begin = corners.reshape(-1, 3)
+    return begin, np.roll(corners, -1, axis=1).reshape(-1, 3) - begin
+
+
+def _met(rays: Rays, begin: Floats, along: Floats) -> NDArray[np.int64]:
+    """(N,) the triangle that each edge passes through, -1 = none."""
+    face = rays.first(begin, along)
+    return np.where(rays.distance(face, begin, along) <= 1, face, -1)
 
 
 def _box_off(box: Mapping[str, Any], points: Floats) -> float:

@@ -43,7 +43,7 @@ from pbrs_farm.check.projector_checks import check_projector
 from pbrs_farm.check.radiance_checks import bright_pixels, check_fit, check_guides
 from pbrs_farm.check.sensor_checks import check_derived
 from pbrs_farm.check.sky_checks import check_illuminance
-from pbrs_farm.check.solid_checks import check_models, check_solids
+from pbrs_farm.check.solid_checks import check_floating, check_models, check_solids
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import BadGlb, Triangles, json_of_glb, triangles_from_glb
@@ -210,6 +210,7 @@ def _check_documents(house: StoredHouse, glb: bytes, scenes: Scenes, tally: Tall
     checks: tuple[tuple[str, Callable[[], None]], ...] = (
         ("house.json", lambda: check_house(house, json_of_glb(glb), digest, tally)),
         ("house.json", lambda: check_models(house, triangles, tally)),
+        ("house.json", lambda: check_floating(house, triangles, tally)),
         ("house.json", lambda: check_solids(house, triangles, rays, tally)),
         ("house.json", lambda: check_joints(house, triangles, tally)),
         ("house.json", lambda: check_motions(house, tally)),

@@ -43,6 +43,8 @@ def add_verbs(verb: Verb) -> None:
     add("--scenes", type=int, default=1, metavar="N", help="scenes a home, by seeds from --seed on")
     add("--views", type=int, default=5, metavar="N", help="views a scene (default 5)")
     add("--physics", action="store_true", help="drop them and let them come to rest")
+    text = "hang them in the air of rooms at any turn, where they touch nothing"
+    add("--float", action="store_true", dest="floating", help=text)
     add("--on", default="", metavar="NAME", help="the furniture or room that takes them")
     add("--room", default="", metavar="NAME", help="the room whose furniture and floor take them")
     add("--unit", default="m", help="of the models' files: m, cm, mm, inch (default m)")
@@ -99,7 +101,7 @@ def _scatter(args: argparse.Namespace) -> int:
             for seed in range(recipe.seed, recipe.seed + args.scenes):
                 scene = home.scatter(
                     found, args.count, on=args.on or None, in_=args.room, seed=seed,
-                    physics=args.physics,
+                    physics=args.physics, floating=args.floating,
                 )  # fmt: skip
                 cameras = scene.cameras_around(
                     n=args.views, distance_m=distance, min_visible=args.visible, size=size,

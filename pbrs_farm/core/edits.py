@@ -45,6 +45,15 @@ class PlaceModel(Record):
     world_from_model: Rows  # rigid; model coordinates in metres
 
 
+class FloatModel(Record):
+    """As PlaceModel, of a model that hangs in the air: nothing holds it."""
+
+    do: Literal["float"] = "float"
+    item: str
+    model: ModelRef
+    world_from_model: Rows
+
+
 class RemoveItems(Record):
     """Take items away; the holes that doors and windows among them cut stay, and so do the instance
     ids of all other items.
@@ -144,6 +153,7 @@ class AddLight(Record):
 
 Edit = Annotated[
     PlaceModel
+    | FloatModel
     | RemoveItems
     | MoveItems
     | OpenJoints

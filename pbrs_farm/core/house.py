@@ -230,6 +230,10 @@ Light of rooms is made of what windows see of it; labels and pictures have it be
 LIT: Final = "lit"
 """Begins the name of a material of such an item that shines by itself: windows at night."""
 
+FLOATING: Final = "floating"
+"""Tag of an item that hangs in the air and touches nothing, put there to teach geometry
+(dress/floating.py): nothing holds it, and it stays where it is when things fall.
+"""
 REMOVED: Final = "removed"
 """Tag of an item that an edit took away: without surfaces, it holds its place, so that the instance
 ids of the others stay.
@@ -297,6 +301,11 @@ class Item:
         out.
         """
         return OUTSIDE in self.tags
+
+    @property
+    def is_floating(self) -> bool:
+        """It hangs in the air on purpose: nothing holds it."""
+        return FLOATING in self.tags
 
     @property
     def is_removed(self) -> bool:

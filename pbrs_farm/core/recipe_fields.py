@@ -80,6 +80,13 @@ class DressFields(FieldGroup):
         0.0,
         description="share of doors and drawers that stand open, as far as nothing is in their way",
     )
+    float_share: float = Field(
+        0.0,
+        ge=0,
+        le=0.5,
+        description="share of what one sees in a room that generated things in the air hide, about;"
+        " also of homes that are not dressed",
+    )
     style: str = Field(
         "", max_length=64, description="the style of every home; empty = drawn by the seed"
     )

@@ -86,7 +86,7 @@ class Piece:
     world_from_local: F64  # (4, 4) rigid
     surfaces: tuple[Surface, ...]  # local
     size: F64  # (3,) of its box, metres
-    is_fixed: bool  # part of the building, screwed to it, or without a thing below it
+    is_fixed: bool  # part of the building, screwed to it, hung in the air, or without a thing below
     lamps: tuple[Lamp, ...]
 
     @property
@@ -210,6 +210,7 @@ def _piece(item: Item, instance: int, name: str, is_resting: bool) -> Piece:
     local_from_world = np.asarray(np.linalg.inv(frame), np.float64)
     surfaces = tuple(_surface_in_frame(s, local_from_world) for s in item.surfaces if len(s.faces))
     is_fixed = item.kind in BUILDING or item.nyu40 in _FIXED or not is_resting
+    is_fixed |= item.is_floating
     is_fixed |= bool(item.joints) and float(size.max()) > _LARGE_M
     return Piece(
         item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights))

@@ -15,6 +15,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.edits import (
     AddLight,
     CoverItems,
+    FloatModel,
     KeyJoints,
     MoveItems,
     OpenJoints,
@@ -28,6 +29,7 @@ from pbrs_farm.core.edits import (
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import (
+    FLOATING,
     MAX_INSTANCES,
     REMOVED,
     Box,
@@ -69,7 +71,7 @@ def apply_edits(house: House, source: SourceRef, fields: ReadFields) -> House:
     return replace(house, id=source.house_id)
 
 
-def _place(house: House, edit: PlaceModel, fields: ReadFields) -> House:
+def _place(house: House, edit: PlaceModel | FloatModel, fields: ReadFields) -> House:
     if any(item.id == edit.item for item in house.items):
         raise BadInput(house.id, edit.item, "there is an item of that id")
     model, shape = edit.model, model_shape(edit.model, fields)
@@ -91,6 +93,7 @@ def _place(house: House, edit: PlaceModel, fields: ReadFields) -> House:
         source_class=model.category,
         box=Box(centre, (high - low) / 2, world_from_model[:3, :3]),
         pose=ModelPose(model.id, edit.world_from_model),
+        tags=(FLOATING,) if edit.do == "float" else (),
     )
     item = _at_home(house, item)
     source = house.source
@@ -339,6 +342,7 @@ def _file(path: str, sha256: str) -> bytes:
 
 _ONE: Final[dict[str, Callable[[House, Any, ReadFields], House]]] = {
     "place": _place,
+    "float": _place,
     "remove": _remove,
     "move": _move,
     "open": _open,

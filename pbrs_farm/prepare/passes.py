@@ -1,6 +1,6 @@
 """The passes that make a finished house of a source: a table of what each does, when and by what.
 
-    read -> stand-ins -> furnish -> dress -> repair -> open -> surroundings -> edits
+    read -> stand-ins -> furnish -> dress -> repair -> open -> float -> surroundings -> edits
 
 The table is the only list of passes: finished_house.py calls them in its order; the digest of the step
 `house`, the versions by which workers know each other and the keys of caches are made from it.
@@ -133,6 +133,22 @@ def _open_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     return [dress_seed(source, recipe), recipe.dress.open_share]
 
 
+def _has_floating_things(source: SourceRef, recipe: Recipe) -> bool:
+    return _is_home(source, recipe) and recipe.dress.float_share > 0
+
+
+def _float_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    from pbrs_farm.dress.things.families import families_digest
+
+    # What is generated for dressing hangs in the air, too.
+    things = [families_digest(), PASS["dress"].version]
+    return [_float_seed(source, recipe), recipe.dress.float_share, *things]
+
+
+def _float_seed(source: SourceRef, recipe: Recipe) -> int:
+    return dress_seed(source, recipe) or recipe.seed
+
+
 def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     if source.kind != "plugin":
         return []
@@ -152,7 +168,7 @@ def _furnish_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     # Where the libraries lie is no matter: their content is.
     fields = recipe.dress.model_dump(
-        mode="json", exclude={"seed", "catalogue", "furnish", "passes", "open_share"}
+        mode="json", exclude={"seed", "catalogue", "furnish", "passes", "open_share", "float_share"}
     )
     plugins = filter(None, recipe.dress.passes.split(":"))
     catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", plugins)
@@ -260,6 +276,14 @@ def _leave_open(work: Preparation) -> Preparation:
     return replace(work, current=left_open(work.house, share, seed))
 
 
+def _float(work: Preparation) -> Preparation:
+    """Things in the air, drawn by the seed of dressing, else by the recipe's."""
+    from pbrs_farm.dress.floating import with_floating_things
+
+    share, seed = work.recipe.dress.float_share, _float_seed(work.source, work.recipe)
+    return replace(work, current=with_floating_things(work.house, share, seed))
+
+
 def _surround(work: Preparation) -> Preparation:
     """Streets, gardens and courts before the windows."""
     from pbrs_farm.dress.surroundings import with_surroundings
@@ -284,6 +308,7 @@ PASSES: Final = (
     Pass("dress", 9, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass("open", 1, ("dress",), _leave_open, _stands_open, _open_depends),
+    Pass("float", 1, ("dress",), _float, _has_floating_things, _float_depends),
     Pass(
         "surroundings", 2, ("surroundings",), _surround,
         lambda source, recipe: _is_home(source, recipe) and recipe.surroundings.kind != "none",

@@ -39,6 +39,7 @@ from pbrs_farm.core.edits import (
     AddLight,
     CoverItems,
     Edit,
+    FloatModel,
     KeyJoints,
     MoveItems,
     OpenJoints,
@@ -355,31 +356,41 @@ class Home:
         in_: str = "",
         seed: Whole = 0,
         physics: bool = False,
+        floating: bool = False,
     ) -> Home:
         """The home with n more things, models in turn by the seed.
 
         on: an item or room whose surface takes them; in_: a room, on all its tables, shelves and
         floor; else anywhere in the home. physics: they are dropped and come to rest against each other
         and the home by rigid-body simulation (extra `physics`), and what falls off four times stays
-        where it fell; else each stands upright by itself.
+        where it fell; else each stands upright by itself. floating: they hang in the air of rooms at any
+        turn and touch nothing, to teach geometry; no fall moves them.
 
         Raises BadInput where less than n fit, MachineFailed where the extra is not installed.
 
             >>> len(home.scatter([can], n=2, on="dining table").items) - len(home.items)
             2
         """
-        if physics:
+        if not models:
+            raise BadInput("scatter", "models", "give at least one model")
+        if floating and physics:
+            raise BadInput(
+                "scatter", "floating", "what hangs in the air does not fall", hint="one of the two"
+            )
+        if floating:
+            from pbrs_farm.scene.placing import floating_poses as poses
+        elif physics:
             from pbrs_farm.scene.physics import settled_poses as poses
         else:
             from pbrs_farm.scene.placing import scattered_poses as poses
-
-        if not models:
-            raise BadInput("scatter", "models", "give at least one model")
-        supports = self._supports(in_) if on is None else self._supports_named(on)
+        targets = self._supports(in_) if on is None else self._supports_named(on)
         house = self.house
-        edits: list[PlaceModel] = []
-        for model, matrix in self.renderer.call(lambda: poses(house, models, n, supports, seed)):
-            edits.append(self._placing(model, matrix, "", taken=[edit.item for edit in edits]))
+        edits: list[PlaceModel | FloatModel] = []
+        for model, matrix in self.renderer.call(lambda: poses(house, models, n, targets, seed)):
+            name = self._free_name(model.id, [edit.item for edit in edits])
+            kind = FloatModel if floating else PlaceModel
+            rows = rows_of_matrix(matrix)
+            edits.append(kind(item=name, model=model.ref, world_from_model=rows))
         return self._edited(*edits)
 
     @checked_call
@@ -582,7 +593,7 @@ class Home:
         was_in = {item.id: item.room_id is not None for item in self.house.items}
         put: list[str] = []
         for edit in edits:
-            if isinstance(edit, PlaceModel | AddLight):
+            if isinstance(edit, PlaceModel | FloatModel | AddLight):
                 put.append(edit.item)
             elif isinstance(edit, MoveItems):
                 put += [name for name in edit.items if was_in[name]]
@@ -593,10 +604,8 @@ class Home:
             text = f"{shown(outside[0].id)} at ({x:.2f}, {y:.2f}, {z:.2f}) is in no room"
             warn_caller(f"{after.id}: {text}{more}")
 
-    def _placing(
-        self, model: Model, matrix: F64, name: str, taken: Sequence[str] = ()
-    ) -> PlaceModel:
-        item = name or self._free_name(model.id, taken)
+    def _placing(self, model: Model, matrix: F64, name: str) -> PlaceModel:
+        item = name or self._free_name(model.id, ())
         return PlaceModel(item=item, model=model.ref, world_from_model=rows_of_matrix(matrix))
 
     def _free_name(self, stem: str, taken: Sequence[str]) -> str:

@@ -21,7 +21,9 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.dress.supports import Support, floor_support, supports_of_item
 from pbrs_farm.dress.worktop import LIFT_M, TopSpot, Worktop
+from pbrs_farm.geometry.free_air import FreeAir
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.home.room_use import is_outdoors
 from pbrs_farm.scene.models import Model
 
 Target = Item | Room
@@ -33,6 +35,7 @@ _FURNITURE: Final = frozenset(
                  "night stand", "chair")
 )  # fmt: skip
 _EYE_LEVEL_M: Final = 1.4  # above the floor: higher tops are used only where there is no lower one
+_GIVEN_UP: Final = 40  # things in a row that find no place in the air
 _HEIGHT_M: Final = 3.0  # of the space over furniture that is in no room
 _NAMED: Final = 3  # targets in a message
 _NO_LEVEL: Final = "name furniture with a level top, or a room for its floor"
@@ -99,6 +102,33 @@ def scattered_poses(
     if len(placed) < n:
         text = f"takes {len(placed)} of {n} things"
         raise BadInput(house.id, "scatter", text, hint="fewer or smaller things, more supports")
+    return placed
+
+
+def floating_poses(
+    house: House, models: Sequence[Model], n: int, targets: Sequence[Target], seed: int
+) -> list[tuple[Model, F64]]:
+    """n models, (model, world_from_model (4, 4)) each, in the air of rooms at any turn, that touch nothing.
+
+    Models are drawn alike, rooms among the targets by their volume, none outdoors; 5 cm are left to
+    all else. Equal seeds give equal poses. Raises BadInput where fewer than n fit.
+    """
+    rng = np.random.default_rng([seed, 3])
+    rooms = [one for one in targets if isinstance(one, Room) and not is_outdoors(one)]
+    volumes = np.array([
+        shapely.Polygon(room.polygon).area * max(room.ceiling_y - room.floor_y, 0) for room in rooms
+    ])  # fmt: skip
+    air, placed, n_failed = FreeAir(house.items), list[tuple[Model, F64]](), 0
+    while len(placed) < n and n_failed < _GIVEN_UP and volumes.any():
+        model = models[int(rng.integers(len(models)))]
+        room = rooms[int(rng.choice(len(rooms), p=volumes / volumes.sum()))]
+        pose = air.put(room, model.shape.points, rng)
+        n_failed = n_failed + 1 if pose is None else 0
+        if pose is not None:
+            placed.append((model, pose))
+    if len(placed) < n:
+        text = f"the air takes {len(placed)} of {n} things"
+        raise BadInput(house.id, "scatter", text, hint="fewer or smaller things, larger rooms")
     return placed
 
 

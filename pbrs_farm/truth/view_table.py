@@ -50,7 +50,8 @@ def view_table(
     class, nyu13, class13, source_class, room, pixels, fraction (of the picture), visible_fraction
     (pixels / pixels when alone in this picture; None unless with_visible_fraction), truncated (see
     is_truncated), box2d (x0, y0, x1, y1 in px, right and bottom exclusive, of the visible pixels)
-    and box3d (centre, half, axes: rows are unit axes; world, metres).
+    and box3d (centre, half, axes: rows are unit axes; world, metres). What hangs in the air has
+    floating, true.
     An empty view has an empty list.
     """
     # Count the pixels and find the pixel box of each visible instance.
@@ -68,6 +69,7 @@ def view_table(
             {
                 "id": instance,
                 **_item_facts(item, int(classes[instance])),
+                **({"floating": True} if item.is_floating else {}),
                 "pixels": pixels,
                 "fraction": pixels / item_buffer.size,
                 "visible_fraction": None

@@ -529,6 +529,8 @@ _FINISHED |= {
     "a row's class13": (row(lambda r: r.update(class13="bed")), "names"),
     "a row's nyu13": (row(lambda r: r.update(nyu13=1)), "names"),
     "a row's source class": (row(lambda r: r.update(source_class="builtin#tv")), "names"),
+    "a row said to hang in the air": (row(lambda r: r.update(floating=True)), "names"),
+    "what stands said to hang in the air": (document("house.json", lambda h: next(i for i in h["items"] if i["kind"] == "object")["tags"].append("floating")), "floating"),
     "a row given a pose": (row(lambda r: r.update(model="m", world_from_model=np.eye(4).tolist(), camera_from_model_opencv=np.eye(4).tolist())), "model poses"),
     "two materials exchanged": (table(lambda t: t["materials"].update({"1": t["materials"]["2"], "2": t["materials"]["1"]})), "tables"),
     "a material's kind": (table(lambda t: t["materials"]["1"].update(kind="mirror")), "tables"),

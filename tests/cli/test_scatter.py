@@ -38,6 +38,26 @@ def test_scattered_models_are_seen_and_kept(
     assert verify(tmp_path / "out").is_clean
 
 
+def test_models_hang_in_the_air_and_are_labelled_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "models").mkdir()
+    can(tmp_path / "models")
+    words = [
+        "scatter", "builtin", "--models", str(tmp_path / "models"), "--unit", "mm", "--count", "30",
+        "--views", "1", "--float", "--out", str(tmp_path / "out"), "--recipe", "preview",
+        "--modes", "opengl_dl", *FIELDS,
+    ]  # fmt: skip
+    assert main(words) == 0
+    (frame,) = pf.open(tmp_path / "out")
+    for row in frame.instances:
+        assert row.get("floating", False) == (row.get("model") == "can")
+    assert any("floating" in row for row in frame.instances)
+    assert verify(tmp_path / "out").is_clean
+    assert main([*words, "--physics"]) == 1
+    assert "what hangs in the air does not fall" in capsys.readouterr().err
+
+
 def test_what_a_model_lacks_is_a_line_and_a_note_of_the_home(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

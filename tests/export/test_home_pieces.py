@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import Item
+from pbrs_farm.core.house import FLOATING, Item
 from pbrs_farm.export.home_pieces import exported_home
 from tests.export.test_home_mjcf import loose, small_home
 
@@ -48,3 +48,10 @@ def test_a_thing_is_loose_where_something_below_bears_it(thing: Item, is_loose: 
     home = exported_home(small_home(bookcase(), thing))
     assert home.pieces[1].is_fixed  # a bookcase stands still
     assert home.pieces[2].is_fixed != is_loose
+
+
+def test_what_hangs_in_the_air_on_purpose_stays_where_it_is() -> None:
+    mug = loose("mug", (0.4, 0.505, 0.1), (0.48, 0.6, 0.18))
+    for tags, is_fixed in (((), False), ((FLOATING,), True)):
+        home = exported_home(small_home(bookcase(), replace(mug, tags=tags)))
+        assert home.pieces[2].is_fixed == is_fixed

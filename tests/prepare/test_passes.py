@@ -76,6 +76,8 @@ def test_a_home_goes_through_the_passes_that_it_needs() -> None:
     full = with_settings(recipe, {"dress.furnish": "empty", "surroundings.kind": "drawn"})
     every = ["read", "furnish", "dress", "repair", "surroundings", "edits"]
     assert names_of(edited, full) == every
+    hung = with_settings(recipe, {"dress.float_share": 0.1})
+    assert names_of(source, hung) == ["read", "repair", "float"]
     plan_of_others = source.model_copy(update={"kind": "plan"})
     assert names_of(plan_of_others, recipe) == ["read", "stand-ins", "repair"]
 
@@ -83,7 +85,9 @@ def test_a_home_goes_through_the_passes_that_it_needs() -> None:
 @pytest.mark.parametrize("kind", ["object", "plugin"])
 def test_an_object_and_a_home_of_a_plugin_are_only_read(kind: str) -> None:
     source = resolve("builtin").model_copy(update={"kind": kind})
-    full = with_settings(Recipe(), {"dress.seed": 2, "dress.furnish": "empty"})
+    full = with_settings(
+        Recipe(), {"dress.seed": 2, "dress.float_share": 0.1, "dress.furnish": "empty"}
+    )
     assert names_of(source, full) == ["read"]
 
 
@@ -141,6 +145,7 @@ def test_another_version_of_a_pass_makes_anew_the_houses_that_go_through_it(
         "dress.furnish": "empty",
         "dress.catalogue": "generated",
         "dress.open_share": 0.1,
+        "dress.float_share": 0.1,
         "surroundings.kind": "drawn",
     }
     full = with_settings(Recipe(), changed)

@@ -1,0 +1,111 @@
+"""Generated things that hang in the air of a home's rooms, for training geometry; no effects.
+
+WMGStereo measured that networks learn depth best from rooms as people have them in which things hang
+at any place and turn beside. Nothing holds these and they touch nothing; they are labelled as what
+they are, and tagged FLOATING.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from functools import cache
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.catalogue import Piece, Place
+from pbrs_farm.core.house import (
+    FLOATING,
+    House,
+    ItemKind,
+    MaterialKind,
+    Note,
+    Room,
+    corners_of_surfaces,
+)
+from pbrs_farm.dress.mutable_house import MutableHouse
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.things.assembly import Model
+from pbrs_farm.dress.things.families import family_pieces, family_shape
+from pbrs_farm.dress.things.things import THINGS
+from pbrs_farm.geometry.free_air import FreeAir, mean_shadow_m2, shadow_for_share
+from pbrs_farm.geometry.moving import moved_item
+from pbrs_farm.home.room_use import MIN_LIVED_IN_M2, is_outdoors
+
+FEW: Final = "floating-few"
+"""Kind of the note about a room that had no place for as many things as were asked for."""
+
+_LEAST_M, _MOST_M = 0.15, 1.0  # the longest side of what hangs in the air
+_SMALL_SHARE: Final = 0.7  # of the draws that are for a small thing, others for furniture
+_GIVEN_UP: Final = 12  # things in a row that find no place
+_LEFT_OUT: Final = (MaterialKind.MIRROR, MaterialKind.BULB, MaterialKind.SHADE)
+
+
+def with_floating_things(house: House, share: float, seed: int) -> House:
+    """The house with things in the air of each room, until they hide about a share of what one sees.
+
+    share: 0 to below 1 of the picture in an empty room, mean over places and directions; furniture
+    hides some of them. Rooms outdoors and closets below 2 m2 stay. Equal arguments give equal bits.
+    """
+    air = FreeAir(house.items)
+    with closing(MutableHouse(house, seed)) as mutable:
+        for room in house.rooms:
+            if not is_outdoors(room) and shapely.Polygon(room.polygon).area > MIN_LIVED_IN_M2:
+                _fill(mutable, air, room, share)
+        return mutable.frozen()
+
+
+def _fill(house: MutableHouse, air: FreeAir, room: Room, share: float) -> None:
+    rng = house.rng("float", room.id)
+    wanted, hidden, n, n_failed = shadow_for_share(room, share), 0.0, 0, 0
+    while n_failed < _GIVEN_UP:
+        piece, shape = _drawn(rng)
+        corners = corners_of_surfaces(shape.surfaces)
+        matrix = air.put(room, corners.reshape(-1, 3), rng)
+        if matrix is None:
+            n_failed += 1
+            continue
+        n_failed = 0
+        item = house.placed(
+            piece, shape, np.zeros(3), 0.0, item_id=f"float-{room.id}-{n}", room_id=room.id,
+            level_id=room.level_id, tags=(FLOATING,),
+        )  # fmt: skip
+        item = moved_item(item, matrix)
+        house.add(item, "float", piece)
+        n += 1
+        hidden += mean_shadow_m2(corners_of_surfaces(item.surfaces))
+        if hidden >= wanted:
+            return
+    text = f"things in the air hide {hidden:.1f} of {wanted:.1f} m2: there is no more place"
+    house.notes.append(Note(FEW, room.id, text))
+
+
+def _drawn(rng: np.random.Generator) -> Model:
+    """A small thing or a piece of furniture, each kind as likely as any other of its sort."""
+    while True:
+        if rng.random() < _SMALL_SHARE:
+            style = style_for(rng)
+            piece, shape = THINGS[list(THINGS)[int(rng.integers(len(THINGS)))]].make(rng, style)
+        else:
+            groups = list(_furniture().values())
+            pieces = groups[int(rng.integers(len(groups)))]
+            piece = pieces[int(rng.integers(len(pieces)))]
+            shape = family_shape(piece)
+        used = {shape.materials[s.material].kind for s in shape.surfaces}
+        if _LEAST_M <= max(piece.size) <= _MOST_M and not used & {*_LEFT_OUT}:
+            return piece, shape
+
+
+@cache
+def _furniture() -> dict[str, list[Piece]]:
+    """Group -> generated pieces of furniture that stand, give no light and are no larger than _MOST_M."""
+    found: dict[str, list[Piece]] = {}
+    for piece in family_pieces():
+        if (
+            piece.place in (Place.FLOOR, Place.SURFACE)
+            and piece.kind is ItemKind.OBJECT
+            and _LEAST_M <= max(piece.size) <= _MOST_M
+        ):
+            found.setdefault(piece.group, []).append(piece)
+    return found

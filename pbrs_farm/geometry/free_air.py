@@ -1,0 +1,161 @@
+"""Free places in the air of rooms, where a thing at any turn touches nothing; state: what was put there.
+
+A thing counts by the box around it, which turns with it, CLEAR_M wider on all sides. No face of
+anything reaches into that box, so whatever hangs in the air is CLEAR_M or more from all else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+import shapely
+
+from pbrs_farm.core.arrays import F64, Matrix4
+from pbrs_farm.core.house import Box, Item, ItemKind, Room, corners_of_surfaces
+from pbrs_farm.core.mesh import clipped_to_box, lengths, points_bounds
+from pbrs_farm.geometry.heights import highest_below
+from pbrs_farm.geometry.plan_grid import PlanGrid, covered
+from pbrs_farm.geometry.scene_triangles import SceneTriangles
+from pbrs_farm.geometry.solids import box_quads
+
+CLEAR_M: Final = 0.05
+"""From what hangs in the air to anything else, at least."""
+
+_TRIES: Final = 30  # places and turns of one thing before it is given up
+_MOST_M3: Final = 12.0  # a thing whose box is larger is a building's shell: its inside is air
+_SHADOW_CELL_M: Final = 0.01
+
+
+class FreeAir:
+    """The air of a house, and what hangs in it.
+
+        air = FreeAir(house.items)
+        matrix = air.put(room, points, np.random.default_rng(1))  # None: it fits nowhere
+
+    Equal calls in equal order give equal places.
+    """
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self._scene = SceneTriangles(items)
+        self._floors, self._roofs = (
+            corners_of_surfaces(s for item in items if item.kind in kinds for s in item.surfaces)
+            for kinds in ((ItemKind.FLOOR, ItemKind.GROUND), (ItemKind.WALL, ItemKind.CEILING))
+        )
+        is_thing = np.array([not item.kind.is_structure for item in items], np.bool_)
+        sizes = np.ptp(self._scene.bounds, axis=1).prod(-1)
+        self._things = self._scene.bounds[is_thing & (sizes <= _MOST_M3)]
+        self._hanging: list[Box] = []
+        self._spheres = np.zeros((0, 4))  # around these: middle and radius
+
+    def put(self, room: Room, points: F64, rng: np.random.Generator) -> Matrix4 | None:
+        """Take a place in a room for a thing: (4, 4) world_from_thing, rigid; None where it fits nowhere.
+
+        points: (V, 3) of its mesh in its own frame, metres. Every place and every turn is as likely
+        as any other. All of it lies over the room's floor, between floor and ceiling, in nothing.
+        """
+        low, high = points_bounds(points)
+        middle, half = (low + high) / 2, (high - low) / 2
+        outline = shapely.Polygon(room.polygon)
+        x0, z0, x1, z1 = outline.bounds
+        least, most = np.array([x0, room.floor_y, z0]), np.array([x1, room.ceiling_y, z1])
+        for _ in range(_TRIES):
+            turn, share = random_turn(rng), rng.random(3)
+            reach = np.abs(turn) @ (half + CLEAR_M)
+            free = most - least - 2 * reach
+            if (free <= 0).any():
+                continue
+            box = Box(least + reach + share * free, half, turn)
+            if self._is_free(box, outline):
+                self._hanging.append(box)
+                sphere = [*box.centre, np.linalg.norm(box.half)]
+                self._spheres = np.concatenate([self._spheres, [sphere]])
+                matrix = np.eye(4)
+                matrix[:3, :3], matrix[:3, 3] = turn, box.centre - turn @ middle
+                return matrix
+        return None
+
+    def _is_free(self, box: Box, outline: shapely.Polygon) -> bool:
+        wide = Box(box.centre, box.half + CLEAR_M, box.axes)
+        corners = wide.corners
+        low, high = points_bounds(corners)
+        plan = shapely.MultiPoint(corners[:, [0, 2]]).convex_hull
+        return (
+            bool(shapely.contains(outline, plan))
+            and not self._is_in_thing(box.centre)
+            and not any(_boxes_meet(wide, other) for other in self._hanging_near(wide))
+            and not _meets(wide, self._scene.in_box(low, high)[0])
+            and self._is_over_floor(box.centre)
+        )
+
+    def _hanging_near(self, box: Box) -> list[Box]:
+        """Those of the boxes put there whose spheres meet that of a box."""
+        apart = lengths(self._spheres[:, :3] - box.centre)
+        near = np.flatnonzero(apart <= self._spheres[:, 3] + np.linalg.norm(box.half))
+        return [self._hanging[k] for k in near]
+
+    def _is_in_thing(self, point: F64) -> bool:
+        inside = (self._things[:, 0] <= point) & (point <= self._things[:, 1])
+        return bool(inside.all(1).any())
+
+    def _is_over_floor(self, point: F64) -> bool:
+        """Whether a floor, and no roof and no wall, is the first thing below a point."""
+        place, y = point[None, [0, 2]], float(point[1])
+        floor, roof = (highest_below(place, c, y)[0] for c in (self._floors, self._roofs))
+        return bool(floor >= roof)
+
+
+def _meets(box: Box, corners: F64) -> bool:
+    """Whether a triangle of (F, 3, 3) reaches into a box."""
+    local = (corners - box.centre) @ box.axes
+    return len(clipped_to_box(local, -box.half, box.half)) > 0
+
+
+def _boxes_meet(a: Box, b: Box) -> bool:
+    if any(_holds(one, other.centre) for one, other in ((a, b), (b, a))):
+        return True
+    quads = box_quads(b.centre, b.half, b.axes)
+    return _meets(a, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+
+
+def _holds(box: Box, point: F64) -> bool:
+    return bool((np.abs((point - box.centre) @ box.axes) <= box.half).all())
+
+
+def random_turn(rng: np.random.Generator) -> F64:
+    """(3, 3) rotation, each as likely as any other (Shoemake 1992: a uniform unit quaternion)."""
+    x, y, z, w = (v := rng.standard_normal(4)) / np.linalg.norm(v)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def mean_shadow_m2(corners: F64) -> float:
+    """The area of a thing's outline, mean over the directions of the three axes, square metres.
+
+    corners: (F, 3, 3). Of a thing at a random turn it is on average what one sees of it from afar.
+    """
+    areas = []
+    for axes in ((0, 1, 2), (1, 0, 2), (0, 2, 1)):
+        turned = corners[..., axes]
+        plan = turned.reshape(-1, 3)[:, [0, 2]]
+        grid = PlanGrid.around(plan, 0.0, _SHADOW_CELL_M, 0.0)
+        areas.append(float(covered(grid, turned).sum()) * _SHADOW_CELL_M**2)
+    return float(np.mean(areas))
+
+
+def shadow_for_share(room: Room, share: float) -> float:
+    """Square metres of outlines that hide a share of what one sees in an empty room, on average.
+
+    A straight way through a room is 4 V / S long on average (Cauchy; V its volume, S the surface
+    around it), and meets one of n things of outline A that lie anywhere with 1 - exp(-n A 4 / S).
+    """
+    outline = shapely.Polygon(room.polygon)
+    height = room.ceiling_y - room.floor_y
+    surface = 2 * outline.area + outline.length * height
+    return float(-np.log1p(-share) * surface / 4)
