@@ -18,6 +18,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.record import Nyu40, Record, read_toml
+from pbrs_farm.dress.filled_walls import fill_wall, is_filled
 from pbrs_farm.dress.furniture_look import BoardLook, grained, look_of
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
@@ -87,9 +88,10 @@ def add_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share
             continue
         rng = house.rng(PASS, room.room.id)
         names = _draw_wanted(house, room, wanted, rng, share)
-        floor = RoomFloor.of(house, space, room) if names else None
+        floor = RoomFloor.of(house, space, room) if names or is_filled(room.kind) else None
         if floor is None:
             continue
+        fill_wall(house, catalogue, floor, PASS, share)
         own = room_style(style, house.rng("style", room.room.id))
         look = look_of(house, catalogue, own, house.rng(PASS, "look", int(rng.integers(_LOOKS))))
         for name in names:

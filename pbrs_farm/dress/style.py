@@ -6,15 +6,17 @@ Colours are sRGB-encoded, 0..1, as `Material.diffuse` is. What there is to draw 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, ClassVar, Final, TypeVar
+from typing import Annotated, ClassVar, Final, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, model_validator
 
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.record import Record, read_toml
+from pbrs_farm.home.room_use import RoomKind
 
 _T = TypeVar("_T")
 Rgb = tuple[float, float, float]
@@ -87,6 +89,7 @@ class Style:
     floors: tuple[str, ...] = ("planks", "strip", "laminate", "carpet")  # liked most first
     walls: tuple[str, ...] = ("paint", "wallpaper")
     papers: tuple[str, ...] = ("stripes", "leaves")  # patterns of wallpaper
+    covers: tuple[str, ...] = ()  # of COVERS, liked most first
     darkness: float = 0.0  # of wood floors against the species, -1 bleached .. 1 stained
 
 
@@ -101,6 +104,7 @@ class _Taste(Record):
     floors: tuple[str, ...]
     walls: tuple[str, ...] = ("paint", "wallpaper")
     papers: tuple[str, ...] = ("stripes", "leaves", "geometric")
+    covers: tuple[str, ...] = ()
     darkness: float = 0.0
 
 
@@ -112,9 +116,23 @@ class _WoodsFor(Record):
     floors: tuple[str, ...]
 
 
+class WallCover(Record):
+    """What covers walls beside paint and paper: a row of style.toml."""
+
+    pattern: str  # of textures/families.py
+    walls: Literal[
+        "foot", "one", "one or all"
+    ]  # of a room: their foot, one wall, one or all of them
+    of: Literal["paint", "wood", "brick", "concrete"]
+    variants: tuple[str, ...] = ("",)
+    low_m: tuple[float, ...] = ()  # heights of a foot whose variants have none
+
+
 class _Styles(Record):
     # The file style.toml.
     woods_for: _WoodsFor
+    covers: dict[str, WallCover]
+    covered_rooms: dict[RoomKind, float]
     woods: tuple[Wood, ...]
     metals: tuple[Metal, ...]
     tastes: tuple[_Taste, ...]
@@ -128,6 +146,8 @@ class _Styles(Record):
         for taste in self.tastes:
             if unknown := {*taste.woods, *taste.metals} - known:
                 raise ValueError(f"{taste.name}: no wood or metal {', '.join(sorted(unknown))}")
+            if unknown := {*taste.covers} - {*self.covers}:
+                raise ValueError(f"{taste.name}: no cover {', '.join(sorted(unknown))}")
         return self
 
 
@@ -135,6 +155,8 @@ _FILE: Final = read_toml(Path(__file__).with_name("style.toml"), _Styles)
 WOODS: Final = {wood.name: wood for wood in _FILE.woods}
 METALS: Final = {metal.name: metal for metal in _FILE.metals}
 WOODS_FOR: Final = _FILE.woods_for
+COVERS: Final[Mapping[str, WallCover]] = _FILE.covers
+COVERED_ROOMS: Final[Mapping[RoomKind, float]] = _FILE.covered_rooms
 _TASTES: Final = _FILE.tastes
 COLOURS: Final = read_toml(Path(__file__).with_name("colours.toml"), dict[str, Colours])
 """What things are sold in, by name."""
@@ -159,6 +181,7 @@ def style_for(rng: np.random.Generator, name: str = "") -> Style:
         floors=taste.floors,
         walls=taste.walls,
         papers=taste.papers,
+        covers=taste.covers,
         darkness=float(np.clip(taste.darkness + rng.normal(0, 0.15), -0.6, 0.6)),
     )
 

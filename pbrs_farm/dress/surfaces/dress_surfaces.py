@@ -32,6 +32,7 @@ from pbrs_farm.dress.surfaces.home_finish import (
     Floor,
     HomeFinish,
     WallFinish,
+    covered,
     floor_of,
     home_finish,
     walls_of,
@@ -117,6 +118,8 @@ def _room_finish(
     taste = room_style(style, rng)
     floor = floor_of(house.rng(PASS, room.room.id, "floor"), taste, home, room.kind)
     walls = walls_of(house.rng(PASS, room.room.id, "walls"), taste, home, room.kind)
+    if walls is not None:
+        walls = covered(house.rng(PASS, room.room.id, "cover"), taste, walls, room.kind)
     if rng.random() >= share:
         return _RoomFinish(room, None, None)
     # Now and then a photographed floor stays.

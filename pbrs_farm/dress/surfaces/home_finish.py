@@ -9,8 +9,20 @@ from typing import TypeVar
 import numpy as np
 
 from pbrs_farm.dress.finish_scheme import aged
-from pbrs_farm.dress.style import COLOURS, WOODS, WOODS_FOR, Rgb, Style, mix, rgb
+from pbrs_farm.dress.style import (
+    COLOURS,
+    COVERED_ROOMS,
+    COVERS,
+    WOODS,
+    WOODS_FOR,
+    Rgb,
+    Style,
+    WallCover,
+    mix,
+    rgb,
+)
 from pbrs_farm.dress.textures.families import SEEDS, Pattern
+from pbrs_farm.dress.textures.panelling import PANELS_M
 from pbrs_farm.dress.textures.wallpaper import inks
 from pbrs_farm.home.room_use import RoomKind
 
@@ -19,6 +31,7 @@ _TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
 WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
 _MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
 _DIRT = rgb("b9b5ac")
+_ALL_WALLS = 0.35  # of covers for one wall or all, the share that is on all
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +146,45 @@ def walls_of(
         dado = Pattern("paint", _seed(rng), (mix(paint.tints[0], style.palette[2], 0.45),))
         return WallFinish(paint, low=dado, low_m=float(rng.choice([0.95, 1.1, 1.25])))
     return WallFinish(paint)
+
+
+def covered(
+    rng: np.random.Generator, style: Style, walls: WallFinish, kind: RoomKind
+) -> WallFinish:
+    """The walls of a room, by chance clad or panelled as the style likes; what is paper gets a foot alone."""
+    if walls.accent is not None or (walls.is_tiled and walls.low is None):
+        return walls
+    if not style.covers or rng.random() >= COVERED_ROOMS.get(kind, 0.0):
+        return walls
+    weights = np.array([1.0 / (k + 1) for k in range(len(style.covers))])
+    cover = COVERS[style.covers[int(rng.choice(len(style.covers), p=weights / weights.sum()))]]
+    is_bare = walls.main.family == "paint" and walls.low is None
+    if not is_bare and cover.walls != "foot":
+        return walls
+    pattern = _pattern_of_cover(rng, style, cover)
+    if cover.walls == "foot":
+        high = PANELS_M[pattern.variant][1] if not cover.low_m else _pick(rng, cover.low_m)
+        return replace(walls, low=pattern, low_m=high)
+    if cover.walls == "one or all" and rng.random() < _ALL_WALLS:
+        return replace(walls, main=pattern)
+    return replace(walls, accent=pattern)
+
+
+def _pattern_of_cover(rng: np.random.Generator, style: Style, cover: WallCover) -> Pattern:
+    pattern = Pattern(cover.pattern, _seed(rng), variant=_pick(rng, cover.variants))
+    match cover.of:
+        case "wood":
+            wood = style.wood if rng.random() < 0.5 else WOODS[_pick(rng, WOODS_FOR.floors)]
+            return replace(pattern, wood=wood, darkness=round(5 * style.darkness) / 5)
+        case "brick":
+            return replace(pattern, tints=(_pick(rng, COLOURS["bricks"]),))
+        case "concrete":
+            return replace(pattern, tints=(_pick(rng, COLOURS["concretes"]),))
+        case "paint":
+            # White more often than a colour.
+            names = ("whites", "whites", "whites", "greys", "paints", "darks")
+            tint = _pick(rng, COLOURS[_pick(rng, names)])
+            return replace(pattern, tints=(tint,))
 
 
 def _paint_pattern(rng: np.random.Generator, style: Style, home: HomeFinish) -> Pattern:

@@ -31,6 +31,13 @@ from pbrs_farm.dress.textures.laid_tiles import (
 )
 from pbrs_farm.dress.textures.maps import SurfaceMaps, encode_maps
 from pbrs_farm.dress.textures.noise import Shape2
+from pbrs_farm.dress.textures.panelling import (
+    PANELS_M,
+    board_maps,
+    panel_maps,
+    slat_maps,
+    wall_plank_maps,
+)
 from pbrs_farm.dress.textures.photographs import photograph_for, photograph_material
 from pbrs_farm.dress.textures.plain_surfaces import (
     carpet_maps,
@@ -65,8 +72,10 @@ _SIZE_M: Final = {
     "smooth plaster": _FLOOR_M, "concrete": _FLOOR_M, "carpet": (1.0, 1.0),
     "loop carpet": (0.64, 0.64), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
     "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
+    "upright boards": (1.2, 1.2), "level boards": (1.2, 1.2), "wall planks": (1.6, 1.6),
+    "slats": (1.2, 1.2),
 }  # fmt: skip
-"""Width and height of one repeat by family; tiles have that of their laying."""
+"""Width and height of one repeat by family; tiles have that of their laying, panels their variant's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +114,7 @@ def pixels_of(size_m: tuple[float, float]) -> Shape2:
 # Families of one tint are painted in few lightnesses and tinted by their material's diffuse colour.
 _TINTED: Final = (
     "paint", "plaster", "smooth plaster", "concrete", "carpet", "loop carpet", "weave", "twill",
-    "leather", "painted brick",
+    "leather", "painted brick", "upright boards", "level boards", "panels",
 )  # fmt: skip
 _LIGHTNESSES: Final = (0.4, 0.6, 0.75, 0.87, 0.97)
 
@@ -121,6 +130,8 @@ def size_of(pattern: Pattern) -> tuple[float, float]:
     """Width and height of one repeat of the pattern, metres; KeyError for an unknown family."""
     if pattern.family == "tiles":
         return _TILES[_laid(pattern)[0]][0]
+    if pattern.family == "panels":
+        return PANELS_M.get(pattern.variant, PANELS_M["low"])
     return _SIZE_M[pattern.family]
 
 
@@ -331,5 +342,16 @@ FAMILIES: dict[str, _Painter] = {
     "weave": lambda r, p: _woven_cloth(r, p, twill=False),
     "twill": lambda r, p: _woven_cloth(r, p, twill=True),
     "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),
+    "upright boards": lambda r, p: board_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=True
+    ),
+    "level boards": lambda r, p: board_maps(
+        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=False
+    ),
+    "wall planks": lambda r, p: wall_plank_maps(
+        r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness, upright=p.variant != "level"
+    ),
+    "slats": lambda r, p: slat_maps(r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness),
+    "panels": lambda r, p: panel_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
 }
 """Painters by family; docs/dress.md shows them all."""

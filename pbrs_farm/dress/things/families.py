@@ -31,6 +31,7 @@ from pbrs_farm.dress.things import (
     beds,
     bins,
     chandeliers,
+    fitted,
     joints,
     kitchen,
     lamps,
@@ -49,6 +50,7 @@ VERSION: Final = 7
 # The order decides which piece a seed draws.
 _MODULES: Final = (
     kitchen, bathroom, seating, tables, storage, beds, lamps, radiators, bins, chandeliers, plants,
+    fitted,
 )  # fmt: skip
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K

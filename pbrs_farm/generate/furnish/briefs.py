@@ -13,11 +13,11 @@ from pydantic import Field, field_validator
 
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.generate.floor_plan import Plan, RoomType
-from pbrs_farm.generate.furnish import bathrooms, bedrooms, living_rooms, small_rooms
+from pbrs_farm.generate.furnish import bathrooms, bedrooms, fitted_walls, living_rooms, small_rooms
 from pbrs_farm.generate.furnish.kitchen import kitchen_places, units_of
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import Places, fixed_places
-from pbrs_farm.generate.furnish.room_space import FurnishSpace
+from pbrs_farm.generate.furnish.room_space import FurnishSpace, free_stretches
 from pbrs_farm.generate.furnish.template import PieceGroup, Template
 
 
@@ -42,14 +42,14 @@ class RoomBrief:
 
 # What holds of a room: it is a studio, no room is open to it, it is where the home's laundry is done.
 _Fact = Literal["", "studio", "closed", "laundry"]
-# Its outline, square metres, metres of its longest row, seats at its table.
-_Measure = Literal["bounds", "area", "row", "seats"]
+# Its outline, square metres, metres of its longest row, of its free stretches of wall, seats at its table.
+_Measure = Literal["bounds", "area", "row", "stretches", "seats"]
 
 
 # What briefs.toml may name: every public function of the modules of templates.
 _TEMPLATES_BY_NAME: Final[dict[str, Callable[..., tuple[Template, ...]]]] = {
     name: function
-    for module in (bathrooms, bedrooms, living_rooms, small_rooms)
+    for module in (bathrooms, bedrooms, fitted_walls, living_rooms, small_rooms)
     for name, function in vars(module).items()
     if getattr(function, "__module__", "") == module.__name__ and not name.startswith("_")
 }
@@ -65,6 +65,7 @@ class _Templates(_ForSome):
     given: dict[str, bool | float | _Measure] = Field(default_factory=dict)
     first: int | None = None
     lower: float = 0.0
+    chance: float = 1.0
 
     @field_validator("make")
     @classmethod
@@ -93,6 +94,7 @@ class _Brief(Record):
 UseWithoutType = Literal["childs_room", "dining_room", "office"]
 """Briefs of rooms that no generated plan has, or that are drawn: no RoomType."""
 
+_LEAST_STRETCH_M: Final = 1.3  # shorter walls are not filled from side to side
 _CHILDS_ROOM: Final = "childs_room"
 _BRIEFS: Final = read_toml(
     Path(__file__).with_name("briefs.toml"), dict[RoomType | UseWithoutType, _Brief]
@@ -130,8 +132,8 @@ def brief_of(
         return tuple(
             PieceGroup(
                 g.name,
-                _templates(g.of, space, shelf, measures)
-                or _templates(g.instead, space, shelf, measures),
+                _templates(g.of, space, shelf, measures, rng)
+                or _templates(g.instead, space, shelf, measures, rng),
                 g.must,
             )
             for g in wanted
@@ -165,7 +167,10 @@ def _facts_of_room(plan: Plan, space: FurnishSpace, type_: RoomType) -> set[_Fac
 
 def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) -> dict[str, Any]:
     x0, z0, x1, z1 = space.bounds
-    found = {"bounds": space.bounds, "area": space.area, "row": max(x1 - x0, z1 - z0) - 0.2}
+    found: dict[str, Any] = {
+        "bounds": space.bounds, "area": space.area, "row": max(x1 - x0, z1 - z0) - 0.2,
+        "stretches": free_stretches(space, _LEAST_STRETCH_M),
+    }  # fmt: skip
     if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
         found["seats"] = 6 if space.area > 24 and rng.random() < 0.6 else 4
     return found
@@ -176,11 +181,12 @@ def _is_for(some: _ForSome, space: FurnishSpace) -> bool:
 
 
 def _templates(
-    some: Iterable[_Templates], space: FurnishSpace, shelf: Shelf, measures: Mapping[str, Any]
-) -> tuple[Template, ...]:
+    some: Iterable[_Templates], space: FurnishSpace, shelf: Shelf, measures: Mapping[str, Any],
+    rng: np.random.Generator,
+) -> tuple[Template, ...]:  # fmt: skip
     found: list[Template] = []
     for one in some:
-        if _is_for(one, space):
+        if _is_for(one, space) and (one.chance == 1.0 or rng.random() < one.chance):
             given = {k: measures[v] if isinstance(v, str) else v for k, v in one.given.items()}
             made = _TEMPLATES_BY_NAME[one.make](shelf, **given)[: one.first]
             found += [replace(t, rank=t.rank - one.lower) if one.lower else t for t in made]

@@ -28,7 +28,7 @@ _FREE_STEP_M: Final = 0.15
 _TOUCH_M: Final = 0.002
 _ABOVE_SILL_M: Final = 0.08
 _DEAD_GAP_M: Final = 0.35  # a gap that nobody can use
-_BESIDE_M: Final = 0.01  # between furniture and the wall at its end
+BESIDE_M: Final = 0.01  # between furniture and the wall at its end
 _APART_M: Final = 0.4  # least distance between two places of one template that are both tried
 _NOISE: Final = 0.25
 _BEST: Final = 20
@@ -197,7 +197,7 @@ def _frames(template: Template, space: FurnishSpace) -> tuple[F64, Ints]:
     u0, _, u1, _ = template.extent
     found, walls = [np.zeros((0, 4))], [np.zeros(0, int)]
     for number, wall in enumerate(space.walls):
-        at = _positions_along_wall(template, wall, _BESIDE_M - u0, wall.length - u1 - _BESIDE_M)
+        at = _positions_along_wall(template, wall, BESIDE_M - u0, wall.length - u1 - BESIDE_M)
         f = wall.frame
         rows = np.empty((len(at), 4))
         rows[:] = f.x, f.z, f.dx, f.dz

@@ -25,6 +25,7 @@ _SPARE_M: Final = 0.03  # behind an open leaf
 _BESIDE_DOOR_M: Final = 0.01  # more than two rectangles may overlap unseen (places.py)
 _OPEN_M: Final = 0.9  # kept free along the middle of a side without a wall
 _EPSILON: Final = 1e-3
+_BESIDE_WALL_M: Final = 0.6  # what doors need free within this of a wall takes some of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +125,29 @@ def with_bodies(space: FurnishSpace, bodies: Sequence[Rect]) -> FurnishSpace:
     if not bodies:
         return space
     return replace(space, outside=np.concatenate([space.outside, np.array(bodies)]))
+
+
+def free_stretches(space: FurnishSpace, least: float) -> tuple[float, ...]:
+    """Metres of each stretch of wall, of least or more, without doors and windows; the longest first."""
+    found = set()
+    for number, wall in enumerate(space.walls):
+        f = wall.frame
+        taken = [(w.low, w.high) for w in space.windows if w.wall == number]
+        for x0, z0, x1, z1 in space.doors.tolist():
+            # A door's ground in the wall's frame: along it, and out of it.
+            ends = [
+                ((x - f.x) * f.dx + (z - f.z) * f.dz, (z - f.z) * f.dx - (x - f.x) * f.dz)
+                for x, z in ((x0, z0), (x1, z1))
+            ]
+            (a, b), out = sorted(u for u, _v in ends), min(v for _u, v in ends)
+            if -_BESIDE_WALL_M < out < _BESIDE_WALL_M and b > 0 and a < wall.length:
+                taken.append((a, b))
+        start = 0.0
+        for a, b in [*sorted(taken), (wall.length, wall.length)]:
+            if a - start >= least:
+                found.add(round(a - start, 3))
+            start = max(start, b)
+    return tuple(sorted(found, reverse=True))
 
 
 def outside_of(polygon: Polygon) -> F64:
