@@ -25,6 +25,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import names_glass, names_mirror
 from pbrs_farm.read.common.furniture_classes import PieceSize
+from pbrs_farm.read.common.joints_of_surfaces import joints_of_surfaces
 from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
@@ -33,6 +34,7 @@ from pbrs_farm.read.common.room_shells import planar_parts
 from pbrs_farm.read.gltf.document import Placed, meshes_of, object_at, placed_nodes
 from pbrs_farm.read.gltf.materials import Emission, SceneMaterials, glass_materials, material_names
 from pbrs_farm.read.gltf.node_classes import Mapping, class_of_node, collection_of
+from pbrs_farm.read.gltf.node_joints import joints_of_parts
 from pbrs_farm.read.gltf.scene_lights import emitted, punctual_light
 from pbrs_farm.read.gltf.structure_parts import centres_of, structure_parts
 from pbrs_farm.read.mesh.obj import Mesh
@@ -94,7 +96,7 @@ def items_of_scene(
     # Part what shows a room or says by its materials what it is; tags of the file or user hold.
     centres = centres_of([item for _, _, item in found])
     for thing, place, item in found:
-        if thing.extras.get("solid") is True:
+        if thing.extras.get("solid") is True or item.joints:
             parts: tuple[Item, ...] = (item,)
         elif thing.seen.is_tagged:
             parts = planar_parts(item)
@@ -208,6 +210,7 @@ def _item(
     lights = _punctual_lights(gltf, thing)
     numbers = [number for _, meshes in parts for number, _ in meshes]
     glass = glass_materials(gltf, numbers) if is_opening else frozenset()
+    joints = joints_of_parts(gltf, thing.parts)
     for part, meshes in parts:
         part_name = str(entry(gltf, "nodes", part.index).get("name", ""))
         is_own_part = part.path != thing.root.path
@@ -232,6 +235,8 @@ def _item(
             surface = placed(laid, part.world_from_node, name=name, material=index)
             if surface is None:
                 continue
+            if part.path in joints:
+                surface = replace(surface, part=joints[part.path].part)
             if emits and emission is not None:
                 shining[len(surfaces)] = emission
             surfaces.append(surface)
@@ -243,7 +248,11 @@ def _item(
         lights = _with_surfaces(lights, surfaces, unknown)
         shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
-    return _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
+    found = _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
+    moving = joints_of_surfaces(
+        dict.fromkeys(joints.values()), surfaces, materials.library.materials
+    )
+    return replace(found, joints=moving) if moving else found
 
 
 def _with_surfaces(

@@ -1,7 +1,7 @@
 """A Habitat scene instance -> House. Effects: reads files below its data set's folder.
 
-Stage, objects and point lights are put into one glTF scene, which the glTF reader reads. Articulated
-objects are not read: a note says how many.
+Stage, objects, articulated objects (URDF) and point lights are put into one glTF scene, which the glTF
+reader reads.
 """
 
 from __future__ import annotations
@@ -39,11 +39,14 @@ from pbrs_farm.read.gltf.document import (
     placed_nodes,
 )
 from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.scene import house_of_gltf
+from pbrs_farm.read.habitat.urdf import MAX_BYTES, Robot, robot_from_urdf
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
 
 _CONFIG: Final = "*.scene_dataset_config.json"
 _LEVELS_UP: Final = 6  # from a scene to its data set's config
+_ARTICULATED: Final = "articulated_object_instances"
 _MOST_INSTANCES: Final = 20_000
 _MOST_LIGHTS: Final = 1_000
 _MOST_JSON_BYTES: Final = 64 * 2**20
@@ -58,8 +61,8 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
     """The House of a scene instance. Raises BadHouse naming file and place.
 
     given.models: folder of the data set, where it is not above the file. A scene whose light is
-    baked into pictures is refused, and one of which more than a third of the objects are missing;
-    articulated objects are left out with a note.
+    baked into pictures is refused, and one of which more than a third of the objects are missing.
+    Articulated objects stand as their instances' joint poses say, with the joints of their URDF.
     """
     path, models = given.path, given.models
     dataset = _Dataset(path, models)
@@ -92,9 +95,7 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
             path, "object_instances", text, hint="get the data set's objects, or --models"
         )
     _add_lights(dataset, scene.get("default_lighting"), built, notes)
-    n = len(scene.get("articulated_object_instances") or ())
-    if n:
-        notes.add("unread-part", "articulated_object_instances", f"{n} (URDF) are not read")
+    _add_articulated(dataset, scene, built, notes)
     gltf = built.gltf()
     data = dataset.folder.read(dataset.scene, max_bytes=_MOST_JSON_BYTES) or b""
     source = Source("habitat", path.name, keys.sha256(data))
@@ -112,7 +113,8 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
         dataset = _Dataset(path, models)
         scene = dataset.json(dataset.scene)
         names = set()
-        rows = [scene.get("stage_instance"), *(scene.get("object_instances") or [])]
+        instances = [scene.get(key) or [] for key in ("object_instances", _ARTICULATED)]
+        rows = [scene.get("stage_instance"), *(row for some in instances for row in some)]
         templates = {r.get("template_name") for r in rows if isinstance(r, dict)}
         for template in sorted(t for t in templates if isinstance(t, str)):
             for kind in ("stage", "object"):
@@ -120,6 +122,10 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
                 if name is not None:
                     asset = dataset.json(name).get("render_asset")
                     names |= {name} | (dataset.files_of(name, asset) if asset else set())
+            urdf = dataset.urdf(template)
+            if urdf is not None:
+                names |= {urdf, *dataset.files_of_robot(urdf)}
+                names |= {n for n in [dataset.config(template, "ao")] if n is not None}
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
     except (BadHouse, OSError, AttributeError, TypeError):
@@ -140,6 +146,7 @@ class _Dataset:
         self.scene = path.relative_to(found).as_posix()
         self._parsed: dict[str, dict[str, Any]] = {}
         self._files = sorted(_names_below(found))
+        self._known = frozenset(self._files)
         self._by_name: dict[str, str] = {}
         for name in self._files:
             self._by_name.setdefault(posixpath.basename(name), name)
@@ -177,6 +184,26 @@ class _Dataset:
         data = self.folder.read(asset, max_bytes=MAX_SCENE_BYTES) or b""
         at = posixpath.dirname(asset)
         return {asset, *(self.folder.name_from(at, uri) for uri in files_of_gltf(data, asset))}
+
+    def urdf(self, template: str) -> str | None:
+        """The name of the URDF of an articulated object's template; None where it has none."""
+        config = self.config(template, "ao")
+        named = self.json(config).get("urdf_filepath") if config else None
+        if config and isinstance(named, str):
+            name = self.folder.name_from(posixpath.dirname(config), named)
+            return name if name in self._known else None
+        base = posixpath.basename(template).removesuffix(".urdf")
+        return self._by_name.get(f"{base}.urdf")
+
+    def robot(self, name: str) -> Robot:
+        """The links and joints of a URDF; BadHouse where it is damaged."""
+        return robot_from_urdf(self.folder.read(name, max_bytes=MAX_BYTES) or b"", name)
+
+    def files_of_robot(self, name: str) -> set[str]:
+        """The models that a URDF shows, and what they name."""
+        files = {v.file for link in self.robot(name).links for v in link.visuals}
+        models = {self.folder.name_from(posixpath.dirname(name), file) for file in files}
+        return {f for model in models if model in self._known for f in self.files_of("", model)}
 
     def class_of(self, template: str) -> str:
         """What objects.csv calls a model: its category, "" where it says nothing."""
@@ -367,16 +394,7 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     if found is None:
         return False
     roots, gltf = found
-    where = Gltf({}, (), dataset.scene)
-    moved = numbers(where, row.get("translation", [0, 0, 0]), 3, f"{place}.translation")
-    w, x, y, z = numbers(where, row.get("rotation", [1, 0, 0, 0]), 4, f"{place}.rotation")
-    if not 0.5 < float(np.linalg.norm([w, x, y, z])) < 2:
-        raise BadHouse(dataset.scene, f"{place}.rotation", "is no unit quaternion")
-    (size,) = numbers(where, [row.get("uniform_scale", 1.0)], 1, f"{place}.uniform_scale")
-    sizes = numbers(where, row.get("non_uniform_scale", [1, 1, 1]), 3, f"{place}.non_uniform_scale")
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes)
-    matrix[:3, 3] = moved
+    matrix = _matrix_of_instance(row, place, dataset.scene)
     inner = _upright_matrix(settings, gltf, config or "")
     if str(row.get("translation_origin", origin)).lower() != "asset_local":
         centre = _centre(gltf, inner, settings, config or "")
@@ -386,6 +404,97 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     user_fields = row.get("user_defined")
     extras = dict(user_fields) if isinstance(user_fields, dict) else {}
     built.place(roots, matrix @ inner, name, extras)
+    return True
+
+
+def _matrix_of_instance(row: dict[str, Any], place: str, file: str) -> F64:
+    """(4, 4) what an instance's translation, rotation and scales say."""
+    where = Gltf({}, (), file)
+    moved = numbers(where, row.get("translation", [0, 0, 0]), 3, f"{place}.translation")
+    w, x, y, z = numbers(where, row.get("rotation", [1, 0, 0, 0]), 4, f"{place}.rotation")
+    if not 0.5 < float(np.linalg.norm([w, x, y, z])) < 2:
+        raise BadHouse(file, f"{place}.rotation", "is no unit quaternion")
+    (size,) = numbers(where, [row.get("uniform_scale", 1.0)], 1, f"{place}.uniform_scale")
+    sizes = numbers(where, row.get("non_uniform_scale", [1, 1, 1]), 3, f"{place}.non_uniform_scale")
+    matrix = np.eye(4)
+    matrix[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes)
+    matrix[:3, 3] = moved
+    return matrix
+
+
+def _add_articulated(dataset: _Dataset, scene: dict[str, Any], built: _Built, notes: Notes) -> None:
+    """Place the articulated objects; a note counts those whose URDF or models are not here."""
+    rows = scene.get(_ARTICULATED) or []
+    if not isinstance(rows, list) or len(rows) > _MOST_INSTANCES:
+        text = f"expected a list of at most {_MOST_INSTANCES}"
+        raise BadHouse(dataset.scene, _ARTICULATED, text)
+    n_missing = n_unread = 0
+    for k, row in enumerate(rows):
+        place = f"{_ARTICULATED}[{k}]"
+        if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
+            raise BadHouse(dataset.scene, f"{place}.template_name", "expected a name")
+        urdf = dataset.urdf(row["template_name"])
+        robot = None if urdf is None else dataset.robot(urdf)
+        n_unread += 0 if robot is None else robot.n_unread
+        n_missing += robot is None or not _add_robot(dataset, str(urdf), robot, row, place, built)
+    if n_missing:
+        notes.add("missing-model", _ARTICULATED, f"{n_missing} of {len(rows)} have no model here")
+    if n_unread:
+        text = f"{n_unread} boxes, cylinders or spheres of URDF are not read"
+        notes.add("unread-part", _ARTICULATED, text)
+
+
+def _add_robot(
+    dataset: _Dataset, urdf: str, robot: Robot, row: dict[str, Any], place: str, built: _Built
+) -> bool:
+    """Place the links of a robot as an instance says; whether any of its models is here."""
+    template = row["template_name"]
+    config = dataset.config(template, "ao")
+    settings = dataset.json(config) if config else {}
+    pose = row.get("initial_joint_pose")
+    order = str(row.get("link_order", settings.get("link_order", "")))
+    values = robot.values(pose, dataset.scene, f"{place}.initial_joint_pose", order)
+    nodes = built.document.setdefault("nodes", [])
+    # Nodes of assets come first: adding them moves the list on.
+    shown: dict[str, list[tuple[list[int], F64]]] = {}
+    for link in robot.links:
+        for visual in link.visuals:
+            name = dataset.folder.name_from(posixpath.dirname(urdf), visual.file)
+            found = built.asset(dataset, name)
+            if found is not None:
+                shown.setdefault(link.name, []).append((found[0], visual.link_from_model))
+    if not shown:
+        return False
+    numbers_of: dict[str, int] = {}
+    roots: list[int] = []
+    for link in robot.links:
+        node: dict[str, Any] = {"name": "", "children": []}
+        if link.joint is not None:
+            value = values.get(link.joint.name, 0.0)
+            node["matrix"] = link.joint.parent_from_link(value).T.ravel().tolist()
+            if link.joint.kind is not None:
+                limits = link.joint.lower, link.joint.upper
+                told = joint_row(
+                    link.name, link.joint.kind, (0, 0, 0), link.joint.axis, limits, value
+                )
+                node["extras"] = {KEY: told}
+        for models, matrix in shown.get(link.name, []):
+            node["children"].append(len(nodes))
+            nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": models})
+        numbers_of[link.name] = len(nodes)
+        nodes.append(node)
+        above = roots if link.parent is None else nodes[numbers_of[link.parent]]["children"]
+        above.append(numbers_of[link.name])
+    (size,) = numbers(
+        Gltf({}, (), config or dataset.scene),
+        [settings.get("uniform_scale", 1.0)],
+        1,
+        "uniform_scale",
+    )
+    inner = np.diag([size, size, size, 1.0])
+    name = dataset.class_of(template) or posixpath.basename(template).removesuffix(".urdf")
+    matrix = _matrix_of_instance(row, place, dataset.scene)
+    built.place(roots, matrix @ inner, name, {"one": True, "by_name": True})
     return True
 
 

@@ -16,11 +16,12 @@ from pbrs_farm.read.common.furniture_classes import (
     class_of_piece,
     kind_of,
 )
+from pbrs_farm.read.common.joints_of_surfaces import joints_of_surfaces
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
-from pbrs_farm.read.sweethome3d.piece_joints import joints_of_surfaces, piece_joints
+from pbrs_farm.read.sweethome3d.piece_joints import piece_joints
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import PANE, PieceModel, PieceModels
 from pbrs_farm.read.sweethome3d.placement import (

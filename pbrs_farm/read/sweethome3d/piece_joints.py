@@ -7,7 +7,7 @@ hinge or rail is its axis.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -15,10 +15,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.joints import Joint, JointKind
-from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.home.masses import mass_kg
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.piece_models import fixed_joint_of, hanger_of, joint_of
@@ -63,21 +60,6 @@ def piece_joints(
         if joint is not None:
             found[name] = (_moved(joint, move, matrix) if move else joint).placed(to_world)
     return found
-
-
-def joints_of_surfaces(
-    joints: Iterable[Joint], surfaces: Sequence[Surface], materials: Sequence[Material]
-) -> tuple[Joint, ...]:
-    """The joints that move one of some surfaces at all, with the mass of what they move."""
-    found = []
-    for joint in joints:
-        own = [s for s in surfaces if s.part == joint.part]
-        mass = sum(
-            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in own
-        )
-        if own:
-            found.append(replace(joint, mass_kg=joint.mass_kg or mass))
-    return tuple(found)
 
 
 def _points_by_joint(meshes: Sequence[Mesh], matrix: F64) -> tuple[dict[str, F64], dict[str, F64]]:

@@ -1,0 +1,202 @@
+"""A thing with joints as URDF says it: links, what is seen of them, how they hang together; no effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+from xml.etree.ElementTree import Element, ParseError
+
+import numpy as np
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+from scipy.spatial.transform import Rotation
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.joints import JointKind
+
+MAX_BYTES: Final = 16 * 2**20
+_MOST_LINKS: Final = 1_000
+_KINDS: Final = {
+    "revolute": JointKind.REVOLUTE, "continuous": JointKind.REVOLUTE,
+    "prismatic": JointKind.PRISMATIC,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Visual:
+    """A model that shows a link."""
+
+    file: str  # as the URDF names it
+    link_from_model: F64  # (4, 4), with its scale
+
+
+@dataclass(frozen=True, slots=True)
+class LinkJoint:
+    """How a link hangs on the one above it."""
+
+    name: str
+    kind: JointKind | None  # None: fixed
+    parent_from_joint: F64  # (4, 4), at value 0
+    axis: F64  # (3,) unit, in the joint's frame
+    lower: float
+    upper: float
+
+    def parent_from_link(self, value: float) -> F64:
+        """(4, 4) where the link stands at a value, radians or metres."""
+        moved = np.eye(4)
+        if self.kind is JointKind.REVOLUTE:
+            moved[:3, :3] = Rotation.from_rotvec(value * self.axis).as_matrix()
+        elif self.kind is JointKind.PRISMATIC:
+            moved[:3, 3] = value * self.axis
+        return np.asarray(self.parent_from_joint @ moved)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A rigid part."""
+
+    name: str
+    visuals: tuple[Visual, ...]
+    parent: str | None  # None: the root
+    joint: LinkJoint | None  # to the parent
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """The links of a URDF, each after the one it hangs on."""
+
+    links: tuple[Link, ...]
+    moving: tuple[str, ...]  # names of joints that are not fixed, in the file's order
+    n_unread: int  # shapes that are no models: boxes, cylinders, spheres
+
+    def values(self, pose: Any, file: str, place: str, order: str = "") -> dict[str, float]:
+        """Joint -> its value, radians or metres, as a Habitat scene gives them.
+
+        pose: a list in the order of the links ("urdf_order": of the file, else of the tree), or an
+        object by joints' names; what it does not say is 0. Raises BadHouse for anything else.
+        """
+        if not pose:
+            return {}
+        names = self.moving
+        if order != "urdf_order":
+            names = tuple(x.joint.name for x in self.links if x.joint and x.joint.kind is not None)
+        rows = pose if isinstance(pose, Mapping) else None
+        if rows is None and isinstance(pose, Sequence) and not isinstance(pose, str):
+            rows = dict(zip(names, pose, strict=False))
+        values = (
+            None
+            if rows is None
+            else {k: v[0] if isinstance(v, list) and len(v) == 1 else v for k, v in rows.items()}
+        )
+        if values is None or not all(
+            type(v) in (int, float) and abs(v) < 1e6 for v in values.values()
+        ):
+            raise BadHouse(file, place, "expected a number for each joint, in a list or by name")
+        return {name: float(v) for name, v in values.items() if name in names}
+
+
+def robot_from_urdf(data: bytes, file: str) -> Robot:
+    """The links and joints of a URDF; BadHouse where it is damaged, or its joints make no tree.
+
+    Collision shapes, masses and materials are not read: Habitat shows a model's own.
+    """
+    root = _parsed(data, file)
+    rows = {str(row.get("name")): row for row in root.findall("link")}
+    if not rows or len(rows) > _MOST_LINKS:
+        raise BadHouse(file, "link", f"has {len(rows)} links; 1 to {_MOST_LINKS} are read")
+    hung: dict[str, tuple[str, LinkJoint]] = {}
+    for row in root.findall("joint"):
+        joint = _joint(row, file)
+        parent, child = (_named(row, tag, rows, file) for tag in ("parent", "child"))
+        if child in hung:
+            raise BadHouse(file, f"joint {joint.name[:60]}", f"{child[:60]} hangs on two links")
+        hung[child] = (parent, joint)
+    below: dict[str | None, list[str]] = {}
+    for name in rows:
+        below.setdefault(hung[name][0] if name in hung else None, []).append(name)
+    links, waiting, n_unread = [], list(reversed(below.get(None, []))), 0
+    while waiting:
+        name = waiting.pop()
+        visuals, n = _visuals(rows[name], file)
+        n_unread += n
+        parent, own = hung.get(name, (None, None))
+        links.append(Link(name, visuals, parent, own))
+        waiting += reversed(below.get(name, []))
+    if len(links) < len(rows):
+        raise BadHouse(file, "joint", "links hang on each other in a ring")
+    moving = tuple(joint.name for _, joint in hung.values() if joint.kind is not None)
+    return Robot(tuple(links), moving, n_unread)
+
+
+def _parsed(data: bytes, file: str) -> Element:
+    try:
+        root: Element = fromstring(data, forbid_dtd=True)
+    except (ParseError, DefusedXmlException, ValueError, LookupError, RecursionError) as error:
+        raise BadHouse(file, "", f"is no XML that is read: {str(error)[:100]}") from None
+    if root.tag != "robot":
+        raise BadHouse(file, "", f"begins with <{str(root.tag)[:40]}>, not <robot>")
+    return root
+
+
+def _named(row: Element, tag: str, links: Mapping[str, Any], file: str) -> str:
+    found = row.find(tag)
+    name = "" if found is None else str(found.get("link"))
+    if name not in links:
+        raise BadHouse(file, f"joint {str(row.get('name'))[:60]}", f"its {tag} is no link")
+    return name
+
+
+def _joint(row: Element, file: str) -> LinkJoint:
+    name, kind = str(row.get("name")), _KINDS.get(str(row.get("type")))
+    place = f"joint {name[:60]}"
+    axis_row, limit = row.find("axis"), row.find("limit")
+    axis = _numbers(None if axis_row is None else axis_row.get("xyz"), (1.0, 0.0, 0.0), file, place)
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        raise BadHouse(file, place, "its axis has no direction")
+    turns = np.pi if row.get("type") == "continuous" else 0.0
+    lower, upper = (
+        float(_numbers(None if limit is None else limit.get(key), (default,), file, place)[0])
+        for key, default in (("lower", -turns), ("upper", turns))
+    )
+    return LinkJoint(name, kind, _origin(row, file, place), axis / length, lower, upper)
+
+
+def _visuals(row: Element, file: str) -> tuple[tuple[Visual, ...], int]:
+    """The models that show a link, and how many other shapes do."""
+    found, n_unread = [], 0
+    place = f"link {str(row.get('name'))[:60]}"
+    for visual in row.findall("visual"):
+        mesh = visual.find("geometry/mesh")
+        if mesh is None or not mesh.get("filename"):
+            n_unread += 1
+            continue
+        matrix = _origin(visual, file, place)
+        matrix[:3, :3] *= _numbers(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
+        found.append(Visual(str(mesh.get("filename")), matrix))
+    return tuple(found), n_unread
+
+
+def _origin(row: Element, file: str, place: str) -> F64:
+    matrix, origin = np.eye(4), row.find("origin")
+    if origin is not None:
+        zero = (0.0, 0.0, 0.0)
+        # Roll about x, then pitch about y, then yaw about z, of fixed axes.
+        rpy = _numbers(origin.get("rpy"), zero, file, place)
+        matrix[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
+        matrix[:3, 3] = _numbers(origin.get("xyz"), zero, file, place)
+    return matrix
+
+
+def _numbers(text: str | None, default: tuple[float, ...], file: str, place: str) -> F64:
+    if text is None:
+        return np.array(default)
+    try:
+        values = np.array([float(word) for word in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if len(values) != len(default) or not (np.abs(values) < 1e9).all():
+        raise BadHouse(file, place, f"{text[:40]!r} is not {len(default)} finite numbers")
+    return values
