@@ -41,7 +41,7 @@ def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest
     names: of their free joints. areas_m2: in plan; of two that stand in each other the smaller moves.
     Restless is what stays in another body, still moves after 4 s, tips over or goes 25 cm.
     """
-    import mujoco
+    from pbrs_farm.quiet_mujoco import mujoco
 
     state = mujoco.MjData(world)
     mujoco.mj_forward(world, state)

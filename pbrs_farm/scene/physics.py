@@ -318,7 +318,7 @@ def _radius(model: Model) -> float:
 def mujoco_module() -> Any:
     """The package; MachineFailed, with the command that adds it, where it is not installed."""
     try:
-        import mujoco
+        from pbrs_farm.quiet_mujoco import mujoco
     except ImportError:
         raise _missing("mujoco") from None
     return mujoco

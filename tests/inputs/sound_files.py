@@ -29,6 +29,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         front3d_files,
         habitat_files,
         ifc_files,
+        mjcf_files,
         plan_files,
         scenestate_files,
         usd_files,
@@ -63,6 +64,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
             lambda folder: habitat_files.habitat_scene(folder, n_triangles), habitat_files.N_OPENINGS
         ),
         "OpenUSD": SoundFile(lambda folder: usd_files.realistic_home(folder / "home.usda", n_triangles)),
+        "MuJoCo": SoundFile(mjcf_files.write_model),
         "IFC": SoundFile(lambda folder: ifc_files.realistic_house(folder / "house.ifc", n_triangles)),
     } | {title: SoundFile(write, len(plan_files.HOLES)) for title, write in plans.items()}  # fmt: skip
 

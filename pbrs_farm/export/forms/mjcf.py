@@ -238,7 +238,7 @@ def _light(body: ET.Element, lamp: Lamp, turn: F64, place: F64) -> None:
 
 def _settle(model: _Model, path: Path) -> list[str]:
     """Place the loose bodies where they come to rest; the names of those fixed instead."""
-    import mujoco
+    from pbrs_farm.quiet_mujoco import mujoco
 
     fixed: list[str] = []
     for _ in range(_ROUNDS):

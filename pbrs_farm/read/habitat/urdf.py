@@ -121,8 +121,9 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
         name = waiting.pop()
         visuals, n = _visuals(rows[name], file)
         n_unread += n
-        parent, own = hung.get(name, (None, None))
-        links.append(Link(name, visuals, parent, own))
+        above = hung.get(name)
+        parent_name = None if above is None else above[0]
+        links.append(Link(name, visuals, parent_name, None if above is None else above[1]))
         waiting += reversed(below.get(name, []))
     if len(links) < len(rows):
         raise BadHouse(file, "joint", "links hang on each other in a ring")

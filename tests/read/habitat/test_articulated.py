@@ -139,7 +139,11 @@ def test_a_change_of_the_urdf_or_its_models_is_seen(tmp_path: Path) -> None:
         ("<robot", "<sdf", "no XML"),
         ('child link="door"', 'child link="dor"', "its child is no link"),
         ('child link="drawer"', 'child link="door"', "hangs on two links"),
-        ('parent link="root"/><child link="body"', 'parent link="door"/><child link="body"', "ring"),
+        (
+            'parent link="root"/><child link="body"',
+            'parent link="door"/><child link="body"',
+            "ring",
+        ),
         ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "no direction"),
         ('axis xyz="0 1 0"', 'axis xyz="0 nan 0"', "finite numbers"),
         ('upper="1.6"', 'upper="wide"', "finite numbers"),

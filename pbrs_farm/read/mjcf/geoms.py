@@ -1,0 +1,189 @@
+"""Geoms of a compiled model of MuJoCo -> triangles and materials; no effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.core.house import Surface
+from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
+from pbrs_farm.images import png_from_array
+from pbrs_farm.quiet_mujoco import mujoco
+
+_ROUND: Final = 24  # segments around a round shape
+_GREY: Final = (0.5, 0.5, 0.5, 1.0)  # of geoms that say no colour
+_SHOWN_GROUPS: Final = 3  # geoms of higher groups are not shown by MuJoCo's own viewer either
+_TYPE: Final = mujoco.mjtGeom
+UNREAD: Final = {_TYPE.mjGEOM_HFIELD: "height field", _TYPE.mjGEOM_SDF: "signed distance field"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shape:
+    """Triangles in a geom's own frame, metres."""
+
+    positions: F64  # (V, 3)
+    faces: I64  # (F, 3)
+    uvs: F64 | None = None  # (V, 2), v down
+    normals: F64 | None = None  # (V, 3)
+
+
+def rgba_of(model: Any, geom: int) -> tuple[float, ...]:
+    """What colour a geom is shown in, as the file has it: its own, else its material's."""
+    own = tuple(float(c) for c in model.geom_rgba[geom])
+    material = int(model.geom_matid[geom])
+    if material < 0 or not np.allclose(own, _GREY):
+        return own
+    return tuple(float(c) for c in model.mat_rgba[material])
+
+
+def is_shown(model: Any, geom: int) -> bool:
+    """Whether MuJoCo's viewer shows a geom at first, and anything of it is seen."""
+    return bool(model.geom_group[geom] < _SHOWN_GROUPS and rgba_of(model, geom)[3] > 0)
+
+
+def is_endless(model: Any, geom: int) -> bool:
+    """Whether a geom is a plane without an end on a side."""
+    is_plane = model.geom_type[geom] == _TYPE.mjGEOM_PLANE
+    return bool(is_plane and min(model.geom_size[geom, :2]) <= 0)
+
+
+def shape_of(model: Any, geom: int, half_m: F64) -> Shape | None:
+    """The triangles of a geom; None of kinds that have none here.
+
+    half_m: (2,) half the sides of an endless plane.
+    """
+    kind, size = _TYPE(int(model.geom_type[geom])), model.geom_size[geom]
+    if kind == _TYPE.mjGEOM_MESH:
+        return _mesh(model, int(model.geom_dataid[geom]))
+    origin = np.zeros(3)
+    if kind == _TYPE.mjGEOM_BOX:
+        surface = box("", origin, np.asarray(size, np.float64), 0)
+    elif kind == _TYPE.mjGEOM_PLANE:
+        w, d = (float(s) if s > 0 else float(h) for s, h in zip(size[:2], half_m, strict=True))
+        surface = quads_surface("", np.array([[[-w, -d, 0], [w, -d, 0], [w, d, 0], [-w, d, 0]]]), 0)
+    elif kind in (_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_ELLIPSOID):
+        surface = sphere("", origin, 1.0, 0, n=_ROUND)
+        axes = np.asarray(size if kind == _TYPE.mjGEOM_ELLIPSOID else [size[0]] * 3, np.float64)
+        ball = _of_surface(surface, model, geom)
+        leaning = None if ball.normals is None else ball.normals / axes
+        return Shape(ball.positions * axes, ball.faces, ball.uvs, leaning)
+    elif kind in (_TYPE.mjGEOM_CYLINDER, _TYPE.mjGEOM_CAPSULE):
+        r, h = float(size[0]), float(size[1])
+        if kind == _TYPE.mjGEOM_CYLINDER:
+            profile = np.array([[0, -h], [r, -h], [r, h], [0, h]], np.float64)
+        else:
+            angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
+            lift = np.where(angles < 0, -h, h)
+            profile = np.column_stack([r * np.cos(angles), r * np.sin(angles) + lift])
+        turned = _of_surface(lathe("", profile, origin, 0, n=_ROUND), model, geom)
+        # A lathe turns about y: its y becomes z.
+        order = [2, 0, 1]
+        normals = None if turned.normals is None else turned.normals[:, order]
+        return Shape(turned.positions[:, order], turned.faces, turned.uvs, normals)
+    else:
+        return None
+    return _of_surface(surface, model, geom)
+
+
+def _of_surface(surface: Surface, model: Any, geom: int) -> Shape:
+    normals, material = surface.normals, int(model.geom_matid[geom])
+    return Shape(
+        surface.positions.astype(np.float64), surface.faces.astype(np.int64),
+        None if surface.uvs is None else _laid(surface.uvs.astype(np.float64), model, material),
+        None if normals is None else normals.astype(np.float64),
+    )  # fmt: skip
+
+
+def _laid(uvs_m: F64, model: Any, material: int) -> F64:
+    """Texture coordinates of a solid: repeats a metre where its material says so, else a side."""
+    repeat = model.mat_texrepeat[material] if material >= 0 else np.ones(2)
+    if material < 0 or not model.mat_texuniform[material]:
+        # Each side of a solid has its own corners: stretch what lies on it to one.
+        quads = uvs_m.reshape(-1, 4, 2) if len(uvs_m) % 4 == 0 else uvs_m[None]
+        low = quads.min(1, keepdims=True)
+        span = np.maximum(quads.max(1, keepdims=True) - low, 1e-9)
+        uvs_m = ((quads - low) / span).reshape(-1, 2)
+    return np.asarray(uvs_m * repeat * [1, -1])
+
+
+def _mesh(model: Any, mesh: int) -> Shape:
+    def rows(array: Any, first: Any, n: Any) -> Any:
+        return array[int(first[mesh]) : int(first[mesh]) + int(n[mesh])]
+
+    points = rows(model.mesh_vert, model.mesh_vertadr, model.mesh_vertnum).astype(np.float64)
+    faces = rows(model.mesh_face, model.mesh_faceadr, model.mesh_facenum).astype(np.int64)
+    corners = faces.reshape(-1)
+    normal_of = rows(model.mesh_facenormal, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
+    every = rows(model.mesh_normal, model.mesh_normaladr, model.mesh_normalnum)
+    normals = every[normal_of].astype(np.float64)
+    uvs = None
+    if int(model.mesh_texcoordadr[mesh]) >= 0:
+        uv_of = rows(model.mesh_facetexcoord, model.mesh_faceadr, model.mesh_facenum).reshape(-1)
+        every = rows(model.mesh_texcoord, model.mesh_texcoordadr, model.mesh_texcoordnum)
+        uvs = every[uv_of].astype(np.float64)
+    # Corners that share a point, its normal and its place in the picture are one vertex.
+    keys = [corners, normal_of] + ([] if uvs is None else [uv_of])
+    _, kept, index = np.unique(np.stack(keys, 1), axis=0, return_index=True, return_inverse=True)
+    return Shape(
+        points[corners[kept]],
+        index.reshape(-1, 3),
+        None if uvs is None else uvs[kept],
+        normals[kept],
+    )
+
+
+def material_row(model: Any, geom: int, texture: int | None) -> dict[str, Any]:
+    """The glTF material of a geom. texture: its number in the document, None = none."""
+    material = int(model.geom_matid[geom])
+    rgba = np.array(rgba_of(model, geom))
+    pbr: dict[str, Any] = {
+        "baseColorFactor": [*linear_from_srgb(rgba[:3].clip(0, 1)).tolist(), float(rgba[3])],
+        "metallicFactor": 0.0, "roughnessFactor": 0.5,
+    }  # fmt: skip
+    row: dict[str, Any] = {"name": "", "pbrMetallicRoughness": pbr}
+    if material >= 0:
+        row["name"] = name_of(model, mujoco.mjtObj.mjOBJ_MATERIAL, material)
+        shine, rough = float(model.mat_shininess[material]), float(model.mat_roughness[material])
+        # A material says roughness since MuJoCo 3.2, -1 = not at all.
+        pbr["roughnessFactor"] = float(np.clip(rough if rough >= 0 else 1 - shine, 0.05, 1))
+        pbr["metallicFactor"] = float(np.clip(model.mat_metallic[material], 0, 1))
+    if texture is not None:
+        pbr["baseColorTexture"] = {"index": texture}
+    if rgba[3] < 1:
+        row["alphaMode"] = "BLEND"
+    return row
+
+
+def texture_of(model: Any, geom: int) -> int | None:
+    """The number of the texture whose colours a geom shows; None where it shows none."""
+    material = int(model.geom_matid[geom])
+    if material < 0:
+        return None
+    roles = np.asarray(model.mat_texid).reshape(model.nmat, -1)[material]
+    wanted = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+    found = [int(roles[int(role)]) for role in wanted if int(roles[int(role)]) >= 0]
+    return found[0] if found else None
+
+
+def png_of_texture(model: Any, texture: int) -> bytes:
+    """The picture of a texture; of one for a cube, that of its first side."""
+    width, height = int(model.tex_width[texture]), int(model.tex_height[texture])
+    n, first = int(model.tex_nchannel[texture]), int(model.tex_adr[texture])
+    data = np.asarray(model.tex_data[first : first + width * height * n], np.uint8)
+    picture = data.reshape(height, width, n)
+    if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_CUBE and height == 6 * width:
+        picture = picture[:width]
+    if n == 2:
+        picture = picture[:, :, :1]
+    return png_from_array(
+        np.ascontiguousarray(picture if picture.shape[2] != 1 else np.repeat(picture, 3, 2))
+    )
+
+
+def name_of(model: Any, kind: Any, number: int) -> str:
+    """The name of an element; "" where it has none."""
+    return str(mujoco.mj_id2name(model, kind, number) or "")

@@ -1,0 +1,102 @@
+"""The files that a model of MuJoCo names; effects: reads the XML among them.
+
+MuJoCo opens them by itself: they are listed before, so that none lies outside the model's folder.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from pathlib import Path
+from typing import Final
+from xml.etree.ElementTree import Element, ParseError
+
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
+
+MAX_XML_BYTES: Final = 128 * 2**20
+_MOST_FILES: Final = 20_000
+_MODELS: Final = ("include", "model")  # elements whose file is XML, too
+_FOLDERS: Final = ("meshdir", "texturedir", "assetdir")
+
+
+def root_of(given: GivenFile) -> tuple[RootFolder, str]:
+    """The folder below which all files lie, and the model's name there; BadHouse where it is not."""
+    root = Path(given.models) if given.models else given.path.parent
+    try:
+        name = given.path.resolve().relative_to(root.resolve()).as_posix()
+    except ValueError:
+        raise BadHouse(given.path, "", f"does not lie below --models {root}") from None
+    return RootFolder(root), name
+
+
+def files_of_model(folder: RootFolder, name: str) -> set[str]:
+    """Names below the root of every file of a model that is there, its own among them.
+
+    Raises BadHouse for XML that cannot be read, and for a name that leads out of the root.
+    """
+    found: set[str] = set()
+    waiting = [(name, "")]  # with the folder that included files are named from
+    while waiting:
+        own, base = waiting.pop()
+        if own in found:
+            continue
+        found.add(own)
+        if len(found) > _MOST_FILES:
+            raise BadHouse(name, "", f"names more than {_MOST_FILES} files")
+        root = _parsed(folder, own)
+        at = base or posixpath.dirname(own)
+        compilers = list(root.iter("compiler"))
+        named = [str(c.get(key)) for c in compilers for key in _FOLDERS if c.get(key)]
+        folders = [at, *(posixpath.join(at, one) for one in named)]
+        for row in root.iter():
+            file = row.get("file")
+            if not file:
+                continue
+            is_model = row.tag in _MODELS
+            names = [_below(folder, f, file, own) for f in (folders[:1] if is_model else folders)]
+            there = [n for n in names if folder.path(n) is not None]
+            if is_model:
+                # Files that an included one names lie as if it stood in its place.
+                waiting += [(n, at if row.tag == "include" else "") for n in there]
+            else:
+                found |= set(there)
+    return found
+
+
+def companions_of_mjcf(given: GivenFile, files: SourceFiles) -> str:
+    """Digest of every other file of the model; "" where there is none."""
+    try:
+        folder, name = root_of(given)
+        names = files_of_model(folder, name) - {name}
+        beside = [
+            f"{name.rsplit('.', 1)[0]}{suffix}" for suffix in (".classes.json", ".rooms.json")
+        ]
+    except (BadHouse, OSError):
+        return ""
+    return files.digest(folder, {*names, *beside})
+
+
+def _below(folder: RootFolder, at: str, file: str, own: str) -> str:
+    try:
+        return folder.name_from(at, file)
+    except BadHouse:
+        hint = "give the folder that holds both: --models FOLDER"
+        raise BadHouse(own, f"file={file[:80]!r}", "leads out of its folder", hint=hint) from None
+
+
+def _parsed(folder: RootFolder, name: str) -> Element:
+    data = folder.read(name, max_bytes=MAX_XML_BYTES)
+    if data is None:
+        raise BadHouse(name, "", "no such file")
+    try:
+        root: Element = fromstring(data, forbid_dtd=True)
+    except (ParseError, DefusedXmlException, ValueError, LookupError, RecursionError) as error:
+        raise BadHouse(name, "", f"is no XML that is read: {str(error)[:100]}") from None
+    if not name.endswith(".urdf") and root.tag not in ("mujoco", "mujocoinclude"):
+        raise BadHouse(name, "", f"begins with <{str(root.tag)[:40]}>, not <mujoco>")
+    return root
