@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.embree_caster import Rays
-from pbrs_farm.check.fact_checks import SAME, is_rigid
+from pbrs_farm.check.embree_caster import Floats, Rays
+from pbrs_farm.check.fact_checks import POSE, SAME, is_rigid
+from pbrs_farm.check.motion_checks import eye_of_row
 from pbrs_farm.check.solid_checks import is_within
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
@@ -20,6 +21,7 @@ from pbrs_farm.core import keys
 COUNT_SHARE = 0.02  # of an item's pixels: those on its outline fall either way
 COUNT_PX = 6  # the same of a small one
 _EYE_M = 2.0  # above a floor, below which an eye stands though there is no ceiling
+_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # OpenCV's axes <-> OpenGL's
 HOME_RULES = ("near_duplicate",)  # that refuse a view for others of the home
 
 
@@ -33,8 +35,8 @@ def check_choice(house: StoredHouse, rays: Rays, triangles: Triangles, tally: Ta
     tally.expect(
         "choice", house.id, len(set(ids)) == len(ids), "a view stands twice in cameras.json"
     )
-    lefts = [row for row in rows if not row.get("left")]
-    same = report.get("n_views") in (len(rows), len(lefts))
+    firsts = [row for row in rows if not eye_of_row(row)]
+    same = report.get("n_views") in (len(rows), len(firsts))
     tally.expect("choice", house.id, same, f"reports {report.get('n_views')} views of {len(rows)}")
     told = house.told_by_marker("cameras").get("views")
     if told:
@@ -105,19 +107,21 @@ def _check_choice_row(
         eye = pose[:3, 3]
         # A balcony ends at its rail.
         same = room["floor_y"] < eye[1] < max(room["ceiling_y"] + 0.5, room["floor_y"] + _EYE_M)
-        same &= (
-            row["origin"] == "walk"
-            or bool(row.get("left"))
-            or is_within(room["polygon"], eye[[0, 2]])
-        )
+        same &= row["origin"] == "walk" or "rig" in row or is_within(room["polygon"], eye[[0, 2]])
         tally.expect("choice", place, bool(same), f"does not stand in room {row['room']}")
-    left = house.camera_rows.get(str(row.get("left", "")))
-    if left is not None:
-        # A pair is judged by its left eye.
-        same = (row["objects"], row["score"]) == (left["objects"], left["score"])
-        tally.expect("choice", place, same, "is judged otherwise than its left eye")
-    if not row["objects"] or "lens" in held or left is not None:
+    first = house.camera_rows.get(row["rig"]["instant"]) if eye_of_row(row) else None
+    if first is not None:
+        # What a rig takes at an instant is judged once.
+        same = (row["objects"], row["score"]) == (first["objects"], first["score"])
+        tally.expect("choice", place, same, "is judged otherwise than the rig's first camera")
+    if not row["objects"] or "lens" in held or first is not None:
         return
+    if "rig" in row:
+        # It is the rig's own place that was judged, through the lens that all cameras have.
+        own = rig_of_recipe(house.recipe).get(row["rig"]["camera"], {})
+        if own.get("lens") or own.get("hfov_deg"):
+            return
+        pose = pose @ _FLIP @ np.linalg.inv(row["rig"]["rig_from_camera_opencv"]) @ _FLIP
     # Count the pixels of each thing at the size at which the view was judged.
     width, height = held["width_px"], held["height_px"]
     fx, fy, cx, cy = (held[name] for name in ("fx", "fy", "cx", "cy"))
@@ -145,40 +149,119 @@ def _check_choice_row(
 
 
 def _check_sequence(house: StoredHouse, rows: list[dict[str, Any]], tally: Tally) -> None:
-    """Frames are numbered and follow each other in time; the right eye stands beside the left one."""
+    """Frames are numbered and follow each other in time; cameras of a rig stand where the recipe says."""
     fields = house.recipe.get("cameras", {})
     for row in rows:
         place = f"{house.id} {row['id']} in cameras.json"
-        left = row.get("left", "")
+        eye = eye_of_row(row)
         frame = row.get("frame")
         if frame is not None:
-            name = f"frame_{frame:05d}" + ("_right" if left else "")
+            name = f"frame_{frame:05d}" + (eye and f"_{eye}")
             tally.expect("sequence", place, row["id"] == name, f"is frame {frame}")
             if fields.get("source") == "walk":
                 same = abs(row["time_s"] - frame / fields["walk_fps"]) <= SAME
                 tally.expect("sequence", place, same, f"is told to be at {row['time_s']} s")
-        if left or row["id"].endswith("_right"):
-            partner = house.camera_rows.get(left)
-            same = row["id"] == f"{left}_right" and partner is not None
-            if tally.expect("sequence", place, same, f"is not the right eye of {left!r}"):
-                assert partner is not None
-                _check_pair(house, row, partner, place, tally)
-    times = [row["time_s"] for row in rows if row.get("frame") is not None and not row.get("left")]
+        if "rig" in row or fields.get("stereo_m") or house.recipe.get("rig"):
+            _check_rig(house, row, place, tally)
+    times = [row["time_s"] for row in rows if row.get("frame") is not None and not eye_of_row(row)]
     same = all(b > a for a, b in itertools.pairwise(times))
     tally.expect("sequence", house.id, same, "its frames do not follow each other in time")
 
 
-def _check_pair(
-    house: StoredHouse, right: Mapping[str, Any], left: Mapping[str, Any], place: str, tally: Tally
+def rig_of_recipe(recipe: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The cameras of a recipe's rig by name, in order; a stereo pair is one of two."""
+    stereo_m = recipe.get("cameras", {}).get("stereo_m", 0.0)
+    right = {"name": "right", "translation_m": [stereo_m, 0.0, 0.0]}
+    pair: list[dict[str, Any]] = [{"name": "left"}, right]
+    rows = pair if stereo_m else (recipe.get("rig") or {}).get("cameras", [])
+    return {row["name"]: row for row in rows}
+
+
+def _rig_from_camera(row: Mapping[str, Any]) -> Floats:
+    """(4, 4) of a camera in the recipe, by products of turns about single axes, or its quaternion."""
+    found = np.eye(4)
+    found[:3, 3] = row.get("translation_m", (0.0, 0.0, 0.0))
+    if row.get("rotation_wxyz") is not None:
+        w, *xyz = np.array(row["rotation_wxyz"]) / np.linalg.norm(row["rotation_wxyz"])
+        v = np.array(xyz)
+        cross = np.cross(np.eye(3), v)
+        found[:3, :3] = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * cross
+        return found
+    yaw, pitch, roll = (
+        np.radians(row.get(f"{name}_deg", 0.0)) for name in ("yaw", "pitch", "roll")
+    )
+    c, s = np.cos([yaw, pitch, roll]), np.sin([yaw, pitch, roll])
+    about_y = np.array([[c[0], 0, s[0]], [0, 1, 0], [-s[0], 0, c[0]]])
+    about_x = np.array([[1, 0, 0], [0, c[1], -s[1]], [0, s[1], c[1]]])
+    about_z = np.array([[c[2], -s[2], 0], [s[2], c[2], 0], [0, 0, 1]])
+    found[:3, :3] = about_y @ about_x @ about_z
+    return found
+
+
+def _check_rig(house: StoredHouse, row: Mapping[str, Any], place: str, tally: Tally) -> None:
+    """A view of a rig: its name, its camera's place in the rig by the recipe, and the rig's in the world.
+
+    All views of an instant agree where the rig stands; without a recipe they alone are compared.
+    """
+    rig = row.get("rig")
+    if not tally.expect("sequence", place, rig is not None, "tells of no rig, the recipe does"):
+        return
+    assert rig is not None
+    instant, camera = str(rig["instant"]), str(rig["camera"])
+    first = house.camera_rows.get(instant)
+    same = row["id"] in (instant, f"{instant}_{camera}") and first is not None
+    if not tally.expect("sequence", place, same, f"is no camera of the rig at {instant!r}"):
+        return
+    assert first is not None
+    told = np.array(rig["rig_from_camera_opencv"], np.float64)
+    known = rig_of_recipe(house.recipe)
+    if house.recipe:
+        same = camera in known and (row["id"] == instant) == (camera == next(iter(known)))
+        what = f"is told to be of camera {camera}"
+        if tally.expect("sequence", place, same, f"{what}, the recipe's has another place"):
+            off = float(np.abs(_rig_from_camera(known[camera]) - told).max())
+            what = f"stands {off:.3g} m or parts of a turn off where the recipe's rig has {camera}"
+            tally.expect("sequence", place, off <= POSE, what)
+        stereo = bool(house.recipe["cameras"]["stereo_m"])
+        name = "stereo" if stereo else (house.recipe.get("rig") or {}).get("name", "rig")
+        tally.expect("sequence", place, rig["name"] == name, f"is told to be of rig {rig['name']}")
+        left = instant if stereo and row["id"] != instant else None
+        tally.expect("sequence", place, row.get("left") == left, "tells of another left eye")
+        _check_rig_lens(row, first, known, place, tally)
+    here, there = (_world_from_rig(one) for one in (row, first))
+    off = float(np.abs(here - there).max())
+    what = f"puts the rig {off:.3g} m or parts of a turn off where its first camera does"
+    tally.expect("sequence", place, off <= POSE, what)
+    tally.expect("sequence", place, row["room"] == first["room"], "is of another room than its rig")
+    same = (row.get("frame"), row.get("time_s")) == (first.get("frame"), first.get("time_s"))
+    tally.expect("sequence", place, same, "is of another instant than its rig")
+
+
+def _check_rig_lens(
+    row: Mapping[str, Any],
+    first: Mapping[str, Any],
+    known: Mapping[str, Mapping[str, Any]],
+    place: str,
+    tally: Tally,
 ) -> None:
-    """The right eye is the left one, moved to its right by the recipe's base line."""
-    a = np.array(left["world_from_camera_opengl"], np.float64)
-    b = np.array(right["world_from_camera_opengl"], np.float64)
-    step = a[:3, :3].T @ (b[:3, 3] - a[:3, 3])
-    base = float(house.recipe.get("cameras", {}).get("stereo_m", 0.0)) or float(step[0])
-    same = bool(np.abs(a[:3, :3] - b[:3, :3]).max() <= SAME and step[0] > 0)
-    same &= bool(np.abs(step - [base, 0, 0]).max() <= 1e-6)
-    what = f"stands {np.round(step, 4).tolist()} m from the left eye, by the recipe {base} m to the right"
-    tally.expect("sequence", place, same, what)
-    same = left["intrinsics"] == right["intrinsics"] and left["room"] == right["room"]
-    tally.expect("sequence", place, same, "has another lens than the left eye")
+    """A pin-hole's own field of view, or the lens that all cameras without their own have."""
+    own, held = known.get(str(row["rig"]["camera"]), {}), row["intrinsics"]
+    if own.get("hfov_deg"):
+        hfov_deg = np.degrees(2 * np.arctan(held["width_px"] / 2 / held["fx"]))
+        same = abs(hfov_deg - own["hfov_deg"]) <= POSE and "lens" not in held
+        tally.expect(
+            "sequence",
+            place,
+            bool(same),
+            f"sees {hfov_deg:g} degrees, the recipe says {own['hfov_deg']:g}",
+        )
+    elif not own.get("lens"):
+        shared = known.get(str(first["rig"]["camera"]), {})
+        same = bool(shared.get("lens") or shared.get("hfov_deg")) or held == first["intrinsics"]
+        tally.expect("sequence", place, same, "has another lens than the rig's first camera")
+
+
+def _world_from_rig(row: Mapping[str, Any]) -> Floats:
+    pose = np.array(row["world_from_camera_opengl"], np.float64) @ _FLIP
+    told = np.array(row["rig"]["rig_from_camera_opencv"], np.float64)
+    return np.asarray(pose @ np.linalg.inv(told))

@@ -34,7 +34,7 @@ ROW_FIELDS: Mapping[str, str] = {
 # Groups of the recipe whose digest view.json holds, and those that a view's light is drawn by.
 PICTURE_GROUPS = (
     "blur", "cameras", "dress", "emission", "histogram", "image", "lens", "light", "materials",
-    "raster", "read", "repair", "sensor", "sky", "surroundings", "tone",
+    "raster", "read", "repair", "rig", "sensor", "sky", "surroundings", "tone",
 )  # fmt: skip
 LIGHT_GROUPS = ("image", "light", "sky", "emission", "materials", "blur")
 # Integrator of the recipe -> as view.json may call it.
@@ -81,7 +81,7 @@ def _check_recipe(view: StoredView, house: StoredHouse, tally: Tally) -> None:
 
 
 def _digest(recipe: Mapping[str, Any], groups: tuple[str, ...]) -> str:
-    fields = {g: recipe[g] for g in ("seed", *groups) if g in recipe}
+    fields = {g: recipe[g] for g in ("seed", *groups) if recipe.get(g) is not None}
     if "light" in fields and groups is LIGHT_GROUPS:
         # What only adds layers draws nothing.
         fields["light"] = {k: v for k, v in fields["light"].items() if k != "groups"}
@@ -97,7 +97,7 @@ def _check_camera_row(view: StoredView, house: StoredHouse, tally: Tally) -> Non
         return
     assert row is not None
     table, held = view.table, row["intrinsics"]
-    for name in ("room", "sector", "origin", "score", "frame", "time_s", "left"):
+    for name in ("room", "sector", "origin", "score", "frame", "time_s", "rig", "left"):
         same = table.get(name) == row.get(name)
         what = f"{name} is {table.get(name)}, in cameras.json {row.get(name)}"
         tally.expect("camera file", view.place, same, what)

@@ -283,8 +283,12 @@ def half_step(values: Floats) -> Floats:
         return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
 
 
-def check_partners(views: list[StoredView], tally: Tally) -> None:
+def check_partners(
+    views: list[StoredView], camera_rows: Mapping[str, dict[str, Any]], tally: Tally
+) -> None:
     """Each partner that is stored itself has the pose and K that the view's table says.
+
+    camera_rows: view's id -> its row in cameras.json.
 
     Its name follows from the view's own. Partners that the folder does not have are passed over
     then, as a view may be rendered alone.
@@ -292,7 +296,7 @@ def check_partners(views: list[StoredView], tally: Tally) -> None:
     by_name = {view.folder.name: view for view in views}
     for view in views:
         for relation, row in sorted(view.table.get("partners", {}).items()):
-            name = _name_of_partner(view, relation)
+            name = _name_of_partner(view, relation, camera_rows)
             what = f"the {relation} view is told to be {row['view']}, not {name}"
             tally.expect("partners", view.place, row["view"] == name, what)
             other = by_name.get(str(row["view"]))
@@ -310,10 +314,29 @@ def check_partners(views: list[StoredView], tally: Tally) -> None:
             tally.expect("partners", view.place, same, what)
 
 
-def _name_of_partner(view: StoredView, relation: str) -> str:
-    """The id of the other eye, or of the frame before or after, of the same eye."""
-    left = view.table.get("left", "")
-    if relation == "stereo":
-        return left or f"{view.folder.name}_right"
-    number = int(view.table["frame"]) + (1 if relation == "next" else -1)
-    return f"frame_{number:05d}" + ("_right" if left else "")
+def _name_of_partner(
+    view: StoredView, relation: str, camera_rows: Mapping[str, dict[str, Any]]
+) -> str:
+    """The id of the other of a pair, or of the frame before or after, by the same camera of a rig."""
+    rig, name = view.table.get("rig"), view.folder.name
+    if relation != "stereo":
+        number = int(view.table["frame"]) + (1 if relation == "next" else -1)
+        eye = eye_of_row({"id": name, "rig": rig})
+        return f"frame_{number:05d}" + (eye and f"_{eye}")
+    # Of the views of the instant that stand beside it and look the same way, the nearest.
+    own, found = camera_rows.get(name, {}), list[tuple[float, str]]()
+    for other, row in camera_rows.items():
+        if other == name or (row.get("rig") or {}).get("instant") != (rig or {}).get("instant"):
+            continue
+        a, b = (np.array(r["world_from_camera_opengl"], np.float64) for r in (own, row))
+        step = a[:3, :3].T @ (b[:3, 3] - a[:3, 3])
+        beside = np.abs(a[:3, :3] - b[:3, :3]).max() < 1e-9 and np.abs(step[1:]).max() < 1e-9
+        if beside and row["intrinsics"] == own["intrinsics"]:
+            found.append((round(abs(float(step[0])), 9), other))
+    return min(found, key=lambda pair: pair[0])[1] if found else ""
+
+
+def eye_of_row(row: Mapping[str, Any]) -> str:
+    """Which camera of a rig took a view of cameras.json: "" of the rig's first one."""
+    rig = row.get("rig")
+    return "" if rig is None or rig["instant"] == row["id"] else str(rig["camera"])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
-from pbrs_farm.check.motion_checks import OtherView, is_seen
+from pbrs_farm.check.motion_checks import OtherView, eye_of_row, is_seen
 from pbrs_farm.check.moved_house import MovedHouse
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
 from pbrs_farm.check.stored_house import StoredHouse
@@ -57,7 +57,7 @@ def check_tracks(
     n, t = len(tracks["query_frame"]), len(tracks["frames"])
     shapes = {3: (n, t, 2), 2: (n, t), 1: (n,)}
     shaped = all(tracks[name].shape == shapes[axes] for name, axes in _SHAPES.items())
-    rows = [row for row in house.camera_rows.values() if "frame" in row and not row.get("left")]
+    rows = [row for row in house.camera_rows.values() if "frame" in row and not eye_of_row(row)]
     film = [str(row["id"]) for row in sorted(rows, key=lambda row: int(row["frame"]))]
     if not tally.expect("tracks", place, shaped, "its arrays do not fit each other"):
         return

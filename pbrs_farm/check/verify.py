@@ -189,7 +189,7 @@ def _check_house(
             moves = np.isin(arrays["instance"], list(now.moved.instances))
             seen.append(SeenView(view, arrays["depth"], arrays["normal"], moves))
     check_reprojection(seen, tally)
-    check_partners([one.view for one in seen], tally)
+    check_partners([one.view for one in seen], stored.camera_rows, tally)
     check_pairs(house, scenes.all[1], tally)
 
     def scene_at(time_s: float | None) -> tuple[MovedHouse, Rays]:

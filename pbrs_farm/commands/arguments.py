@@ -195,6 +195,10 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
     if getattr(args, "trajectory", None):
         text = json.dumps(str(more.trajectory))
         overrides |= {"cameras.source": "trajectory", "cameras.file": text}
+    if getattr(args, "rig", None):
+        from pbrs_farm.formats.rig_toml import rig_from_toml
+
+        overrides["rig"] = rig_from_toml(more.rig).model_dump_json(exclude_unset=True)
     if getattr(args, "catalogue", None):
         overrides["dress.catalogue"] = json.dumps(":".join(more.catalogue))
     if getattr(args, "exact", False):

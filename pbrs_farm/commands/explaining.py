@@ -239,7 +239,7 @@ def _cameras(args: argparse.Namespace) -> int:
     caster = Caster.of_house(house)
     note_step(args.home, "cameras")
     seed = camera_seed(house.id, recipe)
-    sampling = chosen_cameras(house, recipe.cameras, seed, caster)
+    sampling = chosen_cameras(house, recipe, seed, caster)
     document = cameras_document(sampling.views, sampling.report.model_dump(mode="json"))
     if args.out is not None:
         store = FolderStore(args.out.parent)

@@ -412,6 +412,16 @@ def pinholes_of(camera: Camera) -> tuple[list[Camera], PinholeFaces]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RigPlace:
+    """Which camera of a rig a view is taken by."""
+
+    name: str  # of the rig
+    camera: str  # of the camera in it
+    instant: str  # id of the view that the rig's first camera takes then
+    rig_from_camera: Matrix4  # OpenCV axes, metres
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class View:
     """A camera with its place in a house."""
 
@@ -425,4 +435,9 @@ class View:
     objects: dict[int, int] = field(default_factory=dict)  # instance id -> pixels when scored
     frame: int | None = None  # number in a sequence, from 0
     time_s: float | None = None  # of that frame
-    left_id: str = ""  # of a stereo pair's right view: the id of the left one
+    rig: RigPlace | None = None  # where several cameras take each view together
+
+    @property
+    def eye(self) -> str:
+        """The name of its camera in the rig; "" of the first one and where there is no rig."""
+        return "" if self.rig is None or self.rig.instant == self.id else self.rig.camera

@@ -88,7 +88,8 @@ def view_id(room_id: str, sector: int, k: int | None = None) -> str:
     """`<room>_<sector>`, `_<k>` when a sector has several.
 
     Room and sector are those of the camera search; k numbers the views of a sector that keeps
-    several. Frames of a sequence and right views have ids of their own: `frame_id`, `right_id`.
+    several. Frames of a sequence and other cameras of a rig have ids of their own: `frame_id`,
+    `rig_view_id`.
     """
     return f"{room_id}_{sector}" if k is None else f"{room_id}_{sector}_{k}"
 
@@ -98,12 +99,13 @@ def frame_id(number: int) -> str:
     return f"frame_{number:05d}"
 
 
-def right_id(left: str) -> str:
-    """Id of a stereo pair's right view, of the left one's.
+def rig_view_id(first: str, eye: str) -> str:
+    """Id of the view that a camera of a rig takes, of the one that the rig's first camera takes.
 
-    Not for a view that is itself a right one; `take_id` undoes it.
+    eye: the camera's name, as `View.eye` has it: "" is the first camera itself. A stereo pair is a
+    rig whose other camera is called right.
     """
-    return f"{left}_right"
+    return f"{first}_{eye}" if eye else first
 
 
 def take_id(view: str) -> str:

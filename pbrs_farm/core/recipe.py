@@ -37,6 +37,7 @@ from pbrs_farm.core.recipe_fields import (
     SurroundingFields,
     ToneFields,
 )
+from pbrs_farm.core.rig_fields import RigFields, stereo_rig
 from pbrs_farm.core.shown_text import hint_of_choice, near_names, question
 
 __all__ = [
@@ -54,6 +55,7 @@ __all__ = [
     "ReadFields",
     "Recipe",
     "RepairFields",
+    "RigFields",
     "SelectionFields",
     "SensorFields",
     "SkyFields",
@@ -82,6 +84,9 @@ class Recipe(FieldGroup):
     repair: RepairFields = RepairFields()
     surroundings: SurroundingFields = SurroundingFields()
     cameras: CameraFields = CameraFields()
+    rig: RigFields | None = Field(
+        None, description="cameras that take each view together, by --rig"
+    )
     lens: LensFields = LensFields()
     blur: BlurFields = BlurFields()
     sensor: SensorFields = SensorFields()
@@ -99,22 +104,42 @@ class Recipe(FieldGroup):
     def _lens_fits(self) -> Self:
         """The lens gives every pixel one ray, at the picture's size."""
         f = self.cameras
-        fault = self.lens.aspect_fault(self.image.width_px, self.image.height_px)
-        if fault is not None:
-            raise ValueError(fault)
-        size = f.score_width_px, f.score_height_px
-        self.lens.intrinsics(Intrinsics.from_hfov(*size, f.hfov_rad))
+        chosen = Intrinsics.from_hfov(f.score_width_px, f.score_height_px, f.hfov_rad)
+        for place, lens in self.lenses.items():
+            fault = lens.aspect_fault(self.image.width_px, self.image.height_px)
+            if fault is not None:
+                raise ValueError(f"{place}{fault}")
+            lens.intrinsics(chosen)
         return self
+
+    @model_validator(mode="after")
+    def _is_one_rig(self) -> Self:
+        if self.rig is not None and self.cameras.stereo_m > 0:
+            raise ValueError("rig: a stereo pair is a rig: give rig or cameras.stereo_m")
+        return self
+
+    @property
+    def rig_in_use(self) -> RigFields | None:
+        """The cameras that take each view together: of a stereo pair two, None where there is one."""
+        stereo_m = self.cameras.stereo_m
+        return stereo_rig(stereo_m) if stereo_m > 0 else self.rig
+
+    @property
+    def lenses(self) -> dict[str, LensFields]:
+        """The lens of all views, and those of a rig's cameras by their place in messages."""
+        of_rig = () if self.rig is None else self.rig.cameras
+        own = {f"rig camera {c.name}: ": c.lens for c in of_rig if c.lens is not None}
+        return {"": self.lens, **own}
 
     @model_validator(mode="after")
     def _blur_fits(self) -> Self:
         """Blur is of `path`, and depth of field of a lens with an optical axis."""
         if self.blur.is_on and self.light.integrator == "metropolis":
             raise ValueError("group blur is of `path` alone: add --set light.integrator=path")
-        if self.blur.aperture_mm > 0 and not self.lens.lens.depth_is_planar:
-            raise ValueError(
-                f"blur.aperture_mm: lens.model {self.lens.model} has no plane of focus"
-            )
+        for place, lens in self.lenses.items():
+            if self.blur.aperture_mm > 0 and not lens.lens.depth_is_planar:
+                text = f"{place}blur.aperture_mm: lens.model {lens.model} has no plane of focus"
+                raise ValueError(text)
         return self
 
     @property
@@ -167,7 +192,9 @@ class Recipe(FieldGroup):
 
 
 def _digest_of_fields(fields: Mapping[str, Any], groups: tuple[str, ...]) -> str:
-    return keys.digest({g: fields[g] for g in ("seed", *groups)} if groups else fields)
+    # A group that is not there is none, as before it was known.
+    chosen = ("seed", *groups) if groups else fields
+    return keys.digest({g: fields[g] for g in chosen if fields[g] is not None})
 
 
 _PHOTO: Mapping[str, Any] = {

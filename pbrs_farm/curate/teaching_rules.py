@@ -21,6 +21,7 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, opengl_normals
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.formats.view_json import eye_of, instant_of
 from pbrs_farm.selection.histogram_pack import BLACK
 from pbrs_farm.selection.quality import picture_quality
 from pbrs_farm.store.object_store import Store
@@ -150,18 +151,18 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
     """The verdict of each view by the rules of these names; BadInput for a name that is none.
 
     Twins are looked for last, in each room among the views that nothing else rejects: of two the one
-    with the smaller id stays. The right view of a pair goes where its left one goes.
+    with the smaller id stays. What other cameras of a rig took goes where the view of the first one goes.
     """
     for name in names:
         if name not in REASONS:
             raise BadInput("--by", name, "no such rule", hint=f"of {', '.join(REASONS)}")
     found: dict[tuple[str, str], RuleVerdict] = {}
     kept: dict[tuple[str, str], list[ChosenView]] = {}
-    for entry in sorted(entries, key=lambda e: (bool(e.facts.get("left")), e.house.id, e.id)):
-        left = found.get((entry.house.id, entry.facts.get("left") or ""))
+    for entry in sorted(entries, key=lambda e: (bool(eye_of(e.facts)), e.house.id, e.id)):
+        first = found.get((entry.house.id, instant_of(entry.facts)))
         others = kept.setdefault((entry.house.id, entry.room_id), [])
         numbers, reason = (
-            _judged(entry, names, others) if left is None else (left.numbers, left.reason)
+            _judged(entry, names, others) if first is None else (first.numbers, first.reason)
         )
         found[entry.house.id, entry.id] = RuleVerdict(entry.house.id, entry.id, reason, numbers)
     return [found[at] for at in sorted(found)]

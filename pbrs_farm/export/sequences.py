@@ -1,45 +1,65 @@
-"""Views that belong together, for the forms of sequences: by house, in time, with their right views; no effects."""
+"""Views that belong together, for the forms of sequences: by house, in time, by the cameras of a rig; no effects."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.formats.view_json import eye_of, instant_of
+
+_SAME_ROWS: Final = 1e-6  # of two cameras' rotation, and metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceFrame:
-    """One moment of a house: the left view, and the right one where there is a pair."""
+    """One moment of a house: the view of the rig's first camera, or the only one, and the others by name."""
 
-    left: ChosenView
-    right: ChosenView | None = None
+    first: ChosenView
+    others: Mapping[str, ChosenView]
 
     @property
     def time_s(self) -> float | None:
         """None of a view that is no frame."""
-        time = self.left.facts.get("time_s")
+        time = self.first.facts.get("time_s")
         return None if time is None else float(time)
+
+    @property
+    def right(self) -> ChosenView | None:
+        """The nearest view to the right of the first whose rows are its rows; None without one."""
+        camera_from_world = np.linalg.inv(pose_opencv(self.first))
+        found: dict[float, ChosenView] = {}
+        for view in self.others.values():
+            between = camera_from_world @ pose_opencv(view)
+            aside, between[0, 3] = float(between[0, 3]), 0.0
+            same_rows = np.abs(between - np.eye(4)).max() <= _SAME_ROWS
+            if same_rows and aside > _SAME_ROWS and view.facts["K"] == self.first.facts["K"]:
+                found[aside] = view
+        return found[min(found)] if found else None
 
 
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
     """House id -> its moments: frames by number, then views that are no frames by id.
 
-    Right views of stereo pairs are put beside their left; a right view alone is left out.
+    Views of other cameras of a rig are put beside its first one's; such a view alone is left out.
     """
-    rights = {(v.house.id, v.facts["left"]): v for v in views if v.facts.get("left")}
+    others: dict[tuple[str, str], dict[str, ChosenView]] = {}
+    for view in views:
+        if eye := eye_of(view.facts):
+            others.setdefault((view.house.id, instant_of(view.facts)), {})[eye] = view
     frames: dict[str, list[SequenceFrame]] = {}
     for view in views:
-        if not view.facts.get("left"):
-            right = rights.get((view.house.id, view.id))
-            frames.setdefault(view.house.id, []).append(SequenceFrame(view, right))
+        if not eye_of(view.facts):
+            frame = SequenceFrame(view, others.get((view.house.id, view.id), {}))
+            frames.setdefault(view.house.id, []).append(frame)
 
     def order(frame: SequenceFrame) -> tuple[float, str]:
-        return float(frame.left.facts.get("frame", float("inf"))), frame.left.id
+        return float(frame.first.facts.get("frame", float("inf"))), frame.first.id
 
     return {house: sorted(own, key=order) for house, own in frames.items()}
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.camera import Camera, Intrinsics, RigPlace, View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lenses import PINHOLE, lens_from_table
 from pbrs_farm.formats.serialise import json_bytes
+
+_RIGHT: Final = ("stereo", "right")  # the rig of --stereo, and its other camera
 
 
 def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[str, Any]:
@@ -37,10 +39,9 @@ def _json_of_view(view: View) -> dict[str, Any]:
     i = view.camera.intrinsics
     # Views of no sequence and no pair are written as they always were.
     sequence = {} if view.frame is None else {"frame": view.frame, "time_s": view.time_s}
-    pair = {"left": view.left_id} if view.left_id else {}
     return {
         **sequence,
-        **pair,
+        **rig_table(view),
         "id": view.id,
         "room": view.room_id,
         "sector": view.sector,
@@ -56,6 +57,32 @@ def _json_of_view(view: View) -> dict[str, Any]:
         },
         "world_from_camera_opengl": view.camera.world_from_camera.tolist(),
     }  # fmt: skip
+
+
+def rig_table(view: View) -> dict[str, Any]:
+    """What cameras.json and view.json say of the rig that took a view; {} where there is none.
+
+    "rig": its name, the camera's, the instant (the id of its first camera's view) and the transform to
+    the rig, 4 x 4, metres, both frames x right, y down, z forward. The right view of a stereo pair also
+    says "left", the other's id.
+    """
+    if view.rig is None:
+        return {}
+    rig = view.rig
+    table = {
+        "name": rig.name,
+        "camera": rig.camera,
+        "instant": rig.instant,
+        "rig_from_camera_opencv": rig.rig_from_camera.tolist(),
+    }
+    return {"rig": table, **({"left": rig.instant} if (rig.name, view.eye) == _RIGHT else {})}
+
+
+def _rig_place(row: Mapping[str, Any] | None) -> RigPlace | None:
+    if row is None:
+        return None
+    pose = np.array(row["rig_from_camera_opencv"], np.float64)
+    return RigPlace(row["name"], row["camera"], row["instant"], pose)
 
 
 def _view_from_json(row: dict[str, Any]) -> View:
@@ -76,7 +103,7 @@ def _view_from_json(row: dict[str, Any]) -> View:
         objects={int(k): n for k, n in row["objects"].items()},
         frame=row.get("frame"),
         time_s=row.get("time_s"),
-        left_id=row.get("left", ""),
+        rig=_rig_place(row.get("rig")),
     )
 
 

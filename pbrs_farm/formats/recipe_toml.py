@@ -13,7 +13,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.file_kinds import other_kind, wrong_kind
@@ -64,9 +64,22 @@ def toml_from_recipe(recipe: Recipe) -> str:
     lines = [f'recipe = "{recipe.name}"']
     # Values of the recipe itself stand above its groups.
     groups = {name: value for name, value in fields.items() if isinstance(value, dict)}
-    lines += [f"{name} = {json.dumps(fields[name])}" for name in fields if name not in groups]
+    lines += [
+        f"{name} = {_toml(value)}"
+        for name, value in fields.items()
+        if name not in groups and value is not None
+    ]
     for name, values in groups.items():
         lines += ["", f"[{name}]"]
         # TOML has no null: what is not set is left out.
-        lines += [f"{field} = {json.dumps(v)}" for field, v in values.items() if v is not None]
+        lines += [f"{field} = {_toml(v)}" for field, v in values.items() if v is not None]
     return "\n".join(lines)
+
+
+def _toml(value: Any) -> str:
+    """A JSON value as TOML has it: tables inline, without what is not set."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items() if v is not None) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value)

@@ -8,6 +8,7 @@ from typing import Any
 
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.formats.cameras_json import rig_table
 from pbrs_farm.formats.serialise import json_bytes
 
 
@@ -22,15 +23,15 @@ def view_description(
     """What view.json says. facts: step -> facts of its marker; "table" of `truth` stands at the top.
 
     recipe_digest: of the recipe that rendered the view; versions: program or library -> version.
-    The warnings are those of the step "light", each once; frame, time_s and left are there only for
-    views of a sequence or a stereo pair.
+    The warnings are those of the step "light", each once; frame, time_s, rig and left are there only
+    for views of a sequence, a rig or a stereo pair.
     """
     table = facts.get("truth", {}).get("table", {})
     light = facts.get("light", {})
     sequence: dict[str, Any] = {}
     if view.frame is not None:
         sequence = {"frame": view.frame, "time_s": view.time_s}
-    sequence |= {"left": view.left_id} if view.left_id else {}
+    sequence |= rig_table(view)
     # The room's warnings, and what is dark of the picture and of the room.
     warnings = list(dict.fromkeys([*light.get("warnings", []), *light.get("dark", [])]))
     return {
@@ -47,6 +48,21 @@ def view_description(
         "modes": {step: said for step, said in facts.items() if step != "truth"},
         "versions": versions,
     }
+
+
+def eye_of(facts: Mapping[str, Any]) -> str:
+    """Which camera of a rig took the view of a view.json: "" of the rig's first one, else its name.
+
+    "" also where there is no rig.
+    """
+    rig = facts.get("rig")
+    return "" if rig is None or rig["instant"] == facts["view"] else str(rig["camera"])
+
+
+def instant_of(facts: Mapping[str, Any]) -> str:
+    """The id of the view that the rig's first camera took at the same instant; without a rig its own."""
+    rig = facts.get("rig")
+    return str(facts["view"] if rig is None else rig["instant"])
 
 
 def view_json(description: Mapping[str, Any]) -> bytes:

@@ -18,6 +18,7 @@ from pbrs_farm.export.chosen_view import PICTURES
 from pbrs_farm.formats.film_mp4 import film, film_pace
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.formats.output_folder import ViewEntry
+from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.gallery import label_colours as colours
 from pbrs_farm.regular_files import read_regular
 
@@ -25,14 +26,14 @@ _LABELS: Final = ("depth", "normal", "semantic", "instance", "flow_forward")
 
 
 def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
-    """House id -> the left frames of its sequence in their order; houses without any are left out.
+    """House id -> the frames of its sequence in their order; houses without any are left out.
 
-    Frames are known by "frame" in their view.json, right eyes by "left". Gaps are not filled: a
+    Frames are known by "frame" in their view.json, of a rig the first camera's count. Gaps are not filled: a
     sequence that is only partly rendered has the frames that are there.
     """
     found: dict[str, list[ViewEntry]] = {}
     for view in views:
-        if view.facts.get("frame") is not None and not view.facts.get("left"):
+        if view.facts.get("frame") is not None and not eye_of(view.facts):
             found.setdefault(view.house.id, []).append(view)
     return {house: sorted(own, key=lambda v: int(v.facts["frame"])) for house, own in found.items()}
 

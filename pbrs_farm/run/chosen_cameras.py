@@ -8,26 +8,24 @@ from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
 from pbrs_farm.core.plugins import plugins
-from pbrs_farm.core.recipe import CameraFields, LensFields
+from pbrs_farm.core.recipe import CameraFields, LensFields, Recipe, RigFields
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.step_cache import camera_file_text
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.camera_report import CameraReport
-from pbrs_farm.sample.house_sampler import Sampling, add_right_views, sample_cameras
+from pbrs_farm.sample.house_sampler import Sampling, add_rig_views, sample_cameras
 from pbrs_farm.sample.stored_cameras import views_from_cameras
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum, trajectory_views
 from pbrs_farm.sample.walks.walk_sampler import sample_walk
 
 
-def chosen_cameras(house: House, fields: CameraFields, seed: int, caster: Caster) -> Sampling:
-    """The views by fields.source and the report on them, right views of stereo pairs among them.
+def chosen_cameras(house: House, recipe: Recipe, seed: int, caster: Caster) -> Sampling:
+    """The views by cameras.source and the report on them, those of all cameras of a rig among them.
 
     caster: of this house, panes included. Raises BadInput for a file that gives no cameras.
     """
-    sampling = _one_by_one(house, fields, seed, caster)
-    if fields.stereo_m <= 0:
-        return sampling
-    views = add_right_views(sampling.views, fields.stereo_m)
+    sampling = _one_by_one(house, recipe.judged_cameras, seed, caster)
+    views = add_rig_views(sampling.views, recipe.rig_in_use)
     report = sampling.report.model_copy(update={"n_views": len(views)})
     return replace(sampling, views=views, report=report)
 
@@ -44,15 +42,21 @@ def check_camera_file(fields: CameraFields) -> None:
         cameras_from_file_text(text, fields.file, *size)
 
 
-def with_lens(view: View, lens: LensFields) -> View:
-    """The view, which was chosen through a pin-hole, through the recipe's lens; BadInput for a fold.
+def with_lens(view: View, lens: LensFields, rig: RigFields | None = None) -> View:
+    """The view, which was chosen through a pin-hole, through its own lens; BadInput for a fold.
 
+    lens: the recipe's. rig: what the view's camera is of; one of its cameras may have another lens.
     Size, focal lengths and principal point become those that the lens states; one that states none
     keeps the view's. The pose stays. BadInput too for a fisheye without a focal length or field of
     view.
     """
+    chosen, place = view.camera.intrinsics, view.rig
     try:
-        intrinsics = lens.intrinsics(view.camera.intrinsics)
+        if rig is not None and place is not None:
+            own = next(camera for camera in rig.cameras if camera.name == place.camera)
+            intrinsics = own.intrinsics(chosen, lens)
+        else:
+            intrinsics = lens.intrinsics(chosen)
     except ValueError as error:
         raise BadInput("lens", view.id, str(error)) from None
     return replace(view, camera=replace(view.camera, intrinsics=intrinsics))

@@ -79,7 +79,8 @@ def cost_of_run(recipe: Recipe, want: Wanted, n_houses: int) -> RunCost:
     """What a run of n_houses houses costs."""
     m, pixels = measured(), megapixels(recipe)
     has_light = any(mode.groups for mode in want.modes)
-    per_house = views_per_house(recipe, want) * (1 + (recipe.cameras.stereo_m > 0))
+    rig = recipe.rig_in_use
+    per_house = views_per_house(recipe, want) * (1 if rig is None else len(rig.cameras))
     n_views = n_houses * per_house
     # Either mode of light writes both pictures, and each variant one more.
     n_pictures = sum(not mode.groups for mode in want.modes)

@@ -159,7 +159,7 @@ def _sensor_shot(
     earlier = [
         v
         for v in views.values()
-        if v.time_s is not None and bool(v.left_id) == bool(view.left_id)
+        if v.time_s is not None and v.eye == view.eye
         and 0 < view.time_s - v.time_s <= _LAGS * fields.lag_s
     ]  # fmt: skip
     earlier.sort(key=lambda v: v.time_s or 0.0)

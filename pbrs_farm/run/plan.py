@@ -39,7 +39,7 @@ STEPS: Final = {
     step.name: step
     for step in (
         Step("house", 1, passes.STEP_GROUPS, per_view=False),
-        Step("cameras", 6, ("cameras", "lens"), ("house",), per_view=False),
+        Step("cameras", 6, ("cameras", "rig", "lens"), ("house",), per_view=False),
         Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("tracks", 1, ("image",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
@@ -81,7 +81,8 @@ def check_layers(want: Wanted, recipe: Recipe) -> None:
         text = f"follows points through a film, and cameras are {recipe.cameras.source}"
         raise BadInput("--tracks", "", text, hint="--cameras walk")
 
-    check_lens(want.layers, recipe.lens.lens)
+    for lens in recipe.lenses.values():
+        check_lens(want.layers, lens.lens)
     of_light = [name for name in want.layers if name in LIGHT_LAYERS]
     if of_light and recipe.light.integrator != "path":
         text = f"is made of light by `path`, the recipe has {recipe.light.integrator}"
@@ -182,17 +183,18 @@ def lit_views(
 def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: Recipe) -> list[str]:
     """The n_views views to make: the first frames of a sequence, else spread over rooms; 0 = all.
 
-    A stereo pair is one view, of which both pictures are made.
+    What the cameras of a rig take at one instant is one view, of which all pictures are made.
     """
-    all_rows = list(rows)
-    rights = {keys.right_id(row[0]) for row in all_rows} if recipe.cameras.stereo_m > 0 else set()
-    lefts = [row for row in all_rows if row[0] not in rights]
+    all_rows, rig = list(rows), recipe.rig_in_use
+    eyes = [camera.name for camera in rig.cameras[1:]] if rig is not None else []
+    others = {keys.rig_view_id(row[0], eye) for row in all_rows for eye in eyes}
+    firsts = [row for row in all_rows if row[0] not in others]
     if recipe.cameras.source in ("walk", "trajectory"):
-        chosen = [view for view, _room, _score in lefts[: n_views or None]]
+        chosen = [view for view, _room, _score in firsts[: n_views or None]]
     else:
-        chosen = spread(lefts, n_views)
-    both = {view for left in chosen for view in (left, keys.right_id(left))}
-    return [view for view, _room, _score in all_rows if view in both]
+        chosen = spread(firsts, n_views)
+    together = {keys.rig_view_id(first, eye) for first in chosen for eye in ("", *eyes)}
+    return [view for view, _room, _score in all_rows if view in together]
 
 
 def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:

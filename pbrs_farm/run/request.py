@@ -154,6 +154,10 @@ class CameraOptions(Record):
         None, "a second view B metres to the right of each, e.g. 0.065",
         group="viewpoints", metavar="B", sets="cameras.stereo_m",
     )  # fmt: skip
+    rig: Path | None = option(
+        None, "several cameras at the same instants, by a file rig.toml (docs/motion.md)",
+        group="viewpoints", metavar="FILE",
+    )  # fmt: skip
 
 
 class ModelsOption(Record):

@@ -102,11 +102,11 @@ def _cameras(work: Work) -> StepOutput:
     from pbrs_farm.run.chosen_cameras import chosen_cameras
 
     cached = _cached_house(work)
-    house, fields = cached.house, work.recipe.judged_cameras
+    house = cached.house
     seed = camera_seed(work.house_id, work.recipe)
     if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
-    sampling = chosen_cameras(house, fields, seed, cached.caster)
+    sampling = chosen_cameras(house, work.recipe, seed, cached.caster)
     views, report = sampling.views, sampling.report
     # Say why where there are none.
     made = _camera_output(views, report.model_dump(mode="json"), work.recipe)
@@ -126,7 +126,7 @@ def _camera_output(views: Sequence[View], report: dict[str, Any], recipe: Recipe
     """The file of views that were chosen through a pin-hole, with the recipe's lens before them."""
     from pbrs_farm.run.chosen_cameras import with_lens
 
-    views = [with_lens(view, recipe.lens) for view in views]
+    views = [with_lens(view, recipe.lens, recipe.rig_in_use) for view in views]
     facts = {"views": [[v.id, v.room_id, v.score] for v in views]}
     return StepOutput({"cameras.json": cameras_json(views, report)}, facts)
 
@@ -164,7 +164,7 @@ def _tracks(work: Work) -> StepOutput:
 
     cached = _cached_house(work)
     views = cached.views(work.inputs["cameras"]).values()
-    film = sorted((v for v in views if v.frame is not None and not v.left_id), key=_number_of_frame)
+    film = sorted((v for v in views if v.frame is not None and not v.eye), key=_number_of_frame)
     if not film:
         return StepOutput({}, {"n_points": 0})
 

@@ -62,8 +62,8 @@ def _speed_on_walk(view: View, views: Mapping[str, View]) -> tuple[F64, F64] | N
     """(3,) m/s and (3,) rad/s in the world between the frames around a view; None off a walk."""
     if view.frame is None:
         return None
-    # Of the same eye of a stereo pair, the frames before and after, as far as there are any.
-    frames = {v.frame: v for v in views.values() if bool(v.left_id) == bool(view.left_id)}
+    # Of the same camera of a rig, the frames before and after, as far as there are any.
+    frames = {v.frame: v for v in views.values() if v.eye == view.eye}
     before, after = frames.get(view.frame - 1, view), frames.get(view.frame + 1, view)
     time_s = (after.time_s or 0.0) - (before.time_s or 0.0)
     if time_s <= 0:
@@ -78,26 +78,25 @@ FRAMES_AN_ANCHOR: Final = 20  # from one frame whose pixels name the noise to th
 
 
 def pilot_view(view: View, views: Mapping[str, View]) -> View:
-    """The first of each ten frames for all of them, left and right apart; a view that is none itself.
+    """The first of each ten frames for all of them, each camera of a rig apart; a view that is none itself.
 
     views: of the house, by id. Which frame is rendered first changes no picture.
     """
     if view.frame is None:
         return view
-    left = keys.frame_id(view.frame - view.frame % FRAMES_A_PILOT)
-    return views.get(keys.right_id(left) if view.left_id else left, view)
+    first = keys.frame_id(view.frame - view.frame % FRAMES_A_PILOT)
+    return views.get(keys.rig_view_id(first, view.eye), view)
 
 
 def light_seed(view: View, house_id: str, digest: str) -> int:
-    """The seed of a view's light; all frames that one eye takes have the same.
+    """The seed of a view's light; all frames that one camera takes have the same.
 
     digest: of the recipe's groups that light uses. What parts the pixels of these frames are their
     streams (`noise_anchors`).
     """
     name = view.id
     if view.frame is not None:
-        clip = keys.take_id(view.id)
-        name = keys.right_id(clip) if view.left_id else clip
+        name = keys.rig_view_id(keys.take_id(view.id), view.eye)
     return keys.seed(house_id, name, "light", digest)
 
 
@@ -124,7 +123,7 @@ def noise_anchors(view: View, views: Mapping[str, View], camera: Camera) -> Nois
     """
     if view.frame is None:
         return None
-    film = {v.frame: v for v in views.values() if bool(v.left_id) == bool(view.left_id)}
+    film = {v.frame: v for v in views.values() if v.eye == view.eye}
     last = max(frame for frame in film if frame is not None)
     first = view.frame - view.frame % FRAMES_AN_ANCHOR
     numbers = first, min(first + FRAMES_AN_ANCHOR, last)

@@ -9,9 +9,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.camera import Camera, View
+from pbrs_farm.core.camera import RigPlace, View
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
 from pbrs_farm.core.house import House, geometry_from_house
-from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.recipe import CameraFields, RigFields
+from pbrs_farm.core.rig_fields import RigCamera
 from pbrs_farm.sample.camera_report import CameraReport, RoomReport, total_rejected
 from pbrs_farm.sample.eye_probes import ItemCounter
 from pbrs_farm.sample.photo_choice import RoomCandidates
@@ -142,19 +144,24 @@ def _camera_report(
     )
 
 
-def add_right_views(views: Iterable[View], baseline_m: float) -> tuple[View, ...]:
-    """The views, each followed by the right one of its pair; as they are when baseline_m is 0.
+def add_rig_views(views: Iterable[View], rig: RigFields | None) -> tuple[View, ...]:
+    """For each view those of the rig's cameras, which stands where the view's camera does.
 
-    Both have the same intrinsics and axes, so that rows of the two pictures correspond.
+    The first camera's view keeps the id. All have the intrinsics of the view. Without a rig the
+    views are as they are.
     """
-    if baseline_m <= 0:
+    if rig is None:
         return tuple(views)
-    pairs = ((view, _right(view, baseline_m)) for view in views)
-    return tuple(view for pair in pairs for view in pair)
+    return tuple(_rig_view(view, rig, camera) for view in views for camera in rig.cameras)
 
 
-def _right(view: View, baseline_m: float) -> View:
-    pose = view.camera.world_from_camera.copy()
-    pose[:3, 3] += baseline_m * pose[:3, 0]
-    camera = Camera(view.camera.intrinsics, pose)
-    return replace(view, id=keys.right_id(view.id), camera=camera, left_id=view.id)
+def _rig_view(view: View, rig: RigFields, camera: RigCamera) -> View:
+    # Both frames turn from OpenCV's axes, which the rig has, to OpenGL's.
+    moved = OPENCV_FROM_OPENGL @ camera.rig_from_camera @ OPENCV_FROM_OPENGL
+    eye = "" if camera is rig.cameras[0] else camera.name
+    return replace(
+        view,
+        id=keys.rig_view_id(view.id, eye),
+        camera=replace(view.camera, world_from_camera=view.camera.world_from_camera @ moved),
+        rig=RigPlace(rig.name, camera.name, view.id, camera.rig_from_camera),
+    )

@@ -21,6 +21,7 @@ from pbrs_farm.core.checked_calls import (
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
 from pbrs_farm.core.recipe import Recipe, with_settings
+from pbrs_farm.formats.rig_toml import rig_from_table, rig_from_toml
 from pbrs_farm.progress import progress_reporter
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run, Summary
@@ -28,7 +29,7 @@ from pbrs_farm.run.processes.render_task import Event
 from pbrs_farm.run.request import Wanted, wanted_of
 from pbrs_farm.sample.stored_cameras import OUTSIDE
 from pbrs_farm.scene.home import Home, recipe_of
-from pbrs_farm.scene.viewpoints import Viewpoint, film_viewpoints
+from pbrs_farm.scene.viewpoints import Viewpoint, film_viewpoints, rig_viewpoints
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame, Views
 
@@ -102,6 +103,7 @@ def film(
     seconds: Positive = 2.0,
     *,
     from_s: float = 0.0,
+    rig: str | Path | Mapping[str, Any] | None = None,
     modes: Words = (Mode.MLT_IL_OL,),
     layers: Words = (),
     tracks: bool = False,
@@ -114,8 +116,11 @@ def film(
     cameras: one that stands still, or one a frame. fps: frames a second, of which seconds are filmed
     from the time from_s on; the frames are `frame_00000` and so on. All else is as of `render`;
     layers that need the next frame or the one before (flow_forward, scene_flow) are there, but for the
-    film's ends. tracks: follow surface points through all frames, for `.export(out, to="tapvid")` and
-    tracks.npz of `.save(out)`. Raises BadInput where there are not as many cameras as frames.
+    film's ends. rig: a file rig.toml, or what it holds: several cameras take each frame, and the ones
+    given say where the rig is; the views of its first camera are the frames, those of others are
+    `frame_00000_<camera>`. tracks: follow surface points through all frames, for `.export(out, to="tapvid")` and
+    tracks.npz of `.save(out)`. Raises BadInput where there are not as many cameras as frames, and for a
+    rig that is none.
 
         >>> moving = home.open("door*", at={0: 0, 1: 1})
         >>> frames = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["scene_flow"])
@@ -127,11 +132,19 @@ def film(
     if len(given) != n:
         text = f"{fps:g} frames a second for {seconds:g} s are {n} frames, not {len(given)}"
         raise BadInput(home.id, "cameras", text)
+    if rig is not None:
+        home = home.set(rig=_rig_of(rig))
     frames = film_viewpoints([home.viewpoint(camera) for camera in given], fps, from_s)
     recipe = _recipe_of_view(home, frames, size)
+    frames = rig_viewpoints(frames, recipe.rig_in_use)
     with _progress_of(home, frames, observe, progress) as tell:
         want = _wanted(modes, layers).model_copy(update={"tracks": tracks})
         return home.renderer.frames(home.source, recipe, frames, want, tell)
+
+
+def _rig_of(rig: str | Path | Mapping[str, Any]) -> dict[str, Any]:
+    found = rig_from_table(rig, "rig") if isinstance(rig, Mapping) else rig_from_toml(Path(rig))
+    return found.model_dump(exclude_unset=True)
 
 
 @contextmanager

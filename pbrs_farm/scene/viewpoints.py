@@ -13,9 +13,11 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import CameraFields
+from pbrs_farm.core.recipe import CameraFields, LensFields, RigFields
 from pbrs_farm.core.table import Table
+from pbrs_farm.run.chosen_cameras import with_lens
 from pbrs_farm.sample.camera_report import CameraReport
+from pbrs_farm.sample.house_sampler import add_rig_views
 from pbrs_farm.sample.stored_cameras import OUTSIDE, room_of, sector_of
 from pbrs_farm.views.views import MOST_SHOWN, figure_html
 
@@ -151,8 +153,14 @@ def film_viewpoints(
         Viewpoint(
             replace(
                 one.view, id=keys.frame_id(k), origin="given", score=0.0, objects={}, frame=k,
-                time_s=from_s + k / fps,
+                time_s=from_s + k / fps, rig=None,
             )
         )
         for k, one in enumerate(cameras)
     ]  # fmt: skip
+
+
+def rig_viewpoints(frames: Sequence[Viewpoint], rig: RigFields | None) -> list[Viewpoint]:
+    """Each viewpoint as the cameras of a rig take it; as they are without one."""
+    views = add_rig_views([one.view for one in frames], rig)
+    return [Viewpoint(with_lens(view, LensFields(), rig)) for view in views]

@@ -24,6 +24,7 @@ HIDDEN: Final = 255  # behind another surface
 KITTI_FLOW_STEP: Final = 64  # steps a pixel, 2**15 is no motion
 KITTI_DISPARITY_STEP: Final = 256
 _MOST_PX: Final = 2.0**15  # of flow: 16-bit floats end at twice that
+_SAME_ROWS: Final = 1e-9  # of two cameras' rotation, and metres
 _NEAREST_M: Final = 1e-3  # to the other camera's plane
 _SLACK: Final = 1e-4  # of the distance, and metres: how far before a point a ray may end
 Relation = Literal["next", "previous", "stereo"]
@@ -196,24 +197,43 @@ def disparity_label(found: Correspondence) -> NDArray[np.uint16]:
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
     """The partners that a view has among the views of its house (id -> view).
 
-    "stereo", "next" and "previous", as far as they are there; a view that is neither of a pair nor
-    of a sequence has none. The right views of a stereo sequence have right neighbours.
+    "stereo", "next" and "previous", as far as they are there; a view that is neither of a rig nor
+    of a sequence has none. Each camera of a rig has neighbours of its own.
     """
     found: dict[Relation, View] = {}
-    # The other of a pair: the right view knows the left one, whose id names the right one.
-    other = views.get(view.left_id or keys.right_id(view.id))
-    if other is not None and (view.left_id or other.left_id == view.id):
+    other = _rectified_partner(view, views)
+    if other is not None:
         found["stereo"] = other
     if view.frame is None:
         return found
-    # Frames are numbered; the right views of a sequence are a sequence of their own.
+    # Frames are numbered; those of each camera of a rig are a sequence of their own.
     neighbours: tuple[tuple[Relation, int], ...] = (("next", 1), ("previous", -1))
     for relation, step in neighbours:
-        left = keys.frame_id(view.frame + step)
-        neighbour = views.get(keys.right_id(left) if view.left_id else left)
+        neighbour = views.get(keys.rig_view_id(keys.frame_id(view.frame + step), view.eye))
         if neighbour is not None:
             found[relation] = neighbour
     return found
+
+
+def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
+    """The nearest view of the same instant whose rows are this one's: a rig's stereo pair; None without.
+
+    It has the same lens and axes, and stands to the right or the left. Of two as near the first counts.
+    """
+    if view.rig is None:
+        return None
+    own, found = view.rig, dict[str, float]()
+    camera_from_rig = np.linalg.inv(own.rig_from_camera)
+    for name, other in views.items():
+        if name == view.id or other.rig is None or other.rig.instant != own.instant:
+            continue
+        between = camera_from_rig @ other.rig.rig_from_camera
+        aside = abs(float(between[0, 3]))
+        between[0, 3] = 0.0
+        same_rows = np.abs(between - np.eye(4)).max() <= _SAME_ROWS and aside > _SAME_ROWS
+        if same_rows and other.camera.intrinsics == view.camera.intrinsics:
+            found[name] = aside
+    return views[min(found, key=found.__getitem__)] if found else None
 
 
 def partner_table(

@@ -168,7 +168,9 @@ def _provide(folder: Path, text: str) -> None:
     small = recipe_from_name("preview", {name: str(value) for name, value in SMALL.items()})
     (folder / "small.toml").write_text(toml_from_recipe(small))
     # A block under a sentence that names a file is that file.
-    for name, block in re.findall(r"`(mine\.\w+)`[^`]*?```\w*\n(.*?)^```", text, re.M | re.S):
+    for name, block in re.findall(
+        r"`((?:mine|rig)\.\w+)`[^`]*?```\w*\n(.*?)^```", text, re.M | re.S
+    ):
         (folder / name).write_text(block)
     if not (folder / "mine.csv").exists():
         (folder / "mine.csv").write_text("from,id,name\nchair,1,seat\nsofa,1,seat\nbed,2,bed\n")

@@ -67,7 +67,11 @@ def test_colmaps_points_project_to_the_pixels_they_came_from(root: Path, tmp_pat
 
     export(root, tmp_path / "x", "colmap")
     sparse = only(tmp_path / "x") / "sparse/0"
-    model = (sparse / "cameras.txt").read_text().split()
+    models = [line.split() for line in (sparse / "cameras.txt").read_text().splitlines()]
+    model = models[0]
+    # Both eyes are sensors of their own, and alike.
+    assert [m[0] for m in models] == ["1", "2"]
+    assert models[1][1:] == model[1:]
     assert model[1:4] == ["PINHOLE", "64", "48"]
     fx, fy, cx, cy = map(float, model[4:])
     points = [line.split() for line in (sparse / "points3D.txt").read_text().splitlines()]
@@ -78,7 +82,7 @@ def test_colmaps_points_project_to_the_pixels_they_came_from(root: Path, tmp_pat
     for pose_row, seen_row in zip(rows[::2], rows[1::2], strict=True):
         number, w, x, y, z, *shift, camera, name = pose_row.split()
         names.append(name)
-        assert camera == "1"
+        assert camera == ("2" if "_right" in name else "1")
         seen = np.array(seen_row.split(), float).reshape(-1, 3)
         own = [points[int(n) - 1] for n in seen[:, 2]]
         # Each point is seen by this picture alone, at the place in its row that its track says.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -196,3 +197,24 @@ def test_a_wrong_film_is_told(moving: pf.Home) -> None:
         pf.film(moving, [camera] * 3, fps=2, seconds=2, modes=[])
     with pytest.raises(pf.BadInput, match="seconds: share"):
         moving.open("door_*", at={0: 2})
+
+
+def test_a_rig_films_each_frame_by_all_its_cameras(moving: pf.Home) -> None:
+    camera = moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera
+    rig = {"cameras": [{"name": "a"}, {"name": "b", "translation_m": [0.2, 0, 0]}]}
+    film = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["disparity"], rig=rig)
+    names = ["frame_00000", "frame_00000_b", "frame_00001", "frame_00001_b"]
+    assert [frame.ref.view for frame in film] == names
+    # The same pictures as by cameras of one's own, at that time.
+    pose = camera.world_from_camera.copy()
+    pose[:3, 3] += 0.2 * pose[:3, 0]
+    aside = replace(camera, world_from_camera=pose)
+    alone = pf.render(moving.at(0.5), aside, modes=[])
+    np.testing.assert_array_equal(film[3].depth, alone.depth)
+    assert film[3].table["rig"]["camera"] == "b"
+    seen = (film[0].depth > 0) & (film[0].layer("disparity") > 0)
+    f = film[0].table["K"][0][0]
+    expected = 256 * f * 0.2 / film[0].depth[seen]
+    np.testing.assert_allclose(film[0].layer("disparity")[seen], expected, rtol=2e-3, atol=1)
+    with pytest.raises(pf.BadInput, match=r"rig: cameras\[0\].yaw"):
+        pf.film(moving, camera, fps=2, seconds=1, rig={"cameras": [{"name": "a", "yaw": 3}]})

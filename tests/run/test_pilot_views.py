@@ -8,11 +8,12 @@ import pytest
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.recipe import RepairFields, recipe_from_name
+from pbrs_farm.core.rig_fields import stereo_rig
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair
 from pbrs_farm.run.house_cache import CachedHouse, decoded_textures
 from pbrs_farm.run.view_light import light_seed, noise_anchors, pilot_of_view, pilot_view
-from pbrs_farm.sample.house_sampler import add_right_views
+from pbrs_farm.sample.house_sampler import add_rig_views
 from pbrs_farm.store import MemoryStore
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.view_emitters import ViewEmitters
@@ -24,7 +25,7 @@ def views() -> dict[str, View]:
         return Camera.look(Intrinsics.from_hfov(24, 18), eye, np.array([-0.5, -0.2, -1.0]))
 
     frames = [View(f"frame_{k:05d}", "0_0", 0, camera(k), "walk", frame=k) for k in range(12)]
-    return {view.id: view for view in add_right_views(frames, 0.065)}
+    return {view.id: view for view in add_rig_views(frames, stereo_rig(0.065))}
 
 
 def test_ten_frames_have_one_pilot_left_and_right_apart() -> None:

@@ -1,15 +1,15 @@
 """Flow, disparity, occlusion and common surface of squares whose answers are known in closed form."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.rig_fields import stereo_rig
 from pbrs_farm.raycast.caster import Caster
-from pbrs_farm.sample.house_sampler import add_right_views
+from pbrs_farm.sample.house_sampler import add_rig_views
 from pbrs_farm.truth.common_surface import pair_rows
 from pbrs_farm.truth.optical_flow import (
     HIDDEN,
@@ -151,15 +151,16 @@ def views() -> dict[str, View]:
         View(f"frame_{k:05d}", "0_0", 0, at(0.1 * k), "walk", frame=k, time_s=k / 10)
         for k in range(3)
     ]
-    return {v.id: v for v in add_right_views(frames, 0.065)}
+    return {v.id: v for v in add_rig_views(frames, stereo_rig(0.065))}
 
 
 def test_right_views_stand_a_baseline_to_the_right_and_keep_their_frame() -> None:
     pair = views()
     right = pair["frame_00001_right"]
-    assert (right.frame, right.left_id) == (1, "frame_00001")
+    assert right.rig is not None
+    assert (right.frame, right.eye, right.rig.instant) == (1, "right", "frame_00001")
     np.testing.assert_allclose(right.camera.eye, [0.165, 0, 0], atol=1e-12)
-    assert len(add_right_views([replace(right, left_id="")], 0.0)) == 1
+    assert add_rig_views([right], None) == (right,)
 
 
 def test_each_view_knows_its_neighbours_in_time_and_the_other_of_its_pair() -> None:

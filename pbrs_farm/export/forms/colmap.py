@@ -9,9 +9,11 @@ from typing import Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
+from pbrs_farm.formats.view_json import eye_of, instant_of
 
 _STEP_PX: Final = 16  # between the pixels of a view that give points
 _NO_POINT: Final = ("0.5 0.5 -1",)  # what a view sees that sees no surface: a pixel of no point
@@ -21,20 +23,25 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """<house>/images/<view>.png and sparse/0/{cameras,images,points3D}.txt; the number of files.
 
     Poses are world to camera with OpenCV axes, in the home's world (metres, y up). Points are
-    surfaces behind every 16th pixel, with its colour and that pixel as their track.
+    surfaces behind every 16th pixel, with its colour and that pixel as their track. Views of a rig have
+    rigs.txt and frames.txt beside them, as COLMAP 3.12 and later read them.
     """
     n_files = 0
     for house in dict.fromkeys(view.house.id for view in views):
         own = [view for view in views if view.house.id == house]
         (out / house / "images").mkdir(parents=True)
         (out / house / "sparse/0").mkdir(parents=True)
-        cameras: dict[str, int] = {}
+        cameras: dict[tuple[str, str], int] = {}
         images: list[str] = []
         points: list[str] = []
+        sensors: list[int] = []
         for number, view in enumerate(own, start=1):
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
-            camera = cameras.setdefault(_camera_line(view), len(cameras) + 1)
+            # Cameras of a rig are sensors of their own, also where they are alike.
+            key = eye_of(view.facts), _camera_line(view)
+            camera = cameras.setdefault(key, len(cameras) + 1)
+            sensors.append(camera)
             pixels, lines = _points_of(view, picture)
             # A line of its pose and one of what it sees. That is never empty, as COLMAP would allow:
             # readers of gsplat and pycolmap take a line without a word for the end of the file.
@@ -44,13 +51,45 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> int:
             images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n{line}\n")
             points += [f"{line} 0 {number} {k}" for k, line in enumerate(lines)]
         _write_lines(
-            out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for c, n in cameras.items())
+            out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for (_eye, c), n in cameras.items())
         )
         _write_lines(out / house / "sparse/0/images.txt", images)
         numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
         _write_lines(out / house / "sparse/0/points3D.txt", numbered)
         n_files += len(own) + 3
+        if any("rig" in view.facts for view in own):
+            for name, lines in zip(("rigs", "frames"), _rig_lines(own, sensors), strict=True):
+                _write_lines(out / house / f"sparse/0/{name}.txt", lines)
+            n_files += 2
     return n_files
+
+
+def _rig_lines(views: list[ChosenView], sensors: list[int]) -> tuple[list[str], list[str]]:
+    """Lines of rigs.txt and frames.txt. sensors: of each view, the id of its camera.
+
+    The first camera of an instant is the rig's frame, as COLMAP has it.
+    """
+    instants: dict[str, list[tuple[int, int, ChosenView]]] = {}
+    for image, (view, sensor) in enumerate(zip(views, sensors, strict=True), start=1):
+        instants.setdefault(instant_of(view.facts), []).append((image, sensor, view))
+    rigs: dict[str, int] = {}
+    frames: list[str] = []
+    for number, taken in enumerate(instants.values(), start=1):
+        taken.sort(key=lambda row: (eye_of(row[2].facts) != "", row[1]))
+        rig_from_first = _rig_from_camera(taken[0][2])
+        line = f"{len(taken)} CAMERA {taken[0][1]}"
+        for _image, sensor, view in taken[1:]:
+            camera_from_first: F64 = np.linalg.inv(_rig_from_camera(view)) @ rig_from_first
+            line += f" CAMERA {sensor} 1 {_motion_words(np.asarray(camera_from_first))}"
+        rig = rigs.setdefault(line, len(rigs) + 1)
+        data = " ".join(f"CAMERA {sensor} {image}" for image, sensor, _view in taken)
+        frames.append(f"{number} {rig} {_pose_words(taken[0][2])} {len(taken)} {data}\n")
+    return [f"{n} {line}\n" for line, n in rigs.items()], frames
+
+
+def _rig_from_camera(view: ChosenView) -> F64:
+    rig = view.facts.get("rig")
+    return np.eye(4) if rig is None else np.array(rig["rig_from_camera_opencv"], np.float64)
 
 
 def _write_lines(file: Path, lines: Iterable[str]) -> None:
@@ -70,9 +109,12 @@ def _camera_line(view: ChosenView) -> str:
 
 def _pose_words(view: ChosenView) -> str:
     """`qw qx qy qz tx ty tz`, camera from world."""
-    camera_from_world = np.linalg.inv(pose_opencv(view))
-    x, y, z, w = Rotation.from_matrix(camera_from_world[:3, :3]).as_quat(canonical=True)
-    return " ".join(f"{v:.9g}" for v in (w, x, y, z, *camera_from_world[:3, 3]))
+    return _motion_words(np.asarray(np.linalg.inv(pose_opencv(view))))
+
+
+def _motion_words(motion: F64) -> str:
+    x, y, z, w = Rotation.from_matrix(motion[:3, :3]).as_quat(canonical=True)
+    return " ".join(f"{v:.9g}" for v in (w, x, y, z, *motion[:3, 3]))
 
 
 def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[str]]:
@@ -99,7 +141,7 @@ def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[
 FORM = ViewForm(
     "colmap",
     write_colmap,
-    "a text model: cameras, images, points from depth",
+    "a text model: cameras, images, points from depth; of a rig also rigs and frames",
     convention=Convention(
         0.5, has_k=True, axes="camera x right, y down, z forward; the home's world, y up, m"
     ),

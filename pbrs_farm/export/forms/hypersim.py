@@ -34,6 +34,7 @@ from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
+from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.images import jpeg_from_array
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
 from pbrs_farm.run.relight import linear_aovs
@@ -91,12 +92,12 @@ def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
 
 
 def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
-    """The views by camera: those that are no frames, left eyes of a walk, right eyes."""
-    found: dict[tuple[bool, bool], list[ChosenView]] = {}
+    """The views by camera: those that are no frames, frames of a walk; each camera of a rig apart."""
+    found: dict[tuple[bool, str], list[ChosenView]] = {}
     for view in views:
-        key = ("frame" in view.facts, bool(view.facts.get("left")))
+        key = ("frame" in view.facts, eye_of(view.facts))
         found.setdefault(key, []).append(view)
-    for (is_frame, _right), own in found.items():
+    for (is_frame, _eye), own in found.items():
         if is_frame:
             own.sort(key=lambda view: int(view.facts["frame"]))
     return [found[key] for key in sorted(found)]

@@ -18,7 +18,7 @@ _SEEN: Final = 0  # of the layers of occlusion
 
 
 def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
-    """image_2/ (left) and image_3/ (right), disp_*_0/, flow_*/, calib/; the number of files.
+    """image_2/ (the left, or a rig's first camera) and image_3/ (right), disp_*_0/, flow_*/, calib/; the number of files.
 
     <6 digits>_10.png is a frame, <6 digits>_11.png the next one of its sequence. `occ` has every
     surface, `noc` those that the other picture sees. index.txt: number, house, view. Whatever a
@@ -28,7 +28,7 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     rows: list[str] = []
     for house, frames in frames_by_house(views).items():
         for k, frame in enumerate(frames):
-            files = _labels(frame.left)
+            files = _labels(frame.first)
             if not files:
                 continue
             number = f"{len(rows):06d}"
@@ -40,7 +40,7 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.write_bytes(data)
             n_files += len(files)
-            rows.append(f"{number} {house} {frame.left.id}")
+            rows.append(f"{number} {house} {frame.first.id}")
     if not rows:
         hint = "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward"
         raise BadInput("--to", "kitti", "no view has flow or disparity", hint=hint)
@@ -49,7 +49,7 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> int:
 
 
 def _pictures(frame: SequenceFrame, which: str) -> dict[str, bytes]:
-    files = {f"image_2/{{}}_{which}.png": frame.left.data(required_picture(frame.left, "kitti"))}
+    files = {f"image_2/{{}}_{which}.png": frame.first.data(required_picture(frame.first, "kitti"))}
     if frame.right is not None:
         picture = required_picture(frame.right, "kitti")
         files[f"image_3/{{}}_{which}.png"] = frame.right.data(picture)
@@ -92,12 +92,12 @@ def _calibration(frame: SequenceFrame) -> str:
     Pixels count from the centre of the first one, as in KITTI's own tools (drawBox3D.m adds 1 for
     MATLAB, whose first pixel's centre is (1, 1)).
     """
-    require_lens(frame.left, "kitti")
-    k = np.array(k_of_whole_centres(frame.left.facts["K"]), np.float64)
+    require_lens(frame.first, "kitti")
+    k = np.array(k_of_whole_centres(frame.first.facts["K"]), np.float64)
     lines = [_projection("P2", k, 0.0)]
     if frame.right is not None:
         eyes = [
-            np.array(v.facts["world_from_camera_opencv"])[:3, 3] for v in (frame.left, frame.right)
+            np.array(v.facts["world_from_camera_opencv"])[:3, 3] for v in (frame.first, frame.right)
         ]
         lines.append(_projection("P3", k, float(np.linalg.norm(eyes[1] - eyes[0]))))
     return "".join(lines)

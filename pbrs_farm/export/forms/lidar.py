@@ -24,6 +24,7 @@ from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv
+from pbrs_farm.formats.view_json import eye_of
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.truth.lidar import LIDARS, LidarScan, LidarSensor, lidar_scan
@@ -45,17 +46,17 @@ def write_lidar(views: list[ChosenView], out: Path, choice: Choice) -> int:
 
     Points are in the scanner's axes, metres: x forward, y left, z up. poses.txt has rows
     `time x y z qx qy qz qw`, world from scanner (the home's world, y up), the time a frame's in
-    seconds, else the view's number; PCD repeats the pose as VIEWPOINT. Right views of pairs have
-    none. BadInput for a scanner that is not known.
+    seconds, else the view's number; PCD repeats the pose as VIEWPOINT. Other cameras of a rig
+    than the first have none. BadInput for a scanner that is not known.
     """
     sensor = LIDARS.get(choice.lidar)
     if sensor is None:
         hint = did_you_mean(choice.lidar, list(LIDARS))
         raise BadInput("--lidar", choice.lidar, "no such scanner", hint=hint)
-    lefts = [view for view in views if not view.facts.get("left")]
+    firsts = [view for view in views if not eye_of(view.facts)]
     n_files = 0
-    for house_id in dict.fromkeys(view.house.id for view in lefts):
-        own = [view for view in lefts if view.house.id == house_id]
+    for house_id in dict.fromkeys(view.house.id for view in firsts):
+        own = [view for view in firsts if view.house.id == house_id]
         n_files += _write_scans(out / house_id, own, sensor, choice.lidar)
     return n_files
 

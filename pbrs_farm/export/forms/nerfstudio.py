@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lenses import COEFFICIENTS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.form import Convention, ViewForm
@@ -24,7 +25,7 @@ _MODELS: Final = {
     "pinhole": "PINHOLE", "radtan": "OPENCV", "fisheye": "OPENCV_FISHEYE",
     "equirect": "EQUIRECTANGULAR",
 }  # fmt: skip
-"""What nerfstudio calls each lens model; a run has one."""
+"""What nerfstudio calls each lens model; a transforms.json has one."""
 
 
 def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int:
@@ -37,6 +38,10 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> int
     for house in dict.fromkeys(view.house.id for view in views):
         own = [view for view in views if view.house.id == house]
         frames = []
+        models = {intrinsics_of(view.facts).lens.model for view in own}
+        if len(models) > 1:
+            text = f"has one lens model a house, these views have {' and '.join(sorted(models))}"
+            raise BadInput("--to", "nerfstudio", text)
         for view in own:
             row, n = _frame(view, out / house)
             frames.append(row)

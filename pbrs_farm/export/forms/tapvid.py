@@ -33,16 +33,16 @@ def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     videos: dict[str, dict[str, Any]] = {}
     others: list[ChosenView] = []
     for house, moments in frames_by_house(views).items():
-        frames = [m.left for m in moments if m.left.facts.get("frame") is not None]
-        others += [m.left for m in moments if m.left.facts.get("frame") is None]
-        others += [m.right for m in moments if m.right is not None]
+        frames = [m.first for m in moments if m.first.facts.get("frame") is not None]
+        others += [m.first for m in moments if m.first.facts.get("frame") is None]
+        others += [view for m in moments for view in m.others.values()]
         if frames:
             videos[house] = _video(frames)
     if not videos:
         hint = "pbrs-farm run HOME --cameras walk --tracks"
         raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
     (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
-    return 1 + name_left_out(out, others, "is no frame of a film, or a right view")
+    return 1 + name_left_out(out, others, "is no frame of a film, or another camera's of a rig")
 
 
 def _video(frames: list[ChosenView]) -> dict[str, Any]:

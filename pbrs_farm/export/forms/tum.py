@@ -23,18 +23,20 @@ def write_tum(views: list[ChosenView], out: Path, _choice: Choice) -> int:
     """<house>/rgb/, depth/, rgb.txt, depth.txt and groundtruth.txt; the number of files.
 
     groundtruth.txt has rows t x y z qx qy qz qw in the home's world (metres, y up), OpenCV axes:
-    what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. Right views of
-    pairs have all five with `_right` behind their names. Frames of a sequence alone: other views
+    what `--trajectory` reads. Depth is 5000 a metre, 0 = nothing or beyond 13.1 m. What other
+    cameras of a rig took has all five with `_<camera>` behind their names, `_right` of a stereo pair. Frames of a sequence alone: other views
     are named in left_out.txt; BadInput where there is none.
     """
     n_files, written = 0, set[tuple[str, str]]()
     for house, frames in frames_by_house(views).items():
         timed = [(f, f.time_s) for f in frames if f.time_s is not None]
-        lefts = [(f.left, time) for f, time in timed]
-        rights = [(f.right, time) for f, time in timed if f.right is not None]
-        n_files += _write_trajectory(out / house, "", lefts)
-        n_files += _write_trajectory(out / house, "_right", rights)
-        written |= {(house, view.id) for view, _time in (*lefts, *rights)}
+        by_eye: dict[str, list[tuple[ChosenView, float]]] = {}
+        for frame, time in timed:
+            for eye, view in {"": frame.first, **frame.others}.items():
+                by_eye.setdefault(eye, []).append((view, time))
+        for eye, own in by_eye.items():
+            n_files += _write_trajectory(out / house, eye and f"_{eye}", own)
+            written |= {(house, view.id) for view, _time in own}
     if not n_files:
         hint = "pbrs-farm run HOME --cameras walk"
         raise BadInput("--to", "tum", "no view is a frame of a sequence", hint=hint)
@@ -78,7 +80,7 @@ FORM = ViewForm(
     "tum",
     write_tum,
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
-    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`; views that are no frames are named"
+    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise; views that are no frames are named"
     " in `left_out.txt`",
     convention=Convention(
         None,

@@ -244,20 +244,20 @@ def _nearest_place(triangles: F64, place: F64) -> tuple[F64, float]:
 
 
 def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
-    """A clip for each view, and one for each walk: its frames in order, right eyes left out.
+    """A clip for each view, and one for each walk: its frames in order, of a rig the first camera's.
 
     Views of models without a home are left out: they have no room to ask about. One house is read at a
     time. Raises BadInput for a house that is damaged.
     """
     for house_id, frames in frames_by_house(views).items():
-        lefts = [frame.left for frame in frames]
+        firsts = [frame.first for frame in frames]
         if house_id.startswith("object_"):
             continue
-        house = stored_house(lefts[0].entry.folder.parent.parent)
-        walk = [view for view in lefts if view.facts.get("frame") is not None]
+        house = stored_house(firsts[0].entry.folder.parent.parent)
+        walk = [view for view in firsts if view.facts.get("frame") is not None]
         if len(walk) > 1:
             yield _clip(house_id, walk, house)
-        for view in lefts:
+        for view in firsts:
             if len(walk) < 2 or view.facts.get("frame") is None:
                 yield _clip(f"{house_id}__{view.id}", [view], house)
 

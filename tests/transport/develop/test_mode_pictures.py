@@ -173,7 +173,9 @@ def test_frames_of_a_clip_and_both_eyes_have_one_camera() -> None:
     recipe = recipe_from_name("fast", {"tone.camera": "drawn"})
     frames = {recipe.camera_of("h", keys.frame_id(k)) for k in range(9)}
     assert len(frames) == 1
-    assert recipe.camera_of("h", "0_1_2") == recipe.camera_of("h", keys.right_id("0_1_2"))
+    assert recipe.camera_of("h", "0_1_2") == recipe.camera_of(
+        "h", keys.rig_view_id("0_1_2", "right")
+    )
     others = {recipe.camera_of(h, v) for h in "gh" for v in ("0_1_2", "0_1_3", "0_1_4", "0_1_5")}
     assert len(others) > 4
 
