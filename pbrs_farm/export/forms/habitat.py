@@ -1,34 +1,46 @@
 """A home as a Habitat data set of one scene: stage, objects, regions. Effects: writes files.
 
-The building is the stage; each thing an object with collision parts of its own. `pbrs-farm run` reads
-the scene back.
+The building is the stage; each thing an object with collision parts of its own, and what opens an
+articulated object. `pbrs-farm run` reads the scene back.
 """
 
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+from xml.etree import ElementTree as ET
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_glb import glb_of_pieces
 from pbrs_farm.export.home_pieces import COLLIDES, COLLISION, ExportedHome, Piece, digest_name
+from pbrs_farm.export.urdf_links import add_inertial, add_mesh, add_moving_joint
 from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.formats.house_glb import item_extras
 from pbrs_farm.geometry.convex_parts import hull_faces
+from pbrs_farm.geometry.opened import moved_surface
+
+_BODY: Final = "body"
 
 
 def write_habitat(home: ExportedHome, folder: Path) -> int:
     """The data set below folder; the number of files."""
     house, files = home.house, {}
-    files[f"stages/{house.id}.glb"] = glb_of_pieces(house, home.building, with_lamps=False)
+    opening = [piece for piece in home.pieces if len(piece.links) > 1]
+    still = [piece for piece in home.building if len(piece.links) == 1]
+    files[f"stages/{house.id}.glb"] = glb_of_pieces(house, still, with_lamps=False)
     files[f"stages/{house.id}.stage_config.json"] = _json({"render_asset": f"{house.id}.glb"})
     instances = []
     for piece in home.things:
+        if len(piece.links) > 1:
+            continue
         data = glb_of_pieces(house, [piece], with_lamps=True, in_place=False)
         name = f"{piece.class_name.replace(' ', '_')}_{digest_name(data)}"
         if f"objects/{name}.glb" not in files:
@@ -44,9 +56,18 @@ def write_habitat(home: ExportedHome, folder: Path) -> int:
                 config | {"semantic_id": piece.item.nyu40}
             )
         instances.append(_instance(home, piece, name))
+    articulated = []
+    for piece in opening:
+        name, own = _articulated(home, piece)
+        files |= {f"urdf/{name}/{file}": data for file, data in own.items()}
+        pose = [link.joint.value for link in piece.links if link.joint is not None]
+        base = {"fixed_base": piece.is_fixed, "base_type": "fixed" if piece.is_fixed else "free"}
+        row = _instance(home, piece, name) | base | {"initial_joint_pose": pose}
+        articulated.append(row)
     files[f"scenes/{house.id}.scene_instance.json"] = _json({
         "stage_instance": {"template_name": f"stages/{house.id}"},
-        "object_instances": instances, "semantic_scene_instance": house.id,
+        "object_instances": instances, "articulated_object_instances": articulated,
+        "semantic_scene_instance": house.id,
         "translation_origin": "asset_local",
         "user_defined": {"collision": COLLISION},
     })  # fmt: skip
@@ -58,11 +79,12 @@ def write_habitat(home: ExportedHome, folder: Path) -> int:
     })  # fmt: skip
     files[f"{house.id}.scene_dataset_config.json"] = _json({
         "stages": {"paths": {".json": ["stages"]}}, "objects": {"paths": {".json": ["objects"]}},
+        "articulated_objects": {"paths": {".urdf": ["urdf/*"]}},
         "scene_instances": {"paths": {".json": ["scenes"]}},
         "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
     })  # fmt: skip
     for name, data in files.items():
-        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).parent.mkdir(exist_ok=True, parents=True)
         (folder / name).write_bytes(data)
     return len(files)
 
@@ -80,6 +102,42 @@ def _instance(home: ExportedHome, piece: Piece, name: str) -> dict[str, Any]:
         "motion_type": "STATIC" if piece.is_fixed else "DYNAMIC",
         "user_defined": item_extras(piece.item, number),
     }  # fmt: skip
+
+
+def _articulated(home: ExportedHome, piece: Piece) -> tuple[str, dict[str, bytes]]:
+    """The name of a piece that opens, and its files: URDF, config, a GLB a link and a convex part.
+
+    Axes are the piece's, y up, as those of all Habitat's models are.
+    """
+    root = ET.Element("robot", name=piece.class_name.replace(" ", "_"))
+    files: dict[str, bytes] = {}
+
+    def kept(data: bytes, name: str) -> str:
+        file = f"{name}_{digest_name(data)}.glb"
+        files[file] = data
+        return file
+
+    for link in piece.links:
+        name = re.sub(r"[^A-Za-z0-9]+", "_", link.part) or _BODY
+        element = ET.SubElement(root, "link", name=name)
+        matrix = np.eye(4)
+        if link.joint is not None:
+            matrix = add_moving_joint(root, name, _BODY, link.joint, np.eye(3))
+        add_inertial(element, link, matrix, np.eye(3))
+        # Lamps and the frame of the piece stay with its body.
+        own = tuple(moved_surface(s, matrix) for s in link.surfaces)
+        shown = replace(piece, surfaces=own, lamps=() if link.joint else piece.lamps)
+        data = glb_of_pieces(home.house, [shown], with_lamps=True, in_place=False)
+        add_mesh(element, "visual", kept(data, name))
+        for part in link.colliders:
+            add_mesh(
+                element, "collision", kept(_collision((transform_points(matrix, part),)), "part")
+            )
+    ET.indent(root)
+    text = ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    named = f"{root.get('name')}_{digest_name(text)}"
+    config = {"urdf_filepath": f"{named}.urdf", "semantic_id": piece.item.nyu40}
+    return named, files | {f"{named}.urdf": text, f"{named}.ao_config.json": _json(config)}
 
 
 def _regions(home: ExportedHome) -> list[dict[str, Any]]:
@@ -121,8 +179,8 @@ def _collision(parts: tuple[F64, ...]) -> bytes:
 FORM = HomeForm(
     "habitat",
     write_habitat,
-    "a Habitat data set: the building as stage, an object with collision parts for each thing,"
-    " regions, and `navigable/<id>.json`, the outlines where a disc of 0.2 m can stand",
+    "a Habitat data set: the building as stage, an object with collision parts for each thing, an"
+    " articulated object for what opens, regions, and `navigable/<id>.json`, the outlines where a disc of 0.2 m can stand",
     remark=COLLIDES,
     up="y",
 )

@@ -6,28 +6,25 @@ Meshes are OBJ with an MTL, paths are relative to the document.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.forms.mjcf import body_name
-from pbrs_farm.export.home_links import BODY, Link, effort_of
+from pbrs_farm.export.home_links import BODY, Link
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Piece, digest_name
 from pbrs_farm.export.obj_files import obj_of_surfaces, png_textures, rgba_of, z_up_points
+from pbrs_farm.export.urdf_links import add_inertial, add_joint, add_mesh, add_moving_joint
 from pbrs_farm.geometry.convex_parts import hull_faces, slabs
 from pbrs_farm.geometry.opened import moved_surface
 
 _WORLD: Final = "world"
 _MATERIALS: Final = "materials.mtl"
-_MOST_EFFORT, _MOST_SPEED = 100.0, 2.0  # N or N m; m/s or rad/s
 _Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
@@ -81,69 +78,30 @@ class _Document:
                 kind = "fixed" if piece.is_fixed else "floating"
                 turn = _Z_UP @ piece.world_from_local[:3, :3] @ _Z_UP.T
                 place = z_up_points(piece.world_from_local[None, :3, 3])[0]
-                self._joint(f"{name}.at", kind, _WORLD, name, place, turn)
+                add_joint(self.root, f"{name}.at", kind, _WORLD, name, place, turn)
                 self._shapes(element, piece, link, np.eye(4))
                 continue
-            # The link's frame is the joint's, and its meshes stand where they are when it is shut.
-            shut = joint.motion(0.0)
-            shut[:3, 3] -= np.array(joint.point)
-            place = z_up_points(np.array([joint.point]))[0]
-            kind = "prismatic" if joint.kind is JointKind.PRISMATIC else "revolute"
-            row = self._joint(name, kind, body_name(piece, BODY), name, place, np.eye(3))
-            ET.SubElement(row, "axis", xyz=_numbers(z_up_points(np.array([joint.axis]))[0]))
-            limit = {"lower": f"{joint.lower:.9g}", "upper": f"{joint.upper:.9g}"}
-            limit |= {"effort": f"{_MOST_EFFORT:g}", "velocity": f"{_MOST_SPEED:g}"}
-            ET.SubElement(row, "limit", limit)
-            damping, friction = effort_of(joint)
-            ET.SubElement(row, "dynamics", damping=f"{damping:.4g}", friction=f"{friction:.4g}")
+            shut = add_moving_joint(self.root, name, body_name(piece, BODY), joint, _Z_UP)
             self._shapes(element, piece, link, shut)
-
-    def _joint(
-        self, name: str, kind: str, parent: str, child: str, place: F64, turn: F64
-    ) -> ET.Element:
-        row = ET.SubElement(self.root, "joint", name=name, type=kind)
-        ET.SubElement(row, "parent", link=parent)
-        ET.SubElement(row, "child", link=child)
-        angles = Rotation.from_matrix(turn).as_euler("xyz")
-        ET.SubElement(row, "origin", xyz=_numbers(place), rpy=_numbers(angles))
-        return row
 
     def _shapes(self, element: ET.Element, piece: Piece, link: Link, matrix: F64) -> None:
         """matrix: (4, 4) from the piece's frame, y up, to the link's."""
-        inertial = ET.SubElement(element, "inertial")
-        middle = transform_points(matrix, link.middle[None])
-        ET.SubElement(inertial, "origin", xyz=_numbers(z_up_points(middle)[0]))
-        ET.SubElement(inertial, "mass", value=f"{link.mass_kg:.6g}")
-        turn = _Z_UP @ matrix[:3, :3]
-        tensor = turn @ np.diag(link.inertia) @ turn.T
-        rows = {
-            f"i{'xyz'[a]}{'xyz'[b]}": f"{tensor[a, b]:.6g}" for a in range(3) for b in range(a, 3)
-        }
-        ET.SubElement(inertial, "inertia", rows)
+        add_inertial(element, link, matrix, _Z_UP)
         for material in sorted({s.material for s in link.surfaces}):
             own = [moved_surface(s, matrix) for s in link.surfaces if s.material == material]
             data = obj_of_surfaces(own, f"material_{material}", _MATERIALS)
-            _shape(element, "visual", self._mesh(data))
+            add_mesh(element, "visual", self._mesh(data))
         is_wall = piece.item.kind.is_structure
         for part in slabs(link.triangles) if is_wall else link.colliders:
             points = z_up_points(transform_points(matrix, part))
             rows_ = [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points]
             rows_ += [f"f {a} {b} {c}" for a, b, c in hull_faces(points) + 1]
-            _shape(element, "collision", self._mesh(("\n".join(rows_) + "\n").encode()))
+            add_mesh(element, "collision", self._mesh(("\n".join(rows_) + "\n").encode()))
 
     def _mesh(self, data: bytes) -> str:
         name = f"meshes/{digest_name(data)}.obj"
         self.files[name] = data
         return name
-
-
-def _shape(element: ET.Element, tag: str, name: str) -> None:
-    shape = ET.SubElement(element, tag)
-    ET.SubElement(ET.SubElement(shape, "geometry"), "mesh", filename=name)
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return " ".join(f"{float(x):.9g}" for x in values)
 
 
 FORM = HomeForm(

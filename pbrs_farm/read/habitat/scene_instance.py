@@ -494,7 +494,9 @@ def _add_robot(
     inner = np.diag([size, size, size, 1.0])
     name = dataset.class_of(template) or posixpath.basename(template).removesuffix(".urdf")
     matrix = _matrix_of_instance(row, place, dataset.scene)
-    built.place(roots, matrix @ inner, name, {"one": True, "by_name": True})
+    user_fields = row.get("user_defined")
+    own_fields = dict(user_fields) if isinstance(user_fields, dict) else {}
+    built.place(roots, matrix @ inner, name, {"one": True, "by_name": True} | own_fields)
     return True
 
 
