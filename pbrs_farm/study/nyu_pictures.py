@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.resampling import resized_any, resized_nearest
 from pbrs_farm.curate.photographs import NyuMat, Photo
 from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
+from pbrs_farm.study.real_frames import truth_at_size
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training.training_views import ViewArrays
@@ -140,16 +140,7 @@ def nyu_arrays(path: Path, plan: TrainingPlan, split: str) -> ViewArrays:
     ids, rows = [], []
     for picture in nyu_pictures(path, plan, split):
         ids.append(f"{NYU_HOME}/{picture.id}")
-        truth = {
-            name: _resized(name, array, plan)
-            for name, array in picture.truth.items()
-            if plan.task == "depth" or name != "depth"  # which normals are judged by alone
-        }
+        truth = truth_at_size(picture.truth, plan)
         rows.append({"colour": picture.colour, **truth})
     arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return ViewArrays(tuple(ids), arrays.pop("colour"), arrays)
-
-
-def _resized(name: str, array: NDArray[Any], plan: TrainingPlan) -> NDArray[Any]:
-    resized = resized_any if name == "edges" else resized_nearest
-    return resized(array, plan.width_px, plan.height_px)

@@ -19,6 +19,11 @@ PLANE_TRUTH: Final = (
     " one surface, within 1 % of its depth, not seen edge-on"
 )
 DEPTH_TRUTH: Final = "the photograph's own depth along the axis, where it has one"
+PHOTO_TRUTHS: Final = {
+    "normals": PLANE_TRUTH,
+    "depth": DEPTH_TRUTH,
+    "segmentation": "NYU40 classes of the picture's own label, where labelled",
+}
 
 
 def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:

@@ -15,10 +15,10 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_by_area, resized_nearest
 from pbrs_farm.curate.photographs import PhotoFiles, has_depth, pairs_in
 from pbrs_farm.study.comparing.picture_facts import PictureFacts, facts_of
-from pbrs_farm.study.judging.judged_photographs import camera_of, has_labels_of, nyu40_of, read_pair
-from pbrs_farm.study.judging.judged_places import is_root
 from pbrs_farm.study.judging.photo_predictions import SUFFIXES, read_photograph
 from pbrs_farm.study.photographs import middle_of_form
+from pbrs_farm.study.real_frames import camera_of, has_labels_of, nyu40_of, read_pair
+from pbrs_farm.study.training.view_sources import is_root
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.views import Frame
 

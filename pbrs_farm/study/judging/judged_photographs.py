@@ -1,162 +1,31 @@
-"""Photographs with depth as views to judge normals and depth on, of ScanNet classes too. Effects: reads files.
-
-A folder of pairs in a layout of docs/selection.md, and the camera: intrinsics.json with fx, fy,
-cx, cy in pixels (depth_scale: units a metre), or intrinsics.txt with those four numbers or the
-nine of K, beside the pictures or in a folder above. The truth of normals is planes fitted to depth.
-
-ScanNet: <scene>/{color,depth,label}/NAME and the depth camera's 4 x 4, where its tools put it; depth
-is in mm, label NYU40's ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt, extrinsics;
-its depth has rotated bits. TUM RGB-D: <sequence>/{rgb.txt,depth.txt,groundtruth.txt,rgb,depth}; its cameras
-are known by the sequence's name.
-"""
+"""Photographs with depth as views to judge normals and depth on, of ScanNet classes too. Effects: reads files."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.resampling import resized_nearest
-from pbrs_farm.curate import tum_frames
-from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
-from pbrs_farm.images import array_from_png
-from pbrs_farm.regular_files import read_given, text_given
 from pbrs_farm.study.judging.evaluation import JudgedViews
-from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
-from pbrs_farm.study.tasks.classes_task import classes_of
+from pbrs_farm.study.photographs import PHOTO_TRUTHS
+from pbrs_farm.study.real_frames import real_frames
 from pbrs_farm.study.training_plan import TrainingPlan
 
-_FILES: Final = (
-    "intrinsics.json", "intrinsics.txt",
-    # ScanNet's: of its 25,000 frames, and of what its reader writes of a scan.
-    "intrinsics_depth.txt", "intrinsic_depth.txt", "intrinsic/intrinsic_depth.txt",
-    "intrinsics/intrinsic_depth.txt",
-)  # fmt: skip
-_LABEL_TRUTH: Final = "NYU40 classes of the picture's own label, where labelled"
-_LABELS: Final = "label"  # ScanNet's folder of classes, beside the pictures'
-_OF_SUN_RGBD: Final = ("extrinsics", "depth_bfx", "seg.mat")  # beside image/ and intrinsics.txt
 
-
-@dataclass(frozen=True, slots=True)
-class PhotoCamera:
-    """The pinhole camera of photographs, pixels of the stored size."""
-
-    K: tuple[float, float, float, float]  # fx, fy, cx, cy
-    depth_scale: float | None  # units a metre; None = as the file's type says
-
-    def matrix(self) -> F64:
-        """(3, 3)."""
-        fx, fy, cx, cy = self.K
-        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], np.float64)
-
-
-def pair_views(folder: Path, plan: TrainingPlan, name: str) -> JudgedViews:
+def pair_views(
+    folder: Path, plan: TrainingPlan, name: str, trained_on: frozenset[str] = frozenset()
+) -> JudgedViews:
     """Every pair below a folder, for normals and depth, of ScanNet for classes; BadInput for one without intrinsics.
 
     All are held in memory, at the plan's size of picture. BadInput also for tasks of which its files
-    say nothing.
+    say nothing, and for a photograph whose digest is in trained_on.
     """
-    pairs, has_labels = pairs_in(folder), plan.task == "segmentation"
-    if has_labels:
-        pairs = tuple(pair for pair in pairs if has_labels_of(pair))
-    if plan.task not in ("normals", "depth", "segmentation") or not pairs:
-        text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
-        raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
-    ids, colours, truths = [], [], []
-    for pair in pairs:
-        camera = camera_of(pair.rgb.parent, folder)
-        photo = read_pair(pair, camera.depth_scale)
-        colour, rows, columns = crop_to_plan(photo.rgb, plan)
-        if has_labels:
-            truth = {"labels": classes_of(nyu40_of(pair, photo), plan)}
-        else:
-            truth = photo_truth(photo, camera.matrix(), plan)
-        ids.append(pair.id)
-        colours.append(colour)
-        truths.append({key: array[rows, columns] for key, array in truth.items()})
-    said = {"normals": PLANE_TRUTH, "depth": DEPTH_TRUTH}.get(plan.task, _LABEL_TRUTH)
-    return JudgedViews(name, said, tuple(ids), np.stack(colours), tuple(truths))
-
-
-def read_pair(pair: PhotoFiles, depth_scale: float | None) -> Photo:
-    """The photograph, its depth in mm as its layout stores it; BadInput naming the file that is wrong.
-
-    depth_scale: units a metre where its camera says so.
-    """
-    return photo_from_pair(pair, depth_scale=depth_scale, sun_rgbd=_is_of_sun_rgbd(pair))
-
-
-def has_labels_of(pair: PhotoFiles) -> bool:
-    """The photograph has classes where ScanNet has them."""
-    return _label_of(pair).is_file()
-
-
-def _label_of(pair: PhotoFiles) -> Path:
-    return pair.rgb.parent.parent / _LABELS / f"{pair.rgb.stem}.png"
-
-
-def nyu40_of(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
-    """(H, W) NYU40 ids at the photograph's size, 0 = none; BadInput for a file of other labels."""
-    file = _label_of(pair)
-    stored = array_from_png(read_given(file), str(file))
-    if stored.ndim != 2 or int(stored.max(initial=0)) > 40:
-        raise BadInput(file, "", "expected one channel of NYU40 ids, 0 to 40")
-    height, width = photo.rgb.shape[:2]
-    return resized_nearest(stored.astype(np.uint8), width, height)
-
-
-def _is_of_sun_rgbd(pair: PhotoFiles) -> bool:
-    scene = pair.rgb.parent.parent
-    has_camera = (scene / "intrinsics.txt").is_file()
-    return (
-        has_camera
-        and pair.rgb.parent.name == "image"
-        and any((scene / name).exists() for name in _OF_SUN_RGBD)
-    )
-
-
-def camera_of(folder: Path, top: Path) -> PhotoCamera:
-    """The camera of photographs in a folder: the nearest intrinsics file from it up to top's parent.
-
-    folder: where the pictures lie. Raises BadInput where there is none, or one that cannot be read.
-    """
-    above = [folder, *folder.parents]
-    last = above.index(top) if top in above else 0
-    for place in above[: last + 1]:
-        for name in _FILES:
-            if (place / name).is_file():
-                return _read_camera(place / name)
-        K = tum_frames.camera_of_sequence(place)
-        if K is not None:
-            return PhotoCamera(K, None)
-    text = "photographs without intrinsics: normals cannot be taken from their depth"
-    hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
-    raise BadInput(folder, "", text, hint=hint)
-
-
-def _read_camera(path: Path) -> PhotoCamera:
-    text = text_given(path)
-    scale: float | None = None
-    try:
-        if path.suffix == ".json":
-            row = json.loads(text)
-            values = [float(row[key]) for key in ("fx", "fy", "cx", "cy")]
-            scale = float(row["depth_scale"]) if "depth_scale" in row else None
-        else:
-            values = [float(word) for word in text.replace(",", " ").split()]
-            places = {9: (0, 4, 2, 5), 16: (0, 5, 2, 6)}.get(len(values))  # of 3 x 3, of 4 x 4
-            values = values if places is None else [values[k] for k in places]
-    except (ValueError, KeyError, TypeError):
-        values = []
-    if len(values) != 4 or not np.isfinite(values).all() or min(values[:2]) <= 0:
-        raise BadInput(
-            path, "", "expected fx, fy, cx and cy in pixels, or the numbers of K, 3 x 3 or 4 x 4"
-        )
-    fx, fy, cx, cy = values
-    return PhotoCamera((fx, fy, cx, cy), scale)
+    frames = list(real_frames(folder, plan))
+    for frame in frames:
+        if frame.digest in trained_on:
+            text = "this photograph has trained, it may not judge"
+            raise BadInput(folder, frame.id, text, hint="photographs of other rooms")
+    colour = np.stack([frame.colour for frame in frames])
+    ids, truths = tuple(f.id for f in frames), tuple(f.truth for f in frames)
+    return JudgedViews(name, PHOTO_TRUTHS[plan.task], ids, colour, truths)

@@ -24,6 +24,7 @@ from pbrs_farm.study.training.view_sources import (
     credits_of,
     held_out_views,
     is_held_out,
+    is_root,
     with_layer,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -49,7 +50,7 @@ def open_judged_place(
     if path.suffix == ".mat":
         return nyu_views(path, plan, label or "NYUv2", trained_on)
     if path.is_dir() and not is_root(path):
-        return pair_views(path, plan, label or path.name)
+        return pair_views(path, plan, label or path.name, trained_on)
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)
     source = TrainingSource((place,), (own_mode or mode,), hold_out, all_there=False)
@@ -84,11 +85,6 @@ def homes_that_train(sources: Sequence[TrainingSource]) -> frozenset[str]:
         for view in open_views(place)
         if not view.ref.is_object and not is_held_out(view, source)
     )
-
-
-def is_root(path: Path) -> bool:
-    """A folder of views, an output root or shards: no photographs."""
-    return any((path / name).exists() for name in ("houses", "objects", "dataset.json"))
 
 
 def _of_homes(

@@ -20,7 +20,7 @@ from pbrs_farm.study.judging.evaluation import Trained, open_run
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
 from pbrs_farm.study.training.run_folder import RunFolder, make_folder
-from pbrs_farm.study.training.view_sources import NYU_LIGHT
+from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 from pbrs_farm.study.training_plan import plan_as_json
 
 SHIPPED: Final = Path(__file__).parents[1] / "weights"
@@ -118,13 +118,20 @@ def _seen(record: Mapping[str, Any], homes: Sequence[str]) -> str:
     n, first = record["views"]["train"], record["init_origin"].get("mode", "")
     if record["mode"] == NYU_LIGHT:
         return f"{n:,} photographs of NYU Depth v2 (Silberman et al., 2012), labelled there."
+    real = [
+        f"{len(row['pictures']):,} photographs with depth of {row['name']}"
+        + (f", {row['share']:g} of each batch" if "share" in row else "")
+        for row in record.get("photographs", ())
+    ]
+    if record["mode"] == PHOTO_LIGHT:
+        return f"{'; '.join(real)}."
     named = f"{', '.join(homes[:_MOST_HOMES])}{' and others' if len(homes) > _MOST_HOMES else ''}"
     said = f"{n:,} rendered views of {len(homes)} homes in light `{record['mode']}`: {named}."
     if first == NYU_LIGHT:
         return f"{said} The first weights saw photographs of NYU Depth v2 (Silberman et al., 2012)."
     seen = record["init_origin"].get("photographs")
     first = f"; the first weights saw {seen}" if seen else ""
-    return f"{said} No photograph was trained on{first}."
+    return f"{said} {'Beside them ' + '; '.join(real) if real else 'No photograph was trained on'}{first}."
 
 
 def _training_credits(record: Mapping[str, Any]) -> list[str]:

@@ -206,8 +206,11 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
     # Weights are stored below "model."; take what has the same name and shape.
     given = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
     fitting = {n: t for n, t in given.items() if n in own and own[n].shape == t.shape}
-    if not any(t.ndim > 1 for t in fitting.values()):
-        raise BadInput(file, "", "no weight of it fits this network", hint="the same network")
+    # Networks of other plans may share the names of a few parts.
+    if 2 * len(fitting) < len(own) or not any(t.ndim > 1 for t in fitting.values()):
+        some = f"{len(fitting)} of this network's {len(own)} tensors are in it"
+        text = some if fitting else "no weight of it fits this network"
+        raise BadInput(file, "", text, hint="the same --plan, or --set network=...")
     own.update(fitting)
     network.load_state_dict(own)
     taken = f"{len(fitting)} of {len(own)} tensors"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,14 +79,24 @@ class StreamedViews:
         self, steps: range, plan: TrainingPlan, seed: int, own: slice
     ) -> Iterator[BatchRead]:
         """The batch of each step; own: which rows of it."""
-        order = BatchOrder(len(self), plan.batch, seed, self._shards())
-        rows = (order.rows(step)[own].tolist() for step in steps)
-        options: dict[str, Any] = {"num_workers": plan.workers}
-        if plan.workers and any(view.source.url.startswith("s3:") for view, _ in self.pictures):
+        order = self.order(plan.batch, seed)
+        return self.read(order.rows(step)[own] for step in steps)
+
+    def order(self, batch: int, seed: int) -> BatchOrder:
+        """Which views each step takes; of shards few at a time."""
+        return BatchOrder(len(self), batch, seed, self._shards())
+
+    def read(self, rows: Iterable[NDArray[np.intp]]) -> Iterator[BatchRead]:
+        """Some views, by number, and the next some, read ahead by the plan's workers."""
+        numbers = (some.tolist() for some in rows)
+        options: dict[str, Any] = {"num_workers": self.plan.workers}
+        if self.plan.workers and any(
+            view.source.url.startswith("s3:") for view, _ in self.pictures
+        ):
             # S3's client does not survive a fork.
             options["multiprocessing_context"] = "spawn"
         loader = DataLoader(
-            _Pictures(self), batch_sampler=_Rows(rows), collate_fn=_stacked, **options
+            _Pictures(self), batch_sampler=_Rows(numbers), collate_fn=_stacked, **options
         )
         for ids, tensors in loader:
             yield ids, {name: tensor.numpy() for name, tensor in tensors.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
@@ -52,6 +52,14 @@ class TrainingViews(Protocol):
         """The batch of each step; own: which rows of it."""
         ...
 
+    def order(self, batch: int, seed: int) -> BatchOrder:
+        """Which views each step takes."""
+        ...
+
+    def read(self, rows: Iterable[NDArray[np.intp]]) -> Iterator[BatchRead]:
+        """Some views, by number, and the next some; none of them are empty."""
+        ...
+
 
 class BatchOrder:
     """Which views a step takes: each once in an order drawn anew each time round.
@@ -69,9 +77,13 @@ class BatchOrder:
 
     def rows(self, step: int) -> NDArray[np.intp]:
         """(batch,) numbers of views."""
-        at = np.arange(step * self._batch, (step + 1) * self._batch)
+        return self.between(step * self._batch, (step + 1) * self._batch)
+
+    def between(self, first: int, end: int) -> NDArray[np.intp]:
+        """(end - first,) numbers of the views taken so far into the run, steps of any size."""
+        at = np.arange(first, end)
         rounds = at // self._n_views
-        rows = np.empty(self._batch, np.intp)
+        rows = np.empty(len(at), np.intp)
         for k in np.unique(rounds):
             mine = rounds == k
             rows[mine] = self._order_of(int(k))[at[mine] % self._n_views]
@@ -134,10 +146,16 @@ class ViewArrays:
         self, steps: range, plan: TrainingPlan, seed: int, own: slice
     ) -> Iterator[BatchRead]:
         """The batch of each step; own: which rows of it."""
-        order = BatchOrder(len(self), plan.batch, seed)
-        for step in steps:
-            rows = order.rows(step)[own]
-            yield [self.ids[k] for k in rows], self.rows(rows)
+        order = self.order(plan.batch, seed)
+        return self.read(order.rows(step)[own] for step in steps)
+
+    def order(self, batch: int, seed: int) -> BatchOrder:
+        """Which views each step takes."""
+        return BatchOrder(len(self), batch, seed)
+
+    def read(self, rows: Iterable[NDArray[np.intp]]) -> Iterator[BatchRead]:
+        """Some views, by number, and the next some."""
+        return (([self.ids[k] for k in some], self.rows(some)) for some in rows)
 
     def digest(self) -> str:
         """First 16 hex of the sha256 over the ids and the pixels: what a run goes on with."""
@@ -145,6 +163,17 @@ class ViewArrays:
         for array in (self.colour, *self.targets.values()):
             sha.update(np.ascontiguousarray(array).view(np.uint8).data)
         return sha.hexdigest()[:16]
+
+
+def joined(parts: Sequence[ViewArrays]) -> ViewArrays:
+    """The views of one or more sets of one task and size, one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    targets = {
+        name: np.concatenate([one.targets[name] for one in parts]) for name in parts[0].targets
+    }
+    ids = tuple(at for one in parts for at in one.ids)
+    return ViewArrays(ids, np.concatenate([one.colour for one in parts]), targets)
 
 
 def arrays_of_samples(samples: Iterable[Sample], task: StudyTask, plan: TrainingPlan) -> ViewArrays:

@@ -5,25 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house_split import home_of
+from pbrs_farm.core.house_split import home_of, split_of_house
+from pbrs_farm.curate.photographs import has_depth
 from pbrs_farm.study.tasks.tasks import task_of
+from pbrs_farm.study.training.mixed_views import MixedViews
+from pbrs_farm.study.training.photograph_views import Mix, Photographs, id_of, photographs_of
 from pbrs_farm.study.training.streamed_views import Picture, StreamedViews
 from pbrs_farm.study.training.training_views import (
     TrainingViews,
     ViewArrays,
     arrays_of_sample,
     arrays_of_samples,
+    joined,
 )
 from pbrs_farm.study.training_plan import TrainingPlan
+from pbrs_farm.views.hypersim_folder import is_hypersim
 from pbrs_farm.views.open_views import open_views
 from pbrs_farm.views.view_sample import SampleRequest
 from pbrs_farm.views.views import Frame, Views
 
 T = TypeVar("T")
-NYU_LIGHT: Final = "nyuv2"  # what a run's record calls the light of photographs
+NYU_LIGHT: Final = "nyuv2"  # what a run's record calls the light of NYUv2's photographs
+PHOTO_LIGHT: Final = "photographs"  # and that of others
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +41,8 @@ class TrainingSource:
     val and test (a fifth of the homes). all_there: a name of hold_out that no place has is an error;
     where several sources are compared, another one may have it. beside: layers that are read
     beside the task's. objects: models without context instead of rooms. most: at
-    most so many training views, spread over all; 0 = all.
+    most so many training views, spread over all; 0 = all. mix: photographs with depth that have a
+    share of each batch.
     """
 
     places: tuple[str, ...]
@@ -45,6 +52,7 @@ class TrainingSource:
     most: int = 0
     all_there: bool = True
     beside: tuple[str, ...] = ()
+    mix: tuple[Mix, ...] = ()
 
     @property
     def name(self) -> str:
@@ -57,18 +65,52 @@ class TrainingSource:
         return any(place.endswith(".mat") for place in self.places)
 
     @property
+    def is_photographs(self) -> bool:
+        """Folders of photographs with depth instead of views."""
+        folders = (Path(place) for place in self.places)
+        return any(path.is_dir() and not is_root(path) and has_depth(path) for path in folders)
+
+    @property
     def light(self) -> str:
         """What a record calls the pictures' light."""
-        return NYU_LIGHT if self.is_nyu else "+".join(self.modes)
+        if self.is_nyu:
+            return NYU_LIGHT
+        return PHOTO_LIGHT if self.is_photographs else "+".join(self.modes)
 
 
 def training_views(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
     """The views that train: in memory, or streamed where they take more than plan.memory_gb.
 
-    Raises BadInput where there is none.
+    With source.mix, photographs have their share of each batch. Raises BadInput where there is none.
     """
+    views = _rendered_or_real(source, plan)
+    if not source.mix:
+        return views
+    if sum(mix.share for mix in source.mix) >= 1:
+        text = "the shares leave nothing to the views: together below 1"
+        raise BadInput("--mix", ", ".join(mix.place for mix in source.mix), text)
+    parts = [photographs_of(Path(mix.place), plan, mix.most) for mix in source.mix]
+    photographs = tuple(
+        (part.views(plan), mix.share) for part, mix in zip(parts, source.mix, strict=True)
+    )
+    return MixedViews(views, photographs)
+
+
+def photographs_that_train(source: TrainingSource, plan: TrainingPlan) -> list[dict[str, Any]]:
+    """What a run's record says of the photographs with depth it trains on: their folders and digests."""
+    found = _real(source, plan, held_out=False) if source.is_photographs else []
+    mixed = [photographs_of(Path(mix.place), plan, mix.most) for mix in source.mix]
+    rows = [one.record() for one in found]
+    return rows + [
+        one.record() | {"share": mix.share} for one, mix in zip(mixed, source.mix, strict=True)
+    ]
+
+
+def _rendered_or_real(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
     if source.is_nyu:
         return _nyu_views(source, plan, "train", source.most)
+    if source.is_photographs:
+        return _real_views(source, plan, held_out=False)
     pictures = _pictures(source, plan, held_out=False, most=source.most)
     if not pictures:
         text = "no view to train on: all its homes are held out"
@@ -85,6 +127,9 @@ def held_out_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) ->
     """
     if source.is_nyu:
         return _nyu_views(source, plan, "test", most)
+    if source.is_photographs:
+        held = _real(source, plan, held_out=True)
+        return _real_views(source, plan, held_out=True).some(most or 10**9) if held else None
     pictures = _pictures(source, plan, held_out=True, most=most)
     if not pictures:
         return None
@@ -100,7 +145,7 @@ def all_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> View
 def credits_of(source: TrainingSource, homes: Sequence[str]) -> tuple[str, ...]:
     """The lines that everything made of these homes must carry, each once."""
     lines: dict[str, None] = {}
-    for place in () if source.is_nyu else source.places:
+    for place in () if source.is_nyu or source.is_photographs else source.places:
         views = open_views(place)
         credits_of_homes = getattr(views.source, "credits", None)
         own = set(views.homes)
@@ -112,7 +157,7 @@ def credits_of(source: TrainingSource, homes: Sequence[str]) -> tuple[str, ...]:
 
 def left_out(source: TrainingSource, plan: TrainingPlan) -> dict[str, str]:
     """id -> why, of views that lack what the plan's task needs, or that a run has begun only."""
-    if source.is_nyu:
+    if source.is_nyu or source.is_photographs:
         return {}
     lacking: dict[str, str] = {}
     for place in source.places:
@@ -132,6 +177,42 @@ def with_layer(source: TrainingSource, plan: TrainingPlan, layer: str) -> Traini
     except BadInput:  # no view has it
         return source
     return source if lacks else more
+
+
+def is_root(path: Path) -> bool:
+    """A folder of views, an output root, shards or Hypersim's scenes: no photographs."""
+    has = any((path / name).exists() for name in ("houses", "objects", "dataset.json"))
+    return has or is_hypersim(path)
+
+
+def _real(source: TrainingSource, plan: TrainingPlan, *, held_out: bool) -> list[Photographs]:
+    """Photographs of the source's folders whose scenes train, or are held out; a folder without is left out."""
+    found = []
+    for place in source.places:
+        whole = photographs_of(Path(place), plan)
+        pairs = tuple(
+            pair for pair in whole.pairs
+            if _is_held_out(id_of(pair, whole.folder).partition("/")[0], source) == held_out
+        )  # fmt: skip
+        found += [replace(whole, pairs=pairs)] if pairs else []
+    if held_out or not source.most:
+        return found
+    each = -(-source.most // max(len(found), 1))
+    return [replace(one, pairs=tuple(_spread(one.pairs, each))) for one in found]
+
+
+def _is_held_out(scene: str, source: TrainingSource) -> bool:
+    if source.hold_out is not None:
+        return scene in source.hold_out
+    return split_of_house(scene) != "train"
+
+
+def _real_views(source: TrainingSource, plan: TrainingPlan, *, held_out: bool) -> ViewArrays:
+    found = _real(source, plan, held_out=held_out)
+    if not found:
+        text = "no photograph to train on: all its scenes are held out"
+        raise BadInput(source.name, "", text, hint="--hold-out SCENE..., or --hold-out none")
+    return joined([one.views(plan) for one in found])
 
 
 def missing_of(source: TrainingSource) -> list[str]:

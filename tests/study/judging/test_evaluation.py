@@ -15,13 +15,13 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
 from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text
-from pbrs_farm.study.judging.judged_photographs import camera_of
 from pbrs_farm.study.judging.judged_places import open_judged_place
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
 from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import crop_to_plan
+from pbrs_farm.study.real_frames import camera_of
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
