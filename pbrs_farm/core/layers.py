@@ -220,8 +220,8 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     Layer(
         "radiance",
         "radiance.exr",
-        "outdoor.{R,G,B} indoor.{R,G,B} albedo.{R,G,B} normal.{X,Y,Z}; --groups lamps: lamp<N>.{R,G,B};"
-        " --layers shading: diffuse_{outdoor,indoor,albedo,lamp<N>}.{R,G,B}",
+        "outdoor.RGB indoor.RGB albedo.RGB normal.XYZ, a channel a letter; --groups lamps: lampN.RGB;"
+        " --layers shading: all but the normal also with diffuse_ before their names",
         "float32",
         "W m-2 sr-1, linear sRGB primaries; albedo 0..1; normal: the pixel's mean, world, guides the denoiser",
         "-",

@@ -15,7 +15,7 @@ import pytest
 
 import pbrs_farm
 from benchmarks.docs_figures import commits_named, dates_named, sentences, word_count
-from benchmarks.manual_pages import manual_pages
+from benchmarks.manual_pages import manual_pages, without_code
 from pbrs_farm.cli import MODULES, build_parser
 from pbrs_farm.commands.arguments import recipe_of
 from pbrs_farm.core.recipe import Recipe, field_paths
@@ -49,6 +49,25 @@ def commands(page: Path) -> Iterator[list[str]]:
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_fenced_block_says_how_its_commands_are_run(page: Path) -> None:
     assert [f"{b.name} {fault}" for b in blocks_of(page) for fault in b.faults()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_command_stands_in_a_block_by_indent_which_no_test_runs(page: Path) -> None:
+    text = without_code(page.read_text(encoding="utf-8"))
+    assert re.findall(r"^    (?:\S*/)?pbrs-farm .*", text, re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
+def test_no_word_of_a_page_is_taken_for_html_and_so_not_shown(page: Path) -> None:
+    text = re.sub(
+        r"<!--.*?-->|``.*?``|`[^`]*`",
+        "",
+        without_code(page.read_text(encoding="utf-8")),
+        flags=re.S,
+    )
+    assert [
+        t for t in re.findall(r"</?[A-Za-z][^>\n]*>", text) if t not in ("<br>", "<sub>", "</sub>")
+    ] == []
 
 
 def test_a_block_without_a_mark_or_with_a_wrong_one_is_told() -> None:
