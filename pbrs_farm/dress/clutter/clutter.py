@@ -153,7 +153,7 @@ def _dress_seat(placing: Placing, scene: SceneTriangles, index: int, item: Item)
         if width > 1.2 and placing.rng.random() < _THROWN * mess * placing.share:
             lay_throw(placing, scene, index)
         else:
-            dress_seat(placing, scene, index, 4 if width > 1.5 else 2)
+            dress_seat(placing, scene, index, 6 if width > 1.8 else 4 if width > 1.5 else 2)
     elif width < _SEAT_M and kind is RoomKind.BEDROOM and placing.rng.random() < mess:
         seat = find_seat(scene, index, placing.room.floor_y)
         if seat is not None:

@@ -23,7 +23,7 @@ from pbrs_farm.dress.style import (
 )
 from pbrs_farm.dress.textures.families import SEEDS, Pattern
 from pbrs_farm.dress.textures.panelling import PANELS_M
-from pbrs_farm.dress.textures.wallpaper import inks
+from pbrs_farm.dress.textures.wallpaper import PATTERNS, inks
 from pbrs_farm.home.room_use import RoomKind
 
 _T = TypeVar("_T")
@@ -31,6 +31,7 @@ _TILED_FLOORS = (RoomKind.BATHROOM, RoomKind.KITCHEN)
 WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
 _MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
 _DIRT = rgb("b9b5ac")
+_PRINTED_CARPETS = 0.35  # share of carpets with a pattern
 _ALL_WALLS = 0.35  # of covers for one wall or all, the share that is on all
 
 
@@ -263,6 +264,10 @@ def _wood_floor(rng: np.random.Generator, style: Style, name: str) -> Floor:
 
 def _carpet(rng: np.random.Generator, style: Style) -> Floor:
     tint = mix(style.textiles[int(rng.integers(2))], rgb("a89c8a"), 0.45)
+    if rng.random() < _PRINTED_CARPETS:
+        second = style.textiles[int(rng.integers(len(style.textiles)))]
+        tints = (tint, mix(tint, second, 0.75), mix(style.accent, tint, 0.3))
+        return Floor(Pattern("printed carpet", _seed(rng), tints, variant=_pick(rng, PATTERNS)))
     return Floor(Pattern(_pick(rng, ("carpet", "carpet", "loop carpet")), _seed(rng), (tint,)))
 
 

@@ -30,7 +30,15 @@ _FROM_FLOOR_M = 0.015
 _OVER_WINDOW_M = 0.12  # height of the rod above the opening
 _UNDER_CEILING_M = 0.05
 _HIGH_SILL_M = 1.25
-_BESIDE_M = 0.48  # greatest width of wall that a panel covers beside a window
+_BESIDE_M = (
+    0.48,
+    0.34,
+    0.25,
+    0.17,
+    0.12,
+    0.07,
+)  # widths of wall that a panel covers beside a window
+_DRAPED_M = (2.0, 1.5, 1.1, 0.8, 0.6)  # the same of one that covers as much of the wall as is free
 _MOST_OUT_M = 0.2  # greatest distance of the rod from the wall
 _OVER_THINGS_M = 0.4  # a short panel ends at least this far above what stands below it
 _ROD_M = 0.012  # its radius
@@ -115,7 +123,8 @@ def hang_curtains(
     asked anew.
     """
     window = seen.window
-    rod_y = min(window.top_y + _OVER_WINDOW_M, seen.ceiling_y - _UNDER_CEILING_M)
+    highest = seen.ceiling_y - _UNDER_CEILING_M
+    rod_y = highest if cloth.is_draped else min(window.top_y + _OVER_WINDOW_M, highest)
     depth = float(rng.uniform(0.026, 0.038))
     rod_z = max(seen.sticks_out_m + 1.3 * depth + 0.015, 0.075)
     if rod_y < window.top_y + 0.02 or rod_z > _MOST_OUT_M:
@@ -123,9 +132,10 @@ def hang_curtains(
         return False
     out = rod_z + 1.4 * depth
     panels = []
-    cover = float(rng.uniform(0.15, 0.25)) * window.width
+    cover = float(rng.uniform(0.15, 0.25)) * window.width * (1.5 if cloth.is_draped else 1.0)
     for sign in (-1, 1):
-        found = _panel_place(space, room, seen, sign, cover, rod_y, out, house)
+        widths = _DRAPED_M + _BESIDE_M if cloth.is_draped else _BESIDE_M
+        found = _panel_place(space, room, seen, sign, (cover, widths), rod_y, out, house)
         if found is not None:
             panels.append(found)
     # One panel alone looks as if the other had been stolen.
@@ -140,17 +150,21 @@ def hang_curtains(
 
 
 def _panel_place(
-    space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int, cover: float, rod_y: float,
-    out: float, house: MutableHouse,
+    space: HouseSpace, room: RoomSpace, seen: WindowSide, sign: int,
+    spans: tuple[float, Sequence[float]], rod_y: float, out: float, house: MutableHouse,
 ) -> tuple[float, float, float] | None:  # fmt: skip
-    """x0, x1 across and the lowest y of a panel at one end of the window; None = no room."""
+    """x0, x1 across and the lowest y of a panel at one end of the window; None = no room.
+
+    spans: how much of the window it covers, and widths of wall beside it, tried in this order.
+    """
+    cover, widths = spans
     half = seen.window.width / 2
     sill = seen.window.bottom_y
     without = [n for n, i in enumerate(house.items) if i.kind is ItemKind.WINDOW]
     heaters = [n for n, i in enumerate(house.items) if words_of_item(i) & RADIATORS]
     free = shapely.difference(room.area, room.walls)
     swept = [s for n in room.items for s in swept_by_item(house.items[n])]
-    for beyond in (_BESIDE_M, 0.34, 0.25, 0.17, 0.12, 0.07):
+    for beyond in widths:
         inner, outer = sign * (half - cover), sign * (half + beyond)
         x0, x1 = min(inner, outer), max(inner, outer)
         corner = seen.origin + seen.along * (outer + sign * 0.04) + seen.inward * out / 2
@@ -209,6 +223,7 @@ class Cloth:
     tile_m: float
     fold_m: float
     rod: Material
+    is_draped: bool = False  # from the ceiling down, over as much of the wall as is free
 
 
 def room_cloth(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Place
@@ -22,6 +24,14 @@ from pbrs_farm.home.room_use import RoomKind
 
 PASS = "textiles"
 _RAIL_M = 1.25  # height of a towel rail above the floor
+_DRAPED = 0.4  # share of rooms with curtains from the ceiling down, along the wall
+_DRAPED_ROOMS = (
+    RoomKind.LIVING,
+    RoomKind.DINING,
+    RoomKind.BEDROOM,
+    RoomKind.OFFICE,
+    RoomKind.OTHER,
+)
 _FAR_M = 2.5  # greatest distance of a towel from the basin
 
 
@@ -116,6 +126,9 @@ def _dress_windows(
     curtains = rng.random() < WANTS[room.kind].curtains * share
     blinds = rng.random() < WANTS[room.kind].blinds * share
     cloth = room_cloth(house, style, room, rng) if curtains else None
+    is_draped = house.rng(PASS, room.room.id, "draped").random() < _DRAPED
+    if cloth is not None and is_draped and room.kind in _DRAPED_ROOMS:
+        cloth = replace(cloth, is_draped=True)
     look = int(rng.integers(1 << 30))
     for window in room.windows:
         # Inner windows between two rooms stay bare.

@@ -56,7 +56,12 @@ from pbrs_farm.dress.textures.planks import (
     plank_maps,
     rows_of_planks,
 )
-from pbrs_farm.dress.textures.wallpaper import WIDTH_M, wallpaper_maps
+from pbrs_farm.dress.textures.wallpaper import (
+    PATTERNS,
+    WIDTH_M,
+    printed_carpet_maps,
+    wallpaper_maps,
+)
 
 SEEDS: Final = 8
 """Of how many seeds a home draws one: patterns of other homes come again, and are painted once."""
@@ -70,7 +75,7 @@ _SIZE_M: Final = {
     "chevron": _FLOOR_M, "marble": (2.4, 2.4), "terracotta": _FLOOR_M, "brick": _FLOOR_M,
     "painted brick": _FLOOR_M, "paint": (1.0, 1.0), "plaster": _FLOOR_M,
     "smooth plaster": _FLOOR_M, "concrete": _FLOOR_M, "carpet": (1.0, 1.0),
-    "loop carpet": (0.64, 0.64), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
+    "loop carpet": (0.64, 0.64), "printed carpet": (0.8, 0.8), "wallpaper": (WIDTH_M, WIDTH_M), "grain": (1.0, 1.0),
     "weave": (0.25, 0.25), "twill": (0.25, 0.25), "leather": (0.3, 0.3),
     "upright boards": (1.2, 1.2), "level boards": (1.2, 1.2), "wall planks": (1.6, 1.6),
     "slats": (1.2, 1.2),
@@ -338,6 +343,13 @@ FAMILIES: dict[str, _Painter] = {
         r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=True
     ),
     "wallpaper": _wallpaper,
+    "printed carpet": lambda r, p: printed_carpet_maps(
+        r,
+        pixels_of(size_of(p)),
+        size_of(p),
+        p.variant if p.variant in PATTERNS else PATTERNS[0],
+        (p.tints[0], p.tints[1], p.tints[2]),
+    ),
     "grain": lambda r, p: grain_maps(r, p.wood, edge_px=pixels_of(size_of(p))[0]),
     "weave": lambda r, p: _woven_cloth(r, p, twill=False),
     "twill": lambda r, p: _woven_cloth(r, p, twill=True),

@@ -35,6 +35,21 @@ def wallpaper_maps(
     return surface_maps(colour, 0.8, height, size_m, 0.0)
 
 
+def printed_carpet_maps(
+    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], pattern: str,
+    tints: tuple[Rgb, Rgb, Rgb],
+) -> SurfaceMaps:  # fmt: skip
+    """Cut pile in the colours of a wallpaper's pattern, as large as size_m: ground, print, accent."""
+    masks = _DRAWN[pattern](rng, shape)
+    pile = noise(rng, shape, slope=0.3, band=(size_m[0] * 40, 1e9))
+    fleck = noise(rng, shape, slope=0.6)
+    colour = np.broadcast_to(np.array(tints[0], np.float32), (*shape, 3)).copy()
+    for mask, ink in zip(masks, (tints[1], tints[2], mix(tints[0], tints[1], 0.5)), strict=False):
+        colour += mask[..., None] * (np.array(ink, np.float32) - colour)
+    colour *= (1.0 + 0.075 * pile + 0.04 * fleck)[..., None]
+    return surface_maps(colour, 1.0, np.asarray(0.0009 * pile, np.float32), size_m, 0.0)
+
+
 def inks(rng: np.random.Generator, ground: Rgb, accent: Rgb) -> tuple[Rgb, Rgb]:
     """Print colours that go with a ground: mostly tone in tone, sometimes with the accent."""
     strength = rng.uniform(0.86, 0.95)

@@ -14,8 +14,8 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, SHELVES, WHITEBOARD
-from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z
+from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, PAPER, SHELVES, WHITEBOARD
+from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.things.bodies import box, cylinder, revolve, slab, smooth
@@ -23,8 +23,10 @@ from pbrs_farm.dress.things.joints import hollow, opens, shelves
 from pbrs_farm.dress.things.maker import Maker, Pair, thing
 from pbrs_farm.dress.things.materials import MIRROR_GLASS, plain
 from pbrs_farm.dress.things.outlines import Profile, spaced
+from pbrs_farm.dress.things.papers import printed, white_paper
 from pbrs_farm.geometry.solids import lathe, quads_surface
 
+_STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6), (0.55, 0.8, 0.93))  # fmt: skip
 # Turns what stands upright so that its top looks along +z.
 _LYING: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -275,6 +277,27 @@ def pin_board(m: Maker, width: float, height: float, frame: Material) -> None:
                     of=plain("print", (0.45, 0.45, 0.47), 0.8))  # fmt: skip
             m.add(slab((x - 0.005, y + h / 2 - 0.012, 0.0108),
                 (x + 0.005, y + h / 2 - 0.002, 0.016)), of=plain("pin", m.any_colour(), 0.3))  # fmt: skip
+
+
+@thing(group="notes", nyu40=PAPER, place=Place.WALL)
+def wall_notes(m: Maker) -> None:
+    """Sheets, cards and sticky notes taped to a wall beside one another, none quite straight."""
+    columns, rows, z = m.integers(1, 4), m.integers(1, 4), 0.0
+    for column in range(columns):
+        for row in range(rows):
+            if column + row and m.chance(0.25):
+                continue
+            x, y = (column - (columns - 1) / 2) * 0.25, 0.17 + 0.33 * row
+            with m.moved(turn=rotation_z(m.normal(0, 0.03)), at=(x + m.normal(0, 0.012), y, 0.0)):
+                if m.chance(0.3):
+                    for k in range(m.integers(2, 5)):
+                        with m.moved(at=(0.085 * (k % 2) - 0.04, 0.09 * (k // 2) - 0.05, 0.0)):
+                            printed(m, 0.075, 0.075, z, plain("sticky note", m.pick(*_STICKY), 0.8))
+                else:
+                    w, h = m.pick((0.21, 0.297), (0.21, 0.297), (0.148, 0.21), (0.13, 0.18))
+                    printed(m, w, h, z, white_paper(m))
+                    m.add(slab((-0.02, h / 2 - 0.012, z + 0.0006), (0.02, h / 2 + 0.01, z + 0.0008)),
+                        of=plain("tape", (0.86, 0.83, 0.72), 0.5))  # fmt: skip
 
 
 @thing(group="clothes", nyu40=CLOTHES, place=Place.WALL)

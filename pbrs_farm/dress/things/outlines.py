@@ -49,6 +49,21 @@ def fluted(w: float, ribs: int, depth: float) -> list[tuple[float, float]]:
     return [(float(a * np.cos(b)), float(-a * np.sin(b))) for a, b in zip(r, t, strict=True)]
 
 
+def gathered(w: float, d: float, fold: float, deep: float) -> list[tuple[float, float]]:
+    """A rectangle w by d whose sides go in and out by `deep`, a fold about so long: cloth that is gathered."""
+    found = []
+    for (x, z), (dx, dz), side in (
+        ((-w / 2, d / 2), (1.0, 0.0), w), ((w / 2, d / 2), (0.0, -1.0), d),
+        ((w / 2, -d / 2), (-1.0, 0.0), w), ((-w / 2, -d / 2), (0.0, 1.0), d),
+    ):  # fmt: skip
+        n = 2 * max(2, round(side / fold))
+        for k in range(n):
+            # In and out by turns; outwards is to the right of the way round.
+            out, s = deep * (1.0 if k % 2 else -1.0), side * k / n
+            found.append((x + dx * s - dz * out, z + dz * s + dx * out))
+    return found
+
+
 def d_shape(
     w: float, d: float, *, back: float = 0.0, share: float = 0.6, r: float = 0.01, n: int = 16
 ) -> list[tuple[float, float]]:

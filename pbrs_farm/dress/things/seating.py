@@ -37,7 +37,26 @@ from pbrs_farm.dress.things.materials import (
     glossy,
     plain,
 )
-from pbrs_farm.dress.things.outlines import bent, oval, rect, rings
+from pbrs_farm.dress.things.outlines import bent, gathered, oval, rect, rings
+
+
+@thing(group="ottoman", nyu40=CHAIR, place=Place.FLOOR)
+def ottoman(m: Maker) -> None:
+    """A square seat without a back: on feet, in a skirt, or a box; buttons on some."""
+    w, d, h = m.uniform(0.45, 0.85), m.uniform(0.42, 0.55), m.uniform(0.36, 0.44)
+    form = m.weighted(0.4, 0.35, 0.25)
+    low = 0.03 if form == 2 else m.uniform(0.1, 0.16)
+    with m.of(m.cloth()):
+        m.add(rounded((-w / 2 + 0.006, low, -d / 2 + 0.006), (w / 2 - 0.006, h - 0.08, d / 2 - 0.006),
+            0.02, n=1))  # fmt: skip
+        m.add(bulged((w, 0.13, d), n=10, edge=0.7, bulge=5.0), at=(0.0, h - 0.065, 0.0))
+        if form == 1:
+            skirt(m, w, d, low + 0.06)
+        if m.chance(0.4):
+            for x, z in product((-0.22, 0.0, 0.22), (-0.2, 0.2)):
+                m.add(sphere((x * w, h - 0.004, z * d), 0.011, n=6))
+    four_legs(m, m.pick("tapered", "bun", "square"), w, d, low + 0.004, 0.045, 0.06, 0.0,
+        m.pick(m.timber, m.dark_timber, BLACK_STEEL))  # fmt: skip
 
 
 @thing(group="stool", nyu40=CHAIR, place=Place.FLOOR)
@@ -78,7 +97,14 @@ def seat_legs(m: Maker, kind: str, w: float, d: float, high: float, material: Ma
         leg(m, kind, (0.0, 0.0), (0.0, 0.0), high + 0.002, 0.05, material)
 
 
-@family(group="sofa", nyu40=SOFA, place=Place.FLOOR, variants=40,
+def skirt(m: Maker, w: float, d: float, high: float) -> None:
+    """Cloth round what is w by d, from `high` almost down to the floor, in folds that open downwards."""
+    fold, deep = m.uniform(0.1, 0.16), m.pick(0.003, 0.006, 0.009)
+    m.add(loft([(gathered(w + 0.012, d + 0.012, fold, deep), 0.012),
+        (gathered(w + 0.012, d + 0.012, fold, 0.3 * deep), high)], sharp=80.0))  # fmt: skip
+
+
+@family(group="sofa", nyu40=SOFA, place=Place.FLOOR, variants=56,
     size=lambda m: (m.pick(1.45, 1.6, 1.7, 1.85, 1.95, 2.1, 2.2), m.uniform(0.82, 0.98),
     m.uniform(0.74, 0.88)))  # fmt: skip
 def sofa(m: Maker, size: Size) -> None:
@@ -155,6 +181,10 @@ def sofa(m: Maker, size: Size) -> None:
                     for z in (-hd + 0.06, hd - 0.1):
                         m.add(bevelled(((a + b) / 2 - 0.02, low * 0.5, z),
                             ((a + b) / 2 + 0.02, ah - 0.034, z + 0.045), 0.004), of=m.timber)  # fmt: skip
+    # A skirt hides the feet, and what is under it.
+    if arm != "wood" and feet in ("plinth", "bun", "square") and m.chance(0.5):
+        with m.of(material):
+            skirt(m, w, d, base + 0.03)
     # A throw over one arm.
     if arm in ("box", "round", "low") and m.chance(0.2):
         s, other = (m.pick(-1.0, 1.0), plain("fabric throw",
@@ -475,3 +505,85 @@ def hall_bench(m: Maker, size: Size) -> None:
                     hd - 0.0495, m.pick([("drawer",), ("drawer",)], [("door",), ("door",)],
                     [("flap",)]), False, Inside(-hd + 0.008))  # fmt: skip
             m.add(rounded((-hw, h - 0.05, -hd), (hw, h, hd), 0.02, n=2), of=soft)
+
+
+@family(group="office_chair", nyu40=CHAIR, place=Place.FLOOR, called="office_chair", variants=28,
+    size=lambda m: (m.uniform(0.58, 0.66), m.uniform(0.58, 0.66), m.uniform(0.86, 1.14)))  # fmt: skip
+def swivel_chair(m: Maker, size: Size) -> None:
+    """A chair that turns, on five arms with castors: a seat, a back of cloth or slats, armrests on some."""
+    w, d, h = size
+    r, seat = min(w, d) / 2 - 0.02, m.uniform(0.45, 0.5)
+    black = plain(
+        "office plastic", m.pick((0.05, 0.05, 0.05), (0.05, 0.05, 0.05), (0.75, 0.75, 0.75)), 0.5
+    )
+    star = m.pick(black, black, CHROME, STEEL)
+    cover = m.pick(
+        plain("fabric", (0.07, 0.07, 0.08), 0.95),
+        plain("fabric", (0.25, 0.26, 0.28), 0.95),
+        m.cloth(),
+    )
+    for k in range(5):
+        a = pi / 2 + 2 * pi * k / 5
+        x, z = cos(a), sin(a)
+        m.add(
+            tube([(0.03 * x, 0.1, 0.03 * z), (r * x, 0.07, r * z)], 0.02, n=8, end=0.013), of=star
+        )
+        for s in (-0.011, 0.011):
+            m.add(tube([(r * x - z * (s - 0.008), 0.028, r * z + x * (s - 0.008)),
+                (r * x - z * (s + 0.008), 0.028, r * z + x * (s + 0.008))], 0.028, n=10), of=black)  # fmt: skip
+        m.add(tube([(r * x, 0.05, r * z), (r * x, 0.075, r * z)], 0.008, n=6), of=black)
+    m.add(revolve([(0.0, 0.07), (0.034, 0.07), (0.034, 0.2), (0.022, 0.205), (0.022, seat - 0.08),
+        (0.09, seat - 0.075), (0.09, seat - 0.055), (0.0, seat - 0.055)], n=14), of=star)  # fmt: skip
+    wide = 0.82 * w
+    m.add(rounded((-wide / 2, seat - 0.06, -0.24), (wide / 2, seat, 0.26), 0.028, n=2), of=cover)
+    # A bar behind carries the back, which leans.
+    m.add(tube(bent([(0.0, seat - 0.065, -0.1), (0.0, seat - 0.07, -0.25), (0.0, seat + 0.2, -0.29)],
+        0.06, n=3), 0.018, n=8), of=black)  # fmt: skip
+    tall = h - seat - 0.06
+    with m.moved(turn=rotation_x(-0.12), at=(0.0, seat + 0.06, -0.25)):
+        match m.weighted(0.5, 0.3, 0.2):
+            case 0:
+                m.add(
+                    rounded((-0.45 * wide, 0.0, -0.03), (0.45 * wide, tall, 0.025), 0.025, n=2),
+                    of=cover,
+                )
+            case 1:  # a net in a frame
+                t = 0.018
+                with m.of(black):
+                    m.add(
+                        rounded((-0.47 * wide, 0.0, -t), (-0.47 * wide + 0.03, tall, t), 0.012, n=1)
+                    )
+                    m.add(
+                        rounded((0.47 * wide - 0.03, 0.0, -t), (0.47 * wide, tall, t), 0.012, n=1)
+                    )
+                    m.add(
+                        rounded((-0.47 * wide, tall - 0.03, -t), (0.47 * wide, tall, t), 0.012, n=1)
+                    )
+                    m.add(rounded((-0.47 * wide, 0.0, -t), (0.47 * wide, 0.03, t), 0.012, n=1))
+                m.add(
+                    slab((-0.46 * wide, 0.015, -0.003), (0.46 * wide, tall - 0.015, 0.003)),
+                    of=cover,
+                )
+            case 2:
+                for k in range(3):
+                    y = tall * (0.1 + 0.3 * k)
+                    m.add(
+                        rounded(
+                            (-0.45 * wide, y, -0.02),
+                            (0.45 * wide, y + 0.26 * tall, 0.02),
+                            0.018,
+                            n=1,
+                        ),
+                        of=cover,
+                    )
+    if m.chance(0.6):
+        for s in (-1.0, 1.0):
+            x = s * (wide / 2 + 0.015)
+            m.add(tube(bent([(s * wide * 0.3, seat - 0.065, 0.0), (x, seat - 0.06, 0.0), (x, seat + 0.2, 0.0)],
+                0.03, n=3), 0.013, n=8), of=black)  # fmt: skip
+            m.add(
+                rounded(
+                    (x - 0.032, seat + 0.19, -0.12), (x + 0.032, seat + 0.215, 0.14), 0.011, n=1
+                ),
+                of=black,
+            )

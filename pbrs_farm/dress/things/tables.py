@@ -130,7 +130,7 @@ def top_of(m: Maker, kind: str, w: float, d: float, low: float, high: float,
 
 
 @family(group="dining_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
-    size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8), (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95)), m.uniform(0.73, 0.77)))  # fmt: skip
+    size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8), (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95), (2.2, 1.0)), m.uniform(0.73, 0.77)))  # fmt: skip
 def dining_table(m: Maker, size: Size) -> None:
     """A table for two to eight: square, long, round or oval on legs, frames, trestles or one foot."""
     w, d, h = size

@@ -16,10 +16,12 @@ from pbrs_farm.dress.things import (
     clothes,
     cups,
     desk_things,
+    floor_things,
     food,
     frames_and_candles,
     glasses,
     ornaments,
+    papers,
     seating,
     soft,
     tableware,
@@ -30,8 +32,8 @@ from pbrs_farm.dress.things.maker import Thing, described_in
 
 THINGS: Final[Mapping[str, Thing[[]]]] = described_in(
     (
-        appliances, bath_things, bins, bottles, bowls, boxes, clocks, clothes, cups, desk_things, food,
-        frames_and_candles, glasses, ornaments, seating, soft, tableware, toys, vases,
+        appliances, bath_things, bins, bottles, bowls, boxes, clocks, clothes, cups, desk_things,
+        floor_things, food, frames_and_candles, glasses, ornaments, papers, seating, soft, tableware, toys, vases,
     ),
     Thing,
 )  # fmt: skip

@@ -70,6 +70,14 @@ def _tall_mirror(hanging: Hanging, rng: np.random.Generator, style: Style) -> No
     hang_anywhere(hanging, made, low, 0.4, rng)
 
 
+def hang_notes(hanging: Hanging, style: Style, share: float) -> None:
+    """Sheets and sticky notes on a free wall."""
+    rng = hanging.house.rng("notes", hanging.room.room.id)
+    if rng.random() < WANTS[hanging.room.kind].notes * share:
+        low_m = float(rng.uniform(0.95, 1.25))
+        hang_anywhere(hanging, hung_furniture.wall_notes.make(rng, style), low_m, 0.3, rng)
+
+
 def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     """A clock in some kitchens, living rooms and studies."""
     rng = hanging.house.rng("clock", hanging.room.room.id)

@@ -14,7 +14,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.things import hung as hung_furniture
-from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors
+from pbrs_farm.dress.walls.fittings import fit_switches, hang_clock, hang_mirrors, hang_notes
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.kitchens import hang_kitchen
 from pbrs_farm.dress.walls.pictures import Gallery, hang_pictures, hang_pin_board
@@ -67,7 +67,7 @@ def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) ->
 
 
 def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks and sockets in the rooms of the house.
+    """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks, notes and sockets in the rooms of the house.
 
     share: 0..1 of what a room would get.
     """
@@ -90,3 +90,4 @@ def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share
         hang_pictures(hanging, space, gallery, style, share)
         hang_cloth(hanging, style, share)
         hang_clock(hanging, style, share)
+        hang_notes(hanging, style, share)

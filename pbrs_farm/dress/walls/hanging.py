@@ -34,6 +34,7 @@ class RoomWants(Record):
     clock: float
     cloth: float
     pin_board: float
+    notes: float
     coats: float
     most_coats: int
     sockets: int

@@ -10,6 +10,7 @@ _SIDE_M = 0.6  # free beside a bed
 _HEAD_GAP = 0.02
 _CHOICES = 12  # beds of a home, in the order of its preference
 _CHILDS_SHARE = 0.4  # of homes that take a bed made for a child before all others
+_SWIVEL_SHARE = 0.02  # of the chairs that turn, those that a home may have
 _BED_LIKES = Liking(corner=0.0, door=0.12, window_wall=-0.5)
 
 
@@ -130,6 +131,7 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
     """A desk at a wall with its chair, near a window."""
     chairs = shelf.of("chair", height=(0.7, 1.1), width=(0.4, 0.7))
     office = [c for c in chairs if "office" in c.id.lower() or "desk" in c.id.lower()]
+    office = [c for c in shelf.of("office_chair") if shelf.likes(c, _SWIVEL_SHARE)] + office
     chairs = office + chairs
     found = []
     for desk in shelf.of("desk", width=(0.9, widest), depth=(0.5, 0.95), height=(0.6, 1.1))[:4]:

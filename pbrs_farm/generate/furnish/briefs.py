@@ -95,6 +95,8 @@ UseWithoutType = Literal["childs_room", "dining_room", "office"]
 """Briefs of rooms that no generated plan has, or that are drawn: no RoomType."""
 
 _LEAST_STRETCH_M: Final = 1.3  # shorter walls are not filled from side to side
+_FOR_SIX_M2, _FOR_EIGHT_M2 = 16.0, 24.0  # rooms that have a table for so many
+_LARGE_TABLES: Final = 0.65  # share of rooms whose table is as large as they let it
 _CHILDS_ROOM: Final = "childs_room"
 _BRIEFS: Final = read_toml(
     Path(__file__).with_name("briefs.toml"), dict[RoomType | UseWithoutType, _Brief]
@@ -172,7 +174,9 @@ def _measures(space: FurnishSpace, type_: RoomType, rng: np.random.Generator) ->
         "stretches": free_stretches(space, _LEAST_STRETCH_M),
     }  # fmt: skip
     if type_ in (RoomType.LIVING, RoomType.STUDIO):  # dining rooms too
-        found["seats"] = 6 if space.area > 24 and rng.random() < 0.6 else 4
+        # Large rooms have tables for eight, small ones for four.
+        most = 8 if space.area > _FOR_EIGHT_M2 else 6 if space.area > _FOR_SIX_M2 else 4
+        found["seats"] = most if rng.random() < _LARGE_TABLES else max(most - 2, 4)
     return found
 
 

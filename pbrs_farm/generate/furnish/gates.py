@@ -27,7 +27,7 @@ MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {
 _MAY_OVERLAP: Final = {
     frozenset(pair)
     for pair in (
-        ("chair", "dining_table"), ("chair", "desk"), ("chair", "coffee_table"),
+        ("chair", "dining_table"), ("chair", "desk"), ("office_chair", "desk"), ("chair", "coffee_table"),
         ("stool", "piano"), ("armchair", "dining_table"),
     )
 }  # fmt: skip

@@ -11,6 +11,7 @@ _TO_TABLE_M = 0.45  # from a sofa to its table
 _BEHIND_CHAIR_M = 0.75  # from the table's edge
 _SEAT_M = 0.6  # length of table edge that a seat takes
 _UNDER_TABLE_M = 0.2  # depth of a chair that is pushed under the table
+_LEAST_HEAD_M = 0.75  # width of a table at whose ends somebody sits
 _VIEWING_M = (2.0, 2.25, 2.5, 2.8)  # from the screen to the sofa
 
 
@@ -92,6 +93,7 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
         n = _seats(table, at_wall=at_wall)
         if n > seats or n < min(seats, 4) - 2 or (at_wall and w > 1.7):
             continue
+        has_heads = not at_wall and n + 2 <= seats and _has_heads(table)
         # Chairs of one side keep their elbows apart.
         share = w / max(n if at_wall else n // 2, 1)
         narrow = [c for c in chairs if c.size[0] <= share - 0.04]
@@ -99,7 +101,9 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
             continue
         make = _at_wall if at_wall else _free
         found.append(make(table, narrow[0], 0.35 * n))
-        if len(found) >= 6:
+        if has_heads:
+            found.append(_free(table, narrow[0], 0.35 * (n + 2), heads=True))
+        if len(found) >= 8:
             break
     return tuple(found)
 
@@ -112,7 +116,14 @@ def _seats(table: Piece, *, at_wall: bool) -> int:
     return min(a_side, 3) if at_wall else 2 * min(a_side, 3)
 
 
-def _free(table: Piece, chair: Piece, rank: float) -> Template:
+def _has_heads(table: Piece) -> bool:
+    """Whether somebody can sit at either end of a table beside those at its long sides."""
+    w, d = table.size[:2]
+    return w - d > 0.35 and d > _LEAST_HEAD_M
+
+
+def _free(table: Piece, chair: Piece, rank: float, *, heads: bool = False) -> Template:
+    """A table with chairs at its long sides; heads: and one at either end."""
     w, d, _ = table.size
     n = _seats(table, at_wall=False)
     slots, clear = [slot(table, 0.0, 0.0)], []
@@ -128,11 +139,16 @@ def _free(table: Piece, chair: Piece, rank: float) -> Template:
     else:
         for u in _chair_offsets(w, n // 2):
             slots += [slot(chair, u, -d / 2 - out), slot(chair, u, d / 2 + out, turns=2)]
-        far = d / 2 + _BEHIND_CHAIR_M
-        clear = [(-w / 2 - 0.3, -far, w / 2 + 0.3, far)]
+        if heads:
+            slots += [
+                slot(chair, -w / 2 - out, 0.0, turns=-1),
+                slot(chair, w / 2 + out, 0.0, turns=1),
+            ]
+        far, end = d / 2 + _BEHIND_CHAIR_M, w / 2 + (_BEHIND_CHAIR_M if heads else 0.3)
+        clear = [(-end, -far, end, far)]
     front = (-w / 2 - 0.6, -d / 2 - 0.8, w / 2 + 0.6, d / 2 + 0.8)
     return Template(
-        f"table for {n}", tuple(slots), tuple(clear), (front,), Stand.FREE, rank=rank,
+        f"table for {n + 2 * heads}", tuple(slots), tuple(clear), (front,), Stand.FREE, rank=rank,
         liking=Liking(middle=0.1, daylight=0.15),
     )  # fmt: skip
 

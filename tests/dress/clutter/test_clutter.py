@@ -87,6 +87,7 @@ def test_nothing_penetrates_anything() -> None:
 def test_books_stand_in_the_bookcase_with_their_spines_out() -> None:
     mutable = _dressed(_room())
     books = [i for i in _added(mutable) if i.nyu40 == _BOOKS and i.bounds[1, 2] < 0.31]
+    books = [i for i in books if i.bounds[1, 0] < 2.0]  # others lie on the desk
     assert books
     for item in books:
         assert item.box is not None

@@ -136,3 +136,14 @@ def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
         assert row.pictures <= row.most_pictures
         assert row.shelves <= row.most_shelves
         assert bool(row.coats) == bool(row.most_coats)
+
+
+def test_notes_hang_flat_on_a_wall_at_the_height_of_eyes() -> None:
+    found = [(m, item) for m in _houses() for item in _named(m, "Wall notes")]
+    assert found
+    for mutable, item in found:
+        low, high = item.bounds
+        floor_y = next(r.floor_y for r in mutable.source.rooms if r.id == item.room_id)
+        assert min(high[0] - low[0], high[2] - low[2]) < 0.002
+        assert low[1] - floor_y > 0.9
+        assert high[1] - floor_y < 2.4

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.catalogue import EMPTY, Piece, Place
-from pbrs_farm.core.classes import CABINET
+from pbrs_farm.core.classes import CABINET, CHAIR, TABLE
 from pbrs_farm.generate.floor_plan import (
     OpeningKind,
     Plan,
@@ -18,6 +18,7 @@ from pbrs_farm.generate.floor_plan import (
     RoomType,
 )
 from pbrs_farm.generate.furnish.fitted_walls import fitted_wardrobes
+from pbrs_farm.generate.furnish.living_rooms import dining
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import places_of
 from pbrs_farm.generate.furnish.room_space import FurnishSpace, free_stretches, room_space
@@ -72,3 +73,26 @@ def test_a_row_of_doors_is_stretched_from_wall_to_wall() -> None:
 
 def test_a_stretch_that_no_piece_is_near_stays_as_it_is() -> None:
     assert fitted_wardrobes(shelf(1.2), (D,)) == ()
+
+
+def table_and_chairs(width: float) -> Shelf:
+    pieces = (
+        Piece("table", "Table", "dining_table", Place.FLOOR, TABLE, (width, 0.9, 0.75)),
+        Piece("chair", "Chair", "chair", Place.FLOOR, CHAIR, (0.45, 0.5, 0.9)),
+    )
+    return Shelf(replace(EMPTY, pieces=pieces), np.random.default_rng(1))
+
+
+@pytest.mark.parametrize(
+    ("width", "seats", "chairs"), [(1.8, 8, 8), (1.8, 6, 6), (1.4, 6, 6), (1.4, 4, 4)]
+)
+def test_a_long_table_has_somebody_at_either_end_where_so_many_are_asked_for(
+    width: float, seats: int, chairs: int
+) -> None:
+    best = max(dining(table_and_chairs(width), seats), key=lambda t: t.rank)
+    seated = [s for s in best.slots if s.piece.group == "chair"]
+    assert len(seated) == chairs
+    # Those at the ends look along the table, and reach under it.
+    ends = [s for s in seated if s.turns % 2]
+    assert len(ends) == (2 if (width, seats) in ((1.8, 8), (1.4, 6)) else 0)
+    assert all(abs(s.u) - s.depth / 2 == pytest.approx(width / 2 - 0.2) for s in ends)
