@@ -131,7 +131,7 @@ image: setup ## the Docker image (TARGET=gpu for the other): version from git, b
 
 docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
 	@$(call extra,mkdocstrings material,docs)
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo out/site/index.html
 
 format: setup ## format and fix what can be fixed

@@ -81,3 +81,10 @@ def test_clean_leaves_nothing_that_was_made_but_the_environment() -> None:
     folders = {name.strip("/") for name in ignored if name.endswith("/")}
     kept = {"__pycache__", "*.egg-info", "homes"}
     assert folders - kept <= {*command.split()}
+
+
+def test_docs_hears_the_warnings_at_which_strict_ends() -> None:
+    # --quiet drops warnings before --strict counts them: a dead link passes.
+    (line,) = re.findall(r"^\t.*mkdocs build.*", MAKEFILE, re.MULTILINE)
+    assert "--strict" in line
+    assert "--quiet" not in line

@@ -8,6 +8,7 @@ import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from pbrs_farm.scene.home import Home
 from pbrs_farm.views.views import Frame
 from tests.docs.fenced import PAGES, REPO, Block, blocks_of
 
+LAB = sorted((REPO / "docs/lab").rglob("*.md"))
 HOWTO = sorted(p for p in (REPO / "docs/howto").glob("*.md") if p.stem != "index")
 MODULE_OF = {verb: module for module, verbs in MODULES.items() for verb in verbs}
 OF_NAME = {"home": Home, "scene": Home, "lit": Home, "frame": Frame, "left": Frame, "right": Frame}
@@ -55,6 +57,30 @@ def test_every_fenced_block_says_how_its_commands_are_run(page: Path) -> None:
 def test_no_command_stands_in_a_block_by_indent_which_no_test_runs(page: Path) -> None:
     text = without_code(page.read_text(encoding="utf-8"))
     assert re.findall(r"^    (?:\S*/)?pbrs-farm .*", text, re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("page", [*manual_pages(REPO), *LAB], ids=name_of)
+def test_a_link_leads_to_a_page_and_to_a_heading_of_it(page: Path) -> None:
+    dead = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", without_code(page.read_text(encoding="utf-8"))):
+        path, _, anchor = link.partition("#")
+        to = page.parent / path if path else page
+        if "://" in link or path.startswith("mailto:"):
+            continue
+        if not to.exists() or (anchor and to.suffix == ".md" and anchor not in anchors(to)):
+            dead.append(link)
+    assert dead == []
+
+
+@cache
+def anchors(page: Path) -> list[str]:
+    """The anchors that MkDocs gives a page's headings."""
+    found: list[str] = []
+    for heading in re.findall(r"^#+ (.+)$", without_code(page.read_text(encoding="utf-8")), re.M):
+        words = re.sub(r"\]\([^)]*\)", "]", heading).encode("ascii", "ignore").decode()
+        slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", words).strip().lower())
+        found.append(f"{slug}_{found.count(slug)}" if slug in found else slug)
+    return found
 
 
 @pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
