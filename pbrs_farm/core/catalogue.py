@@ -36,7 +36,7 @@ class Piece:
 
     id: str  # unique in the catalogue: `<library>#<its id there>`, `generated#<family>`
     name: str
-    group: str  # what it is: "chair", "table_lamp", "book"; docs/dress.md lists all
+    group: str  # what it is: "chair", "table_lamp", "book"; docs/dress/catalogue.md lists all
     place: Place
     nyu40: int
     size: tuple[float, float, float]  # width, depth, height in metres

@@ -143,7 +143,7 @@ class RepairFields(FieldGroup):
 
 
 class SurroundingFields(FieldGroup):
-    """What lies before the windows (docs/dress.md); rooms have its light."""
+    """What lies before the windows (docs/dress/outside.md); rooms have its light."""
 
     kind: Literal["none", "drawn", "street", "garden", "court", "blocks", "hills"] = Field(
         "none", description="on all sides; drawn: by the house's seed, storey and kind of home"

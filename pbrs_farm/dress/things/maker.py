@@ -300,7 +300,7 @@ def thing(
 ) -> Callable[[Callable[Concatenate[Maker, P], None]], Thing[P]]:
     """The decorator of a function that describes a thing.
 
-    group: what it is; docs/dress.md lists all. nyu40: its class. place: where it stands or hangs.
+    group: what it is; docs/dress/catalogue.md lists all. nyu40: its class. place: where it stands or hangs.
     called: what its pieces are named after, the function's name unless given.
     """
 
