@@ -50,4 +50,4 @@ def rig_from_toml(path: Path) -> RigFields:
 
 def rig_from_table(fields: Mapping[str, Any], place: object) -> RigFields:
     """The rig that the tables of such a file say; BadInput, naming place and key, where they are none."""
-    return checked(RigFields, dict(fields), place, hint="docs/motion.md#rigs")
+    return checked(RigFields, dict(fields), place, hint="docs/motion/rigs.md")

@@ -155,7 +155,7 @@ class CameraOptions(Record):
         group="viewpoints", metavar="B", sets="cameras.stereo_m",
     )  # fmt: skip
     rig: Path | None = option(
-        None, "several cameras at the same instants, by a file rig.toml (docs/motion.md)",
+        None, "several cameras at the same instants, by a file rig.toml (docs/motion/rigs.md)",
         group="viewpoints", metavar="FILE",
     )  # fmt: skip
 
