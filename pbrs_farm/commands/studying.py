@@ -74,13 +74,15 @@ def add_verbs(verb: Verb) -> None:
     p = verb("predict", _predict)
     photographs = "a run (none with --task), then pictures, or folders of them, of any size; EXIF's orientation holds"
     p.usage = (
-        "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--json]\n"
-        "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--json]"
+        "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]\n"
+        "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
     )
     p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=photographs)
     text = "no RUN: the weights that come with the package for this task"
     p.add_argument("--task", choices=TASKS, help=text)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
+    text = "horizontal field of view of all of them, for a network that is told rays; else intrinsics.json, EXIF, or the plan's"
+    p.add_argument("--hfov", type=float, default=0.0, metavar="DEG", help=text)
     p.add_argument("--json", action="store_true", help="a JSON line a photograph")
 
     p = verb("ablation", _ablation)
@@ -333,14 +335,20 @@ def _predict(args: argparse.Namespace) -> int:
         raise BadInput("predict", str(run), "no photograph is named", hint=hint)
     files = photograph_files(photographs)
     n_failed = 0
-    for row in predict_photographs(open_run(run), files, args.out):
+    trained = open_run(run)
+    if args.hfov and not trained.plan.rays:
+        raise BadInput("--hfov", f"{args.hfov:g}", "this network is told no rays: it needs none")
+    if args.hfov and not 1 <= args.hfov <= 170:
+        raise BadInput("--hfov", f"{args.hfov:g}", "expected degrees, 1 to 170")
+    for row in predict_photographs(trained, files, args.out, args.hfov):
         n_failed += "error" in row
         if args.json:
             echo(json.dumps(row))
         elif "error" in row:
             echo(row["error"])
         else:
-            echo(f"{row['file']}: {row['seconds']:.2f} s")
+            seen = f", {row['hfov_deg']} degrees wide ({row['camera']})" if "camera" in row else ""
+            echo(f"{row['file']}: {row['seconds']:.2f} s{seen}")
     if not args.json:
         echo(f"{counted(len(files) - n_failed, 'photograph')}; {args.out / 'index.html'}")
     return int(n_failed > 0)

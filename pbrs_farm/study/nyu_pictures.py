@@ -15,19 +15,27 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import NyuMat, Photo
-from pbrs_farm.study.photographs import DEPTH_TRUTH, PLANE_TRUTH, crop_to_plan, photo_truth
+from pbrs_farm.study.photographs import (
+    DEPTH_TRUTH,
+    PLANE_TRUTH,
+    camera_of_crop,
+    crop_to_plan,
+    photo_truth,
+)
 from pbrs_farm.study.real_frames import truth_at_size
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
-from pbrs_farm.study.training.training_views import ViewArrays
+from pbrs_farm.study.training.training_views import CAMERA, ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.truth.boundary import instance_boundary
 
 # Of the colour camera, as the data set's toolbox has it.
 _K: Final = np.array([[518.85790, 0, 325.58245], [0, 519.46961, 253.73617], [0, 0, 1]], np.float64)
 _CROP: Final = (slice(44, 471), slice(40, 601))  # Eigen's rows and columns
+_K_OF_CROP: Final = _K - np.array([[0, 0, 40], [0, 0, 44], [0, 0, 0]])
 NYU_TRUTHS: Final = {
     "normals": PLANE_TRUTH,
     "depth": DEPTH_TRUTH,
@@ -44,6 +52,7 @@ class NyuPicture:
     id: str  # its number in the file, four digits
     colour: NDArray[np.uint8]  # at the plan's size
     truth: Arrays  # at the photograph's own size, in the form of the task's targets
+    camera: F32  # (4,) fx, fy, cx, cy at the plan's size
 
 
 def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[NyuPicture]:
@@ -61,7 +70,8 @@ def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[NyuPict
             truth = _truth(path, int(photo.id) - 1, photo, plan, classes)
             colour, rows, columns = crop_to_plan(photo.rgb[_CROP], plan)
             cut = {key: array[_CROP][rows, columns] for key, array in truth.items()}
-            yield NyuPicture(photo.id, colour, cut)
+            camera = camera_of_crop(_K_OF_CROP, rows, columns, plan)
+            yield NyuPicture(photo.id, colour, cut, camera)
     if not n_found:
         raise BadInput(path, "", f"no {split} picture: splits.mat is of another file")
 
@@ -141,6 +151,7 @@ def nyu_arrays(path: Path, plan: TrainingPlan, split: str) -> ViewArrays:
     for picture in nyu_pictures(path, plan, split):
         ids.append(f"{NYU_HOME}/{picture.id}")
         truth = truth_at_size(picture.truth, plan)
-        rows.append({"colour": picture.colour, **truth})
+        camera = {CAMERA: picture.camera} if plan.rays else {}
+        rows.append({"colour": picture.colour, **truth, **camera})
     arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return ViewArrays(tuple(ids), arrays.pop("colour"), arrays)

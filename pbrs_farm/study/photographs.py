@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.curate.photographs import Photo
 from pbrs_farm.study.plane_normals import normals_of_depth
@@ -45,6 +45,14 @@ def crop_to_plan(
     """The middle of a photograph in the plan's form, at the plan's size; the rows and columns taken."""
     rows, columns = middle_of_form(rgb.shape[0], rgb.shape[1], plan.width_px, plan.height_px)
     return resized_by_area(rgb[rows, columns], plan.width_px, plan.height_px), rows, columns
+
+
+def camera_of_crop(K: F64, rows: slice, columns: slice, plan: TrainingPlan) -> F32:
+    """(4,) fx, fy, cx, cy at the plan's size of what crop_to_plan took of a photograph of camera K (3, 3)."""
+    x = plan.width_px / (columns.stop - columns.start)
+    y = plan.height_px / (rows.stop - rows.start)
+    cx, cy = K[0, 2] - columns.start, K[1, 2] - rows.start
+    return np.array([K[0, 0] * x, K[1, 1] * y, cx * x, cy * y], np.float32)
 
 
 def middle_of_form(

@@ -21,14 +21,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_nearest
 from pbrs_farm.curate import tum_frames
 from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import digest_of_regular, read_given, text_given
-from pbrs_farm.study.photographs import crop_to_plan, photo_truth
+from pbrs_farm.study.photographs import camera_of_crop, crop_to_plan, photo_truth
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -66,6 +66,7 @@ class RealFrame:
         Arrays  # (H, W, ...) of the same part, at its own size, in the form of the task's targets
     )
     digest: str  # of the picture's file: what has trained may not judge
+    camera: F32  # (4,) fx, fy, cx, cy at the plan's size
 
 
 def real_frames(folder: Path, plan: TrainingPlan) -> Iterator[RealFrame]:
@@ -100,7 +101,8 @@ def read_frame(pair: PhotoFiles, folder: Path, plan: TrainingPlan) -> RealFrame:
     else:
         truth = photo_truth(photo, camera.matrix(), plan)
     cut = {key: array[rows, columns] for key, array in truth.items()}
-    return RealFrame(pair.id, colour, cut, digest_of_picture(pair))
+    own = camera_of_crop(camera.matrix(), rows, columns, plan)
+    return RealFrame(pair.id, colour, cut, digest_of_picture(pair), own)
 
 
 def digest_of_picture(pair: PhotoFiles) -> str:
@@ -167,6 +169,16 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
 
     folder: where the pictures lie. Raises BadInput where there is none, or one that cannot be read.
     """
+    found = find_camera(folder, top)
+    if found is not None:
+        return found
+    text = "photographs without intrinsics: normals cannot be taken from their depth"
+    hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
+    raise BadInput(folder, "", text, hint=hint)
+
+
+def find_camera(folder: Path, top: Path) -> PhotoCamera | None:
+    """As camera_of; None where there is no such file."""
     above = [folder, *folder.parents]
     last = above.index(top) if top in above else 0
     for place in above[: last + 1]:
@@ -176,9 +188,7 @@ def camera_of(folder: Path, top: Path) -> PhotoCamera:
         K = tum_frames.camera_of_sequence(place)
         if K is not None:
             return PhotoCamera(K, None)
-    text = "photographs without intrinsics: normals cannot be taken from their depth"
-    hint = 'put intrinsics.json there: {"fx": 518.9, "fy": 519.5, "cx": 325.6, "cy": 253.7}'
-    raise BadInput(folder, "", text, hint=hint)
+    return None
 
 
 def _read_camera(path: Path) -> PhotoCamera:

@@ -31,6 +31,7 @@ class TrainingPlan:
     encoding: str = (
         "centred"  # of colour: centred (0..1 less 128/255), caffe (BGR less means), imagenet, lite
     )
+    rays: bool = False  # the direction of each pixel's ray is three channels more of the input
     # Steps
     batch: int = 8  # views a step, over all processes
     accumulate: int = 1  # steps whose gradients are summed before the weights move
@@ -56,7 +57,7 @@ class TrainingPlan:
     # Augmentation
     flip: bool = True
     turn_deg: float = 0.0  # sd of a turn of the camera, in pitch and in roll, held to twice that
-    hfov_deg: float = 60.0  # of the views, horizontal, that are turned
+    hfov_deg: float = 60.0  # horizontal, of views that are turned, and of pictures without a camera
     zoom: float = 1.0  # largest enlargement of a random part of the view, 1 = none
     gain: float = 0.2  # brightness times 1 +- gain
     gamma: float = 0.2  # brightness to the power of 1 +- gamma

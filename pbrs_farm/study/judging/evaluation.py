@@ -47,6 +47,7 @@ class JudgedViews:
     colour: NDArray[np.uint8]  # (N, h, w, 3) sRGB
     truths: tuple[Arrays, ...]  # arrays (H, W, ...) of each view, of any size
     credits: tuple[str, ...] = ()  # whose homes the pictures show
+    cameras: F32 | None = None  # (N, 4) fx, fy, cx, cy of each picture, of plans with `rays`
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -63,7 +64,7 @@ def judged_of_arrays(
 ) -> JudgedViews:
     """Rendered views, whose truth has the network's size."""
     truths = tuple(views.target(k) for k in range(len(views)))
-    return JudgedViews(name, truth, views.ids, views.colour, truths, credits)
+    return JudgedViews(name, truth, views.ids, views.colour, truths, credits, views.cameras)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +137,7 @@ def open_run(root: Path, *, exact: bool = False) -> Trained:
     folder, record, plan = finished_run(root)
     check_exact(plan.task, exact=exact)
     task = task_of(plan.task, EXACT_THRESHOLDS if exact else 0)
-    network = network_of(plan.network, task.n_out(plan))
+    network = network_of(plan.network, task.n_out(plan), rays=plan.rays)
     _check_sha256(folder.weights, str(record.get("weights_sha256", "")))
     position = load_checkpoint(folder.weights, network)
     if position.task != plan.task:
@@ -166,7 +167,7 @@ def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
     Lazy, in the order of the views; the network's picture is scaled to the truth's size, not the
     truth to the network's.
     """
-    return predict(run.network, views.colour, run.task, run.plan, views.sizes)
+    return predict(run.network, views.colour, run.task, run.plan, views.sizes, views.cameras)
 
 
 def evaluate(run: Trained, views: JudgedViews) -> Evaluation:

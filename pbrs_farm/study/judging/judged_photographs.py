@@ -28,4 +28,5 @@ def pair_views(
             raise BadInput(folder, frame.id, text, hint="photographs of other rooms")
     colour = np.stack([frame.colour for frame in frames])
     ids, truths = tuple(f.id for f in frames), tuple(f.truth for f in frames)
-    return JudgedViews(name, PHOTO_TRUTHS[plan.task], ids, colour, truths)
+    cameras = np.stack([frame.camera for frame in frames])
+    return JudgedViews(name, PHOTO_TRUTHS[plan.task], ids, colour, truths, cameras=cameras)

@@ -67,7 +67,10 @@ def judge_of_places(places: Sequence[JudgedViews], plan: TrainingPlan) -> Judge:
         return {
             f"on_{on.name}": task.error(
                 score_predictions(
-                    predict(network, on.colour, task, plan, on.sizes), on.truths, task, plan
+                    predict(network, on.colour, task, plan, on.sizes, on.cameras),
+                    on.truths,
+                    task,
+                    plan,
                 ).figures
             )
             for on in places
@@ -122,4 +125,6 @@ def nyu_views(path: Path, plan: TrainingPlan, name: str, trained_on: frozenset[s
     said = f"{NYU_TRUTHS[plan.task]}; Eigen's crop; {which}"
     colour = np.stack([picture.colour for picture in pictures])
     truths = tuple(picture.truth for picture in pictures)
-    return JudgedViews(name, said, tuple(picture.id for picture in pictures), colour, truths)
+    ids = tuple(picture.id for picture in pictures)
+    cameras = np.stack([picture.camera for picture in pictures])
+    return JudgedViews(name, said, ids, colour, truths, cameras=cameras)

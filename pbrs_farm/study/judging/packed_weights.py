@@ -24,6 +24,7 @@ from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 from pbrs_farm.study.training_plan import plan_as_json
 
 SHIPPED: Final = Path(__file__).parents[1] / "weights"
+_TOLD_RAYS: Final = " and the direction of each pixel's ray (`predict --hfov`)"
 _SAYS: Final = {
     "normals": "the direction of the surface at each pixel",
     "segmentation": "which of NYU's {n_classes} classes each pixel is of",
@@ -89,7 +90,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     said = [
         f"---\ntags: [{task.name}, indoor, synthetic-data]\nlibrary_name: pbrs-farm\n---",
         f"# {task.name}, plan {plan.name}",
-        f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room. Network `{plan.network}`,"
+        f"Says {_SAYS[task.name].format(n_classes=plan.n_classes)}, from one colour picture of a room{_TOLD_RAYS * plan.rays}. Network `{plan.network}`,"
         f" {record['weights']:,} weights in half floats, trained at {size}.",
         "```\npbrs-farm predict FOLDER PHOTO... --out seen\n```",
         "FOLDER is where this card lies; the package's own weights go by `--task`, too.",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from pbrs_farm.core.arrays import Srgb8Image
+from pbrs_farm.core.arrays import F64, Srgb8Image
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
@@ -28,6 +29,7 @@ from pbrs_farm.images import decode_photo, jpeg_from_array, png_from_array
 from pbrs_farm.regular_files import read_given
 from pbrs_farm.study.judging.evaluation import Trained
 from pbrs_farm.study.judging.others_predictions import file_kind
+from pbrs_farm.study.real_frames import find_camera
 from pbrs_farm.study.tasks.classes_task import class_names
 from pbrs_farm.study.training.prediction import predict
 from pbrs_farm.study.training.run_folder import make_folder
@@ -39,6 +41,9 @@ _BATCH: Final = 8
 _SHOWN_PX: Final = 960  # width of the page's pictures
 _LEAST_SHARE: Final = 0.005  # of a photograph that a class covers to be named
 _ORIENTATION: Final = 0x0112  # EXIF's tag
+_EXIF_IFD: Final = 0x8769
+_FOCAL_35MM: Final = 0xA405
+_FILM_DIAGONAL_MM: Final = math.hypot(36, 24)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +52,10 @@ class Photograph:
 
     name: str  # of its files: the picture's own, without a suffix
     colour: Srgb8Image  # (H, W, 3)
+    path: Path = Path()
+    focal_35mm: float = (
+        0.0  # mm, of a camera of 35 mm film that sees as much, by EXIF; 0 = not told
+    )
 
 
 def photograph_files(words: Sequence[Path]) -> list[Path]:
@@ -77,7 +86,8 @@ def read_photograph(path: Path, name: str = "") -> Photograph:
     if colour.shape[0] * colour.shape[1] > _MAX_PIXELS:
         text = f"has {colour.shape[1]}x{colour.shape[0]} pixels, at most {_MAX_PIXELS:,} are read"
         raise BadInput(path, "", text)
-    return Photograph(name or path.stem, upright(colour, _orientation(data)))
+    orientation, focal = _exif(data)
+    return Photograph(name or path.stem, upright(colour, orientation), path, focal)
 
 
 def upright(colour: Srgb8Image, orientation: int) -> Srgb8Image:
@@ -94,11 +104,40 @@ def upright(colour: Srgb8Image, orientation: int) -> Srgb8Image:
     return np.ascontiguousarray(colour)
 
 
-def _orientation(data: bytes) -> int:
+def _exif(data: bytes) -> tuple[int, float]:
+    """Orientation, 1 where it is not told, and the focal length for 35 mm film, 0 likewise."""
     try:
-        return int(Image.open(io.BytesIO(data)).getexif().get(_ORIENTATION, 1))
+        exif = Image.open(io.BytesIO(data)).getexif()
+        orientation = int(exif.get(_ORIENTATION, 1))
     except (OSError, ValueError, TypeError, SyntaxError):
-        return 1
+        return 1, 0.0
+    try:
+        focal = float(exif.get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0))
+    except (OSError, ValueError, TypeError, SyntaxError, KeyError):
+        focal = 0.0
+    return orientation, focal if math.isfinite(focal) and focal > 0 else 0.0
+
+
+def camera_of_photograph(
+    photograph: Photograph, told_deg: float, assumed_deg: float
+) -> tuple[F64, str]:
+    """(4,) fx, fy, cx, cy of a photograph in its pixels, and what says so.
+
+    The first that there is: told_deg, a horizontal field of view, 0 = none; an intrinsics file beside the
+    photograph or in the folder above; EXIF's focal length for 35 mm film, by the diagonal; assumed_deg.
+    """
+    height, width = photograph.colour.shape[:2]
+    folder = photograph.path.parent
+    beside = None if told_deg else find_camera(folder, folder)
+    if beside is not None:
+        return np.array(beside.K, np.float64), "intrinsics"
+    if told_deg:
+        said, f = "told", width / 2 / math.tan(math.radians(told_deg) / 2)
+    elif photograph.focal_35mm:
+        said, f = "EXIF", photograph.focal_35mm / _FILM_DIAGONAL_MM * math.hypot(width, height)
+    else:
+        said, f = "assumed", width / 2 / math.tan(math.radians(assumed_deg) / 2)
+    return np.array([f, f, width / 2, height / 2]), said
 
 
 def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
@@ -113,22 +152,29 @@ def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
     return (rows, columns) if max(rows, columns) > _MULTIPLE else (rows, 2 * _MULTIPLE)
 
 
-def predict_photographs(run: Trained, files: Sequence[Path], out: Path) -> Iterator[dict[str, Any]]:
+def predict_photographs(
+    run: Trained, files: Sequence[Path], out: Path, hfov_deg: float = 0.0
+) -> Iterator[dict[str, Any]]:
     """Write each photograph's prediction below out, and the page last; a row a photograph as it is done.
 
     A picture that cannot be read is a row with an "error", and the rest goes on. The files are
     docs/formats/layers.md's: normal.png (16 bits), semantic.png or nyu13.png (ids), depth.png (mm), or edges.png (255 x how likely
-    an edge is), each behind the photograph's name; NAME_shown.png is for eyes. Raises BadInput where
-    out cannot be written to.
+    an edge is), each behind the photograph's name; NAME_shown.png is for eyes. hfov_deg: of all
+    photographs, for a network that is told rays; 0 = as each says. Its rows have "hfov_deg" and
+    "camera", what said so. Raises BadInput where out cannot be written to.
     """
     make_folder(out)
     rows: list[dict[str, Any]] = []
     for batch in _batches(run, files):
         began = time.perf_counter()
         photographs = [one for one in batch if isinstance(one, Photograph)]
-        seen = _predicted(run, photographs)
+        cameras = _cameras(run, photographs, hfov_deg)
+        seen = _predicted(run, photographs, [camera for camera, _said in cameras])
+        facts = (_camera_facts(one, *c) for one, c in zip(photographs, cameras, strict=False))
         rows += [
-            _written(run, one, next(seen), out) if isinstance(one, Photograph) else one
+            _written(run, one, next(seen), out) | next(facts, {})
+            if isinstance(one, Photograph)
+            else one
             for one in batch
         ]
         seconds = (time.perf_counter() - began) / max(len(photographs), 1)
@@ -176,13 +222,33 @@ def _size(run: Trained, photograph: Photograph) -> tuple[int, int]:
     return network_size(height, width, run.plan.width_px * run.plan.height_px)
 
 
-def _predicted(run: Trained, photographs: Sequence[Photograph]) -> Iterator[NDArray[Any]]:
+def _cameras(
+    run: Trained, photographs: Sequence[Photograph], hfov_deg: float
+) -> list[tuple[F64, str]]:
+    """Of a network that is told rays: the camera of each, and what says so; else none."""
+    if not run.plan.rays:
+        return []
+    return [camera_of_photograph(one, hfov_deg, run.plan.hfov_deg) for one in photographs]
+
+
+def _camera_facts(photograph: Photograph, camera: F64, said: str) -> dict[str, Any]:
+    half = photograph.colour.shape[1] / 2 / camera[0]
+    return {"hfov_deg": round(math.degrees(2 * math.atan(half)), 1), "camera": said}
+
+
+def _predicted(
+    run: Trained, photographs: Sequence[Photograph], cameras: Sequence[F64]
+) -> Iterator[NDArray[Any]]:
     if not photographs:
         return
     height, width = _size(run, photographs[0])
     small = np.stack([resized_by_area(p.colour, width, height) for p in photographs])
     sizes = [(int(p.colour.shape[0]), int(p.colour.shape[1])) for p in photographs]
-    yield from predict(run.network, small, run.task, run.plan, sizes)
+    scaled = None
+    if cameras:
+        factors = np.array([[width / w, height / h] * 2 for h, w in sizes])
+        scaled = (np.stack(cameras) * factors).astype(np.float32)
+    yield from predict(run.network, small, run.task, run.plan, sizes, scaled)
 
 
 def _written(

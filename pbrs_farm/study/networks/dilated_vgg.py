@@ -21,7 +21,7 @@ _CONTEXT: Final = (1, 1, 2, 4, 8, 16, 1)  # dilations of the context module; a 1
 
 
 class DilatedVgg(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, n_classes, H, W) scores, upsampled bilinearly.
+    """(B, n_in, H, W) colour -> (B, n_classes, H, W) scores, upsampled bilinearly.
 
     head: "full" 7x7 dilated by 4 with 4096 channels, the paper's (134 million weights), or "small"
     3x3 dilated by 12 with 256. tiny: an eighth of the width. context: the module of 8 layers that
@@ -29,11 +29,12 @@ class DilatedVgg(nn.Module):  # type: ignore[misc]
     """
 
     def __init__(
-        self, n_classes: int, *, head: str = "full", tiny: bool = False, context: bool = False
-    ) -> None:
+        self, n_classes: int, *, head: str = "full", tiny: bool = False, context: bool = False,
+        n_in: int = 3,
+    ) -> None:  # fmt: skip
         super().__init__()
         table: Sequence[tuple[int, int]] = TINY_STAGES if tiny else STAGES
-        self.stages = vgg_stages(table, batch_norm=tiny, dilations=_DILATIONS)
+        self.stages = vgg_stages(table, batch_norm=tiny, dilations=_DILATIONS, n_in=n_in)
         width = table[-1][0]
         kernel, dilation, n_hidden = (7, 4, 4096) if head == "full" else (3, 12, 256)
         n_hidden = n_hidden // 2 if tiny else n_hidden

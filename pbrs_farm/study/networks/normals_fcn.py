@@ -19,14 +19,14 @@ _UP: Final = (3, 3, 3, 2)
 
 
 class NormalsFcn(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, n_out, H, W); H and W of 16 pixels or more."""
+    """(B, n_in, H, W) colour -> (B, n_out, H, W); H and W of 16 pixels or more."""
 
-    def __init__(self, n_out: int = 3, divide: int = 1) -> None:
+    def __init__(self, n_out: int = 3, divide: int = 1, n_in: int = 3) -> None:
         """divide: of every width; 1 is the paper's network."""
         super().__init__()
         table = [(width // divide, n) for width, n in STAGES]
         widths = [width for width, _ in table]
-        self.down = vgg_stages(table, batch_norm=True)
+        self.down = vgg_stages(table, batch_norm=True, n_in=n_in)
         self.pool = nn.MaxPool2d(2, return_indices=True, ceil_mode=True)
         self.unpool = nn.MaxUnpool2d(2)
         # Each stage up ends with the width that the pooling above it had.

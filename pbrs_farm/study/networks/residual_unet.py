@@ -18,13 +18,14 @@ from pbrs_farm.study.networks.vgg import start_he
 
 
 class ResidualUnet(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, n_out, H, W); H and W even, of 32 pixels or more."""
+    """(B, n_in, H, W) colour -> (B, n_out, H, W); H and W even, of 32 pixels or more."""
 
     def __init__(
-        self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 96, 128, 160), n_attention: int = 2
-    ) -> None:
+        self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 96, 128, 160), n_attention: int = 2,
+        n_in: int = 3,
+    ) -> None:  # fmt: skip
         super().__init__()
-        self.stem = Residual(3 * FOLD**2 + 2, widths[0])
+        self.stem = Residual(n_in * FOLD**2 + 2, widths[0])
         pairs = list(itertools.pairwise(widths))
         self.down = nn.ModuleList(Residual(a, b) for a, b in pairs)
         self.up = nn.ModuleList(Residual(a + b, a) for a, b in reversed(pairs))

@@ -19,12 +19,13 @@ FOLD = 2
 
 
 class SmallUnet(nn.Module):  # type: ignore[misc]
-    """(B, 3, H, W) colour -> (B, n_out, H, W); H and W even, of 32 pixels or more."""
+    """(B, n_in, H, W) colour -> (B, n_out, H, W); H and W even, of 32 pixels or more."""
 
-    def __init__(self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 112, 160)) -> None:
+    def __init__(
+        self, n_out: int = 3, widths: tuple[int, ...] = (32, 64, 112, 160), n_in: int = 3
+    ) -> None:
         super().__init__()
-        n_in = 3 * FOLD**2 + 2
-        self.stem = _block(n_in, widths[0])
+        self.stem = _block(n_in * FOLD**2 + 2, widths[0])
         pairs = list(itertools.pairwise(widths))
         self.down = nn.ModuleList(_block(a, b) for a, b in pairs)
         self.context = nn.Linear(widths[-1], widths[-1])

@@ -40,9 +40,10 @@ def vgg_stages(
     *,
     batch_norm: bool,
     dilations: Sequence[int] = (1, 1, 1, 1, 1),
+    n_in: int = 3,
 ) -> nn.ModuleList:
     """The five stages, poolings left out."""
-    inputs = [3] + [width for width, _ in table[:-1]]
+    inputs = [n_in] + [width for width, _ in table[:-1]]
     return nn.ModuleList(
         stage(n_in, width, n_convs, batch_norm=batch_norm, dilation=dilation)
         for n_in, (width, n_convs), dilation in zip(inputs, table, dilations, strict=True)

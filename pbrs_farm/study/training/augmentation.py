@@ -8,12 +8,16 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from pbrs_farm.study.pixel_rays import mirrored_rays, places_of_rays, rays_at
 from pbrs_farm.study.tasks.study_task import Batch, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
 
 
 def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
-    """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw."""
+    """The batch, colour (B, 3, H, W) float 0..1 in it, changed by what dice (on the CPU) draw.
+
+    rays (B, H, W, 2), where they are in it, stay those of the pixels (pixel_rays.py).
+    """
     n, device = len(batch["colour"]), batch["colour"].device
 
     def drawn(*shape: int) -> Tensor:
@@ -24,6 +28,8 @@ def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gener
         batch = task.mirrored(batch, flips)
         colour = batch["colour"]
         batch["colour"] = torch.where(flips.view(-1, 1, 1, 1), colour.flip(3), colour)
+        if "rays" in batch:
+            batch["rays"] = mirrored_rays(batch["rays"], flips)
     if plan.turn_deg > 0:
         angles = torch.randn((n, 2), generator=dice).to(device).clamp(-2, 2)
         batch = rotate_cameras(batch, task, angles * (plan.turn_deg * pi / 180), plan.hfov_deg)
@@ -78,11 +84,13 @@ def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: floa
     """The views as cameras would see them that are pitched up and rolled clockwise by angles (B, 2).
 
     A turned camera's picture is a homography of the old one, whatever the depth; normals turn with
-    the camera. angles: radians. hfov_deg: of the views. What the old picture does not show has the
+    the camera. angles: radians. hfov_deg: of the views, where their rays do not say it. What the old picture does not show has the
     border's colour and no label.
     """
     height, width = batch["colour"].shape[2:]
     rotation = _rotations(angles)
+    if "rays" in batch:
+        return _turned_by_rays(batch, task, rotation)
     # Rays through the new pixels, in units of the old picture's half width.
     half = tan(hfov_deg * pi / 360)
     x = ((torch.arange(width, device=angles.device) + 0.5) * 2 / width - 1) * half
@@ -99,6 +107,15 @@ def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: floa
     plane = old[..., :2] / old[..., 2:].clamp(min=1e-3) / half
     grid = plane * plane.new_tensor([1.0, width / height])
     return task.turned(_sample_at(batch, grid), rotation)
+
+
+def _turned_by_rays(batch: Batch, task: StudyTask, rotation: Tensor) -> Batch:
+    """rotate_cameras of views that know their rays: a turned camera has those of before."""
+    rays = batch["rays"]
+    directions = torch.cat([rays, torch.ones_like(rays[..., :1])], -1)
+    old = torch.einsum("bji,bhwj->bhwi", rotation, directions)
+    grid = places_of_rays(rays, old[..., :2] / old[..., 2:].clamp(min=1e-3))
+    return task.turned(_sample_at(batch, grid) | {"rays": rays}, rotation)
 
 
 def _rotations(angles: Tensor) -> Tensor:
@@ -126,10 +143,12 @@ def _sample_at(batch: Batch, grid: Tensor) -> Batch:
     columns = ((grid[..., 0] + 1) * width / 2 - 0.5).round().long().clamp(0, width - 1)
     rows = ((grid[..., 1] + 1) * height / 2 - 0.5).round().long().clamp(0, height - 1)
     views = torch.arange(n, device=grid.device).view(-1, 1, 1)
-    labels = {name: x[views, rows, columns] for name, x in batch.items() if name != "colour"}
+    rays = {"rays": rays_at(batch["rays"], grid)} if "rays" in batch else {}
+    pictures = {"colour": colour, **rays}
+    labels = {name: x[views, rows, columns] for name, x in batch.items() if name not in pictures}
     # Beyond the picture nothing is known.
     outside = (grid.abs() > 1).any(-1)
     if outside.any():
         for label in labels.values():
             label[outside] = 0
-    return labels | {"colour": colour}
+    return labels | pictures

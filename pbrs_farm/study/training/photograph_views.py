@@ -15,7 +15,7 @@ from pbrs_farm.curate.photographs import PhotoFiles
 from pbrs_farm.study.photographs import PHOTO_TRUTHS
 from pbrs_farm.study.real_frames import digest_of_picture, read_frame, real_pairs, truth_at_size
 from pbrs_farm.study.tasks.tasks import task_of
-from pbrs_farm.study.training.training_views import ViewArrays
+from pbrs_farm.study.training.training_views import CAMERA, ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _MIX: Final = re.compile(r"(.+?):([0-9]*\.?[0-9]+)(?::([0-9]+))?")
@@ -42,7 +42,9 @@ class Photographs:
         rows: list[dict[str, Any]] = []
         for pair in self.pairs:
             frame = read_frame(pair, self.folder, plan)
-            rows.append({"colour": frame.colour, **truth_at_size(frame.truth, plan)})
+            camera = {CAMERA: frame.camera} if plan.rays else {}
+            truth = truth_at_size(frame.truth, plan)
+            rows.append({"colour": frame.colour, **truth, **camera})
         arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
         ids = tuple(id_of(pair, self.folder) for pair in self.pairs)
         return ViewArrays(ids, arrays.pop("colour"), arrays)

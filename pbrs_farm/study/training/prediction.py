@@ -16,9 +16,10 @@ from torch import nn
 from torch.nn import functional
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
 from pbrs_farm.study.networks.network_choice import encode_colour
+from pbrs_farm.study.pixel_rays import ray_channels, rays_of_cameras
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -54,20 +55,28 @@ def move_to_device(network: nn.Module, plan: TrainingPlan) -> nn.Module:
 
 def predict(
     network: nn.Module, colour: NDArray[np.uint8], task: StudyTask, plan: TrainingPlan,
-    sizes: Sequence[tuple[int, int]] = (),
+    sizes: Sequence[tuple[int, int]] = (), cameras: F32 | None = None,
 ) -> Iterator[NDArray[Any]]:  # fmt: skip
     """A prediction of each picture of colour (N, H, W, 3), in order. The network's mode is restored.
 
     sizes: (height, width) of each prediction, that outputs are interpolated to; none = as colour.
+    cameras: (N, 4) fx, fy, cx, cy at colour's size, of a plan with `rays`: BadInput without.
     """
+    if plan.rays and cameras is None:
+        text = "the network is told each pixel's ray, and these pictures have no camera"
+        raise BadInput("predict", plan.task, text)
     was_training = network.training
     network.eval()
     device = next(network.parameters()).device
     try:
         for at in range(0, len(colour), _BATCH):
             pictures = torch.from_numpy(colour[at : at + _BATCH]).to(device)
+            rays = None
+            if plan.rays and cameras is not None:
+                own = torch.from_numpy(cameras[at : at + _BATCH]).to(device)
+                rays = rays_of_cameras(own, *colour.shape[1:3])
             with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
-                output = network_output(network, as_colour(pictures), plan).float()
+                output = network_output(network, as_colour(pictures), plan, rays).float()
             wanted = sizes[at : at + _BATCH]
             if all(size == tuple(output.shape[-2:]) for size in wanted):
                 yield from task.predictions(output)
@@ -82,10 +91,17 @@ def predict(
         network.train(was_training)
 
 
-def network_output(network: nn.Module, colour: torch.Tensor, plan: TrainingPlan) -> torch.Tensor:
-    """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says."""
+def network_output(
+    network: nn.Module, colour: torch.Tensor, plan: TrainingPlan, rays: torch.Tensor | None = None
+) -> torch.Tensor:
+    """The network's map of colour (B, 3, H, W) 0..1, at that size; enlarged between where the plan says.
+
+    rays: (B, H, W, 2) of each pixel, of a plan with `rays`.
+    """
     size = colour.shape[-2:]
     colour = encode_colour(colour, plan.encoding)
+    if rays is not None:
+        colour = torch.cat([colour, ray_channels(rays)], 1)
     if plan.enlarge == 1:
         return network(colour)
     large = functional.interpolate(
@@ -95,15 +111,15 @@ def network_output(network: nn.Module, colour: torch.Tensor, plan: TrainingPlan)
 
 
 class _Whole(nn.Module):  # type: ignore[misc]
-    """What network_output is, as a module: colour (1, 3, H, W) 0..1 -> (1, C, H, W)."""
+    """What network_output is, as a module: colour (1, 3, H, W) 0..1, rays (1, H, W, 2) -> (1, C, H, W)."""
 
     def __init__(self, network: nn.Module, plan: TrainingPlan) -> None:
         super().__init__()
         self.network, self.plan = network, plan
 
-    def forward(self, colour: torch.Tensor) -> torch.Tensor:
+    def forward(self, colour: torch.Tensor, rays: torch.Tensor | None = None) -> torch.Tensor:
         """The map at the picture's size."""
-        return network_output(self.network, colour, self.plan)
+        return network_output(self.network, colour, self.plan, rays)
 
 
 def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
@@ -111,17 +127,20 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
 
     The colour's encoding is inside. The map is (1, C, H, W): a normal (x right, y down, z forward, of
     no particular length), a score a class (channel 0 is class 1), edges, or the logarithm of metres.
-    Raises MachineFailed without the packages that export.
+    A plan with `rays` has a second input of that name, (1, H, W, 2): x and y of each pixel's direction
+    (x, y, 1), x right, y down. Raises MachineFailed without the packages that export.
     """
     missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
     if missing:
         raise MachineFailed(f"ONNX needs {missing[0]}", hint=install_command("study"))
     whole = _Whole(network, plan).cpu().float().eval()
-    colour = torch.zeros(1, 3, plan.height_px, plan.width_px)
+    given = [torch.zeros(1, 3, plan.height_px, plan.width_px)]
+    given += [torch.zeros(1, plan.height_px, plan.width_px, 2)] if plan.rays else []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what the exporter itself will do otherwise one day
         program = torch.onnx.export(
-            whole, (colour,), dynamo=True, input_names=["colour"], output_names=["map"],
+            whole, tuple(given), dynamo=True, input_names=["colour", "rays"][: len(given)],
+            output_names=["map"],
             verbose=False,
         )  # fmt: skip
     program.save(path, external_data=False)
@@ -136,7 +155,7 @@ def judge_views(
     network: nn.Module, views: ViewArrays, task: StudyTask, plan: TrainingPlan
 ) -> Judged:
     """How good the network is on views."""
-    predictions = predict(network, views.colour, task, plan)
+    predictions = predict(network, views.colour, task, plan, cameras=views.cameras)
     return score_predictions(predictions, (views.target(k) for k in range(len(views))), task, plan)
 
 

@@ -64,7 +64,7 @@ def train(
     # Draw the weights, then lay over them what the run starts from.
     task = task_of(plan.task)
     torch.manual_seed(job.seed)
-    network = network_of(plan.network, task.n_out(plan))
+    network = network_of(plan.network, task.n_out(plan), rays=plan.rays)
     origin = start_from(network, job.init)
     plan, timed = _faster(folder, network, views, plan, share)
     job = replace(job, plan=plan, facts=job.facts | timed)

@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.study.pixel_rays import rays_of_cameras
 from pbrs_farm.study.tasks.study_task import Batch, StudyTask
 from pbrs_farm.study.training.augmentation import augment
 from pbrs_farm.study.training.checkpoint import (
@@ -29,7 +30,7 @@ from pbrs_farm.study.training.checkpoint import (
 from pbrs_farm.study.training.optimisers import optimiser_of, running_mean, set_rate
 from pbrs_farm.study.training.prediction import as_colour, device_of, move_to_device, network_output
 from pbrs_farm.study.training.run_folder import RunFolder, plan_digest
-from pbrs_farm.study.training.training_views import BatchRead, TrainingViews
+from pbrs_farm.study.training.training_views import CAMERA, BatchRead, TrainingViews
 from pbrs_farm.study.training_plan import TrainingPlan, rate_at
 
 _TIMED_STEPS: Final = 2  # of each arithmetic; the first makes what others find made
@@ -203,10 +204,12 @@ class _Loop:
             for name, array in arrays.items()
         }
         batch["colour"] = as_colour(batch["colour"])
+        if plan.rays:
+            batch["rays"] = rays_of_cameras(batch.pop(CAMERA), *batch["colour"].shape[2:])
         batch = augment(batch, self.task, plan, torch.Generator().manual_seed(chance))
 
         with torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
-            output = network_output(self.model, batch["colour"], plan)
+            output = network_output(self.model, batch["colour"], plan, batch.get("rays"))
         losses = self.task.loss(output, batch, plan)
         self._stop_at_nan(losses, ids, step)
         # Gradients add up over plan.accumulate batches before the weights move.

@@ -10,12 +10,15 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.views.view_sample import Sample
 
 BatchRead = tuple[list[str], dict[str, NDArray[Any]]]  # ids, arrays (B, ...) by name
+CAMERA: Final = "camera"
+"""Of a view's arrays: fx, fy, cx, cy at the plan's size, of a plan with `rays`."""
 _WINDOW: Final = 4  # shards whose views are mixed with one another
 
 
@@ -125,6 +128,11 @@ class ViewArrays:
         """The arrays of some views, by name; colour among them."""
         return {"colour": self.colour[at]} | {k: v[at] for k, v in self.targets.items()}
 
+    @property
+    def cameras(self) -> F32 | None:
+        """(N, 4) fx, fy, cx, cy of each view, where the plan is told rays."""
+        return self.targets.get(CAMERA)
+
     def target(self, at: int) -> Arrays:
         """The targets of one view."""
         return {name: array[at] for name, array in self.targets.items()}
@@ -196,4 +204,10 @@ def arrays_of_sample(sample: Sample, task: StudyTask, plan: TrainingPlan) -> Arr
     if sample.colour is None or sample.size != (plan.width_px, plan.height_px):
         size = f"{plan.width_px}x{plan.height_px}"
         raise BadInput(sample.id, "colour", f"expected {size} pixels, got {sample.size}")
-    return {"colour": sample.colour, **task.targets(sample, plan)}
+    camera = {CAMERA: camera_numbers(sample.K)} if plan.rays else {}
+    return {"colour": sample.colour, **task.targets(sample, plan), **camera}
+
+
+def camera_numbers(K: NDArray[Any]) -> F32:
+    """(4,) fx, fy, cx, cy of a matrix (3, 3)."""
+    return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]], np.float32)
