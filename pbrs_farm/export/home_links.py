@@ -15,14 +15,12 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import Surface, corners_of_surfaces
+from pbrs_farm.core.house import Item, Material, Surface, corners_of_surfaces
 from pbrs_farm.core.joints import Joint, JointKind
-from pbrs_farm.geometry.convex_parts import close_parts, hull_volume, hulls_of_parts
+from pbrs_farm.geometry.convex_parts import close_parts, connected
+from pbrs_farm.home.masses import body_kg
 
-_KG_PER_M3: Final = 100.0  # of the hulls of parts: furniture is mostly air
-_LEAST_KG, _MOST_KG = 0.1, 150.0
-_LEAST_LINK_KG: Final = 0.05
-_MOST_FILLED: Final = 12  # parts whose hulls are counted for the mass
+_LEAST_KG, _MOST_KG = 0.05, 150.0
 BODY: Final = ""
 """The part that stands still, or falls as one where the piece is loose."""
 
@@ -34,6 +32,8 @@ class Link:
     part: str  # Surface.part; BODY of what has no joint
     surfaces: tuple[Surface, ...]
     joint: Joint | None  # against the body, in the piece's frame; None of the body
+    materials: Sequence[Material]  # of the house
+    nyu40: int  # the class of its thing
 
     @cached_property
     def triangles(self) -> F64:
@@ -49,14 +49,15 @@ class Link:
 
     @cached_property
     def mass_kg(self) -> float:
-        """Its joint's, or 100 kg for each cubic metre that its parts fill, 0.1 to 150."""
+        """Its joint's, or by what its surfaces are made of (`home.masses.body_kg`), 0.05 to 150."""
         if self.joint is not None and self.joint.mass_kg > 0:
-            return max(self.joint.mass_kg, _LEAST_LINK_KG)
-        if not len(self.triangles):
-            return _LEAST_KG
-        filled = hulls_of_parts(self.triangles, most=_MOST_FILLED)
-        volume = sum(hull_volume(part) for part in filled)
-        return float(np.clip(_KG_PER_M3 * volume, _LEAST_KG, _MOST_KG))
+            return max(self.joint.mass_kg, _LEAST_KG)
+        solids = (
+            (body, self.materials[surface.material])
+            for surface in self.surfaces
+            for body in connected(corners_of_surfaces((surface,)))
+        )
+        return float(np.clip(body_kg(solids, self.nyu40), _LEAST_KG, _MOST_KG))
 
     @cached_property
     def bounds(self) -> F64:
@@ -77,19 +78,21 @@ class Link:
 
 
 def links_of(
-    surfaces: Sequence[Surface], joints: Sequence[Joint], local_from_world: F64
+    surfaces: Sequence[Surface], item: Item, materials: Sequence[Material], local_from_world: F64
 ) -> tuple[Link, ...]:
-    """The body, then a link for each joint whose part has faces.
+    """The body, then a link for each joint of the item whose part has faces.
 
-    surfaces: in the piece's frame. joints: in the world, as an item has them.
+    surfaces: the item's, in the piece's frame. materials: of its house.
     """
+    joints = item.joints
     moving = {joint.part for joint in joints}
     body = tuple(s for s in surfaces if s.part not in moving)
-    found = [Link(BODY, body, None)]
+    found = [Link(BODY, body, None, materials, item.nyu40)]
     for joint in joints:
         own = tuple(s for s in surfaces if s.part == joint.part)
         if own:
-            found.append(Link(joint.part, own, joint.placed(local_from_world)))
+            placed = joint.placed(local_from_world)
+            found.append(Link(joint.part, own, placed, materials, item.nyu40))
     return tuple(found)
 
 

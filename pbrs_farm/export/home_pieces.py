@@ -18,7 +18,7 @@ import shapely
 from pbrs_farm.core import classes, keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Room, Surface
+from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
 from pbrs_farm.export.home_links import Link, links_of
 from pbrs_farm.geometry.heights import highest_below
@@ -88,6 +88,7 @@ class Piece:
     size: F64  # (3,) of its box, metres
     is_fixed: bool  # part of the building, screwed to it, hung in the air, or without a thing below
     lamps: tuple[Lamp, ...]
+    materials: tuple[Material, ...]  # of its house
 
     @property
     def is_building(self) -> bool:
@@ -103,7 +104,7 @@ class Piece:
     def links(self) -> tuple[Link, ...]:
         """Its body, and each part that a joint moves."""
         local_from_world = np.asarray(np.linalg.inv(self.world_from_local), np.float64)
-        return links_of(self.surfaces, self.item.joints, local_from_world)
+        return links_of(self.surfaces, self.item, self.materials, local_from_world)
 
     @cached_property
     def colliders(self) -> tuple[F64, ...]:
@@ -177,7 +178,7 @@ def exported_home(house: House) -> ExportedHome:
     names = _unique_names(house.items)
     scene = SceneTriangles(house.items)
     found = [
-        _piece(item, number, name, _rests(scene, k))
+        _piece(item, house.materials, number, name, _rests(scene, k))
         for k, ((number, item), name) in enumerate(zip(numbered, names, strict=True))
     ]
     return ExportedHome(house, tuple(found))
@@ -197,7 +198,9 @@ def _unique_names(items: Iterable[Item]) -> list[str]:
     return found
 
 
-def _piece(item: Item, instance: int, name: str, is_resting: bool) -> Piece:
+def _piece(
+    item: Item, materials: tuple[Material, ...], instance: int, name: str, is_resting: bool
+) -> Piece:
     frame = np.eye(4)
     box = item.oriented_box
     size = 2 * box.half if item.surfaces else np.zeros(3)
@@ -213,8 +216,9 @@ def _piece(item: Item, instance: int, name: str, is_resting: bool) -> Piece:
     is_fixed |= item.is_floating
     is_fixed |= bool(item.joints) and float(size.max()) > _LARGE_M
     return Piece(
-        item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights))
-    )
+        item, instance, name, frame, surfaces, size, is_fixed, tuple(map(_lamp, item.lights)),
+        materials,
+    )  # fmt: skip
 
 
 def _surface_in_frame(surface: Surface, b_from_a: F64) -> Surface:

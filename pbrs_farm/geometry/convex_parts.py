@@ -1,4 +1,4 @@
-"""Convex parts of a mesh, for collision: exact ones by CoACD, quick ones by what hangs together; no effects."""
+"""Convex parts of a mesh, for collision: boards and legs as they are, or by CoACD; no effects."""
 
 from __future__ import annotations
 
@@ -42,20 +42,8 @@ _MOST_PLANES = 1  # along an axis, beside its middle
 _STRAIGHT = 0.5  # of the commonest direction's faces: what lies along its axes is not turned
 
 
-def hulls_of_parts(triangles: F64, *, most: int = 12) -> tuple[F64, ...]:
-    """The convex hull (V, 3) of each part of triangles (F, 3, 3) that hangs together; never none.
-
-    A table is its top and its legs, a chair its seat, back and legs, in milliseconds; a part that is
-    hollow is filled. The `most` largest parts are kept.
-    """
-    groups = (group.reshape(-1, 3) for group in _connected(triangles))
-    hulls = [hull for group in groups if (hull := hull_of(group)) is not None]
-    largest = sorted(hulls, key=lambda hull: -ConvexHull(hull).volume)[:most]
-    return tuple(largest) or (thickened(triangles.reshape(-1, 3)),)
-
-
-def _connected(triangles: F64) -> list[F64]:
-    """Triangles (F, 3, 3) by what hangs together."""
+def connected(triangles: F64) -> list[F64]:
+    """Triangles (F, 3, 3) by what hangs together: corners nearer than 0.01 mm are one."""
     points = triangles.reshape(-1, 3)
     corners = np.unique(points.round(5), axis=0, return_inverse=True)[1].reshape(-1, 3)
     ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
@@ -82,7 +70,7 @@ def close_parts(triangles: F64, *, within_m: float = 0.005, most: int = 32) -> t
     so. Boards and legs come out as they are.
     """
     turn = rotation_y(_level_turn(triangles))
-    groups = [_fronts_outwards(group) for group in _connected(triangles @ turn)]
+    groups = [_fronts_outwards(group) for group in connected(triangles @ turn)]
     thing = _Thing.of(groups, within_m)
     if len(groups) <= most:
         parts = [thing.part((group,)) for group in groups]

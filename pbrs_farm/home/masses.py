@@ -1,22 +1,27 @@
-"""What a part of a thing weighs, by what it is made of; no effects.
+"""What a thing or a part of one weighs, by what it is made of; no effects.
 
 Densities are those of handbooks: chipboard 650 kg/m3 (EN 312 has 600 to 700), glass 2,500 (EN 572),
-steel 7,850, of sheets that are folded round air or foam 8 kg/m2 (1 mm).
+steel 7,850, of sheets that are folded round air or foam 8 kg/m2 (1 mm), stone and china 2,400,
+plastic 1,000, paper 700, cloth 300 about foam and feathers of 40.
 """
 
 from __future__ import annotations
 
-from typing import Final
+import re
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
+from pbrs_farm.core import classes
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.core.mesh import face_areas, signed_volume
+from pbrs_farm.core.mesh import closed_edge_share, face_areas, signed_volume
 
 _BOARD_KG_M3: Final = 650.0
 _GLASS_KG_M3: Final = 2_500.0
 _STEEL_KG_M3: Final = 7_850.0
 _SHEET_KG_M2: Final = 8.0
 _GLASSY: Final = (MaterialKind.GLASS, MaterialKind.PANE, MaterialKind.MIRROR)
+_CLOSED: Final = 0.9  # share of paired edges from which triangles bound a solid
 _SHEETS: Final = ("enamel", "steel", "chrome", "brass", "iron", "metal", "handle", "machine")
 
 
@@ -36,3 +41,61 @@ def mass_kg(corners: F64, material: Material) -> float:
         area = float(face_areas(corners).sum())
         return min(_STEEL_KG_M3 * volume, _SHEET_KG_M2 * area)
     return _BOARD_KG_M3 * volume
+
+
+class _Stuff(NamedTuple):
+    """What things are made of: a wall of some thickness, and what fills the space behind it."""
+
+    words: str  # of materials, between blanks; `steel` is in "brushed steel"
+    wall_kg_m3: float
+    wall_m: float  # what is thinner is solid
+    core_kg_m3: float = 0.0
+    nyu40: tuple[int, ...] = ()  # things that are of it where their material's name says nothing
+
+
+_BOARDS: Final = _Stuff("wood oak timber board", 650, 0.018)
+_STUFFS: Final = (
+    _Stuff("glass pane mirror bottle", 2_500, 0.006, nyu40=(classes.MIRROR,)),
+    _Stuff("steel chrome brass iron metal enamel tin bronze copper aluminium machine", 7_850, 0.001),
+    _Stuff("stone marble granite concrete", 2_400, 0.03),
+    _Stuff("ceramic china porcelain terracotta clay pot", 2_400, 0.006, nyu40=(
+        classes.TOILET, classes.SINK, classes.BATHTUB)),
+    _Stuff("plastic rubber nylon vinyl", 1_000, 0.003, nyu40=(
+        classes.TELEVISION, classes.LAMP, classes.OTHERPROP, classes.BOX)),
+    _Stuff("paper page pages book card cardboard carton", 700, 0.05, nyu40=(
+        classes.BOOKS, classes.PAPER, classes.PICTURE)),
+    _Stuff(
+        "cloth fabric linen wool cotton leather velvet felt fur duvet blanket pillow cushion "
+        "mattress throw towel textile", 300, 0.003, 40, nyu40=(
+            classes.BED, classes.SOFA, classes.PILLOW, classes.CLOTHES, classes.TOWEL,
+            classes.CURTAIN, classes.FLOOR_MAT, classes.BAG)),
+    _BOARDS,
+)  # fmt: skip
+
+
+def body_kg(solids: Iterable[tuple[F64, Material]], nyu40: int) -> float:
+    """Kilograms of a thing's bodies, each the triangles (F, 3, 3) of what hangs together and its material.
+
+    Models draw a chest as one closed shell: of what is thicker than a wall of its material only the
+    wall counts, and what fills cushions. An open mesh is a sheet as thick as that wall. nyu40: the
+    thing's class, for materials whose names say nothing.
+    """
+    total = 0.0
+    for corners, material in solids:
+        stuff = _stuff_of(material, nyu40)
+        walls = stuff.wall_m * float(face_areas(corners).sum())
+        volume = walls
+        if closed_edge_share(corners.round(5)) >= _CLOSED:
+            volume = abs(signed_volume(corners, corners.mean((0, 1))))
+        total += stuff.wall_kg_m3 * min(volume, walls) + stuff.core_kg_m3 * max(volume - walls, 0.0)
+    return total
+
+
+def _stuff_of(material: Material, nyu40: int) -> _Stuff:
+    words = set(re.findall("[a-z]+", material.name.casefold()))
+    if material.kind in _GLASSY:
+        words.add("glass")
+    found = next((s for s in _STUFFS if words & set(s.words.split())), None)
+    if found is None and material.is_metal:
+        return next(s for s in _STUFFS if "metal" in s.words.split())
+    return found or next((s for s in _STUFFS if nyu40 in s.nyu40), _BOARDS)

@@ -10,14 +10,12 @@ import pytest
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import OUTSIDE, Box, House, ItemKind, corners_of_surfaces
+from pbrs_farm.core.house import OUTSIDE, Box, House, ItemKind
 from pbrs_farm.core.recipe import ReadFields, Recipe
 from pbrs_farm.export.export_homes import export_homes
 from pbrs_farm.export.home_glb import glb_of_pieces
 from pbrs_farm.export.home_pieces import exported_home, rooms_json
 from pbrs_farm.formats.glb import gltf_from_glb
-from pbrs_farm.geometry.convex_parts import hulls_of_parts
-from pbrs_farm.geometry.solids import box
 from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
@@ -98,7 +96,7 @@ def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkabl
         assert (parts.min(0) > low - 0.02).all()
         assert (parts.max(0) < high + 0.02).all()
         assert (parts.max(0) - parts.min(0) > 0.9 * piece.size - 0.02).all()
-        assert 0.1 <= piece.mass_kg <= 150
+        assert 0.05 <= piece.mass_kg <= 150
     assert all(home.navigable[room.id] for room in home.house.rooms)
 
 
@@ -109,16 +107,3 @@ def test_a_folder_without_a_home_and_options_of_views_are_one_line(
         export_homes(tmp_path, tmp_path / "out", "gltf")
     assert main(["export", str(tmp_path), "--to", "gltf", "--split"]) == 1
     assert "--to gltf writes homes" in capsys.readouterr().err
-
-
-def test_a_table_collides_as_its_top_and_legs() -> None:
-    boxes = [((0, 0.7, 0), (1.2, 0.75, 0.8))]
-    boxes += [((x, 0, z), (x + 0.05, 0.7, z + 0.05)) for x in (0.02, 1.12) for z in (0.02, 0.72)]
-    middle = [((np.add(a, b) / 2), np.subtract(b, a) / 2) for a, b in boxes]
-    surfaces = [box("part", centre, half, 0) for centre, half in middle]
-    parts = hulls_of_parts(corners_of_surfaces(surfaces))
-    assert len(parts) == 5
-    assert sorted(len(p) for p in parts) == [8] * 5
-    np.testing.assert_allclose(parts[0].min(0), boxes[0][0], atol=1e-5)
-    (flat,) = hulls_of_parts(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 0, 1]]]))
-    assert flat.shape == (8, 3)
