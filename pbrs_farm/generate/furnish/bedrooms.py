@@ -138,7 +138,8 @@ def desks(shelf: Shelf, *, widest: float = 1.65) -> tuple[Template, ...]:
         w, d, _ = desk.size
         slots = [backed(desk)]
         if chairs:
-            slots.append(slot(chairs[0], 0.0, 0.02 + d - 0.12 + chairs[0].size[1] / 2, turns=2))
+            out = chairs[0].size[1] / 2 - shelf.under_m(chairs[0], desk, 0.0, 2, 0.12)
+            slots.append(slot(chairs[0], 0.0, 0.02 + d + out, turns=2))
         room = (-0.4, 0.02 + d, 0.4, 0.02 + d + 0.85)
         found.append(
             Template(

@@ -100,9 +100,9 @@ def dining(shelf: Shelf, seats: int, *, at_wall: bool = False) -> tuple[Template
         if not narrow:
             continue
         make = _at_wall if at_wall else _free
-        found.append(make(table, narrow[0], 0.35 * n))
+        found.append(make(shelf, table, narrow[0], 0.35 * n))
         if has_heads:
-            found.append(_free(table, narrow[0], 0.35 * (n + 2), heads=True))
+            found.append(_free(shelf, table, narrow[0], 0.35 * (n + 2), heads=True))
         if len(found) >= 8:
             break
     return tuple(found)
@@ -122,27 +122,33 @@ def _has_heads(table: Piece) -> bool:
     return w - d > 0.35 and d > _LEAST_HEAD_M
 
 
-def _free(table: Piece, chair: Piece, rank: float, *, heads: bool = False) -> Template:
+def _free(
+    shelf: Shelf, table: Piece, chair: Piece, rank: float, *, heads: bool = False
+) -> Template:
     """A table with chairs at its long sides; heads: and one at either end."""
     w, d, _ = table.size
     n = _seats(table, at_wall=False)
     slots, clear = [slot(table, 0.0, 0.0)], []
-    out = chair.size[1] / 2 - _UNDER_TABLE_M
     if abs(w - d) < 0.15 and n == 4:
         # One on each side.
+        before, behind, left, right = (
+            _out(shelf, table, chair, 0.0, turns) for turns in (0, 2, -1, 1)
+        )
         slots += [
-            slot(chair, 0.0, -d / 2 - out), slot(chair, 0.0, d / 2 + out, turns=2),
-            slot(chair, -w / 2 - out, 0.0, turns=-1), slot(chair, w / 2 + out, 0.0, turns=1),
+            slot(chair, 0.0, -d / 2 - before), slot(chair, 0.0, d / 2 + behind, turns=2),
+            slot(chair, -w / 2 - left, 0.0, turns=-1), slot(chair, w / 2 + right, 0.0, turns=1),
         ]  # fmt: skip
         around = (-w / 2 - 0.6, -d / 2 - 0.6, w / 2 + 0.6, d / 2 + 0.6)
         clear = [around]
     else:
         for u in _chair_offsets(w, n // 2):
-            slots += [slot(chair, u, -d / 2 - out), slot(chair, u, d / 2 + out, turns=2)]
+            before, behind = (_out(shelf, table, chair, u, turns) for turns in (0, 2))
+            slots += [slot(chair, u, -d / 2 - before), slot(chair, u, d / 2 + behind, turns=2)]
         if heads:
+            left, right = (_out(shelf, table, chair, 0.0, turns) for turns in (-1, 1))
             slots += [
-                slot(chair, -w / 2 - out, 0.0, turns=-1),
-                slot(chair, w / 2 + out, 0.0, turns=1),
+                slot(chair, -w / 2 - left, 0.0, turns=-1),
+                slot(chair, w / 2 + right, 0.0, turns=1),
             ]
         far, end = d / 2 + _BEHIND_CHAIR_M, w / 2 + (_BEHIND_CHAIR_M if heads else 0.3)
         clear = [(-end, -far, end, far)]
@@ -153,18 +159,30 @@ def _free(table: Piece, chair: Piece, rank: float, *, heads: bool = False) -> Te
     )  # fmt: skip
 
 
-def _at_wall(table: Piece, chair: Piece, rank: float) -> Template:
+def _out(shelf: Shelf, table: Piece, chair: Piece, u: float, turns: int) -> float:
+    """From a table's edge to the middle of a chair that is pushed in as far as both allow.
+
+    u: where along that edge the chair stands, in the table's frame.
+    """
+    at = -u if turns == 2 else u
+    return chair.size[1] / 2 - shelf.under_m(chair, table, at, turns, _UNDER_TABLE_M)
+
+
+def _at_wall(shelf: Shelf, table: Piece, chair: Piece, rank: float) -> Template:
     w, d, _ = table.size
     slots = [backed(table)]
-    out = chair.size[1] / 2 - _UNDER_TABLE_M
     n = _seats(table, at_wall=True)
     if abs(w - d) < 0.15:
         # Two who sit face to face.
         v = 0.02 + d / 2
-        slots += [slot(chair, -w / 2 - out, v, turns=-1), slot(chair, w / 2 + out, v, turns=1)]
+        left, right = (_out(shelf, table, chair, 0.0, turns) for turns in (-1, 1))
+        slots += [slot(chair, -w / 2 - left, v, turns=-1), slot(chair, w / 2 + right, v, turns=1)]
         clear: Rect = (-w / 2 - 0.6, 0.0, w / 2 + 0.6, d)
     else:
-        slots += [slot(chair, u, 0.02 + d + out, turns=2) for u in _chair_offsets(w, n)]
+        slots += [
+            slot(chair, u, 0.02 + d + _out(shelf, table, chair, u, 2), turns=2)
+            for u in _chair_offsets(w, n)
+        ]
         clear = (-w / 2, d, w / 2, d + _BEHIND_CHAIR_M)
     front = (-w / 2 - 0.5, 0.3, w / 2 + 0.5, d + 0.9)
     return Template(

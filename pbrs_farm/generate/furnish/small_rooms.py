@@ -45,9 +45,12 @@ def outdoor_sets(shelf: Shelf) -> tuple[Template, ...]:
     for table in tables[:3]:
         w, d, _ = table.size
         for chair in chairs[:2]:
-            out = w / 2 + chair.size[1] / 2 - 0.1
+            left, right = (
+                w / 2 + chair.size[1] / 2 - shelf.under_m(chair, table, 0.0, turns, 0.1)
+                for turns in (-1, 1)
+            )
             v = 0.05 + max(d, chair.size[0]) / 2
-            seats = (slot(chair, -out, v, turns=-1), slot(chair, out, v, turns=1))
+            seats = (slot(chair, -left, v, turns=-1), slot(chair, right, v, turns=1))
             found.append(
                 Template(
                     "table and two chairs", (slot(table, 0.0, v), *seats), rank=0.5,
