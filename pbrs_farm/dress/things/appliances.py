@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Final
 
-from numpy import pi
+from numpy import pi, radians
 
 from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_z
@@ -20,6 +21,7 @@ from pbrs_farm.dress.things.bodies import (
     tube,
 )
 from pbrs_farm.dress.things.cups import handle
+from pbrs_farm.dress.things.joints import shell
 from pbrs_farm.dress.things.maker import Maker, thing
 from pbrs_farm.dress.things.materials import (
     BLACK_GLASS,
@@ -27,10 +29,13 @@ from pbrs_farm.dress.things.materials import (
     CHROME,
     RUBBER,
     STEEL,
+    glass,
     glossy,
     plain,
 )
 from pbrs_farm.dress.things.outlines import bent, rect, rings
+
+_DOOR_RAD: Final = radians(95)
 
 
 @thing(group="kettle")
@@ -126,24 +131,32 @@ def toaster(m: Maker) -> None:
 
 @thing(group="microwave", nyu40=OTHERFURNITURE)
 def microwave(m: Maker) -> None:
-    """A microwave oven: its window, and keys or knobs on the right."""
+    """A microwave oven: its door with a window, hinged at the left; keys or knobs on the right."""
     w, d, h = m.uniform(0.44, 0.52), m.uniform(0.33, 0.4), m.uniform(0.255, 0.3)
     hw = w / 2
-    shell = m.pick(glossy("white lacquer", (0.92, 0.92, 0.9), 0.35), STEEL, BLACK_STEEL,
+    case = m.pick(glossy("white lacquer", (0.92, 0.92, 0.9), 0.35), STEEL, BLACK_STEEL,
         glossy("microwave", (0.06, 0.06, 0.065), 0.3))  # fmt: skip
     panel, front = m.uniform(0.09, 0.12), d / 2
-    m.add(bevelled((-hw, 0.012, -d / 2), (hw, h, front - 0.022), 0.004), of=shell)
-    m.add(bevelled((-hw, 0.014, front - 0.0218), (hw - panel - 0.0015, h - 0.002, front), 0.004),
-        of=shell)  # fmt: skip
-    m.add(bevelled((hw - panel + 0.0015, 0.014, front - 0.0218), (hw, h - 0.002, front), 0.004),
-        of=m.pick(shell, BLACK_GLASS))  # fmt: skip
-    m.add(slab((-hw + 0.035, 0.05, front), (hw - panel - 0.045, h - 0.045, front + 0.0008)),
-        of=BLACK_GLASS)  # fmt: skip
-    if m.chance(0.6):
-        m.add(tube(bent([(hw - panel - 0.022, 0.05, front - 0.002),
-            (hw - panel - 0.022, 0.05, front + 0.03), (hw - panel - 0.022, h - 0.045, front + 0.03),
-            (hw - panel - 0.022, h - 0.045, front - 0.002)], 0.012), 0.006, n=6),
-            of=m.pick(CHROME, shell))  # fmt: skip
+    # Its works behind the panel; beside them a space with a plate that turns.
+    edge, face = hw - panel, front - 0.022
+    m.add(bevelled((edge, 0.012, -d / 2), (hw, h, face), 0.004), of=case)
+    shell(m, (-hw, edge), (0.012, h), (-d / 2, face), 0.018, case)
+    middle = (edge - hw) / 2
+    plate_r = min(edge + hw, d) / 2 - 0.035
+    m.add(cylinder(plate_r, 0.034, 0.04, n=28), at=(middle, 0, face - plate_r - 0.014),
+        of=glass((0.9, 0.95, 0.95), 0.2))  # fmt: skip
+    m.add(bevelled((edge + 0.0015, 0.014, front - 0.0218), (hw, h - 0.002, front), 0.004),
+        of=m.pick(case, BLACK_GLASS))  # fmt: skip
+    with m.hinged("door", at=(-hw, 0.014, front), axis=(0.0, -1.0, 0.0), upper_rad=_DOOR_RAD):
+        m.add(bevelled((-hw, 0.014, front - 0.0218), (edge - 0.0015, h - 0.002, front), 0.004),
+            of=case)  # fmt: skip
+        m.add(slab((-hw + 0.035, 0.05, front), (edge - 0.045, h - 0.045, front + 0.0008)),
+            of=BLACK_GLASS)  # fmt: skip
+        if m.chance(0.6):
+            m.add(tube(bent([(edge - 0.022, 0.05, front - 0.002), (edge - 0.022, 0.05, front + 0.03),
+                (edge - 0.022, h - 0.045, front + 0.03),
+                (edge - 0.022, h - 0.045, front - 0.002)], 0.012), 0.006, n=6),
+                of=m.pick(CHROME, case))  # fmt: skip
     x, keys = hw - panel / 2, plain("keys", (0.7, 0.7, 0.7), 0.5)
     m.add(slab((x - 0.03, h - 0.075, front), (x + 0.03, h - 0.045, front + 0.0008)),
         of=plain("clock", (0.02, 0.06, 0.05), 0.1))  # fmt: skip

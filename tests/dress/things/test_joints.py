@@ -10,6 +10,8 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.dress.style import style_for
+from pbrs_farm.dress.things.appliances import microwave
 from pbrs_farm.dress.things.families import families, family_pieces, family_shape
 
 # What stands in homes and has fronts; of each the least space behind one, metres.
@@ -137,3 +139,19 @@ def test_a_shut_toilets_lid_stands_up_before_its_cistern_over_an_open_bowl() -> 
         back = wide[wide[:, 2] < wide[:, 2].min() + 0.02]
         hit, rays, _ = mesh.ray.intersects_location(back, np.tile([0, 0, -1.0], (len(back), 1)))
         assert (back[rays][:, 2] - hit[:, 2] > 0.001).all()
+
+
+def test_a_microwave_has_a_door_and_a_plate_in_a_space_behind_it() -> None:
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        _piece, shape = microwave.make(rng, style_for(rng))
+        (joint,) = shape.joints
+        shut, wide = moved(shape, joint)
+        assert 0.2 < joint.mass_kg < 4
+        assert wide[:, 2].mean() > shut[:, 2].mean() + 0.1
+        body = np.concatenate([s.positions[s.faces] for s in shape.surfaces if s.part == ""])
+        mesh = trimesh.Trimesh(body.reshape(-1, 3), np.arange(3 * len(body)).reshape(-1, 3))
+        low, high = shut.min(0), shut.max(0)
+        eye = [[*((low + high) / 2)[:2], high[2] + 0.3]]
+        at, _rays, _ = mesh.ray.intersects_location(eye, [[0, 0, -1.0]], multiple_hits=False)
+        assert high[2] - at[0, 2] > 0.2
