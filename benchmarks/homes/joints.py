@@ -15,6 +15,7 @@ from typing import Final
 
 from benchmarks.figures import write_report
 from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.made_home import MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.geometry.opened import free_value
@@ -32,8 +33,11 @@ UNITS: Final = {
     "joints.with_joints": "of these, those that have a joint at all",
     "joints.joints": "doors, drawers, flaps, lids and sashes that are joints",
     "joints.free": "of these, those that go at least half of their way",
+    "joints.drawers": "drawers",
+    "joints.drawers_free": "of these, those that go nine tenths of their way",
 }
 
+_WIDE: Final = 0.9
 _OPENED: Final = re.compile(
     r"\b(wardrobe|cabinet|cupboard|sideboard|chest|drawers?|fridge|refrigerator|freezer|oven|cooker|"
     r"dishwasher|washing machine|washer|dryer)\b",
@@ -56,6 +60,8 @@ def main(words: list[str] | None = None) -> None:
         "joints.with_joints": round(counts["with joints"] / counts["things"], 3),
         "joints.joints": counts["joints"],
         "joints.free": round(counts["free"] / counts["joints"], 3),
+        "joints.drawers": counts["drawers"],
+        "joints.drawers_free": counts["drawers free"],
     }
     write_report("joints", figures, UNITS)
 
@@ -75,8 +81,14 @@ def _count(house: House, counts: Counter[str]) -> set[str]:
             continue
         free = 0
         for joint in item.joints:
-            value, _by = free_value(scene, index, joint.part, joint.upper)
-            free += value - joint.lower >= 0.5 * (joint.upper - joint.lower)
+            value, by = free_value(scene, index, joint.part, joint.upper)
+            share = (value - joint.lower) / (joint.upper - joint.lower)
+            free += share >= 0.5
+            if joint.kind is JointKind.PRISMATIC and item.kind is ItemKind.OBJECT:
+                counts["drawers"] += 1
+                counts["drawers free"] += share >= _WIDE
+                if share < _WIDE:
+                    print(f"{house.id}: {item.name}/{joint.part} stops before {by}", flush=True)
         counts["joints"] += len(item.joints)
         counts["free"] += free
         if is_opened(item):

@@ -117,10 +117,10 @@ class Shelf:
         return min(self._under[key], most_m)
 
     def _slide_m(self, chair: Piece, table: Piece, at: float, turns: int) -> float:
-        shapes = self.catalogue.shape(chair), self.catalogue.shape(table)
-        if shapes[0] is None or shapes[1] is None:
+        seat, top = self.catalogue.shape(chair), self.catalogue.shape(table)
+        if seat is None or top is None:
             return np.inf
-        moving, standing = (corners_of_surfaces(shape.surfaces) for shape in shapes)
+        moving, standing = (corners_of_surfaces(shape.surfaces) for shape in (seat, top))
         # In the chair's frame, which looks along +z: the table turned back, its edge ahead.
         standing = standing @ rotation_y(turns * np.pi / 2).T
         ahead = moving[..., 2].max() - standing[..., 2].min() + _BEFORE_TABLE_M
