@@ -11,6 +11,7 @@ import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import House, Item, ItemKind, Surface
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import edges_are_paired, signed_volume, triangle_corners
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import Passage, house_space
@@ -255,3 +256,26 @@ def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
         assert now.uvs is not None
         assert now.uvs.min() >= 0
         assert now.uvs.max() <= 1
+
+
+def test_curtains_hang_clear_of_what_opens_towards_the_window() -> None:
+    # A chest that looks at the window's wall; its drawers come to 5 cm before it.
+    space = house_space(MutableHouse(_bare(), 1))
+    (window,) = space.room("0_0").windows
+    side = window.side_of("0_0")
+    assert side is not None
+    middle = window.face_point(side)[0]
+    low, high = np.array([middle - 1.6, 0.0, 0.46]), np.array([middle + 1.6, 0.5, 0.9])
+    body = box("body", (low + high) / 2, (high - low) / 2, 0)
+    ahead = np.array([0.0, 0.0, 0.23])
+    front = box("front", (low + high) / 2 - ahead, (high - low) / 2 * [1, 1, 0.02], 0)
+    chest = Item(
+        "chest", "Chest", ItemKind.OBJECT, "0", (body, replace(front, part="drawer")), 17,
+        room_id="0_0", joints=(Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, -1), 0.4),),
+    )  # fmt: skip
+    usual = [_dressed(seed, _empty()) for seed in range(1, 7)]
+    assert any(i.room_id == "0_0" for m in usual for i in _added(m, CURTAIN))
+    for seed in range(1, 7):
+        for curtain in _added(_dressed(seed, _empty(chest)), CURTAIN):
+            # Short ones may end above it.
+            assert curtain.room_id != "0_0" or curtain.bounds[0, 1] > 0.5
