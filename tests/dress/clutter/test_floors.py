@@ -9,6 +9,7 @@ import shapely
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.house import Item
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
@@ -79,6 +80,23 @@ def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
         for item in _on_floor(mutable):
             footprint = shapely.box(*item.bounds[:, [0, 2]].ravel())
             assert before.intersection(footprint).area < 1e-4, item.name
+
+
+def test_nothing_stands_where_a_drawer_comes_out() -> None:
+    # Of a desk, which is of no class that has fronts; it comes out by 1.1 m.
+    body = solid("Desk", [0.5, 0, 0], [3.5, 0.7, 0.6], 14)
+    front = replace(solid("", [0.5, 0.2, 0.6], [3.5, 0.6, 0.62]).surfaces[0], part="drawer")
+    joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 1.1)
+    desk = replace(body, surfaces=(*body.surfaces, front), joints=(joint,))
+    swept, n = shapely.box(0.5, 0.6, 3.5, 1.72), 0
+    for seed in range(5):
+        mutable = MutableHouse(house(desk, name="Garage"), seed)
+        add_clutter(mutable, EMPTY, style_for(np.random.default_rng(seed), "nordic"), 1.0)
+        for item in _on_floor(mutable):
+            footprint = shapely.box(*item.bounds[:, [0, 2]].ravel())
+            assert swept.intersection(footprint).area < 1e-4, item.name
+            n += 1
+    assert n > 3
 
 
 def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
