@@ -158,6 +158,12 @@ class CameraBlur:
     # Shares of that time: each row is open for so long, and the last row opens so much after the first.
     open_share: float = 1.0
     rolling_share: float = 0.0
+    middle_share: float = 0.0  # from mid-shutter to the middle of the part that is looked at
+
+    def part(self, begin: float, end: float) -> CameraBlur:
+        """The same camera while a part of its shutter's time passes, from share begin to share end."""
+        middle = self.middle_share + (0.5 * (begin + end) - 0.5) * self.open_share
+        return replace(self, open_share=(end - begin) * self.open_share, middle_share=middle)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

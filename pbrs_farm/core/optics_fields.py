@@ -24,7 +24,10 @@ class BlurFields(FieldGroup):
     )
     focus_m: float = Field(0.0, ge=0, le=1e4, description="depth; 0 = what the middle shows")
     shutter_s: float = Field(
-        0.0, ge=0, le=60, description="open that long; 0 = nothing moves. Of a walk: along it"
+        0.0,
+        ge=0,
+        le=60,
+        description="open that long; 0 = nothing moves. Of a walk: along it; things that move blur, too",
     )
     rolling_s: float = Field(
         0.0,

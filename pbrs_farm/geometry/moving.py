@@ -167,6 +167,14 @@ class MovingHouse:
                 normals[rows] = surface.normals
         return house, replace(self.geometry, positions=positions, normals=normals)
 
+    def moves_between(self, from_s: float, to_s: float) -> bool:
+        """Whether anything moves in that time."""
+        keys = {t for motion in self.house.motions for t in motion.times_s if from_s < t < to_s}
+        return any(
+            bool((self.face_motions(from_s, t)[1] != np.eye(4)).any())
+            for t in sorted({*keys, to_s})
+        )
+
     def face_motions(self, from_s: float, to_s: float) -> tuple[I64, F64]:
         """(F,) numbers and (M, 4, 4) matrices: matrices[numbers[f]] takes face f from one time to another.
 

@@ -174,8 +174,10 @@ def _extra(name: str, work: Work) -> object:
         others = [layer for layer in labels if layer in plugins("layers")]
         known = [*labels, *marks_in_digest("layers", others)]
         return [*known, *layers_in_digest(labels, max_albedo(work.recipe))]
-    if name == "light" and work.layers_of("light"):
-        return ["diffuse"]
+    if name == "light":
+        blurred = work.recipe.blur.shutter_s > 0
+        found = ["diffuse"] * bool(work.layers_of("light")) + ["things blur"] * blurred
+        return found or None
     if name == "develop":
         return _extra_of_develop(work)
     preset = work.recipe.cameras.preset

@@ -294,7 +294,7 @@ def _light(work: Work) -> StepOutput:
     layers = work.layers_of("light")
     result = scene.render(
         camera, view.room_id, fields, seed, checkpoint, pilot=pilot, anchors=anchors,
-        splits_diffuse=bool(layers),
+        splits_diffuse=bool(layers), shutter_s=work.recipe.blur.shutter_s,
     )  # fmt: skip
     # Name the images as the file does.
     images = {name: getattr(result, name) for name in ("outdoor", "indoor", "albedo", "normal")}

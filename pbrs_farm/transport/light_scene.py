@@ -5,6 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -168,6 +169,7 @@ class LightScene:
         pilot: Pilot | None = None,
         anchors: NoiseAnchors | None = None,
         splits_diffuse: bool = False,
+        shutter_s: float = 0.0,
     ) -> LightResult:
         """The radiance of both light groups in a camera's view, by the integrator of fields.
 
@@ -184,13 +186,22 @@ class LightScene:
         stays on them; None: each pixel has its own.
         splits_diffuse: the result has the diffuse light of first surfaces, too (diffuse_images.py);
         `path` alone.
+        shutter_s: for how long the shutter of a camera with blur is open; what moves meanwhile is
+        blurred, about the time to which the scene was moved.
         Pixels without a ray are black. Raises MachineFailed for a lens, blur or split on a scalar
         variant, RenderFailed for blur or split by Metropolis.
         """
         # Emitters and their weights are those of the pilot's view; it is kept for the next one.
         own = pilot or Pilot(camera, seed, self._time_s)
         kept = checkpoint or NoCheckpoint()
-        result = self._render(camera, room_id, fields, seed, kept, own, anchors, splits_diffuse)
+        move = self._mover(camera, shutter_s)
+        now_s = self._time_s
+        try:
+            result = self._render(
+                camera, room_id, fields, seed, kept, own, anchors, splits_diffuse, move
+            )
+        finally:
+            self.move_to(now_s)
         return result if camera.blind is None else blacken(result, camera.blind)
 
     def _render(
@@ -203,6 +214,7 @@ class LightScene:
         pilot: Pilot,
         anchors: NoiseAnchors | None,
         splits_diffuse: bool,
+        move: Callable[[float], None] | None,
     ) -> LightResult:
         if splits_diffuse:
             self._check_split(fields, room_id, seed)
@@ -214,7 +226,7 @@ class LightScene:
         emitters, weights = self._emitters_of_pilot(pilot, fields)
         streams = self._streams(camera, anchors) if anchors else None
         view = SampledView(
-            self.device_scene, emitters, camera, fields, seed, streams, splits_diffuse
+            self.device_scene, emitters, camera, fields, seed, streams, splits_diffuse, move
         )
         facts: dict[str, Any] = {"seed": seed, "lamp_weights": self._weights_by_name(weights)}
         if fields.integrator == "metropolis":
@@ -233,6 +245,16 @@ class LightScene:
         result = result_from_sums(sums, camera, spp, facts)
         result = add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
         return add_diffuse_images(result, sums, spp) if splits_diffuse else result
+
+    def _mover(self, camera: Camera, shutter_s: float) -> Callable[[float], None] | None:
+        """What moves things to a share of the shutter's time; None where they stand still meanwhile."""
+        middle_s = self._time_s
+        if camera.blur is None or shutter_s <= 0 or self._moving is None or middle_s is None:
+            return None
+        begin_s = middle_s - 0.5 * shutter_s
+        if not self._moving[0].moves_between(begin_s, begin_s + shutter_s):
+            return None
+        return lambda share: self.move_to(begin_s + share * shutter_s)
 
     def _emitters_of_pilot(
         self, pilot: Pilot, fields: LightFields

@@ -5,8 +5,8 @@ Effects: reads the clock where there is a time budget.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +21,8 @@ from pbrs_farm.transport.path_tracer import Lanes, SampleSums, sums_from_arrays,
 from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
 from pbrs_farm.transport.time_budget import TimeBudget
 
+MOST_PARTS: Final = 16
+"""Instants at which things stand in a picture that they blur."""
 _SAMPLES_PER_LAUNCH: Final = 1 << 26  # bounds how long one kernel runs
 _SPP: Final = "spp"  # in what is kept: samples of each pixel so far
 
@@ -40,6 +42,8 @@ class SampledView:
     seed: int
     streams: NDArray[np.uint32] | None = None  # of each pixel's random numbers (surface_noise.py)
     splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
+    move: Callable[[float], None] | None = None
+    """Puts what moves where it is at a share of the shutter's time; None: nothing moves while it is open."""
 
 
 def path_sums(
@@ -107,11 +111,54 @@ def _traced(
 ) -> SampleSums:
     """Sums over n samples of every pixel, from the first on."""
     i = view.camera.intrinsics
-    lanes = Lanes(
-        i.width_px, i.height_px, first, n, view.seed, n_lamps=n_lamps, streams=view.streams,
-        splits_diffuse=view.splits_diffuse,
-    )  # fmt: skip
-    return trace(view.scene, view.emitters, view.camera, lanes, view.fields, max_depth=max_depth)
+    total: SampleSums | None = None
+    for start, count, camera in _parts_of_shutter(view, first, n):
+        lanes = Lanes(
+            i.width_px, i.height_px, start, count, view.seed, n_lamps=n_lamps, streams=view.streams,
+            splits_diffuse=view.splits_diffuse,
+        )  # fmt: skip
+        sums = trace(view.scene, view.emitters, camera, lanes, view.fields, max_depth=max_depth)
+        total = _plus(total, sums)
+    assert total is not None, "at least one sample is traced"
+    return total
+
+
+def _parts_of_shutter(view: SampledView, first: int, n: int) -> Iterator[tuple[int, int, Camera]]:
+    """(first sample, number, camera) of launches in each of which nothing moves; moves things before each.
+
+    Without things that move there is one. Else a pass of fields.spp samples is divided among the parts of the
+    shutter's time, each as long as it has samples; things stand where they are in its middle, the
+    camera moves on within it. A sample's part follows from its number alone.
+    """
+    spp, blur = view.fields.spp, view.camera.blur
+    if view.move is None or blur is None:
+        yield first, n, view.camera
+        return
+    length = shutter_part_spp(spp)
+    order = _spread_order(-(-spp // length))
+    begin = first
+    while begin < first + n:
+        place = begin % spp
+        end = min(begin - place + min((place // length + 1) * length, spp), first + n)
+        # A part is named by the samples of its place in the order, which are as many.
+        part = order[place // length]
+        low = part * length
+        shares = low / spp, min(low + length, spp) / spp
+        view.move(0.5 * sum(shares))
+        yield begin, end - begin, replace(view.camera, blur=blur.part(*shares))
+        begin = end
+
+
+def shutter_part_spp(spp: int) -> int:
+    """Samples of a pass of spp that see things at one instant: two at least, of MOST_PARTS instants at most."""
+    return max(-(-spp // MOST_PARTS), min(2, spp))
+
+
+def _spread_order(n: int) -> list[int]:
+    """0 to n - 1, the last one last, so that the first few lie all over the time (van der Corput)."""
+    bits = max((n - 2).bit_length(), 1)
+    reversed_bits = [int(f"{k:0{bits}b}"[::-1], 2) for k in range(n - 1)]
+    return [*sorted(range(n - 1), key=reversed_bits.__getitem__), n - 1]
 
 
 def _plus(total: SampleSums | None, sums: SampleSums) -> SampleSums:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.camera import Camera, CameraBlur, Intrinsics
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.motions import Motion
 from pbrs_farm.core.recipe import Recipe, recipe_from_name
 from pbrs_farm.geometry.moving import house_at
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.transport.light_scene import LightScene
-from pbrs_farm.transport.scene_tables.sky import sky_for_house
+from pbrs_farm.transport.sample_passes import MOST_PARTS, SampledView, _parts_of_shutter
+from pbrs_farm.transport.scene_tables.sky import sky_for_house, uniform_sky
+from pbrs_farm.transport.validation import known_rooms as rooms
 
 pytestmark = pytest.mark.skipif(
     choose_variant().startswith("scalar"), reason="light that moves needs LLVM"
@@ -69,3 +72,89 @@ def test_a_lamp_that_moves_is_told() -> None:
     scene = scene_of(replace(house, motions=(falls,)))
     with pytest.raises(BadHouse, match="lamp that moves"):
         scene.move_to(1.0)
+
+
+FOCAL_PX = 48 / math.tan(0.3)
+SHUTTER_S = 0.5
+
+
+def panel_that_moves() -> tuple[House, Camera]:
+    """A black panel 2 m before a camera, which moves to the right at .4 m/s before a white wall."""
+    wall = rooms.quad([(-9, -9, -0.5), (9, -9, -0.5), (9, 9, -0.5), (-9, 9, -0.5)], 1)
+    panel = rooms.quad([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], 0)
+    item = Item("panel", "panel", ItemKind.WALL, "0", (panel,), room_id="0_0")
+    paints = [rooms.matte("black", 0.0), rooms.matte("white", 0.8)]
+    house = rooms.house([wall], paints, lamps=[item])
+    moves = Motion("panel", "", (0.0, 2.0), ((0, 0, 0, 1, 0, 0, 0), (0.8, 0, 0, 1, 0, 0, 0)))
+    return replace(house, motions=(moves,)), rooms.camera((0.4, 0, 2), (0.4, 0, 0), 96, 8, 0.6)
+
+
+def albedo_rows(scene: LightScene, camera: Camera, spp: int, shutter_s: float = 0.0) -> np.ndarray:
+    update = {"filter": "box", "pilot_spp": 0, "spp": spp}
+    fields = RECIPE.light.model_copy(update=update)
+    result = scene.render(camera, "0_0", fields, 1, shutter_s=shutter_s)
+    return np.asarray(result.albedo[..., 0].mean(0))
+
+
+def test_a_thing_that_moves_while_the_shutter_is_open_is_blurred_about_its_middle() -> None:
+    house, camera = panel_that_moves()
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
+    scene.move_to(1.0)
+    blurred = albedo_rows(scene, replace(camera, blur=CameraBlur()), 64, SHUTTER_S)
+    # At 1 s the edge stands at .4 m, the picture's middle, and goes .2 m while the shutter is open: each
+    # column is dark for as long as the panel is before it.
+    width = FOCAL_PX * 0.4 * SHUTTER_S / 2
+    expected = 0.8 * np.clip((np.arange(96) + 0.5 - 48) / width + 0.5, 0, 1)
+    assert np.abs(blurred - expected).max() < 0.06
+    # Sixteen instants: the mean of many sharp pictures over the shutter's time.
+    sharp = []
+    for k in range(32):
+        scene.move_to(1.0 + SHUTTER_S * ((k + 0.5) / 32 - 0.5))
+        sharp.append(albedo_rows(scene, replace(camera, blur=CameraBlur()), 4))
+    assert np.abs(blurred - np.mean(sharp, axis=0)).max() < 0.06
+    assert np.abs(blurred - sharp[16]).max() > 0.3
+
+
+def test_a_camera_that_goes_along_sees_a_moving_thing_sharp() -> None:
+    house, camera = panel_that_moves()
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
+    scene.move_to(1.0)
+    along = CameraBlur(velocity_m=(0.4 * SHUTTER_S, 0.0, 0.0))
+    rows = albedo_rows(scene, replace(camera, blur=along), 64, SHUTTER_S)
+    # Within each of 16 instants the camera alone goes on, by a sixteenth of 14.5 px.
+    assert ((rows > 0.05) & (rows < 0.75)).sum() <= 2
+
+
+def test_the_scene_stands_at_its_time_after_a_blurred_picture() -> None:
+    house, camera = panel_that_moves()
+    scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
+    scene.move_to(1.0)
+    before = albedo_rows(scene, camera, 4)
+    albedo_rows(scene, replace(camera, blur=CameraBlur()), 4, SHUTTER_S)
+    np.testing.assert_array_equal(albedo_rows(scene, camera, 4), before)
+
+
+@pytest.mark.parametrize("spp", [1, 2, 10, 28, 50, 64])
+def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: int) -> None:
+    moved: list[float] = []
+    fields = RECIPE.light.model_copy(update={"spp": spp})
+    camera = replace(panel_that_moves()[1], blur=CameraBlur())
+    view = SampledView(None, None, camera, fields, 1, move=moved.append)  # type: ignore[arg-type]
+    whole = list(_parts_of_shutter(view, 0, spp))
+    assert sum(n for _first, n, _camera in whole) == spp
+    assert len(whole) <= MOST_PARTS
+    # Each part is as long as it has samples, and things stand in its middle.
+    parts = sorted(
+        (middle, n / spp, c.blur.open_share)
+        for middle, (_first, n, c) in zip(moved, whole, strict=True)
+        if c.blur is not None
+    )
+    ends = np.cumsum([share for _middle, share, _open in parts])
+    np.testing.assert_allclose([p[2] for p in parts], [p[1] for p in parts])
+    np.testing.assert_allclose([p[0] for p in parts], ends - [0.5 * p[1] for p in parts])
+    # Launches of other sizes give each sample the same part.
+    moved_before, moved[:] = list(moved), []
+    pieces = [p for k in range(0, spp, 3) for p in _parts_of_shutter(view, k, min(3, spp - k))]
+    by_sample = [m for m, (_f, n, _c) in zip(moved, pieces, strict=True) for _ in range(n)]
+    expected = [m for m, (_f, n, _c) in zip(moved_before, whole, strict=True) for _ in range(n)]
+    assert by_sample == expected

@@ -49,6 +49,7 @@ class LensCamera(NamedTuple):
     exposure: Any  # share of that time for which a row is open
     rolling: Any  # share of it from the first row's light to the last one's
     row: Any  # share of it from a row's light to the next one's
+    middle: Any  # share of it from mid-shutter to the middle of the part that is looked at
 
 
 def device_camera(camera: Camera) -> DeviceCamera | LensCamera:
@@ -88,6 +89,7 @@ def _lens_camera(camera: Camera) -> LensCamera:
         dr.opaque(mi.Float, blur.open_share),
         dr.opaque(mi.Float, blur.rolling_share),
         dr.opaque(mi.Float, blur.rolling_share / camera.intrinsics.height_px),
+        dr.opaque(mi.Float, blur.middle_share),
     )
 
 
@@ -130,7 +132,7 @@ def camera_ray(
     along = middle + (offset.x - 0.5) * right + (offset.y - 0.5) * down
     local, start = mi.Vector3f(along.x, along.y, along.z), mi.Vector3f(0)
     # Rows are lit one after another, the middle one at mid-shutter.
-    time = (corner.y + offset.y) * camera.row - 0.5 * camera.rolling
+    time = (corner.y + offset.y) * camera.row - 0.5 * camera.rolling + camera.middle
     if sampler is not None:
         # Start anywhere in the pupil and aim at the point that is sharp.
         pupil = mi.warp.square_to_uniform_disk_concentric(sampler.get_2d(mi.UInt32(_LENS_DIM)))
