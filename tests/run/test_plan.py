@@ -59,8 +59,8 @@ def test_the_name_of_a_recipe_is_no_part_of_its_digest() -> None:
 @pytest.mark.parametrize(
     ("name", "digest"),
     [
-        ("paper", "776f9df401b2cc8fc30b44c67019b1a7"),
-        ("released", "6511c2033ebfc2ea6f1c79670bbe1c64"),
+        ("paper", "58bd32eee7ed2ac28da001d28d35d4ee"),
+        ("released", "e142ed5762e28f2b7fdda1a55923e28d"),
     ],
 )
 def test_what_is_not_of_the_paper_is_off_in_paper_and_released(name: str, digest: str) -> None:
@@ -68,6 +68,7 @@ def test_what_is_not_of_the_paper_is_off_in_paper_and_released(name: str, digest
     assert not recipe_from_name(name).repair.lamp_in_every_room
     assert recipe_from_name(name).repair.lamp_lx == 0
     assert recipe_from_name(name).dress.open_share == 0
+    assert recipe_from_name(name).dress.float_share == 0
     assert not recipe_from_name(name).repair.add_ceilings
     assert recipe_from_name(name).surroundings.kind == "none"
     assert recipe_from_name(name).selection.min_room_lx == 0
