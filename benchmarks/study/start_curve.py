@@ -17,24 +17,28 @@ Effects: out/study/start (or PBRS_STUDY_FOLDER/start): homes, runs, results.json
 from __future__ import annotations
 
 import argparse
-import contextlib
+import itertools
 import json
 import os
 import shutil
-import signal
 import statistics
-import subprocess
 import sys
 import tarfile
-import threading
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.study.rendered import FOLDER
+from benchmarks.study.trainings import (
+    FIRST_JUDGE,
+    SMALL_PICTURES,
+    Training,
+    gains_by_home,
+    row_of_run,
+    run_program,
+    train_all,
+)
 
 START: Final = FOLDER / "start"
 HOMES: Final = START / "homes"
@@ -45,7 +49,6 @@ MADE_BY: Final = (
     "python -m benchmarks.study.start_curve render",
     "python -m benchmarks.study.start_curve train",
 )
-_FIRST_JUDGE: Final = 60101  # seeds of made homes that judge begin here, as the learning curve's do
 _HELD_OUT: Final = "made"
 _FIELDS: Final = (
     "judge_every=0",
@@ -54,32 +57,14 @@ _FIELDS: Final = (
     "final_views=200",
     "threads=2",
 )
-_LIGHT: Final = ("--size", "160x120", "--recipe", "fast", "--dress", "1")
 # Behind homes that come empty.
 _GENERATED: Final = ("--furnish", "empty", "--catalogue", "generated")
-# Views are looked at as large as they are made: what a home costs is halved by it.
-_SCORED: Final = ("--set", "cameras.score_width_px=160", "--set", "cameras.score_height_px=120")
-_GRACE_S: Final = 15.0  # between asking a process to end and ending it
+_LOG: Final = START / "program.log"
 _SHARD: Final = 600  # views, about 12 MB
 
 
-@dataclass(frozen=True, slots=True)
-class Training:
-    """A row of the table before it is made."""
-
-    init: str
-    views: int
-    seed: int
-
-    @property
-    def folder(self) -> Path:
-        """Where it goes."""
-        return START / "runs" / f"{self.init}_{self.views}views_seed{self.seed}"
-
-    @property
-    def evaluation(self) -> Path:
-        """What says that it is done."""
-        return self.folder / "evaluation/evaluation.json"
+def _folder(init: str, views: int, seed: int) -> Path:
+    return START / "runs" / f"{init}_{views}views_seed{seed}"
 
 
 def main(words: Sequence[str]) -> None:
@@ -127,14 +112,14 @@ def _arguments(words: Sequence[str]) -> argparse.Namespace:
 
 def _render(args: argparse.Namespace) -> None:
     began = time.monotonic()
-    last = _FIRST_JUDGE + args.judges - 1
+    last = FIRST_JUDGE + args.judges - 1
     option, own = (",furniture=none", _GENERATED) if args.generated else ("", ())
-    homes = [f"made:{span}{option}" for span in (f"{_FIRST_JUDGE}..{last}", f"1..{args.homes}")]
+    homes = [f"made:{span}{option}" for span in (f"{FIRST_JUDGE}..{last}", f"1..{args.homes}")]
     words = [
-        "run", *homes, *own, *_LIGHT, *_SCORED, "--modes", *args.modes,
+        "run", *homes, *own, *SMALL_PICTURES, "--modes", *args.modes,
         "--views", str(args.views), "--jobs", str(args.jobs), "--out", str(HOMES),
     ]  # fmt: skip
-    code = _pbrs_farm(words, began + args.seconds if args.seconds else None)
+    code = run_program(words, began + args.seconds if args.seconds else None, _LOG)
     views = list(HOMES.glob("houses/*/views/*/view.json"))
     row = {
         "homes": len({path.parents[2] for path in views}), "views": len(views),
@@ -162,7 +147,9 @@ def _copy_views(out: Path) -> None:
     shards = START / "shards"
     shutil.rmtree(shards, ignore_errors=True)
     words = ["--layers", "colour", "normal", "--colour", "jpeg:95", "--shard-size", str(_SHARD)]
-    _pbrs_farm(["pack", str(HOMES), "--modes", "mlt_il_ol", *words, "--out", str(shards)], None)
+    run_program(
+        ["pack", str(HOMES), "--modes", "mlt_il_ol", *words, "--out", str(shards)], None, _LOG
+    )
     out.mkdir(parents=True, exist_ok=True)
     for path in (*shards.glob("*"), START / "rendered.jsonl"):
         if path.is_file():
@@ -192,41 +179,21 @@ def _train(args: argparse.Namespace) -> None:
     deadline = time.monotonic() + args.seconds if args.seconds else None
     place = args.place or str(HOMES)
     held, n_views = _held_out(place)
-    trainings = list(dict.fromkeys(
-        Training(init, min(views, n_views), seed)
-        for seed in range(args.seeds)
-        for views in args.points
-        for init in INITS
-    ))  # fmt: skip
+    points = dict.fromkeys(min(views, n_views) for views in args.points)
+    fields = [f"steps={args.steps}", f"batch={args.batch}", *_FIELDS, *args.set]
+    judges = (f"{_HELD_OUT}={place}", *args.on)
+    trainings = []
+    for seed, views, init in itertools.product(range(args.seeds), points, INITS):
+        train = (
+            "train", "normals", place, "--plan", "lite", "--init", init, "--views", str(views),
+            "--seed", str(seed), "--hold-out", *held,
+            *(word for field in fields for word in ("--set", field)),
+        )  # fmt: skip
+        trainings.append(Training(_folder(init, views, seed), train, judges))
     device = device_of(plan_of("normals", "lite"))
     said = f"{n_views} views train, {len(held)} homes judge, {len(trainings)} trainings on {device}"
     print(said, flush=True)
-    telling, took = threading.Lock(), [0.0]
-
-    def make(training: Training) -> None:
-        began = time.monotonic()
-        # What cannot end in time is not begun.
-        if training.evaluation.exists() or (deadline and began + max(took) > deadline):
-            return
-        fields = [f"steps={args.steps}", f"batch={args.batch}", *_FIELDS, *args.set]
-        train = [
-            "train", "normals", place, "--plan", "lite", "--init", training.init,
-            "--views", str(training.views), "--seed", str(training.seed), "--hold-out", *held,
-            *(word for field in fields for word in ("--set", field)), "--out", str(training.folder),
-        ]  # fmt: skip
-        judging = (word for on in (f"{_HELD_OUT}={place}", *args.on) for word in ("--on", on))
-        evaluate = ["evaluate", str(training.folder), *judging]
-        log = training.folder.with_suffix(".log")
-        if any(_pbrs_farm(words, deadline, log) for words in (train, evaluate)):
-            print(f"{training.folder.name}: not finished, {log} says how far", flush=True)
-            return
-        with telling:
-            took.append(time.monotonic() - began)
-            print(f"{training.folder.name}: {took[-1]:.0f} s", flush=True)
-            _tell(args.copy)
-
-    with ThreadPoolExecutor(args.together) as pool:
-        list(pool.map(make, trainings))
+    train_all(trainings, args.together, deadline, lambda: _tell(args.copy))
     print(_tell(args.copy), flush=True)
 
 
@@ -237,50 +204,20 @@ def _held_out(place: str) -> tuple[list[str], int]:
 
     refs = open_views(place).refs
     homes = [home_of(ref.house) for ref in refs]
-    held = sorted({home for home in homes if int(home.rpartition("-")[2]) >= _FIRST_JUDGE})
+    held = sorted({home for home in homes if int(home.rpartition("-")[2]) >= FIRST_JUDGE})
     if not held or len(held) == len(set(homes)):
         raise RuntimeError(f"{place}: no home that judges, or none that trains: render goes first")
     return held, sum(home not in held for home in homes)
-
-
-def _pbrs_farm(words: Sequence[str], deadline: float | None, log: Path | None = None) -> int:
-    """Run the program until it ends or until the deadline, told first and then ended; its exit code."""
-    log = log or START / "program.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    line = [sys.executable, "-m", "pbrs_farm.cli", *words]
-    with log.open("a") as out:
-        process = subprocess.Popen(line, stdout=out, stderr=out, start_new_session=True)
-        try:
-            return process.wait(None if deadline is None else max(deadline - time.monotonic(), 0))
-        except subprocess.TimeoutExpired:
-            process.send_signal(signal.SIGINT)
-        try:
-            return process.wait(_GRACE_S) or 1
-        except subprocess.TimeoutExpired:
-            return 1
-        finally:
-            # The session is its own: what it started ends with it.
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
 
 
 def _rows() -> list[dict[str, Any]]:
     """What each training that is judged was, and its evaluations."""
     rows = []
     for path in sorted((START / "runs").glob("*/evaluation/evaluation.json")):
-        report = json.loads(path.read_text())
         init, views, seed = path.parents[1].name.split("_")
-        rows.append({
-            "run": path.parents[1].name, "init": init, "views": int(views.removesuffix("views")),
-            "seed": int(seed.removeprefix("seed")), "steps": report["run"]["plan"]["steps"],
-            "batch": report["run"]["plan"]["batch"],
-            "homes": len(report["run"]["homes"]["train"]), "baseline": report["trained"]["baseline_name"],
-            "training_deg": report["trained"]["network"]["train"]["mean_deg"],
-            "judged": {
-                one["on"]: {key: one[key] for key in ("n_views", "figures", "parts", "shares", "groups")}
-                for one in report["evaluations"]
-            },
+        rows.append(row_of_run(path) | {
+            "init": init, "views": int(views.removesuffix("views")),
+            "seed": int(seed.removeprefix("seed")),
         })  # fmt: skip
     return rows
 
@@ -348,13 +285,12 @@ def start_figures(rows: Sequence[dict[str, Any]]) -> dict[str, float]:
             for row in rows
             if row["views"] == views
         }
-        seeds = [s for init, s in groups if init == "imagenet" and ("none", s) in groups]
-        if not seeds:
+        none, imagenet = (
+            {s: of for (init, s), of in groups.items() if init == name} for name in INITS[::-1]
+        )
+        gains = gains_by_home(none, imagenet)
+        if not gains:
             continue
-        gains = [
-            statistics.fmean(groups["none", s][home] - groups["imagenet", s][home] for s in seeds)
-            for home in groups["none", seeds[0]]
-        ]
         name = f"study.init_gain_{views}"
         figures[name] = round(statistics.fmean(gains), 2)
         figures[f"{name}_low"], figures[f"{name}_high"] = (

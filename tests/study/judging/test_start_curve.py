@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.study import start_curve, study_figures
+from benchmarks.study import start_curve, study_figures, trainings
 
 pytestmark = pytest.mark.study
 
@@ -84,11 +84,10 @@ def test_the_table_has_a_row_a_start_and_what_knows_no_picture() -> None:
 def test_the_program_is_ended_at_the_deadline(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(start_curve, "START", tmp_path)
-    monkeypatch.setattr(start_curve, "_GRACE_S", 0.0)
+    monkeypatch.setattr(trainings, "_GRACE_S", 0.0)
     began = time.monotonic()
-    assert start_curve._pbrs_farm(["doctor"], began) == 1
-    assert start_curve._pbrs_farm(["--version"], None, tmp_path / "logs/said.log") == 0
+    assert trainings.run_program(["doctor"], began, tmp_path / "doctor.log") == 1
+    assert trainings.run_program(["--version"], None, tmp_path / "logs/said.log") == 0
     assert (tmp_path / "logs/said.log").read_text().strip()
 
 
