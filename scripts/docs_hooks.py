@@ -48,6 +48,13 @@ def page_of_notebook(notebook: Path) -> str:
     return f"{title}\n\n{file}\n{rest}\n"
 
 
+def on_page_content(html: str, **_rest: Any) -> str:
+    """Show a poster that links to a film as that film, which plays in the page."""
+    poster = r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>'
+    film = r'<video controls loop muted playsinline preload="none" src="\1" poster="\3" title="\2"></video>'
+    return re.sub(poster, film, html)
+
+
 def on_page_markdown(markdown: str, page: Any, **_rest: Any) -> str:
     """Point links that leave the docs at those texts."""
     up = "../" * page.file.src_uri.count("/")
