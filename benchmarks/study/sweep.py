@@ -161,6 +161,9 @@ def _render(args: argparse.Namespace) -> None:
 
 
 def _train(args: argparse.Namespace) -> None:
+    from pbrs_farm.study.judging.judged_places import open_judged_place
+    from pbrs_farm.study.training_plan import plan_of
+
     deadline = time.monotonic() + args.seconds if args.seconds else None
     arms = arms_to_do(args.arms)
     roots = {root: _views_by_home(root) for arm in arms for root in _roots_of(arm)}
@@ -171,6 +174,9 @@ def _train(args: argparse.Namespace) -> None:
         )
     n_views = min(sum(own[home] for home in homes) for own in roots.values())
     print(f"{len(homes)} homes and {n_views} views of each arm train", flush=True)
+    plan = plan_of("normals", "lite")
+    for on in args.on:  # what cannot judge is told now, not after the first training
+        open_judged_place(on, plan, mode="mlt_il_ol")
     trainings = []
     for seed, arm in itertools.product(range(args.seeds), arms):
         fields = [
