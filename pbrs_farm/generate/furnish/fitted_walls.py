@@ -29,7 +29,7 @@ def fitted_bookcases(shelf: Shelf, stretches: Sequence[float]) -> tuple[Template
 
 
 def fitted_show_cases(shelf: Shelf, stretches: Sequence[float]) -> tuple[Template, ...]:
-    """Doors of glass over cupboards along each stretch of wall that is no longer than such pieces are."""
+    """Doors of glass over cupboards, as long as each stretch of wall, 2.4 m at most."""
     return _fitted(shelf, "fitted_cabinet", stretches, 0.6, longest=2.4)
 
 
