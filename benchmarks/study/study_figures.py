@@ -46,6 +46,7 @@ UNITS = (
         "study.normals_train": "degrees, mean on its training views",
         "study.matching_equal": "share of 24 fixtures whose count is the min-cost assignment's",
         "study.iou_equal": "share of 8 fixtures whose mIoU is torchmetrics' within 1e-6",
+        "study.detector_small": "share of whole cups, bowls, bottles, vases of .06 to .12 of the picture that CenterNet finds in our views",
         "study.compare": "1 = a root is at no distance from itself and farther from darker photographs; a test that must pass",
         "study.resume_equal": "1 = a killed run went on to the same weights",
         "study.ablation_s": "s: the built-in home rendered and its four lights compared; a test that must pass",
@@ -99,7 +100,7 @@ def main() -> None:
             continue
         figures |= found
         cpu_s += seconds
-    figures |= _dressed_gain() | _init_gain() | {"study.bench_cpu_s": round(cpu_s, 1)}
+    figures |= _dressed_gain() | _init_gain() | _detector() | {"study.bench_cpu_s": round(cpu_s, 1)}
     write_report("study", figures, UNITS)
     if failed:
         raise RuntimeError(f"failed: {', '.join(failed)}")
@@ -290,6 +291,18 @@ def _dressed_gain() -> Figures:
     gains = np.subtract(bare, dressed)
     spread = float(gains.std(ddof=1)) if len(gains) > 1 else float("nan")
     return {"study.dressed_gain": float(gains.mean()), "study.dressed_gain_spread": spread}
+
+
+def _detector() -> Figures:
+    """From the views that benchmarks/study/detector.py was asked of, where it was run."""
+    # Imported where needed: it wants torch.
+    from benchmarks.study import detector
+
+    if not detector.RESULTS.exists():
+        text = "left out, run python -m benchmarks.study.detector ROOT first"
+        print(f"study.detector_small: {text}", file=sys.stderr)
+        return {}
+    return detector.detector_figures(json.loads(detector.RESULTS.read_text()))
 
 
 def _init_gain() -> Figures:
