@@ -58,13 +58,14 @@ class PhotoCamera:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RealFrame:
-    """A photograph cut to a plan's form."""
+    """A photograph cut to a plan's form.
+
+    truth: (H, W, ...) of the same part, at the photograph's own size, in the form of the task's targets.
+    """
 
     id: str  # its path below the folder
     colour: NDArray[np.uint8]  # (h, w, 3) at the plan's size
-    truth: (
-        Arrays  # (H, W, ...) of the same part, at its own size, in the form of the task's targets
-    )
+    truth: Arrays
     digest: str  # of the picture's file: what has trained may not judge
     camera: F32  # (4,) fx, fy, cx, cy at the plan's size
 

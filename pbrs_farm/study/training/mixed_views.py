@@ -104,5 +104,6 @@ class MixedViews:
 def _joined(reads: Sequence[BatchRead]) -> BatchRead:
     """The rows of several reads as one batch."""
     ids = [at for own, _ in reads for at in own]
-    names = reads[0][1].keys() & reads[-1][1].keys()
-    return ids, {name: np.concatenate([arrays[name] for _, arrays in reads]) for name in names}
+    return ids, {
+        name: np.concatenate([arrays[name] for _, arrays in reads]) for name in reads[-1][1]
+    }
