@@ -43,7 +43,7 @@ _OPENED: Final = re.compile(
     r"dishwasher|washing machine|washer|dryer)\b",
     re.IGNORECASE,
 )
-_NOTHING: Final = re.compile(r"\b(frame|open)\b", re.IGNORECASE)  # a doorway, shelves
+_NOTHING: Final = re.compile(r"\b(frame|open|blind)\b", re.IGNORECASE)  # a doorway, shelves
 
 
 def main(words: list[str] | None = None) -> None:
