@@ -406,16 +406,18 @@ def _compare(args: argparse.Namespace) -> int:
         size_of_views,
     )
     from pbrs_farm.study.comparing.comparison import compare_sets
+    from pbrs_farm.study.networks.initial_weights import imagenet_features
     from pbrs_farm.study.training.run_folder import make_folder
 
     at_least("--views", args.views, 0)
-    size = size_of_views(args.root)
-    make_folder(args.out)  # before anything is read
+    # What is missing here is told before pictures are read.
+    network, size = imagenet_features(), size_of_views(args.root)
+    make_folder(args.out)
     photographs = read_photographs(args.photographs, size, most=args.views)
     ours = read_views(args.root, size, mode=args.mode, most=args.views)
     for line in (*photographs.left_out, *ours.left_out):
         warn(f"left out: {line}")
-    comparison = compare_sets(ours, photographs)
+    comparison = compare_sets(ours, photographs, network)
     path = write_comparison(args.out, comparison)
     if args.json:
         echo_json(comparison.report)

@@ -1,4 +1,4 @@
-"""Views of ours beside photographs: distances, histograms, the views that are most unlike. Effects: torch reads weights."""
+"""Views of ours beside photographs: distances, histograms, the views that are most unlike; torch, no effects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from pbrs_farm.study.comparing.set_distance import (
     shared_of_halves,
 )
 from pbrs_farm.study.networks.efficient_unet import LiteFeatures
-from pbrs_farm.study.networks.initial_weights import imagenet_features
 from pbrs_farm.study.networks.network_choice import encode_colour
 from pbrs_farm.study.training.prediction import as_colour
 
@@ -62,12 +61,11 @@ class Comparison:
     unlike: tuple[Unlike, ...]
 
 
-def compare_sets(ours: PictureSet, photographs: PictureSet) -> Comparison:
+def compare_sets(ours: PictureSet, photographs: PictureSet, network: LiteFeatures) -> Comparison:
     """Compare two sets of two or more pictures of one size.
 
-    Raises MachineFailed where the package with EfficientNet-Lite0's weights is not installed.
+    network: what says how pictures look, as `imagenet_features` gives it.
     """
-    network = imagenet_features()
     a, b = ours.pictures, photographs.pictures
     features = _features(network, a), _features(network, b)
     groups = tuple(
