@@ -16,6 +16,7 @@ import pbrs_farm as pf
 from pbrs_farm.check import verify
 from pbrs_farm.check.certificate import Certificate
 from pbrs_farm.images import exr_from_layers, layers_from_exr
+from pbrs_farm.run.processes.render_task import Event
 from tests.check.roots import sign
 
 LAYERS = [
@@ -218,3 +219,35 @@ def test_a_rig_films_each_frame_by_all_its_cameras(moving: pf.Home) -> None:
     np.testing.assert_allclose(film[0].layer("disparity")[seen], expected, rtol=2e-3, atol=1)
     with pytest.raises(pf.BadInput, match=r"rig: cameras\[0\].yaw"):
         pf.film(moving, camera, fps=2, seconds=1, rig={"cameras": [{"name": "a", "yaw": 3}]})
+
+
+def test_a_film_that_was_killed_goes_on_where_it_was(
+    made: Path, moving: pf.Home, tmp_path: Path
+) -> None:
+    root = tmp_path / "root"
+    shutil.copytree(made, root)
+    (folder,) = root.glob("houses/*")
+    # As a kill leaves it: one frame is not begun, of one its last step, and tracks, are not done.
+    shutil.rmtree(folder / "views/frame_00001")
+    for marker in folder.glob("done/*frame_00001.json"):
+        marker.unlink()
+    for lost in ("done/view.frame_00002.json", "views/frame_00002/view.json", "done/tracks.json"):
+        (folder / lost).unlink()
+    again: list[str] = []
+
+    def hear(event: Event) -> None:
+        if event.kind == "done":
+            again.append(f"{event.step} {event.view_id}")
+
+    pf.render_homes(moving, root, modes=["opengl_dl"], layers=LAYERS, tracks=True, observe=hear)
+    assert sorted(again) == [
+        "opengl_dl frame_00001", "tracks None", "truth frame_00001", "view frame_00001",
+        "view frame_00002",
+    ]  # fmt: skip
+    ((before, after),) = zip(made.glob("houses/*"), root.glob("houses/*"), strict=True)
+    names = [
+        p.relative_to(before) for p in before.rglob("*") if p.is_file() and p.parent.name != "done"
+    ]
+    for name in names:
+        if name.name != "manifest.jsonl":
+            assert (after / name).read_bytes() == (before / name).read_bytes(), name
