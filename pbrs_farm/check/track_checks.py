@@ -23,7 +23,8 @@ from pbrs_farm.check.stored_view import StoredView
 
 FILE: Final = "tracks.npz"
 MOST_FRAMES: Final = 12  # of a film, spread over it, beside those in which points were chosen
-_PX: Final = 0.02  # and a hundred-thousandth of the place: 32-bit floats
+_PX: Final = 0.02
+_VERTEX_M: Final = 1e-6  # of vertices in 32-bit floats
 _DEPTH: Final = 1e-4  # of the depth, and metres
 _BESIDE_M: Final = (
     0.002  # of a point: where its surroundings are seen and it is not, either is right
@@ -140,7 +141,7 @@ def _check_frame(
     told, hidden = tracks["points"][own, f].astype(np.float64), tracks["occluded"][own, f]
     with np.errstate(invalid="ignore"):
         front = (depth > 1e-3) & np.isfinite(px).all(1)
-        off = np.abs(told - px).max(1) > _PX + 1e-5 * np.abs(px).max(1)
+        off = np.abs(told - px).max(1) > place_slack_px(px, depth)
         off |= np.abs(tracks["depth_m"][own, f] - depth) > _DEPTH * (1 + np.abs(depth))
         margin = np.minimum(px, np.array(view.size[::-1]) - px).min(axis=1)
     tally.add("tracks", len(own))
@@ -160,6 +161,13 @@ def _check_frame(
     for k in wrong[:20]:
         word = "hidden" if hidden[k] else "seen"
         tally.fail("tracks", place, f"point {own[k]} is not {word} in {view.folder.name}")
+
+
+def place_slack_px(px: Floats, depth: Floats) -> Floats:
+    """(N,) px by which a place (N, 2) may be off: 32-bit floats of it, and of vertices near the camera's plane."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 1e-5 + _VERTEX_M / np.abs(depth)
+        return np.asarray(_PX + share * np.abs(px).max(axis=1))
 
 
 def _may_be_either(
