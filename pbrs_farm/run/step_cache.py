@@ -180,11 +180,18 @@ def _extra(name: str, work: Work) -> object:
         return found or None
     if name == "develop":
         return _extra_of_develop(work)
-    preset = work.recipe.cameras.preset
-    if name == "cameras" and preset in plugins("cameras"):
-        return marks_in_digest("cameras", [preset])[0]
-    if name == "cameras" and work.recipe.cameras.source in ("file", "trajectory"):
-        return keys.sha256(camera_file_text(work.recipe.cameras).encode())
+    if name == "cameras":
+        chosen = _extra_of_cameras(work.recipe.cameras)
+        # Stereo pairs tell of their rig.
+        return ["rig", chosen] if work.recipe.cameras.stereo_m > 0 else chosen
+    return None
+
+
+def _extra_of_cameras(fields: CameraFields) -> str | None:
+    if fields.preset in plugins("cameras"):
+        return marks_in_digest("cameras", [fields.preset])[0]
+    if fields.source in ("file", "trajectory"):
+        return keys.sha256(camera_file_text(fields).encode())
     return None
 
 
