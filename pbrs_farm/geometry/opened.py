@@ -99,17 +99,6 @@ def free_value(scene: SceneTriangles, index: int, part: str, wanted: float) -> t
     return best, stopped_by
 
 
-def slide_m(moving: F64, standing: F64, along: tuple[float, float, float], most_m: float) -> float:
-    """How far triangles (F, 3, 3) slide along a unit axis before they meet others, at most most_m.
-
-    They stop 4 mm before them; what their rim alone would graze, by less than a centimetre, is let pass.
-    """
-    joint = Joint("", JointKind.PRISMATIC, (0.0, 0.0, 0.0), along, most_m)
-    low, high = _bounds_of_way(joint, moving, most_m)
-    track = _Track.of(joint, surface_points(moving, _SPACING_M))
-    return min(track.way_to(standing, np.array([low, high])), most_m)
-
-
 def _near(
     scene: SceneTriangles, index: int, part: str, low: F64, high: F64
 ) -> Iterator[tuple[str, F64]]:

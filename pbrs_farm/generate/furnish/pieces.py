@@ -12,11 +12,9 @@ import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue, Piece
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Template
-from pbrs_farm.geometry.opened import slide_m
+from pbrs_farm.generate.furnish.under_tables import way_under_m
 
 STYLES: Final = {
     "mixed": "",
@@ -71,7 +69,6 @@ class Shelf:
             words = set(re.findall(r"[a-z0-9]+", f"{piece.id} {piece.name}".lower()))
             self._order[piece.id] = key - _LIKED * bool(words & liked)
         self._tops: dict[str, float] = {}
-        self._under: dict[tuple[str, str, float, int], float] = {}
 
     def of(
         self, *groups: str, width: tuple[float, float] = (0.0, 9.0),
@@ -111,21 +108,10 @@ class Shelf:
         at: metres of its middle from that of the edge, along the chair's width. turns: quarter turns of
         the chair to the left, as in slot, against the table's. most_m where either has no shape.
         """
-        key = chair.id, table.id, round(at, 4), turns % 4
-        if key not in self._under:
-            self._under[key] = self._slide_m(chair, table, at, turns % 4)
-        return min(self._under[key], most_m)
-
-    def _slide_m(self, chair: Piece, table: Piece, at: float, turns: int) -> float:
         seat, top = self.catalogue.shape(chair), self.catalogue.shape(table)
         if seat is None or top is None:
-            return np.inf
-        moving, standing = (corners_of_surfaces(shape.surfaces) for shape in (seat, top))
-        # In the chair's frame, which looks along +z: the table turned back, its edge ahead.
-        standing = standing @ rotation_y(turns * np.pi / 2).T
-        ahead = moving[..., 2].max() - standing[..., 2].min() + _BEFORE_TABLE_M
-        standing = standing + np.array([-at, 0.0, ahead])
-        return slide_m(moving, standing, (0.0, 0.0, 1.0), table.size[1]) - _BEFORE_TABLE_M
+            return most_m
+        return min(way_under_m(seat, top, at, turns), most_m)
 
     def _top(self, piece: Piece) -> float:
         shape = self.catalogue.shape(piece)

@@ -1,0 +1,91 @@
+"""How far a chair goes under a table before the two meet; no effects but caches.
+
+Both become pictures of depth, seen along the way: of the chair how far it reaches in each cell of 8 mm,
+of the table where it begins. They meet at the least difference, wherever along the edge the chair
+stands, so that a table is looked at once a side.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Final, NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.catalogue import Shape
+from pbrs_farm.core.house import corners_of_surfaces
+from pbrs_farm.geometry.surface_points import surface_points
+
+_CELL_M: Final = 0.008
+_SPACING_M: Final = 0.008  # of points: a leg covers cells enough where one of them is empty
+_QUARTER: Final = np.array([1.0, 1.0, -1.0])
+_APART_M: Final = 0.004  # at which a chair stops before the table
+
+
+class _Depths(NamedTuple):
+    """Depths in metres by cells across the way: x, then height. Where nothing is they are infinite."""
+
+    first: tuple[int, int]  # number of the first cell
+    depths: F64
+    inner: Bools  # cells that count: a chair's rim may graze
+
+
+def way_under_m(chair: Shape, table: Shape, at: float, turns: int) -> float:
+    """Metres that a chair's front goes beyond a table's edge; inf where nothing stops it.
+
+    at: metres of the chair's middle from that of the edge, along the chair's width. turns: quarter turns
+    of the chair to the left, against the table's.
+    """
+    return _way_m(chair, table, round(at / _CELL_M), turns % 4)
+
+
+@lru_cache(maxsize=65536)
+def _way_m(chair: Shape, table: Shape, at: int, turns: int) -> float:
+    front, near = _front(chair), _near(table)[turns]
+    # Cells that both have, counted from the chair's middle.
+    begins = np.array(near.first) - [at, 0]
+    low = np.maximum(front.first, begins)
+    high = np.minimum(
+        np.array(front.first) + front.depths.shape, begins + np.array(near.depths.shape)
+    )
+    if (low >= high).any():
+        return np.inf
+    a, b = (tuple(map(slice, low - first, high - first)) for first in (front.first, begins))
+    apart = np.where(front.inner[a], near.depths[b] - front.depths[a], np.inf)
+    return max(float(apart.min()) - _APART_M, 0.0)
+
+
+@lru_cache(maxsize=512)
+def _front(chair: Shape) -> _Depths:
+    """How far a chair reaches behind its front, at most 0: chairs look along +z."""
+    corners = corners_of_surfaces(chair.surfaces)
+    points = surface_points(corners, _SPACING_M)
+    first, depths = _greatest(points, points[:, 2] - corners[..., 2].max())
+    covered = ndimage.binary_closing(np.isfinite(depths))
+    return _Depths(first, depths, ndimage.binary_erosion(covered) & np.isfinite(depths))
+
+
+@lru_cache(maxsize=256)
+def _near(table: Shape) -> tuple[_Depths, ...]:
+    """Where a table begins behind its edge, as a chair before each of its sides sees it, by turns."""
+    corners = corners_of_surfaces(table.surfaces)
+    points = surface_points(corners, _SPACING_M)
+    box = np.stack([corners.min((0, 1)), corners.max((0, 1))])
+    found = []
+    for _ in range(4):
+        first, depths = _greatest(points, box[:, 2].min() - points[:, 2])
+        found.append(_Depths(first, -depths, np.isfinite(depths)))
+        # A quarter turn, without a rounding: z takes the place of x, -x that of z.
+        points, box = (rows[:, [2, 1, 0]] * _QUARTER for rows in (points, box))
+    return tuple(found)
+
+
+def _greatest(points: F64, values: F64) -> tuple[tuple[int, int], F64]:
+    """The first cell and the greatest value in each; an empty rim of two cells around them."""
+    cells = np.floor(points[:, :2] / _CELL_M).astype(np.int64)
+    first = cells.min(0) - 2
+    found = np.full(tuple(cells.max(0) - first + 3), -np.inf)
+    np.maximum.at(found, tuple((cells - first).T), values)
+    return (int(first[0]), int(first[1])), found
