@@ -10,6 +10,7 @@ from pbrs_farm.generate.furnish.template import Liking, PieceSlot, Stand, Templa
 _TO_TABLE_M = 0.45  # from a sofa to its table
 _BEHIND_CHAIR_M = 0.75  # from the table's edge
 _SEAT_M = 0.6  # length of table edge that a seat takes
+_BETWEEN_CHAIRS_M = 0.01  # round the corner of a table
 _UNDER_TABLE_M = 0.2  # depth of a chair that is pushed under the table
 _LEAST_HEAD_M = 0.75  # width of a table at whose ends somebody sits
 _VIEWING_M = (2.0, 2.25, 2.5, 2.8)  # from the screen to the sofa
@@ -130,9 +131,10 @@ def _free(
     n = _seats(table, at_wall=False)
     slots, clear = [slot(table, 0.0, 0.0)], []
     if abs(w - d) < 0.15 and n == 4:
-        # One on each side.
+        # One on each side: none goes so far that it meets the one round the corner.
+        most = (min(w, d) - chair.size[0]) / 2 - _BETWEEN_CHAIRS_M
         before, behind, left, right = (
-            _out(shelf, table, chair, 0.0, turns) for turns in (0, 2, -1, 1)
+            _out(shelf, table, chair, 0.0, turns, most) for turns in (0, 2, -1, 1)
         )
         slots += [
             slot(chair, 0.0, -d / 2 - before), slot(chair, 0.0, d / 2 + behind, turns=2),
@@ -141,11 +143,18 @@ def _free(
         around = (-w / 2 - 0.6, -d / 2 - 0.6, w / 2 + 0.6, d / 2 + 0.6)
         clear = [around]
     else:
-        for u in _chair_offsets(w, n // 2):
+        offsets, inner = _chair_offsets(w, n // 2), d / 2
+        for u in offsets:
             before, behind = (_out(shelf, table, chair, u, turns) for turns in (0, 2))
             slots += [slot(chair, u, -d / 2 - before), slot(chair, u, d / 2 + behind, turns=2)]
+            inner = min(inner, d / 2 + min(before, behind) - chair.size[1] / 2)
         if heads:
-            left, right = (_out(shelf, table, chair, 0.0, turns) for turns in (-1, 1))
+            most = _UNDER_TABLE_M
+            if inner < chair.size[0] / 2 + _BETWEEN_CHAIRS_M:
+                # Those at the sides stand in the way of the one at the end.
+                side = max(map(abs, offsets), default=0.0) + chair.size[0] / 2
+                most = w / 2 - side - _BETWEEN_CHAIRS_M
+            left, right = (_out(shelf, table, chair, 0.0, turns, most) for turns in (-1, 1))
             slots += [
                 slot(chair, -w / 2 - left, 0.0, turns=-1),
                 slot(chair, w / 2 + right, 0.0, turns=1),
@@ -159,13 +168,17 @@ def _free(
     )  # fmt: skip
 
 
-def _out(shelf: Shelf, table: Piece, chair: Piece, u: float, turns: int) -> float:
+def _out(
+    shelf: Shelf, table: Piece, chair: Piece, u: float, turns: int, most: float = _UNDER_TABLE_M
+) -> float:
     """From a table's edge to the middle of a chair that is pushed in as far as both allow.
 
-    u: where along that edge the chair stands, in the table's frame.
+    u: where along that edge the chair stands, in the table's frame. most: how far other chairs let it
+    go, negative where it must stand off.
     """
     at = -u if turns == 2 else u
-    return chair.size[1] / 2 - shelf.under_m(chair, table, at, turns, _UNDER_TABLE_M)
+    under = shelf.under_m(chair, table, at, turns, _UNDER_TABLE_M)
+    return chair.size[1] / 2 - min(under, most)
 
 
 def _at_wall(shelf: Shelf, table: Piece, chair: Piece, rank: float) -> Template:
