@@ -21,8 +21,8 @@ _MOST_PARTED: Final = 60
 _FALL_S: Final = 4.0  # that bodies have to come to rest
 _SLOW_S: Final = 0.6  # at first they sink slowly, so that what hovers does not jump
 _SLOW: Final = (0.2, 0.7)  # m/s, rad/s
-_LOOK_S: Final = 0.4
-_STILL_M: Final = 2e-4  # that a body at rest moves in _LOOK_S
+_LOOK_S: Final = 2.0
+_STILL_M: Final = 5e-4  # that a body at rest moves in _LOOK_S
 _LOST_M: Final = 0.25  # a body that goes farther had nothing to stand on
 _TIPPED_RAD: Final = 0.35
 

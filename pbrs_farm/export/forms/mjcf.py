@@ -171,7 +171,7 @@ def _defaults(default: ET.Element) -> None:
     row = {"type": "mesh", "group": "2", "contype": "0", "conaffinity": "0", "mass": "0"}
     ET.SubElement(visual, "geom", row)
     collider = ET.SubElement(default, "default", {"class": "collider"})
-    row = {"group": "3", "type": "mesh", "condim": "6", "friction": "0.8 0.01 0.002", "mass": "0"}
+    row = {"group": "3", "type": "mesh", "condim": "6", "friction": "0.8 0.01 0.004", "mass": "0"}
     row |= {"rgba": "0.2 0.6 0.9 0.4", "solref": "0.005 1", "solimp": "0.97 0.995 0.0005"}
     ET.SubElement(collider, "geom", row)
     # Meshes may be open, and have no volume.
