@@ -12,6 +12,7 @@ from pbrs_farm.dress.filled_walls import KINDS, fill_wall
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import RoomFloor
 from pbrs_farm.dress.space import house_space
+from pbrs_farm.dress.space.wall_faces import WallFace
 from pbrs_farm.dress.things.families import with_families
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 
@@ -51,7 +52,7 @@ def test_a_filled_wall_has_nothing_free_beside_the_piece() -> None:
         assert longer < 0.9 or wide > 4.3
 
 
-def _covers(face, item: Item) -> float:  # type: ignore[no-untyped-def]
+def _covers(face: WallFace, item: Item) -> float:
     out = face.out_of(np.asarray(item.bounds))
     s = face.s_of(np.asarray(item.bounds))
     return float(np.ptp(s)) if -0.01 < out.min() < 0.05 else -1.0

@@ -69,15 +69,12 @@ def test_the_first_keyframe_is_how_they_stand(tmp_path: Path) -> None:
     key = f'<keyframe><key qpos="{quarter} -.2 3 1 .85 1 0 0 0"/></keyframe>'
     found = house(write_model(tmp_path, more=key))
     # Turned anticlockwise about its right edge, the leaf stands out before the front.
-    opened = np.array([[1.28, 0, -2.3], [1.38, 1.8, -1.7]])
+    opened = np.array([[1.3, 0, -2.3], [1.38, 1.8, -1.7]])
     shut = np.array([[0.7, 0, -2.3], [1.3, 1.8, -2.22]])
     fridge = item(found, "fridge_1")
-    turned = bounds(fridge, "fridge_1_door")
-    assert turned[0][2] == pytest.approx(-2.3, abs=1e-5)
-    assert turned[1][2] == pytest.approx(-1.7, abs=1e-5)
+    assert bounds(fridge, "fridge_1_door") == pytest.approx(opened, abs=1e-5)
     (door,) = fridge.joints
     assert door.value == pytest.approx(quarter)
-    assert opened.shape == shut.shape
     motion = door.motion(0.0)
     points = np.concatenate([s.positions for s in fridge.surfaces if s.part])
     back = points @ motion[:3, :3].T + motion[:3, 3]
