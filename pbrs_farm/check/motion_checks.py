@@ -25,7 +25,7 @@ FLOW_PX = 0.02  # beside half a step of what stores it
 SEEN, OUTSIDE, HIDDEN = 0, 128, 255
 BORDER_PX = 0.01  # of the other picture: on it a point is in or out
 KITTI_REACH_PX = 511.9  # of motion that KITTI's 16 bits hold
-REACH_M = 2e-4  # how far before a point the ray to it may end
+REACH = 1e-5  # of the distance, and metres: how far before a point the ray to it may end
 JITTER_PX = 0.02  # around a point: where its surroundings differ either state is right
 
 # Relation -> layers of flow, of its KITTI form and of occlusion.
@@ -173,15 +173,17 @@ def _points_of(
     return points, px, margin
 
 
-def is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = REACH_M) -> Bools:
-    """(N,) whether nothing stands between the other eye and each point."""
+def is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = 0) -> Bools:
+    """(N,) whether nothing stands between the other eye and each point, by more than 32-bit rays are off."""
     eye = other.world_from_camera[:3, 3]
     to = points - eye
     face: Faces = rays.first(eye, to)
     t = rays.distance(face, eye, to)
     distance = np.linalg.norm(to, axis=1)
     with np.errstate(invalid="ignore"):
-        return np.asarray((face < 0) | ((1 - t) * distance <= slack_m), bool)
+        return np.asarray(
+            (face < 0) | ((1 - t) * distance <= slack_m + REACH * (1 + distance)), bool
+        )
 
 
 def check_motion(

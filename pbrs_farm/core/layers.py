@@ -149,11 +149,12 @@ def _between(
     *,
     shown_as: ShownAs,
     resized: Resized = "nearest",
+    version: int = 1,
 ) -> Layer:
     file = f"{name}.{ending}"
     return Layer(
         name, file, channels, dtype, unit, nodata, "truth", True, partner, needs,
-        shown_as=shown_as, resized=resized,
+        shown_as=shown_as, resized=resized, version=version,
     )  # fmt: skip
 
 
@@ -164,11 +165,15 @@ def _flow(name: str, partner: str) -> tuple[Layer, ...]:
         _between(f"flow_{name}", partner, "X Y", "float16", unit, "0, 0", "exr",
                  shown_as="flow", resized="pixels"),
         _between(f"flow_{name}_kitti", partner, "RGB", "uint16", kitti, "0 in all three",
-                 shown_as="flow_kitti", resized="pixels"),
-        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128", shown_as="mask"),
+                 shown_as="flow_kitti", resized="pixels", version=_REACH_VERSION),
+        _between(f"occlusion_{name}", partner, "Y", "uint8", _SEEN_THERE, "128", shown_as="mask",
+                 version=_REACH_VERSION),
     )  # fmt: skip
 
 
+_REACH_VERSION: Final = (
+    2  # of layers that ask what a ray reaches: hidden by a tenth of a millimetre counts
+)
 _SEEN_THERE: Final = "in the other picture: 0 = seen, 128 = outside it, 255 = hidden"
 
 
@@ -291,7 +296,7 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
     _along_axis("hha", "RGB", "uint8", "disparity, height in cm, angle with gravity (Gupta et al. 2014)"),
     replace(
         _along_axis("projector", "Y", "uint8", "dots of an infrared projector beside the camera, or amid a pair"),
-        shows_albedo=True,
+        shows_albedo=True, version=_REACH_VERSION,
     ),
     replace(
         _along_axis("depth_sensor", "Y", "uint16", "planar z in mm as a Kinect measures it", shown_as="depth"),
@@ -310,7 +315,7 @@ OWN_LAYERS: Final[tuple[Layer, ...]] = (
         "0, 0, 0", "exr", shown_as="range",
     ),
     _between("disparity", "stereo", "Y", "uint16", "256 x px between the pictures of a pair (KITTI)", needs="rows", shown_as="disparity", resized="pixels"),
-    _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask"),
+    _between("occlusion_stereo", "stereo", "Y", "uint8", _SEEN_THERE, "128", shown_as="mask", version=_REACH_VERSION),
 )  # fmt: skip
 
 

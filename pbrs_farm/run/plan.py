@@ -40,8 +40,8 @@ STEPS: Final = {
     for step in (
         Step("house", 1, passes.STEP_GROUPS, per_view=False),
         Step("cameras", 6, ("cameras", "rig", "lens"), ("house",), per_view=False),
-        Step("pairs", 1, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
-        Step("tracks", 1, ("image",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("pairs", 2, ("cameras",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("tracks", 2, ("image",), ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 3, ("image", "raster"), ("house", "cameras")),

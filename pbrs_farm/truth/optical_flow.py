@@ -26,7 +26,7 @@ KITTI_DISPARITY_STEP: Final = 256
 _MOST_PX: Final = 2.0**15  # of flow: 16-bit floats end at twice that
 _SAME_ROWS: Final = 1e-9  # of two cameras' rotation, and metres
 _NEAREST_M: Final = 1e-3  # to the other camera's plane
-_SLACK: Final = 1e-4  # of the distance, and metres: how far before a point a ray may end
+_SLACK: Final = 1e-5  # of the distance, and metres: ten times what 32-bit rays are off
 Relation = Literal["next", "previous", "stereo"]
 
 

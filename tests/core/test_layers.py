@@ -67,7 +67,8 @@ def test_a_digest_knows_the_version_of_a_layer_and_the_limit_of_its_albedo(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert layers_in_digest(["depth_z", "nocs"], 0.9) == []
-    assert layers_in_digest(["albedo", "projector"], 0.9) == ["albedo 0.9", "projector 0.9"]
+    shown = ["albedo 0.9", "projector 0.9", f"projector {LAYER['projector'].version}"]
+    assert layers_in_digest(["albedo", "projector"], 0.9) == shown
     changed = tuple(replace(x, version=3) if x.name == "hha" else x for x in layers.LAYERS)
     monkeypatch.setattr(layers, "LAYERS", changed)
     assert layers_in_digest(["hha", "depth_z"], 1.0) == ["hha 3"]

@@ -83,6 +83,18 @@ def test_what_moves_by_itself_flows_and_hides_what_it_comes_before() -> None:
     assert not scene_flow_label(hit, view, None).any()
 
 
+def test_what_comes_a_fifth_of_a_millimetre_before_a_wall_hides_it() -> None:
+    now = squares((9, 0, 0, 4), (0.5, 0, 0, 9))  # behind the wall
+    then = squares((9, 0, 0, 4), (0.5, 0, 0, 3.9998))
+    nearer = np.eye(4)
+    nearer[2, 3] = 5.0002
+    other = OtherTime(then.first_hit, np.array([0, 0, 1, 1]), np.stack([np.eye(4), nearer]))
+    found = correspondence(now.hit_record(at(0)), at(0), at(0), now.first_hit, other)
+    row, column = HEIGHT // 2, WIDTH // 2
+    assert found.state[row, column] == HIDDEN
+    assert found.state[row, column + 8] == SEEN
+
+
 def test_what_comes_nearer_spreads_from_the_middle() -> None:
     now, then = moved_square((0.0, 0.0, 1.0))
     view = at(0)
