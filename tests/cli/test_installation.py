@@ -55,6 +55,18 @@ def test_what_is_missing_is_named_with_what_it_would_give(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
+    ("has_torch", "text"), [(True, "all"), (False, "all but study, which trains networks: pip it")]
+)
+def test_where_only_the_large_extra_is_missing_doctor_names_it_and_all_is_well(
+    has_torch: bool, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(doctor, "missing_extras", list)
+    monkeypatch.setattr(doctor, "is_installed", lambda name: has_torch or name != "torch")
+    monkeypatch.setattr(doctor, "install_command", lambda *_: "pip it")
+    assert doctor._extras() == doctor.Finding("extras", "ok", text)
+
+
+@pytest.mark.parametrize(
     ("system", "machine", "command"),
     [
         ("linux", "x86_64", "pip install 'pbrs-farm[llvm]'"),

@@ -47,12 +47,15 @@ SHRUNK_PYTHON = (
     (r"600\.0, 0, 640\], \[0, 600, 360\]", "30.0, 0, 32], [0, 30, 18]"),
 )  # fmt: skip
 NEEDS = {  # what a page takes from a page before it
-    "data": "run Studio --recipe preview --views 2 --out out/studio",
-    "study": "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
-    "hugging_face": "run made:1..20 --dress 1 --recipe fast --modes mlt_il_ol --out out/homes",
-    "night": "run Studio --recipe preview --views 1 --out out/day",
-    "train": "run Studio --recipe preview --modes mlt_il_ol --out out/other",
-    "predict": "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
+    "data": ("run Studio --recipe preview --views 2 --out out/studio",),
+    "study": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
+    "hugging_face": ("run made:1..20 --dress 1 --recipe fast --modes mlt_il_ol --out out/homes",),
+    "night": ("run Studio --recipe preview --views 1 --out out/day",),
+    "predict": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
+    "compare": (
+        "run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",
+        "run Studio --recipe preview --modes mlt_il_ol --out out/other",
+    ),
 }
 
 
@@ -70,8 +73,8 @@ RUN = [p for p in PAGES if p.stem not in AS_THEY_STAND and any(_is_run(b) for b 
 def test_a_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     _provide(tmp_path, text)
-    if page.stem in NEEDS:
-        _command(f"pbrs-farm {NEEDS[page.stem]}", tmp_path, small=True)
+    for line in NEEDS.get(page.stem, ()):
+        _command(f"pbrs-farm {line}", tmp_path, small=True)
     if page.stem == "predict" and find_spec("torch"):
         train = "pbrs-farm train normals out/homes --out out/runs/normals --set steps=2"
         _command(train, tmp_path, small=True)
@@ -125,6 +128,8 @@ def _placed(word: str, folder: Path) -> str:
         return "Studio"
     if word == "docs/pictures/gallery/N.json":
         return str(REPO / "docs/pictures/gallery/04.json")  # of Studio, as the gallery says
+    if "*" in word:  # as a shell would
+        return str(next(folder.glob(word)).relative_to(folder))
     root, found, _ = word.partition("/houses/HOUSE/views/VIEW")
     if not found:
         return word
