@@ -46,6 +46,9 @@ SHRUNK_PYTHON = (
     (r"cameras_around\(n=4\)", "cameras_around(n=1)"), (r"size=\(1280, 720\)", "size=(64, 36)"),
     (r"600\.0, 0, 640\], \[0, 600, 360\]", "30.0, 0, 32], [0, 30, 18]"),
 )  # fmt: skip
+SHRUNK_FILE = (  # of a data set
+    (r"made:1\.\.50", "made:1..2"), (r"views = 12", "views = 1"), (r'recipe = "fast"', 'recipe = "small.toml"'), (r'size = "1024x512"', 'size = "128x64"'),
+)  # fmt: skip
 NEEDS = {  # what a page takes from a page before it
     "data": ("run Studio --recipe preview --views 2 --out out/studio",),
     "study": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
@@ -99,7 +102,7 @@ def _command(line: str, folder: Path, *, small: bool) -> None:
     for large, smaller in SHRUNK if small else ():
         line = re.sub(large, smaller, line)
     words = shlex.split(line, comments=True)
-    if words[0] == "eval":
+    if words[0] in ("eval", "(cd"):
         words = ["bash", "-ec", line]
     elif words[0] == "pip":
         words = [sys.executable, "-m", *words, "-q", "--no-deps", "--no-build-isolation"]
@@ -176,6 +179,8 @@ def _provide(folder: Path, text: str) -> None:
     for name, block in re.findall(
         r"`((?:mine|rig)\.\w+)`[^`]*?```\w*\n(.*?)^```", text, re.M | re.S
     ):
+        for large, smaller in SHRUNK_FILE:
+            block = re.sub(large, smaller, block)
         (folder / name).write_text(block)
     if not (folder / "mine.csv").exists():
         (folder / "mine.csv").write_text("from,id,name\nchair,1,seat\nsofa,1,seat\nbed,2,bed\n")
