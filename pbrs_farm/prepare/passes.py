@@ -305,7 +305,7 @@ PASSES: Final = (
     Pass("read", 5, ("read",), _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 3, ("read", "dress"), _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, ("dress",), _furnish, _is_furnished, _furnish_depends),
-    Pass("dress", 9, ("dress",), _dress, _is_dressed, _dress_depends),
+    Pass("dress", 10, ("dress",), _dress, _is_dressed, _dress_depends),
     Pass("repair", 2, ("repair",), _repair, _is_home),
     Pass("open", 1, ("dress",), _leave_open, _stands_open, _open_depends),
     Pass("float", 1, ("dress",), _float, _has_floating_things, _float_depends),

@@ -45,10 +45,10 @@ STEPS: Final = {
         Step("truth", 4, ("image",), ("house", "cameras")),
         Step("opengl_dl", 3, ("image", "raster"), ("house", "cameras")),
         Step("opengl_il", 3, ("image", "raster"), ("house", "cameras")),
-        Step("illuminance", 9, ("sky", "emission", "materials"), ("house",), per_view=False),
+        Step("illuminance", 10, ("sky", "emission", "materials"), ("house",), per_view=False),
         # Whatever changes illuminance changes light's digest, too: it need not stand in `after`.
         Step(
-            "light", 26, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
+            "light", 27, ("image", "light", "sky", "emission", "materials", "blur"), ("house", "cameras"),
             needs=("illuminance",),
         ),
         Step("develop", 8, ("tone", "light", "sensor"), ("light",), needs=("light",)),

@@ -252,8 +252,9 @@ def jar(m: Maker) -> None:
         case 2 | 3:  # glass with what is in it, and a cork
             m.add(revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.8), (0.8, 0.88), (0.8, 0.92),
                 (0, 0.92)]), n=18), of=glass())  # fmt: skip
-            m.add(revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, tall * m.uniform(0.4, 0.7)),
-                (0, tall * 0.6)], n=16), of=plain("grain", grain, 0.9))  # fmt: skip
+            full = tall * m.uniform(0.4, 0.7)
+            m.add(revolve([(0, 0.003), (r - 0.004, 0.003), (r - 0.004, full), (0, full + 0.1 * r)],
+                n=16), of=plain("grain", grain, 0.9))  # fmt: skip
             if form == 2:
                 m.add(frustum((r * 0.78, tall * 0.9202), (r * 0.82, tall), n=16),
                     of=plain("cork", (0.72, 0.57, 0.4), 0.9))  # fmt: skip

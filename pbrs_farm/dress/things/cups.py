@@ -90,10 +90,10 @@ def cup(m: Maker) -> None:
                 n=20), of=plain("cup lid", (0.12, 0.12, 0.12), 0.4))  # fmt: skip
         case 12:  # of glass, tea in it
             m.add(vessel([(0, 0), (r * 0.9, 0), (r * 0.95, tall)], 0.0025, n=20),
-                of=materials.TABLE_GLASS)  # fmt: skip
+                of=materials.CLEAR)  # fmt: skip
             m.add(frustum((r * 0.86, 0.004), (r * 0.88, tall * 0.75), n=18), of=plain("tea",
                 m.pick((0.35, 0.16, 0.06), (0.12, 0.07, 0.04), (0.75, 0.6, 0.42)), 0.15))  # fmt: skip
-            m.add(handle(r * 0.93, tall), of=materials.TABLE_GLASS)
+            m.add(handle(r * 0.93, tall), of=materials.CLEAR)
 
 
 def handle(radius: float, tall: float) -> Surface:

@@ -44,7 +44,7 @@ from pbrs_farm.dress.things import (
 from pbrs_farm.dress.things.assembly import GENERATED
 from pbrs_farm.dress.things.maker import Family, described_in
 
-VERSION: Final = 7
+VERSION: Final = 8
 """Of what families are written with: part of the catalogue's digest. Raised when a shape changes."""
 
 # The order decides which piece a seed draws.

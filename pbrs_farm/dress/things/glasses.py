@@ -168,7 +168,7 @@ def glass(m: Maker) -> None:
     """
     form = m.weighted(0.4, 0.42, 0.08, 0.05, 0.05)
     m.name = "wine_glass" if form == 0 else "tumbler"
-    with m.of(materials.TABLE_GLASS):
+    with m.of(materials.CLEAR):
         match form:
             case 0:
                 _stemmed(m)

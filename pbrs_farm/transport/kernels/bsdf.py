@@ -23,6 +23,7 @@ import mitsuba as mi
 from pbrs_farm.core.frames import LUMINANCE
 
 _MIN_RECONNECT_ALPHA = 0.1
+_LEAST_WALL_COS = 0.1  # a round wall is met no flatter over its whole thickness
 
 
 class Bsdf(NamedTuple):
@@ -161,6 +162,15 @@ def thin_glass_reflectance(cos_i: Any) -> Any:
     fresnel: Any = mi.fresnel
     r = fresnel(dr.abs(cos_i), mi.Float(1.5))[0]
     return 2 * r / (1 + r)
+
+
+def thin_glass_transmittance(tau: Any, cos_i: Any) -> Any:
+    """Color3f of the light that glass leaves of what it does not reflect.
+
+    tau: Color3f, what it leaves at right angles; cos_i: either sign. Light that is not bent goes 1 / cos
+    as far through a wall, so that a jar is darkest at its outline (Beer and Lambert's law).
+    """
+    return dr.power(tau, dr.rcp(dr.maximum(dr.abs(cos_i), _LEAST_WALL_COS)))
 
 
 def _lobe_probabilities(bsdf: Bsdf, wi: Any, least_diffuse: float) -> tuple[Any, Any]:

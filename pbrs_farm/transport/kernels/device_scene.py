@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.raycast.tracer import scene_from_mesh
-from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance
+from pbrs_farm.transport.kernels.bsdf import Bsdf, thin_glass_reflectance, thin_glass_transmittance
 from pbrs_farm.transport.kernels.packets import colour, point, vector
 from pbrs_farm.transport.kernels.sampler import device_array
 from pbrs_farm.transport.kernels.surface_textures import (
@@ -117,6 +117,9 @@ class DeviceScene:
             self._opaque = None
             if not transparent.all():
                 self._opaque = scene_from_mesh(mi, tables.positions, tables.faces[~transparent])
+                self._opaque_faces = device_array(
+                    mi.UInt32, (~transparent).nonzero()[0].astype("uint32")
+                )
         self._rows = device_array(mi.Float, tables.face_rows.ravel())
         self._tags = device_array(mi.UInt32, tables.face_tags)
         self._materials = device_array(mi.Float, tables.material_rows.ravel())
@@ -147,6 +150,7 @@ class DeviceScene:
         """The first surface along a ray, by the faster test where there is a tree for it.
 
         It takes one ray of two million through an edge to the face behind (docs/light_methods.md).
+        Glass that lies on an opaque face is left out: behind it a ray would start below that face.
         """
         ray = _ray(o, d, dr.inf)
         first = self._all if self._fast is None else self._fast
@@ -156,7 +160,35 @@ class DeviceScene:
             face2, bary2, again = _first_face(self._all, ray, active & ~valid)
             face, bary = dr.select(again, face2, face), dr.select(again, bary2, bary)
             valid |= again
+        if dr.hint(self._transparent is not None and self._opaque is not None, mode="scalar"):
+            face, bary = self._below_glass(o, d, face, bary, valid)
         return self._interaction(face, bary, d, valid, with_maps=True)
+
+    @dr.syntax
+    def _below_glass(self, o: Any, d: Any, face: Any, bary: Any, valid: Any) -> tuple[Any, Any]:
+        """(face, its barycentric coordinates) that a ray meets, less glass that touches what is behind it.
+
+        As a glass's foot and a table do. Nearer than a ray's step off its surface counts as touching.
+        """
+        tag = dr.gather(mi.UInt32, self._tags, face, valid) & 0xFFFF
+        kind = dr.gather(mi.Float, self._materials, tag * MATERIAL_FLOATS + KIND, valid)
+        face, bary = mi.UInt32(face), mi.Point2f(bary)
+        is_glass = valid & (mi.UInt32(kind) == GLASS)
+        # Branch: packets of lanes that meet no glass pass by.
+        if is_glass:
+            v0, e1, e2 = (self._packet(face, k, is_glass) for k in range(3))
+            a, b = vector(e1), vector(e2)
+            p = point(v0) + bary.x * a + bary.y * b
+            cos = dr.abs(dr.dot(dr.normalize(dr.cross(a, b)), d))
+            # Look a little before it, too, for faces in one plane, but not behind where the ray began.
+            step = _ray_step(p) / dr.maximum(cos, LEAST_COS)
+            near = _ray(p - 0.5 * step * d, d, 2.5 * step)
+            found = self._opaque.ray_intersect_preliminary(near, False, is_glass)
+            touches = is_glass & found.is_valid()
+            below = dr.gather(mi.UInt32, self._opaque_faces, found.prim_index, touches)
+            face = dr.select(touches, below, face)
+            bary = dr.select(touches, mi.Point2f(found.prim_uv), bary)
+        return face, bary
 
     @dr.syntax
     def intersect_past_holes(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
@@ -205,8 +237,10 @@ class DeviceScene:
             face = dr.gather(mi.UInt32, self._transparent_faces, found.prim_index, met)
             si = self._interaction(face, found.prim_uv, way, met)
             # Let through what glass does not reflect, all at a cut-out.
-            transmitted = 1 - thin_glass_reflectance(dr.dot(si.n, way))
-            through = dr.select(si.bsdf.kind == GLASS, si.bsdf.tau * transmitted, 0)
+            cos = dr.dot(si.n, way)
+            clear_share = 1 - thin_glass_reflectance(cos)
+            through = thin_glass_transmittance(si.bsdf.tau, cos) * clear_share
+            through = dr.select(si.bsdf.kind == GLASS, through, 0)
             through = dr.select(si.is_cutout, mi.Color3f(1), through)
             left = dr.select(met, left * through, left)
             # Go on behind it.
@@ -394,7 +428,11 @@ def offset_ray_origin(p: Any, n: Any) -> Any:
     n: towards the side that the ray goes to. The step grows with the coordinates, as
     float32's spacing does.
     """
-    return mi.Point3f(p + n * (_RAY_OFFSET * (1 + dr.max(dr.abs(p)))))
+    return mi.Point3f(p + n * _ray_step(p))
+
+
+def _ray_step(p: Any) -> Any:
+    return _RAY_OFFSET * (1 + dr.max(dr.abs(p)))
 
 
 def _first_face(scene: Any, ray: Any, active: Any) -> tuple[Any, Any, Any]:

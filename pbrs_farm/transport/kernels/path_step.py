@@ -18,6 +18,7 @@ from pbrs_farm.transport.kernels.bsdf import (
     is_reconnectable,
     sample_bsdf,
     thin_glass_reflectance,
+    thin_glass_transmittance,
     view_independent_pdf,
     white_share,
 )
@@ -384,7 +385,9 @@ def _throughput(step: _Step, scattered: ScatteredRay) -> Any:
     vertex, lobe, bsdf = step.vertex, step.lobe, step.vertex.si.bsdf
     factor = dr.select(vertex.is_rough, scattered.value / scattered.pdf, mi.Color3f(1))
     factor = dr.select(vertex.is_mirror, bsdf.f0, factor)
-    beta = step.path.beta * dr.select(vertex.is_glass & scattered.passed, bsdf.tau, factor)
+    passed = vertex.is_glass & scattered.passed
+    left = thin_glass_transmittance(bsdf.tau, vertex.wi.z)
+    beta = step.path.beta * dr.select(passed, left, factor)
     if step.strategy.near is None and vertex.is_pane is None:
         return beta
     # Make up for having chosen reflection more often than it happens.

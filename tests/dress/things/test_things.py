@@ -12,7 +12,7 @@ from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.things import books
 from pbrs_farm.dress.things.assembly import Model
 from pbrs_farm.dress.things.book_covers import N_CELLS, book_covers
-from pbrs_farm.dress.things.materials import TABLE_GLASS
+from pbrs_farm.dress.things.materials import CLEAR
 from pbrs_farm.dress.things.things import THINGS
 
 _STYLE = style_for(np.random.default_rng(1), "nordic")
@@ -107,8 +107,10 @@ def test_the_same_seed_gives_the_same_bits() -> None:
         assert one[1].surfaces[0].positions.tobytes() == two[1].surfaces[0].positions.tobytes()
 
 
-def test_the_walls_of_a_drinking_glass_take_a_third_of_the_light() -> None:
-    # Light goes through two walls, each with two faces, and each face tints by as much as it is opaque.
-    kd = ((np.array(TABLE_GLASS.diffuse) + 0.055) / 1.055) ** 2.4
-    passed = (1 - TABLE_GLASS.opacity * (1 - kd)) ** 4
-    assert 0.5 < passed.min() < passed.max() < 0.8
+def test_a_jar_is_clear_in_its_middle_and_dark_at_its_outline() -> None:
+    # Light goes through two walls, each with two faces; where it meets them at 70 degrees, on a longer way.
+    kd = ((np.array(CLEAR.diffuse) + 0.055) / 1.055) ** 2.4
+    passed = (1 - CLEAR.opacity * (1 - kd)) ** 4
+    outline = passed ** (1 / np.cos(np.radians(70)))
+    assert 0.8 < passed.min() < passed.max() < 0.95
+    assert outline.min() < 0.65

@@ -98,6 +98,15 @@ def test_thin_glass_of_index_1_5_reflects_8_percent_head_on() -> None:
     assert thin_glass_reflectance(mi.Float(1.0)).numpy()[0] == pytest.approx(0.0769, abs=1e-3)
 
 
+@pytest.mark.parametrize("cos", [1.0, -0.5, 0.2])
+def test_a_wall_of_glass_takes_as_much_light_as_the_way_through_it_is_long(cos: float) -> None:
+    mi = mitsuba()
+    from pbrs_farm.transport.kernels.bsdf import thin_glass_transmittance
+
+    left = thin_glass_transmittance(mi.Color3f(0.9, 1.0, 0.5), mi.Float(cos)).numpy().ravel()
+    np.testing.assert_allclose(left, np.array([0.9, 1.0, 0.5]) ** (1 / abs(cos)), rtol=1e-4)
+
+
 def test_pairs_of_sobol_numbers_fill_every_cell_once() -> None:
     import drjit as dr
 
