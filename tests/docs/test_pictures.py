@@ -6,6 +6,8 @@ Who makes a picture anew writes its row; captions inside the pictures name the s
 from __future__ import annotations
 
 import csv
+import json
+import re
 import shlex
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 
 from pbrs_farm.cli import MODULES, build_parser
 from pbrs_farm.commands.arguments import recipe_of
+from pbrs_farm.prepare.passes import versions_of_passes
 from pbrs_farm.run import plan
 from tests.docs.fenced import PAGES, REPO
 
@@ -45,6 +48,29 @@ def test_every_picture_with_a_command_that_chooses_views_has_a_row() -> None:
             shown.append((picture, command))
     assert len(shown) >= 4
     assert set(shown) <= known
+
+
+def test_each_home_of_the_gallery_is_shown_by_its_number_and_has_a_camera() -> None:
+    text = (REPO / "docs/gallery.md").read_text(encoding="utf-8")
+    with (PICTURES / "gallery/homes.csv").open(encoding="utf-8") as file:
+        homes = {row["number"]: row["home"] for row in csv.DictReader(file)}
+    cells = re.findall(r"gallery/(\d\d)\.jpg\)<br>(\d\d)<br>((?:`[^`]+`(?:<br>)?)+)", text)
+    shown = {number: "".join(re.findall("`([^`]+)`", words)) for _, number, words in cells}
+    assert [picture for picture, _, _ in cells] == list(shown)
+    assert shown == homes
+    for number in homes:
+        (camera,) = json.loads((PICTURES / f"gallery/{number}.json").read_text())
+        assert {"world_from_camera", "hfov_rad", "room"} == set(camera)
+
+
+@pytest.mark.slow
+def test_the_gallery_shows_homes_as_they_are_made_now() -> None:
+    """Its cameras stand in other rooms otherwise: scripts/gallery_pictures.py makes it anew."""
+    text = (REPO / "docs/gallery.md").read_text(encoding="utf-8")
+    now = versions_of_passes()
+    assert (
+        f"They show version {now['furnish']} of furnishing and {now['dress']} of dressing." in text
+    )
 
 
 @pytest.mark.slow
