@@ -1,12 +1,12 @@
 """The weights that come with the package: trained, judged and packed; and what they are worth.
 
-    python -m benchmarks.study.shipped                    homes, trainings, cards: two hours of a core
-    python -m benchmarks.study.shipped --tasks boundaries one of them
+    python -m benchmarks.study.start_curve render --homes 100   homes, with their labels
+    python -m benchmarks.study.shipped                          trainings, cards: an hour of two cores
+    python -m benchmarks.study.shipped --tasks boundaries       one of them
 
-Normals come from benchmarks/study/start_curve.py; those that are trained here are what segmentation
-starts from, and do not ship.
-Effects: out/study/curve (homes of the learning curve, rendered where they are missing),
-out/study/shipped/<task>, and with --install pbrs_farm/study/weights/<task>. What is trained is kept.
+Normals come from start_curve.py's own trainings; classes and boundaries are trained here on the same homes.
+Effects: out/study/curve (drawn homes that judge, rendered where they are missing), out/study/shipped/<task>,
+and with --install pbrs_farm/study/weights/<task>. What is trained is kept.
 """
 
 from __future__ import annotations
@@ -25,40 +25,43 @@ from typing import Final
 import numpy as np
 
 import pbrs_farm.cli
-from benchmarks.study.curve import JUDGES, rendered, roots_of_homes
+from benchmarks.study.curve import rendered
 from benchmarks.study.kept_rows import Figures
 from benchmarks.study.rendered import FOLDER
+from benchmarks.study.start_curve import HOMES, held_out
 
 RUNS: Final = FOLDER / "shipped"
-HOMES: Final = {"normals": 80, "segmentation": 80, "boundaries": 20}
-"""Task -> how many homes of the learning curve it trains on, ten views of each."""
 PLANS: Final = {
-    "normals": ("steps=2400", "judge_every=1200", "final_views=100", "bf16=true"),
     "segmentation": (
-        "steps=1600",
-        "judge_every=800",
-        "final_views=100",
-        "bf16=true",
+        "steps=1200",
+        "batch=16",
         "n_classes=13",
         "average=0.99",
+        "zoom=1.3",
+        "hue=0.5",
+        "threads=1",
+        "judge_every=0",
+        "final_views=100",
     ),
-    # Lines are a pixel wide: at the views' own size.
     "boundaries": (
-        "width_px=160",
-        "height_px=120",
-        "bf16=true",
         "steps=700",
-        "judge_every=350",
-        "final_views=16",
+        "batch=8",
         "average=0.99",
         "hue=0.5",
+        "threads=1",
+        "judge_every=0",
+        "final_views=32",
     ),
 }
-"""Task -> what its plan `tiny` is changed by."""
-_COMMON: Final = ("threads=1", "width_px=96", "height_px=72")
-# The judge that chooses the step where a task has few views; the other one measures.
-_CHOOSES: Final = {"boundaries": "drawn"}
+"""Task -> what its plan `lite` is changed by."""
+VIEWS: Final = {"segmentation": 1000, "boundaries": 600}
+"""Task -> views it trains on, spread over the homes."""
 _MEASURES: Final = "made"
+_DRAWN: Final = "drawn"
+MADE_BY: Final = (
+    "python -m benchmarks.study.start_curve render --homes 100",
+    "python -m benchmarks.study.shipped",
+)
 _N_PHOTOGRAPHS: Final = 4
 
 UNITS: Final = {
@@ -76,29 +79,27 @@ def main(words: Sequence[str] = ()) -> None:
     parser.add_argument("--jobs", type=int, default=1, help="processes that render")
     parser.add_argument("--install", action="store_true", help="into pbrs_farm/study/weights")
     args = parser.parse_args(words)
-    judges = {name: rendered(name, args.jobs) for name in JUDGES}
-    # Segmentation starts from normals of the same homes.
-    first = ["normals"] if "segmentation" in args.tasks and "normals" not in args.tasks else []
-    for task in [*first, *args.tasks]:
+    place = str(HOMES)
+    held, _ = held_out(place)
+    judges = {_MEASURES: place, _DRAWN: rendered(_DRAWN, args.jobs)}
+    for task in args.tasks:
         run = RUNS / task
-        homes = [rendered(name, args.jobs) for name in roots_of_homes(HOMES[task])]
-        for line in (_training(task, run, homes, judges), _judging(run, judges)):
+        for line in (_training(task, run, place, held), _judging(run, judges)):
             if pbrs_farm.cli.main(line):
                 raise RuntimeError(f"{' '.join(line[:2])} failed; what is done is kept")
         from pbrs_farm.study.judging.packed_weights import SHIPPED, pack_weights
 
-        packed = pack_weights(run, run / "packed", made_by=("python -m benchmarks.study.shipped",))
-        if args.install and task != "normals":
+        packed = pack_weights(run, run / "packed", made_by=MADE_BY)
+        if args.install:
             shutil.copytree(packed.root, SHIPPED / task, dirs_exist_ok=True)
 
 
-def _training(task: str, run: Path, homes: Sequence[str], judges: dict[str, str]) -> list[str]:
-    words = ["train", task, *homes, "--hold-out", "none", "--out", str(run)]
-    if task == "segmentation":  # few views show enough of each class
-        words += ["--init", str(RUNS / "normals")]
-    if judge := _CHOOSES.get(task):
-        words += ["--on", f"{judge}={judges[judge]}", "--stop-on", judge]
-    return words + [word for field in (*_COMMON, *PLANS[task]) for word in ("--set", field)]
+def _training(task: str, run: Path, place: str, held: Sequence[str]) -> list[str]:
+    return [
+        "train", task, place, "--plan", "lite", "--init", "imagenet", "--hold-out", *held,
+        "--views", str(VIEWS[task]), "--out", str(run),
+        *(word for field in PLANS[task] for word in ("--set", field)),
+    ]  # fmt: skip
 
 
 def _judging(run: Path, judges: dict[str, str]) -> list[str]:

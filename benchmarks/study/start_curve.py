@@ -178,7 +178,7 @@ def _train(args: argparse.Namespace) -> None:
 
     deadline = time.monotonic() + args.seconds if args.seconds else None
     place = args.place or str(HOMES)
-    held, n_views = _held_out(place)
+    held, n_views = held_out(place)
     points = dict.fromkeys(min(views, n_views) for views in args.points)
     fields = [f"steps={args.steps}", f"batch={args.batch}", *_FIELDS, *args.set]
     judges = (f"{_HELD_OUT}={place}", *args.on)
@@ -197,7 +197,7 @@ def _train(args: argparse.Namespace) -> None:
     print(_tell(args.copy), flush=True)
 
 
-def _held_out(place: str) -> tuple[list[str], int]:
+def held_out(place: str) -> tuple[list[str], int]:
     """The homes of a place that judge, by name, and how many views the others have."""
     from pbrs_farm.core.house_split import home_of
     from pbrs_farm.views.open_views import open_views
