@@ -7,7 +7,7 @@ one's (an edge that two casters see differently) is left to the checks of its ow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.embree_caster import Faces, Floats, Rays
 from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.pixel_checks import of_another_part
+from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 
 Bools = NDArray[np.bool_]
@@ -186,72 +188,101 @@ def is_seen(points: Floats, other: OtherView, rays: Rays, slack_m: float = 0) ->
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """N pixels, and what their rays meet."""
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    z: Floats  # metres
+    face: Faces
+
+    def some(self, index: NDArray[Any]) -> _Seen:
+        return _Seen(self.rows[index], self.columns[index], self.z[index], self.face[index])
+
+
 def check_motion(
     view: StoredView,
     arrays: Mapping[str, NDArray[Any]],
-    rays: Rays,
+    scene: tuple[Triangles, Rays],
     pixels: tuple[NDArray[np.int64], NDArray[np.int64]],
     tally: Tally,
     then: Callable[[float | None], Then] | None = None,
 ) -> None:
     """Recompute the layers between views at pixels (rows, columns).
 
-    rays: of the house at the view's time; then: of the house at another time, where things move.
+    scene: the house at the view's time; then: of the house at another time, where things move.
     """
+    _triangles, rays = scene
     rows, columns = pixels
     origin, directions = view.rays(rows, columns)
     face = rays.first(origin, directions)
     z = rays.distance(face, origin, directions)
     # Keep the pixels whose stored depth is that of the ray.
     own = (face >= 0) & (np.abs(arrays["depth"][rows, columns] - z * 1000) <= 1.0 + z)
-    rows, columns, z, face = rows[own], columns[own], z[own], face[own]
+    seen = _Seen(rows, columns, z, face).some(own)
     for relation in (*FLOW_LAYERS, "stereo"):
         other = other_view(view, relation)
         names = FLOW_LAYERS.get(relation, ("disparity", "occlusion_stereo"))
+        names = (*names, "scene_flow") if relation == "next" else names
         if other is None:
-            between = (*names, "scene_flow") if relation == "next" else names
-            lost = [name for name in between if name in arrays]
+            lost = [name for name in names if name in arrays]
             tally.expect("motion", view.place, not lost, f"{lost} without a {relation} view")
             continue
         row = view.table["partners"][relation]
         there = Then(rays, stay) if then is None else then(row.get("time_s"))
-        found = follow_points(
-            view, other, rows, columns, z, there.rays, partial(_carried, there, face)
+        layers = {n: arrays[n] for n in names if n in arrays}
+        right, ties = _judge_layers(view, other, seen, layers, there)
+        all_right = np.logical_and.reduce([np.ones(len(seen.z), bool), *right.values()])
+        wrong = np.nonzero(~all_right)[0]
+        if len(wrong) and there.carry is not stay:
+            # Of two things at one depth either may move: one explains all layers at once.
+            at = seen.some(wrong)
+            faces = of_another_part(at.face, *view.rays(at.rows, at.columns), scene)
+            wrong, at = wrong[faces >= 0], replace(at, face=faces).some(faces >= 0)
+            again, _ = _judge_layers(view, other, at, layers, there)
+            either = wrong[np.logical_and.reduce(list(again.values()))]
+            for name in layers:
+                right[name][either] = ties[name][either] = True
+        for name in layers:
+            tally.add(f"motion: {name}", len(seen.rows), ties=int(ties[name].sum()))
+            for k in np.nonzero(~right[name])[0]:
+                what = f"row {seen.rows[k]}, column {seen.columns[k]}"
+                tally.fail(f"motion: {name}", view.place, what)
+
+
+def _judge_layers(
+    view: StoredView, other: OtherView, seen: _Seen, layers: Mapping[str, NDArray[Any]], there: Then
+) -> tuple[dict[str, Bools], dict[str, Bools]]:
+    """Layer -> (N,) what it stores at pixels is right, and that it is so as another answer is, too."""
+    at = seen.rows, seen.columns, seen.z
+    found = follow_points(view, other, *at, there.rays, partial(_carried, there, seen.face))
+    rights, all_ties = dict[str, Bools](), dict[str, Bools]()
+    for name, array in layers.items():
+        values, tied = (
+            array[seen.rows, seen.columns].astype(np.float64),
+            np.zeros(len(seen.z), bool),
         )
-        if relation == "next" and "scene_flow" in arrays:
-            _check_scene_flow(view, arrays["scene_flow"], (rows, columns, z, face), there, tally)
-        stored = {n: arrays[n][rows, columns].astype(np.float64) for n in names if n in arrays}
-        for name, values in stored.items():
+        if name == "scene_flow":
+            right, may_tie = _judge_scene_flow(view, values, seen, there), tied
+        else:
             right, may_tie = _judge_motion(name, values, found)
-            # Look again at what is wrong.
-            ties = np.nonzero(~right & may_tie)[0]
-            ties = ties[
-                near_edge(
-                    view, other, rows[ties], columns[ties], z[ties], there.rays,
-                    partial(_carried, there, face[ties]),
-                )
-            ]  # fmt: skip
-            right[ties] = True
-            tally.add(f"motion: {name}", len(values), ties=len(ties))
-            for k in np.nonzero(~right)[0]:
-                tally.fail(f"motion: {name}", view.place, f"row {rows[k]}, column {columns[k]}")
+        # Look again at what is wrong.
+        ties = np.nonzero(~right & may_tie)[0]
+        of = seen.some(ties)
+        carry = partial(_carried, there, of.face)
+        ties = ties[near_edge(view, other, of.rows, of.columns, of.z, there.rays, carry)]
+        right[ties] = tied[ties] = True
+        rights[name], all_ties[name] = right, tied
+    return rights, all_ties
 
 
-def _check_scene_flow(
-    view: StoredView,
-    stored: NDArray[Any],
-    seen: tuple[NDArray[np.int64], NDArray[np.int64], Floats, Faces],
-    then: Then,
-    tally: Tally,
-) -> None:
-    """How far things have moved until the next frame, of points at depth z on faces."""
-    rows, columns, z, face = seen
-    origin, directions = view.rays(rows, columns)
-    points = origin + directions * z[:, None]
-    off = np.abs(stored[rows, columns] - (then.carry(points, face) - points)).max(axis=1)
-    tally.add("motion: scene_flow", len(rows))
-    for k in np.nonzero(~(off <= SCENE_FLOW_M))[0]:
-        tally.fail("motion: scene_flow", view.place, f"row {rows[k]}, column {columns[k]}")
+def _judge_scene_flow(view: StoredView, values: Floats, seen: _Seen, then: Then) -> Bools:
+    """(N,) whether a layer tells how far the points of pixels have moved until the next frame."""
+    origin, directions = view.rays(seen.rows, seen.columns)
+    points = origin + directions * seen.z[:, None]
+    off = np.abs(values - (then.carry(points, seen.face) - points)).max(axis=1)
+    return np.asarray(off <= SCENE_FLOW_M, bool)
 
 
 def _judge_motion(name: str, values: Floats, found: Followed) -> tuple[Bools, Bools]:

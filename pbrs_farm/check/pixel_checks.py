@@ -129,7 +129,7 @@ def _fill_one_place(
     for k, start, leg in zip(both, starts, legs, strict=True):
         pair, ray = np.array([first[k], other[k]]), directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
-        t = _distances_pierced(triangles, pair, start, leg)
+        t = distances_pierced(triangles, pair, start, leg)
         # One place: parallel, and closer along the normal than a tie may be.
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
             found[k] = abs(t[0] - t[1]) * abs(normals[0] @ ray) <= TIE_DEPTH_M
@@ -330,7 +330,7 @@ def _coincident(
         # Look for a triangle of that instance at the depth of the first hit.
         own = np.nonzero(triangles.instance == instance)[0]
         for pixel in np.nonzero(labels["instance"] == instance)[0]:
-            t = _distances_pierced(triangles, own, starts[pixel], legs[pixel])
+            t = distances_pierced(triangles, own, starts[pixel], legs[pixel])
             gap = np.abs(t - first[pixel]) * across[pixel]
             gap[own == face[pixel]] = np.inf
             if len(own) and gap.min() <= TIE_DEPTH_M:
@@ -358,7 +358,32 @@ def of_another_colour(
         own = order[start[face[k]] : last[face[k]]]
         own = own[triangles.material[own] != triangles.material[face[k]]]
         if len(own):
-            gap = np.abs(_distances_pierced(triangles, own, origin, directions[k]) - distance[k])
+            gap = np.abs(distances_pierced(triangles, own, origin, directions[k]) - distance[k])
+            if gap.min() * across[k] <= TIE_DEPTH_M:
+                found[k] = own[gap.argmin()]
+    return rays.without_holes(found, origin, directions)
+
+
+def of_another_part(
+    face: Faces, origin: Floats, directions: Floats, scene: tuple[Triangles, Rays]
+) -> Faces:
+    """(N,) a triangle of another item or part that each ray pierces where it meets face, or -1.
+
+    Of a leaf and its frame that cross at one depth either may be seen.
+    """
+    triangles, rays = scene
+    found = np.full(len(face), -1, np.int64)
+    corners = triangles.vertices.astype(np.float64)[triangles.faces]
+    low, high = corners.min(1) - TIE_DEPTH_M, corners.max(1) + TIE_DEPTH_M
+    distance = rays.distance(face, origin, directions)
+    across = np.abs(np.einsum("ni,ni->n", rays.normal(face, directions), directions))
+    for k in np.nonzero(face >= 0)[0]:
+        point = origin + distance[k] * directions[k]
+        is_other = triangles.instance != triangles.instance[face[k]]
+        is_other |= triangles.part != triangles.part[face[k]]
+        own = np.nonzero(is_other & ((low <= point) & (point <= high)).all(1))[0]
+        if len(own):
+            gap = np.abs(distances_pierced(triangles, own, origin, directions[k]) - distance[k])
             if gap.min() * across[k] <= TIE_DEPTH_M:
                 found[k] = own[gap.argmin()]
     return rays.without_holes(found, origin, directions)
@@ -377,10 +402,10 @@ def _number_planes(corners: Floats) -> NDArray[np.int64]:
     return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1), np.int64)
 
 
-def _distances_pierced(
+def distances_pierced(
     triangles: Triangles, own: NDArray[np.int64], origin: Floats, ray: Floats
 ) -> Floats:
-    """(F,) distance at which one ray pierces each of the triangles own; inf = misses it."""
+    """(F,) distance at which one ray pierces each of the triangles own, in lengths of ray; inf = misses it."""
     a, b, c = (triangles.vertices[triangles.faces[own, k]].astype(np.float64) for k in range(3))
     # Moeller and Trumbore 1997, one ray and many triangles.
     e1, e2, s = b - a, c - a, origin - a

@@ -270,7 +270,7 @@ def _check_view(
     _check_rays(view, arrays, scenes, n_pixels, tally)
     if MOTION_LAYERS & arrays.keys():
         check_motion(
-            view, arrays, scenes.all[1], _chosen(view, n_pixels), tally, partial(times.then, scenes)
+            view, arrays, scenes.all, _chosen(view, n_pixels), tally, partial(times.then, scenes)
         )
     return arrays
 
