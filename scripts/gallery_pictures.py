@@ -4,7 +4,7 @@
     python scripts/gallery_pictures.py --part 0 of 2  every second one: a process a core, then without it
 
 docs/pictures/gallery/homes.csv says which homes, and the room that is shown where a home has one. Of its
-views the best is rendered, as the page's own command renders it. About twenty CPU minutes for all.
+views the best is rendered, as the page's own command renders it.
 Effects: out/gallery, docs/pictures/gallery, docs/gallery.md. Remove out/gallery when homes have changed.
 """
 

@@ -1,7 +1,7 @@
 """The weights that come with the package: trained, judged and packed; and what they are worth.
 
     python -m benchmarks.study.start_curve render --homes 100   homes, with their labels
-    python -m benchmarks.study.shipped                          trainings, cards: an hour of two cores
+    python -m benchmarks.study.shipped                          trainings, cards: an hour of a core
     python -m benchmarks.study.shipped --tasks boundaries       one of them
 
 Normals come from start_curve.py's own trainings; classes and boundaries are trained here on the same homes.
