@@ -4,12 +4,12 @@
 
 Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
 left as it is. Some want more than their page: photos/*.png are photographs of yours (predict, train's views
-under viewseen/, photographs), farm.png and job.png are screenshots of the board, spp4 to spp256 are runs of
+under viewseen/, photographs, photographs_seen), farm.png and job.png are screenshots of the board, spp4 to spp256 are runs of
 gpu.md's last line, back is simulators.md's export rendered again, ownviews a run with own_furniture.md's
 catalogue, desk/Desk and desk/Laptop the two halves of photographs.md's block, light/NN_NAME.png the pictures
 of switches.md's table, resume_sums.npz the sums that a killed view leaves beside its outputs.
 Effects: reads out/, writes docs/pictures/howto/PAGE.jpg, 640 pixels wide (screenshots as wide as they are) and
-at most 60 kB, and the pictures of docs/switches.md and docs/photographs.md.
+at most 60 kB, and the pictures of docs/switches.md and docs/photographs.md and the sheet of predict.md.
 """
 
 from __future__ import annotations
@@ -301,6 +301,19 @@ def photographs() -> None:
     rows(*pairs).save(PICTURES.parent / "photographs.jpg", quality=88, optimize=True)
 
 
+def photographs_seen() -> None:
+    """docs/pictures/photographs_seen.jpg: each photograph beside its normals, classes and edges."""
+    said = ("seen", "classes", "edges")  # where predict.md's first three commands write
+    sheets = [
+        row(
+            Image.open(photo),
+            *(Image.open(OUT / task / f"{photo.stem}_shown.png") for task in said),
+        )
+        for photo in sorted(OUT.glob("photos/*.png"))
+    ]
+    rows(*sheets).save(PICTURES.parent / "photographs_seen.jpg", quality=85, optimize=True)
+
+
 def switches() -> None:
     """docs/pictures/switches.webp: a view's lights one after another."""
     frames = []
@@ -326,7 +339,7 @@ PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
 
 
 # Pictures of other pages, which save themselves.
-OTHERS: Final = {f.__name__: f for f in (switches, photographs)}
+OTHERS: Final = {f.__name__: f for f in (switches, photographs, photographs_seen)}
 
 
 def main(names: Iterable[str]) -> None:
