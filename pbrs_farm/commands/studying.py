@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 LOGGERS = ("tensorboard", "wandb")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
+_SHIPPED = "no RUN: the weights that come with the package for this task"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -58,7 +59,13 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument("--export", choices=("onnx", "weights"), help=export)
 
     p = verb("evaluate", _evaluate)
-    p.add_argument("run", type=Path, metavar="RUN", help="the folder of `train --out`")
+    p.usage = (
+        "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
+        "       %(prog)s --task TASK --on PLACE --out DIR [--predictions DIR] [--views N] [--exact] [--json]"
+    )
+    text = "the folder of `train --out` (none with --task)"
+    p.add_argument("run", type=Path, nargs="?", metavar="RUN", help=text)
+    p.add_argument("--task", choices=TASKS, help=_SHIPPED)
     p.add_argument("--on", action="append", default=[], metavar="PLACE", help=_ON)
     p.add_argument(
         "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
@@ -78,8 +85,7 @@ def add_verbs(verb: Verb) -> None:
         "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
     )
     p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=photographs)
-    text = "no RUN: the weights that come with the package for this task"
-    p.add_argument("--task", choices=TASKS, help=text)
+    p.add_argument("--task", choices=TASKS, help=_SHIPPED)
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the files")
     text = "horizontal field of view of all of them, for a network that is told rays; else intrinsics.json, EXIF, or the plan's"
     p.add_argument("--hfov", type=float, default=0.0, metavar="DEG", help=text)
@@ -273,8 +279,9 @@ def _evaluate(args: argparse.Namespace) -> int:
     from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 
     others = [others_predictions(word) for word in args.predictions]
-    run = open_run(args.run, exact=args.exact)
-    out = args.out or args.run / "evaluation"
+    folder = _judged_run(args)
+    run = open_run(folder, exact=args.exact)
+    out = args.out or folder / "evaluation"
     if args.on:
         make_folder(out)  # before anything is judged
     trained_on = frozenset(run.record["homes"]["train"])
@@ -300,8 +307,24 @@ def _evaluate(args: argparse.Namespace) -> int:
     if evaluations:
         from pbrs_farm.study.judging.error_page import write_evaluation
 
-        echo(str(write_evaluation(out, run, evaluations)))
+        page = write_evaluation(out, run, evaluations)
+        if not args.json:
+            echo(str(page))
     return 0
+
+
+def _judged_run(args: argparse.Namespace) -> Path:
+    """The run that `evaluate` names, or that comes with the package for --task."""
+    from pbrs_farm.study.judging.packed_weights import shipped_run
+
+    if (args.run is None) == (args.task is None):
+        hint = "pbrs-farm evaluate RUN, or --task normals"
+        raise BadInput(
+            "evaluate", str(args.run or ""), "either a run or a task is named", hint=hint
+        )
+    if args.task and args.on and not args.out:
+        raise BadInput("--task", args.task, "--out must say where the page goes", hint="--out DIR")
+    return shipped_run(args.task) if args.task else args.run
 
 
 def _with_column(

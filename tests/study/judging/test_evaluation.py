@@ -402,3 +402,20 @@ def test_a_folder_without_predictions_of_these_views_is_an_error(
     words = ["evaluate", str(run), "--on", f"photos={pairs}", "--predictions", str(pairs)]
     assert main([*words, "--out", str(pairs / "e")]) == 1
     assert "no prediction of any view" in capsys.readouterr().err
+
+
+def test_weights_of_the_package_are_judged_by_their_task(
+    pairs: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path_factory.mktemp("judged")
+    words = ["evaluate", "--task", "normals", "--on", f"wall={pairs}", "--out", str(out), "--json"]
+    assert main(words) == 0
+    (told,) = json.loads(capsys.readouterr().out)["evaluations"]
+    (judged,) = json.loads((out / "evaluation.json").read_text())["evaluations"]
+    assert told["figures"] == judged["figures"]
+    assert judged["figures"]["network"]["n_pixels"] > 0
+    assert main(words[:-3]) == 1
+    assert "--out must say where the page goes" in capsys.readouterr().err
+    assert main(["evaluate", "--on", str(pairs)]) == 1
+    assert main(["evaluate", str(out), "--task", "normals"]) == 1
+    assert capsys.readouterr().err.count("either a run or a task is named") == 2
