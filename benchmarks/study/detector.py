@@ -58,13 +58,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.study.detector", description=__doc__
     )
-    parser.add_argument("root", help="output folder, pictures of 640x480")
+    parser.add_argument("roots", nargs="+", metavar="ROOT", help="output folder of 640x480")
     parser.add_argument("--mode", default="", help="lighting (default: the best there is)")
     parser.add_argument("--coco", type=Path, help="photographs' boxes, COCO's JSON")
     parser.add_argument("--pictures", type=Path, help="folder of its photographs")
     parser.add_argument("--out", type=Path, default=RESULTS)
     args = parser.parse_args()
-    found = {"views": judged(pictures_of_root(args.root, args.mode))}
+    views = (picture for root in args.roots for picture in pictures_of_root(root, args.mode))
+    found = {"views": judged(views)}
     if args.coco and args.pictures:
         found["photographs"] = judged(pictures_of_coco(args.coco, args.pictures))
     args.out.parent.mkdir(parents=True, exist_ok=True)
