@@ -30,8 +30,8 @@ Verb = Callable[[str, Handler], argparse.ArgumentParser]
 
 # Help of arguments that name a home, and a view.
 HOME: Final = (
-    "file of a home or a folder of homes (`inputs` lists the formats), example home's name, `builtin`,"
-    " `made:SEED`, or `plugin:NAME,SEED`"
+    "file of a home or a folder of homes (those in it, not in folders below; `inputs` lists the"
+    " formats), example home's name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`"
 )
 _MAX_LINE: Final = 1500  # characters of a warning: a command that reproduces a fault fits
 MAX_SEEDS: Final = 100_000  # of one command
@@ -126,12 +126,18 @@ def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
 def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
     """The homes asked for, those of ranges and of folders one by one.
 
-    houses: a list of SUNCG houses, and homes their root alone. Raises BadInput.
+    houses: a list of SUNCG houses, and homes their root alone. Raises BadInput. Of a folder with homes
+    a warning tells which others lie one folder deeper.
     """
-    from pbrs_farm.prepare.source import suncg_list, words_of_homes
+    from pbrs_farm.prepare.source import homes_left_below, suncg_list, words_of_homes
 
     if not houses:
-        return words_of_homes(list(homes))
+        words = words_of_homes(list(homes))
+        # A folder that stays a word has no homes of its own: its error says where they lie.
+        for folder in dict.fromkeys(homes):
+            if folder not in words and (left := homes_left_below(Path(folder))):
+                warn(f"{folder}: {left}")
+        return words
     if len(homes) != 1:
         raise BadInput("--houses", houses, "needs the SUNCG root as the one HOME")
     return suncg_list(Path(homes[0]), Path(houses))

@@ -6,8 +6,9 @@ Effects: reads files, and the example homes' package from the cache (or through 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Final
 
 from pydantic import TypeAdapter
@@ -42,6 +43,7 @@ _UNREAD_SUFFIXES: Final = frozenset({
     ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
     ".ply", ".rvt", ".sdf", ".skp", ".stl",
 })  # fmt: skip
+_MOST_NAMED: Final = 3  # folders of homes that a hint names
 _LONGEST_ID: Final = 255  # bytes of a folder's name
 _DEFAULT_KIND: Final = "sweethome3d"  # of a path that says nothing: its reader tells what is wrong
 SAVED_SUFFIX: Final = ".home.json"
@@ -164,9 +166,38 @@ def words_of_homes(words: Sequence[str]) -> list[str]:
 
 
 def _homes_in(folder: Path) -> list[str]:
+    return [str(path) for path in sorted(_home_files(folder))]
+
+
+def _home_files(folder: Path) -> Iterator[Path]:
+    """The homes that lie in a folder which is no home itself, in no order."""
+    if folder.is_dir() and format_of_file(folder) is None:
+        yield from filter(_is_home_file, folder.iterdir())
+
+
+def homes_left_below(folder: Path) -> str:
+    """Which homes of a folder are not taken, since they lie one folder deeper, and what takes them; "" = none.
+
+    They are named and not taken: a model (.glb) below a scene may be a home or its furniture.
+    """
     if not folder.is_dir() or format_of_file(folder) is not None:
-        return []
-    return [str(path) for path in sorted(folder.iterdir()) if _is_home_file(path)]
+        return ""
+    below = [path for path in sorted(folder.iterdir()) if _holds_homes(path)]
+    if not below:
+        return ""
+    if len(below) > _MOST_NAMED:
+        names, words = f"{len(below)} folders such as {below[0].name}", f"{quote(str(folder))}/*/"
+    else:
+        names = " and ".join(path.name for path in below)
+        words = " ".join(quote(str(path)) for path in below)
+    return f"homes lie one folder deeper, in {names}: `pbrs-farm run {words}` takes them"
+
+
+def _holds_homes(folder: Path) -> bool:
+    try:
+        return not folder.name.startswith(".") and any(True for _ in _home_files(folder))
+    except OSError:
+        return False
 
 
 def _is_home_file(path: Path) -> bool:
@@ -446,6 +477,8 @@ def _of_folder(folder: Path) -> tuple[str, str]:
         )
     if (folder / "house").is_dir():
         hint = "SUNCG's root: name ROOT/house/ID, or ROOT and --houses LIST"
+    elif below := homes_left_below(folder):
+        hint = below
     elif list(folder.glob("*.json")):
         hint = _ROOT_HINT
     elif any(next(folder.glob(f"*{suffix}"), None) for suffix in _MODEL_SUFFIXES):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import json
+import shlex
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -180,6 +181,32 @@ def test_a_folder_of_homes_is_no_home_where_one_is_looked_at(tmp_path: Path) -> 
     (tmp_path / "b.sh3d").write_bytes(b"")
     with pytest.raises(BadHouse, match="is a folder of 2 homes"):
         resolve(str(tmp_path))
+
+
+def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("two words/b.glb", "one/a.sh3d", "empty/notes.txt", ".hidden/c.sh3d"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_bytes(b"")
+    with pytest.raises(BadHouse, match="no home file") as error:
+        resolve(str(tmp_path))
+    command = shlex.join(["pbrs-farm", "run", str(tmp_path / "one"), str(tmp_path / "two words")])
+    expected = f"homes lie one folder deeper, in one and two words: `{command}` takes them"
+    assert expected in str(error.value)
+    # The error of the folder says it; no warning before it.
+    assert home_arguments([str(tmp_path)], None) == [str(tmp_path)]
+    assert capsys.readouterr().err == ""
+    # Beside a home it is a warning, and what lies deeper is not taken.
+    (tmp_path / "top.sh3d").write_bytes(b"")
+    assert home_arguments([str(tmp_path)], None) == [str(tmp_path / "top.sh3d")]
+    assert expected in capsys.readouterr().err
+    # Of more folders than a line should hold it is the shell's pattern.
+    for name in "abc":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "home.sh3d").write_bytes(b"")
+    home_arguments([str(tmp_path)], None)
+    assert f"`pbrs-farm run {tmp_path}/*/` takes them" in capsys.readouterr().err
 
 
 def test_a_file_that_is_not_there_is_missing_in_its_own_format(tmp_path: Path) -> None:
