@@ -45,6 +45,7 @@ def _add_make(p: argparse.ArgumentParser) -> None:
     text = f"family of the plans (default: one by seed): {', '.join(PLANS)}"
     add("--plans", metavar="NAME", help=text)
     add("--storeys", metavar="N", help="1 or 2 with a staircase between (default 1)")
+    add("--offices", metavar="N", help="bedrooms that are offices (default 0)")
     text = "leave the rooms without furniture; needs no package"
     add("--empty", action="store_true", help=text)
     add("--programme", type=Path, metavar="FILE", help="JSON: the rooms of a certain flat")
@@ -127,7 +128,9 @@ def _make_of_plan(args: argparse.Namespace) -> int:
 
     at_least("--floor", args.floor or 0, 0)
     # The plan decides the rooms, so wishes about rooms contradict it.
-    given = [f"--{k}" for k in ("rooms", "area", "storeys", "programme") if getattr(args, k)]
+    given = [
+        f"--{k}" for k in ("rooms", "area", "storeys", "offices", "programme") if getattr(args, k)
+    ]
     if given:
         raise BadInput("--plan", str(args.plan), f"leaves no choice of {given[0]}")
     entry = format_of_file(args.plan)
@@ -158,7 +161,6 @@ def _folder(path: Path) -> None:
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:
     """The homes that the options name; raises BadInput as a word of `run` would."""
     from pbrs_farm.core.made_home import made_homes
-    from pbrs_farm.generate.programme import Wishes
     from pbrs_farm.generate.programme_file import programme_from_json
 
     if args.apartment:
@@ -167,11 +169,11 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         raise BadInput("--floor", str(args.floor), "needs --plan FILE")
     options = [
         f"{k}={v}"
-        for k in ("rooms", "area", "style", "plans", "storeys")
+        for k in ("rooms", "area", "style", "plans", "storeys", "offices")
         if (v := getattr(args, k))
     ]
     options += ["furniture=none"] * args.empty
-    given = [f"--{k}" for k in ("rooms", "area") if args.programme and getattr(args, k)]
+    given = [f"--{k}" for k in ("rooms", "area", "offices") if args.programme and getattr(args, k)]
     if args.programme and args.storeys not in (None, "1"):
         raise BadInput(
             "--programme", str(args.programme),
@@ -184,9 +186,6 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
         raise BadInput("--seed", str(args.seed), "is below 0", hint="--seed 1")
     first, last = args.seed, args.seed + args.count - 1
     homes = made_homes(",".join((f"made:{first}..{last}", *options)))
-    # Say at once what no seed can meet.
-    bedrooms, area = homes[0].bedrooms, homes[0].area
-    Wishes(bedrooms, (float(area[0]), float(area[1])), homes[0].storeys)
     return homes, programme_from_json(args.programme) if args.programme else None
 
 

@@ -49,6 +49,7 @@ class MadeHome:
     furniture: bool = True
     storeys: int = 1
     plans: str = ""  # the family of its plan; "" = drawn by seed
+    offices: int = 0  # bedrooms that are offices
 
     @property
     def word(self) -> str:
@@ -70,6 +71,8 @@ class MadeHome:
             parts.append(f"plans={self.plans}")
         if self.storeys != plain.storeys:
             parts.append(f"storeys={self.storeys}")
+        if self.offices:
+            parts.append(f"offices={self.offices}")
         if not self.furniture:
             parts.append("furniture=none")
         return ",".join(parts)
@@ -98,8 +101,8 @@ def is_made(word: str) -> bool:
 def made_homes(word: str) -> list[MadeHome]:
     """The homes of a word, one a seed. Raises BadInput for a word that names none.
 
-    A word is made:FIRST..LAST,key=value,... with keys rooms, area, style, plans, storeys and
-    furniture=none; a single seed is a range of one. Every home of the word shares its options.
+    A word is made:FIRST..LAST,key=value,... with keys rooms, area, style, plans, storeys,
+    offices and furniture=none; a single seed is a range of one. Every home of the word shares its options.
     BadInput also for a range longer than MAX_HOMES and for wishes that no home meets
     (`check_wishes`).
     """
@@ -121,20 +124,24 @@ def made_homes(word: str) -> list[MadeHome]:
             home = replace(home, plans=_one_of(PLANS, word, option, "no such family of plans"))
         elif key == "storeys":
             home = replace(home, storeys=_checked_range(word, value, 99)[1])
+        elif key == "offices":
+            home = replace(home, offices=_checked_range(word, value, 99)[1])
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
             raise BadInput(word, option, "is no option of made homes", hint=_HINT)
-    check_wishes(home.bedrooms, home.area, home.storeys)
+    check_wishes(home.bedrooms, home.area, home.storeys, home.offices)
     return [replace(home, seed=seed) for seed in range(first, last + 1)]
 
 
-def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: int = 1) -> None:
-    """Raise BadInput for a number of bedrooms, an area and storeys that no home meets.
+def check_wishes(
+    bedrooms: tuple[int, int], area: tuple[float, float], storeys: int = 1, offices: int = 0
+) -> None:
+    """Raise BadInput for a number of bedrooms, an area, storeys and offices that no home meets.
 
     bedrooms and area (m2) are inclusive ranges. A home must exist whose area overlaps the range,
     for a number of bedrooms within it; two storeys need at least the bedrooms for which plans of
-    two storeys exist. The error names the range that would do.
+    two storeys exist, and beside its offices a home has a bedroom. The error names the range that would do.
     """
     low, high = bedrooms
     if not 0 <= low <= high <= len(_AREA_OF_HOMES) - 1:
@@ -144,6 +151,11 @@ def check_wishes(bedrooms: tuple[int, int], area: tuple[float, float], storeys: 
         raise BadInput("area", f"{area[0]:g}..{area[1]:g}", "is no range", hint="area=60..90")
     if storeys not in (1, 2):
         raise BadInput("storeys", str(storeys), "homes have one storey or two", hint="storeys=2")
+    if offices and high <= offices:
+        text, most_rooms = "offices are bedrooms, of which one stays", len(_AREA_OF_HOMES) - 1
+        hint = f"rooms={min(offices + 1, most_rooms)}..{most_rooms}, offices=1..{most_rooms - 1}"
+        raise BadInput("offices", f"{offices} of {high} bedrooms", text, hint=hint)
+    low = max(low, offices + 1 if offices else 0)
     least, most = _AREA_OF_HOMES[low][0], _AREA_OF_HOMES[high][1]
     if storeys == 2:
         if high < min(AREA_OF_TWO_STOREYS):

@@ -90,7 +90,7 @@ def _draw_stairs(root: Element, stair: Stair) -> None:
 def _tint(type_: RoomType) -> str:
     """The colour of a room's floor, by what it is used for."""
     match type_:
-        case RoomType.LIVING | RoomType.STUDIO:
+        case RoomType.LIVING | RoomType.STUDIO | RoomType.OFFICE:
             return _LIVING
         case RoomType.KITCHEN:
             return _COOKING

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.generate.drawn_plan import drawn_plan
-from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey
+from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, RoomType, Storey
 from pbrs_farm.generate.furnish.furnished import furnished
 from pbrs_farm.generate.furnish.gates import furnish_report
 from pbrs_farm.generate.openings import plan_faults
@@ -54,6 +54,7 @@ def drawn_home(
     best: DrawnHome | None = None
     for _ in range(_TRIES):
         plans, stair = _drawn_plans(rng, wishes, programme)
+        plans = with_offices(plans, wishes.offices) if wishes is not None else plans
         for _ in range(_FURNISHINGS):
             storeys = tuple(Storey(p, furnished(p, catalogue, rng, style)) for p in plans)
             home = DrawnHome(
@@ -65,6 +66,35 @@ def drawn_home(
                 return best
     assert best is not None
     return best
+
+
+def with_offices(plans: tuple[Plan, ...], n: int) -> tuple[Plan, ...]:
+    """The storeys with n bedrooms turned into offices: the smallest, first those that no room is entered from.
+
+    The largest bedroom stays one.
+    """
+    rooms = [
+        (storey, number) for storey, plan in enumerate(plans) for number in range(len(plan.rooms))
+    ]
+    bedrooms = [at for at in rooms if plans[at[0]].rooms[at[1]].type is RoomType.BEDROOM]
+
+    def rank(at: tuple[int, int]) -> tuple[bool, float]:
+        plan = plans[at[0]]
+        guests = (o for o in plan.openings if o.other == at[1] and o.room != at[1])
+        private = (RoomType.WARDROBE, RoomType.BATHROOM)
+        return any(plan.rooms[o.room].type in private for o in guests), plan.rooms[at[1]].area
+
+    largest = max(bedrooms, key=lambda at: plans[at[0]].rooms[at[1]].area, default=None)
+    chosen = sorted((at for at in bedrooms if at != largest), key=rank)[:n]
+    label = RoomType.OFFICE.label
+    names = {at: label if n == 1 else f"{label} {k + 1}" for k, at in enumerate(sorted(chosen))}
+    return tuple(
+        replace(plan, rooms=tuple(
+            replace(room, type=RoomType.OFFICE, name=names[storey, number]) if (storey, number) in names else room
+            for number, room in enumerate(plan.rooms)
+        ))
+        for storey, plan in enumerate(plans)
+    )  # fmt: skip
 
 
 def _broken(storey: Storey, catalogue: Catalogue) -> list[str]:

@@ -25,6 +25,7 @@ class RoomType(StrEnum):
     LIVING = "living"
     KITCHEN = "kitchen"
     BEDROOM = "bedroom"
+    OFFICE = "office"  # to work in
     STUDIO = "studio"  # to live and to sleep in
     BATHROOM = "bathroom"
     WC = "wc"
@@ -37,7 +38,9 @@ class RoomType(StrEnum):
     @property
     def is_habitable(self) -> bool:
         """Whether people spend their days or nights there: it needs daylight."""
-        return self in (RoomType.LIVING, RoomType.KITCHEN, RoomType.BEDROOM, RoomType.STUDIO)
+        return self in (
+            RoomType.LIVING, RoomType.KITCHEN, RoomType.BEDROOM, RoomType.OFFICE, RoomType.STUDIO,
+        )  # fmt: skip
 
     @property
     def is_wet(self) -> bool:

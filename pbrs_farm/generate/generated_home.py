@@ -41,9 +41,10 @@ def generate_home(
 
     Raises BadInput for wishes that no home meets.
     """
-    wishes = Wishes(
-        home.bedrooms, (float(home.area[0]), float(home.area[1])), home.storeys, home.plans
-    )
+    low, high = home.bedrooms
+    bedrooms = max(low, home.offices + 1 if home.offices else 0), high
+    area = float(home.area[0]), float(home.area[1])
+    wishes = Wishes(bedrooms, area, home.storeys, home.plans, home.offices)
     # All randomness comes from one stream that the wishes and the version name.
     words = (home.word,) if programme is None else (home.word, repr(programme))
     rng = np.random.default_rng(keys.seed("made", home.version, *words))

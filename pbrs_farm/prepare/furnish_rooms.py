@@ -83,7 +83,7 @@ _USES: Final = {
     RoomKind.LIVING: _Use(RoomType.LIVING), RoomKind.BEDROOM: _Use(RoomType.BEDROOM),
     RoomKind.KITCHEN: _Use(RoomType.KITCHEN), RoomKind.BATHROOM: _Use(RoomType.BATHROOM),
     RoomKind.HALL: _Use(RoomType.HALL), RoomKind.DINING: _Use(RoomType.LIVING, "dining_room"),
-    RoomKind.OFFICE: _Use(RoomType.LIVING, "office"),
+    RoomKind.OFFICE: _Use(RoomType.OFFICE),
 }  # fmt: skip
 
 # Groups of briefs -> NYU40 classes of things of which a room needs no second one.

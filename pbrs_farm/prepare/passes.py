@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pbrs_farm.repair import RepairReport
 
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
-_FURNISH_VERSION: Final = 2  # of furnish_rooms.py, beside that of what furnishes generated homes
+_FURNISH_VERSION: Final = 3  # of furnish_rooms.py, beside that of what furnishes generated homes
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
 
 

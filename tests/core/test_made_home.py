@@ -14,7 +14,9 @@ def test_a_range_names_one_home_a_seed() -> None:
 
 
 def test_a_word_says_all_of_its_home() -> None:
-    home = MadeHome(7, (2, 3), (90, 110), "nordic", furniture=False, storeys=2, plans="us")
+    home = MadeHome(
+        7, (2, 3), (90, 110), "nordic", furniture=False, storeys=2, plans="us", offices=1
+    )
     assert made_homes(home.word) == [home]
     assert home.digest != MadeHome(7).digest
 
@@ -31,6 +33,12 @@ def test_a_word_says_all_of_its_home() -> None:
         ("made:1,storeys=3", "one storey or two"),
         ("made:1,plans=castle", "no such family of plans.*alpine"),
         ("made:1,storeys=2,rooms=1", "2 to 4 bedrooms"),
+        (
+            "made:1,offices=2,rooms=1..2",
+            "offices: 2 of 2 bedrooms: .*of which one stays.*rooms=3..4",
+        ),
+        ("made:1,offices=4", "of which one stays"),
+        ("made:1,offices=x", "no number"),
         ("made:1..2000000", "at most"),
     ],
 )

@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import RoomType
+from pbrs_farm.generate.openings import plan_faults
 from pbrs_farm.generate.programme_file import programme_from_json
 
 FLAT = [{"type": "bedroom", "name": "Ada"}, {"type": "living", "area": 24}, "kitchen", "bathroom"]
@@ -83,6 +84,15 @@ def test_rooms_that_are_wished_adjacent_share_a_wall(tmp_path: Path) -> None:
         )
         shared = ada.buffer(0.1).intersection(kitchen.buffer(0.1))
         assert max(np.ptp(shared.bounds[::2]), np.ptp(shared.bounds[1::2])) > 0.7
+
+
+def test_a_programme_has_an_office_of_the_size_of_its_wish(tmp_path: Path) -> None:
+    programme = programme_from_json(written(tmp_path, {"rooms": [*FLAT, "office"]}))
+    plan = drawn_plan(np.random.default_rng(3), None, programme)
+    (office,) = [room for room in plan.rooms if room.type is RoomType.OFFICE]
+    assert office.name == "Office"
+    assert office.area == pytest.approx(9, rel=0.25)
+    assert not plan_faults(plan)
 
 
 def test_a_programme_without_a_plan_says_what_to_leave_out(tmp_path: Path) -> None:

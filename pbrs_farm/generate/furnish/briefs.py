@@ -91,7 +91,7 @@ class _Brief(Record):
     least_share: float = 0.0
 
 
-UseWithoutType = Literal["childs_room", "dining_room", "office"]
+UseWithoutType = Literal["childs_room", "dining_room"]
 """Briefs of rooms that no generated plan has, or that are drawn: no RoomType."""
 
 _LEAST_STRETCH_M: Final = 1.3  # shorter walls are not filled from side to side

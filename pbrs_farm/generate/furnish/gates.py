@@ -16,6 +16,7 @@ from pbrs_farm.generate.furnish.walk_bitmap import WalkMap
 _SEATS: Final = ("sofa", "corner_sofa", "armchair", "chair")
 MUST_HAVES: Final[dict[RoomType, tuple[tuple[str, ...], ...]]] = {
     RoomType.BEDROOM: (("bed",),),
+    RoomType.OFFICE: (("desk",),),
     RoomType.STUDIO: (("bed",), _SEATS),
     RoomType.LIVING: (_SEATS,),
     RoomType.KITCHEN: (("sink",), ("cooker", "hob"), ("fridge",)),
