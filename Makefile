@@ -111,7 +111,7 @@ bench-light-tables: setup ## every bench of docs/lab/light.md, one after another
 	@$(call extra,flip_evaluator,bench)
 	@$(cycles-packages)
 	@failed=; for name in view demo light guided growth denoised presets lux cycles; do $(BIN)/python -m benchmarks $$name || failed="$$failed $$name"; done; \
-	$(BIN)/python -m benchmarks light_tables; \
+	$(BIN)/python -m benchmarks lab_tables; \
 	test -z "$$failed" || { echo "bench-light-tables: failed, tables as before:$$failed" >&2; exit 1; }
 
 bench-cycles: setup ## three homes against Blender's Cycles, in a Python of its own: under 20 quiet minutes

@@ -35,7 +35,7 @@ OWN_TARGET: Final = {
     "light_pictures": "light.light_pictures",
     "sky": "light.sky_lux",
     "outside": "views.outside",
-    "light_tables": "light.light_tables",
+    "lab_tables": "lab_tables",
     "denoised": "light.denoised",
     "growth": "light.growth",
     "guided": "light.guided",

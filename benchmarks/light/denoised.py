@@ -48,7 +48,7 @@ class Sampled:
 
 
 def main() -> None:
-    """Measure and write out/bench/denoised.json; `python -m benchmarks light_tables` makes its table."""
+    """Measure and write out/bench/denoised.json; `python -m benchmarks lab_tables` makes its table."""
     recipe = recipe_from_name("fast")
     errors: dict[tuple[str, int], list[tuple[float, float, float]]] = {}
     samples = []

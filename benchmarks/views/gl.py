@@ -34,6 +34,7 @@ def main() -> None:
         name = raster.name
     print(f"{HOME}, {len(cameras)} views of {SIZE[0]}x{SIZE[1]}, {name}")
     figures = {
+        "gl.picture_s": round(1 / dl[0], 4),
         "gl.dl_views_per_s": round(dl[0], 2),
         "gl.il_views_per_s": round(il[0], 2),
         "gl.dl_cpu_s_per_view": round(dl[1], 4),
@@ -42,6 +43,7 @@ def main() -> None:
         "gl.triangles": sum(item.n_faces for item in house.items),
     }
     units = dict.fromkeys(figures, "1/s") | {
+        "gl.picture_s": "s of an OpenGL-DL picture",
         "gl.dl_cpu_s_per_view": "s of all cores",
         "gl.il_cpu_s_per_view": "s of all cores",
         "gl.load_s": "s",

@@ -1,22 +1,88 @@
-"""Write the measured tables into the docs: `python -m benchmarks light_tables`.
+"""Write the measured tables of the lab book: `python -m benchmarks lab_tables`.
 
-A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME one of table_rows.TABLES. Below it
-stands the command that measures it; in the lab book, docs/lab, also the commit, the machine and its load. A table whose JSON is
-missing, or lacks a figure, stays as it is and is named; so are tables of different commits. Effects: writes docs/*.md.
+A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME a table of lab_rows.csv or, where rows
+need code, of light/table_rows.py. Below it stands the command that measures it; in the lab book, docs/lab, also the commit,
+the machine and its load. A table whose JSON is missing, or lacks a figure, stays as it is and is named; so are tables of
+different commits, and those that a program of WRITTEN_ELSEWHERE writes. Effects: writes docs/*.md.
 """
 
 from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.figures import FOLDER
-from benchmarks.light.table_rows import TABLES, Table
+from benchmarks.light import table_rows
+from benchmarks.light.table_rows import Figures, Table, row
+from pbrs_farm.core.record import Record, Several, read_csv
 
 DOCS: Final = Path("docs")
+ROWS: Final = Path(__file__).with_name("lab_rows.csv")
+WRITTEN_ELSEWHERE: Final = {"sweep": "python -m benchmarks.study.sweep table --write"}
+"""Mark -> the program that writes what stands there."""
+
 _BLOCK: Final = re.compile(r"<!-- bench:(\w+) -->\n(.*?)<!-- /bench -->", re.DOTALL)
+_FIGURE: Final = re.compile(r"\{([\w.]+)(?:/(\d+))?(?::([^}]*))?\}")
+
+
+class LabRow(Record):
+    """A row of a table; one without a bench is the table's head. lab_rows.csv says what cells hold."""
+
+    table: str
+    what: str
+    cells: Several[str]
+    wanted: str = ""
+    bench: str = ""
+
+
+def filled(cell: str, figures: Figures) -> str:
+    """A cell with its figures. Raises KeyError with the name of one that there is not.
+
+    Example:
+        >>> filled("{a.mb/1000:.1f} GB, {a.same:yes}", {"a.mb": 1234, "a.same": 1})
+        '1.2 GB, yes'
+    """
+
+    def told(match: re.Match[str]) -> str:
+        name, divisor, form = match.groups()
+        value = figures[name]
+        if form == "yes":
+            return "yes" if value else "no"
+        return format(value / int(divisor) if divisor else value, form or "")
+
+    return _FIGURE.sub(told, cell)
+
+
+def simple_table(rows: Sequence[LabRow]) -> Table:
+    """The table of these rows, of which the first is the head."""
+    benches = tuple(dict.fromkeys(r.bench for r in rows if r.bench))
+
+    def lines(figures: Figures) -> list[str]:
+        written = [
+            [
+                r.what,
+                *(filled(c, figures) for c in r.cells),
+                *([r.wanted] if rows[0].wanted else []),
+            ]
+            for r in rows
+        ]
+        return [row(written[0]), "|---" * len(written[0]) + "|", *map(row, written[1:])]
+
+    return Table(benches, f"python -m benchmarks {' '.join(benches)}", lines)
+
+
+def _simple_tables() -> dict[str, Table]:
+    by_table: dict[str, list[LabRow]] = {}
+    for one in read_csv(ROWS, LabRow):
+        by_table.setdefault(one.table, []).append(one)
+    return {name: simple_table(rows) for name, rows in by_table.items()}
+
+
+TABLES: Final = table_rows.TABLES | _simple_tables()
+"""Mark -> its table."""
 
 
 def main() -> None:
@@ -37,6 +103,9 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
 
         def replaced(block: re.Match[str], page: Path = page) -> str:
             name = block[1]
+            if name in WRITTEN_ELSEWHERE:
+                said.append(f"{page}: {name} stays as it is: `{WRITTEN_ELSEWHERE[name]}` writes it")
+                return block[0]
             if name not in TABLES:
                 raise ValueError(f"{page}: no table {name!r}; of {', '.join(TABLES)}")
             lines, problem = table_lines(TABLES[name], reports, in_lab=page.parent.name == "lab")

@@ -1,0 +1,133 @@
+"""Tables of the lab book: filled from reports, left alone where a figure is missing, and those of its pages."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks import lab_tables
+from benchmarks.__main__ import DEFAULT, OWN_TARGET
+from benchmarks.lab_tables import ROWS, TABLES, WRITTEN_ELSEWHERE, LabRow, filled, written_tables
+from benchmarks.manual_pages import REPO
+from pbrs_farm.core.record import read_csv
+
+ROWS_OF_BOOK = read_csv(ROWS, LabRow)
+_BLOCK = re.compile(r"<!-- bench:(\w+) -->\n(.*?)<!-- /bench -->", re.DOTALL)
+_NAME = re.compile(r"\{([\w.]+)")
+
+
+def _report(
+    folder: Path, bench: str, figures: dict[str, object], commit: str = "abcdef012345"
+) -> None:
+    machine = {"cores": 2, "cpu": "a Xeon", "load_1min": 0.51}
+    text = json.dumps({"figures": figures, "machine": machine, "commit": commit})
+    (folder / f"{bench}.json").write_text(text)
+
+
+@pytest.fixture
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A page of a lab book with a table `ours` of two benches."""
+    rows = [
+        LabRow(table="ours", what="what", cells=("value",), wanted="wanted"),
+        LabRow(table="ours", what="a view", cells=("{one.s:.1f} s",), wanted="5 s", bench="one"),
+        LabRow(table="ours", what="the same", cells=("{two.same:yes}",), bench="two"),
+    ]
+    monkeypatch.setattr(lab_tables, "TABLES", {"ours": lab_tables.simple_table(rows)})
+    page = tmp_path / "docs/lab/some.md"
+    page.parent.mkdir(parents=True)
+    page.write_text("# Page\n\n<!-- bench:ours -->\nbefore\n<!-- /bench -->\n\nafter\n")
+    return page
+
+
+def test_a_cell_tells_figures_divided_and_yes_or_no() -> None:
+    figures = {"a.mb": 1234, "a.same": 0, "a.names": "x, y"}
+    assert filled("{a.mb:,} of {a.mb/1000:.1f}", figures) == "1,234 of 1.2"
+    assert filled("{a.same:yes}; {a.names}", figures) == "no; x, y"
+    with pytest.raises(KeyError, match=r"a\.other"):
+        filled("{a.other:.1f}", figures)
+
+
+def test_a_table_is_written_with_command_commit_machine_and_load(
+    page: Path, tmp_path: Path
+) -> None:
+    _report(tmp_path, "one", {"one.s": 6.84})
+    _report(tmp_path, "two", {"two.same": 1})
+    assert written_tables(tmp_path / "docs", tmp_path) == [f"{page}: ours written"]
+    said = "*`python -m benchmarks one two` (abcdef0: 2 cores of a Xeon, load 0.5, 0.5, the bench's own included).*"
+    table = (
+        "| what | value | wanted |\n|---|---|---|\n| a view | 6.8 s | 5 s |\n| the same | yes |  |"
+    )
+    text = page.read_text()
+    assert (
+        text == f"# Page\n\n<!-- bench:ours -->\n\n{table}\n\n{said}\n\n<!-- /bench -->\n\nafter\n"
+    )
+    written_tables(tmp_path / "docs", tmp_path)
+    assert page.read_text() == text
+
+
+def test_tables_of_two_commits_are_told(page: Path, tmp_path: Path) -> None:
+    _report(tmp_path, "one", {"one.s": 6.84})
+    _report(tmp_path, "two", {"two.same": 1}, "0123456789ab")
+    assert "tables are of 2 commits" in written_tables(tmp_path / "docs", tmp_path)[-1]
+
+
+def test_a_table_without_its_report_or_a_figure_stays_and_is_named(
+    page: Path, tmp_path: Path
+) -> None:
+    before = page.read_text()
+    _report(tmp_path, "one", {"one.s": 6.84})
+    (said,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "ours stays as it is: there is no " in said
+    assert said.endswith("(python -m benchmarks one two)")
+    _report(tmp_path, "two", {})
+    (said,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "no figure two.same" in said
+    assert page.read_text() == before
+
+
+def test_a_table_that_another_program_writes_is_left_alone(page: Path, tmp_path: Path) -> None:
+    text = "<!-- bench:sweep -->\ntheirs\n<!-- /bench -->\n"
+    page.write_text(text)
+    (said,) = written_tables(tmp_path / "docs", tmp_path)
+    assert WRITTEN_ELSEWHERE["sweep"] in said
+    assert page.read_text() == text
+
+
+def test_a_mark_that_is_no_table_is_told(page: Path, tmp_path: Path) -> None:
+    page.write_text("<!-- bench:other -->\n<!-- /bench -->\n")
+    with pytest.raises(ValueError, match="no table 'other'"):
+        written_tables(tmp_path / "docs", tmp_path)
+
+
+def test_each_simple_table_stands_once_in_the_lab_book_with_its_rows() -> None:
+    """A page has the first cells of the table, whoever wrote it, so that figures elsewhere find them."""
+    text = "\n".join(p.read_text("utf-8") for p in (REPO / "docs/lab").glob("*.md"))
+    found = [(name, body) for name, body in _BLOCK.findall(text) if name not in WRITTEN_ELSEWHERE]
+    simple = {row.table for row in ROWS_OF_BOOK}
+    assert sorted(name for name, _ in found if name in simple) == sorted(simple)
+    for name, body in found:
+        assert name in TABLES
+        if name in simple:
+            rows = [line.split(" | ") for line in body.splitlines() if line.startswith("| ")]
+            own = [row for row in ROWS_OF_BOOK if row.table == name]
+            assert [row[0] for row in rows] == [f"| {row.what}" for row in own], name
+            assert len({len(row) for row in rows}) == 1, name
+            assert "*`python -m benchmarks" in body, name
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS_OF_BOOK if row.bench], ids=lambda r: r.what)
+def test_the_figures_of_a_row_are_some_that_its_bench_writes(row: LabRow) -> None:
+    """Each name, or what follows its prefix, stands quoted in the bench's module or folder."""
+    module = (
+        REPO / "benchmarks" / (DEFAULT | OWN_TARGET)[row.bench].replace(".", "/")
+    ).with_suffix("")
+    files = [module / "__init__.py", module.with_suffix(".py"), *(module.parent.glob("*.py"))]
+    source = "\n".join(f.read_text("utf-8") for f in files if f.is_file())
+    names = [name for cell in row.cells for name in _NAME.findall(cell)]
+    assert names
+    for name in names:
+        parts = (name, name.partition(".")[2], name.partition(".")[2].partition("_")[2])
+        assert any(f'"{part}"' in source for part in parts if part), name
