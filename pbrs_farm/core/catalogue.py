@@ -102,6 +102,7 @@ class Catalogue:
     digest: str  # of everything that shapes come from
     pictures: tuple[Picture, ...] = ()
     notes: tuple[Note, ...] = ()
+    own: frozenset[str] = frozenset()  # ids of the pieces of the user's own libraries
     painted_folder: Path | None = None  # where painted materials are kept for other homes
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 

@@ -64,6 +64,11 @@ class DressFields(FieldGroup):
     swap: Share = Field(
         0.7, description="share of furniture that another model of its class replaces"
     )
+    own_share: Share = Field(
+        0.5,
+        description="how often a piece of your own libraries is chosen where one fits; 0 = as often"
+        " as any other",
+    )
     furniture: Share = Field(
         1.0, description="share of the furniture that fits along free walls and beside beds"
     )

@@ -93,7 +93,7 @@ def dressed_house(
 ) -> Dressed:  # fmt: skip
     """As dress, with what refit_after_repair needs. on_progress: called with the share of the passes that are done."""
     bank = PaintedBank(catalogue.painted_folder)
-    with closing(MutableHouse(house, seed, fields.mess, bank)) as mutable:
+    with closing(MutableHouse(house, seed, fields.mess, bank, fields.own_share)) as mutable:
         return Dressed(
             *_dressed(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
         )

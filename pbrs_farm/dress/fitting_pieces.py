@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.dress.old_place import OldPlace
@@ -46,6 +48,18 @@ def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
         and up * height >= (1 - HEIGHT) * old_height
     )
     return (across, up, along) if fits else None
+
+
+def own_or_all(
+    pieces: Sequence[Piece], own: frozenset[str], share: float, rng: np.random.Generator
+) -> Sequence[Piece]:
+    """The user's own of some pieces with probability share, else all of them.
+
+    own: Catalogue.own. Where none is the user's own nothing is drawn, so that choices without a
+    library of one's own stay as they are.
+    """
+    mine = [piece for piece in pieces if piece.id in own]
+    return mine if mine and rng.random() < share else pieces
 
 
 def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:

@@ -19,6 +19,7 @@ from pbrs_farm.core.catalogue import Catalogue, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER, SINK
 from pbrs_farm.core.record import Nyu40, Record, read_toml
 from pbrs_farm.dress.filled_walls import fill_wall, is_filled
+from pbrs_farm.dress.fitting_pieces import own_or_all
 from pbrs_farm.dress.furniture_look import BoardLook, grained, look_of
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.room_floor import LOWER_M, OUT_M, FloorSpot, RoomFloor, spot_at
@@ -128,7 +129,8 @@ def _stand_at_wall(
     for w in sorted(widths, reverse=True):
         if w > floor.wall_m:
             continue
-        made = _from_catalogue(catalogue, kind, w, own) if from_catalogue else None
+        share = house.own_share
+        made = _from_catalogue(catalogue, kind, w, own, share) if from_catalogue else None
         made = made or _generated(kind, look, (w, height, depth), own)
         spot = _find_spot(house, floor, kind, made, rng)
         if spot is None:
@@ -147,7 +149,9 @@ def _generated(
     return grained(CASE_GOODS[kind.model].make(rng, look.style, look.boards, size), look)
 
 
-def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: int) -> Model | None:
+def _from_catalogue(
+    catalogue: Catalogue, kind: WantedKind, width: float, own: int, own_share: float
+) -> Model | None:
     """A model of about that width; None where there is none."""
     fit = [
         p
@@ -160,7 +164,8 @@ def _from_catalogue(catalogue: Catalogue, kind: WantedKind, width: float, own: i
     ]
     if not fit:
         return None
-    piece = fit[own % len(fit)]
+    chosen = own_or_all(fit, catalogue.own, own_share, np.random.default_rng(own))
+    piece = chosen[own % len(chosen)]
     shape = catalogue.shape(piece)
     if shape is None or sum(len(s.faces) for s in shape.surfaces) > _MOST_FACES:
         return None

@@ -10,6 +10,7 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.classes import NIGHT_STAND, SOFA
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.dress.ceiling_lamps import PASS, hang_from_ceiling
+from pbrs_farm.dress.fitting_pieces import own_or_all
 from pbrs_farm.dress.made_lamps import floor_lamp, table_lamp, with_flux
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
@@ -43,7 +44,7 @@ def stand_by_sofas(
     sofas = [n for n in room.items if house.items[n].nyu40 == SOFA]
     if has_one or not sofas or rng.random() >= _BY_SOFA:
         return
-    piece, shape = _draw_lamp(catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
+    piece, shape = _draw_lamp(house, catalogue, "floor_lamp", rng) or floor_lamp(rng, style)
     radius = float(np.abs(shape.bounds[:, [0, 2]]).max())
     for number in sofas:
         # Try each end; take the lamp away again where it closes a way.
@@ -67,7 +68,7 @@ def stand_by_beds(
     stands = [n for n in room.items if house.items[n].nyu40 == NIGHT_STAND]
     if not stands or rng.random() >= _BY_BED:
         return
-    piece, shape = _draw_lamp(catalogue, "table_lamp", rng) or table_lamp(rng, style)
+    piece, shape = _draw_lamp(house, catalogue, "table_lamp", rng) or table_lamp(rng, style)
     for number in stands:
         low, high = space.bounds[number]
         middle = ((low + high) / 2)[[0, 2]]
@@ -82,13 +83,14 @@ def stand_by_beds(
 
 
 def _draw_lamp(
-    catalogue: Catalogue, group: str, rng: np.random.Generator
+    house: MutableHouse, catalogue: Catalogue, group: str, rng: np.random.Generator
 ) -> tuple[Piece, Shape] | None:
     """A lamp of the catalogue that shines and is not too large to stand; None = make one."""
     fit = [p for p in catalogue.of(group) if p.size[2] < (0.55 if group == "table_lamp" else 1.95)]
     if not fit or rng.random() < 0.15:
         return None
-    piece = fit[int(rng.integers(len(fit)))]
+    chosen = own_or_all(fit, catalogue.own, house.own_share, rng)
+    piece = chosen[int(rng.integers(len(chosen)))]
     shape = catalogue.shape(piece)
     return (piece, shape) if shape is not None and shape.lights else None
 

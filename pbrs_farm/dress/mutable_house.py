@@ -39,11 +39,13 @@ class MutableHouse:
     """
 
     def __init__(
-        self, house: House, seed: int, mess: float = 0.0, bank: PaintedBank | None = None
-    ) -> None:
+        self, house: House, seed: int, mess: float = 0.0, bank: PaintedBank | None = None,
+        own_share: float = 0.0,
+    ) -> None:  # fmt: skip
         self.source = house
         self.seed = seed
         self.mess = mess  # 0..1: how little people have tidied up
+        self.own_share = own_share  # 0..1: of choices that the user's own libraries have alone
         self.items: list[Item] = list(house.items)
         self.materials = PaintedMaterials(house.materials, house.textures)
         self.bank = bank or PaintedBank(None)  # what surfaces are painted with

@@ -17,7 +17,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import Item, ItemKind, LightPart
-from pbrs_farm.dress.fitting_pieces import Scale, common_scale, is_lit_alike
+from pbrs_farm.dress.fitting_pieces import Scale, common_scale, is_lit_alike, own_or_all
 from pbrs_farm.dress.mutable_house import MutableHouse, moved_item
 from pbrs_farm.dress.neighbours import (
     ALIKE_HELD,
@@ -184,8 +184,12 @@ def _swap_set(
         house.refused[f"{PASS}: no other model is held as the old one is"] += 1
         return
     why = "no other model can be used"
-    for k in rng.permutation(len(candidates))[:_TRIES]:
-        piece, scale = candidates[int(k)]
+    order = rng.permutation(len(candidates)).tolist()
+    first = own_or_all([piece for piece, _ in candidates], catalogue.own, house.own_share, rng)
+    liked = {piece.id for piece in first}
+    order.sort(key=lambda k: candidates[k][0].id not in liked)
+    for k in order[:_TRIES]:
+        piece, scale = candidates[k]
         shape = catalogue.shape(piece)
         if shape is None or not is_lit_alike(bool(shape.lights), items):
             continue

@@ -190,6 +190,31 @@ def test_chairs_of_one_room_get_one_model() -> None:
         assert models != {"T#old"}
 
 
+def test_a_library_of_one_s_own_gets_its_share_of_what_is_swapped_however_small_it_is() -> None:
+    catalogue = _catalogue(*(("dresser", f"n{k}", (1.2, 0.5, 0.8)) for k in range(50)))
+    one_own = replace(catalogue, own=frozenset({"T#n7"}))
+    drawn = {"none": (catalogue, 0.5), "half": (one_own, 0.5), "even": (one_own, 0.0)}
+    models = {
+        name: [_swapped_dresser(library, share, seed) for seed in range(60)]
+        for name, (library, share) in drawn.items()
+    }
+    # Half of 60 draws and a fiftieth of the rest, three standard deviations either way.
+    assert 19 <= models["half"].count("T#n7") <= 42
+    # Without a library of one's own, or with a share of 0, what is drawn is as it was.
+    assert models["none"] == models["even"]
+    assert models["none"].count("T#n7") < 8
+    # A choice that is not the user's is the one that there was before.
+    kept = [now == before for now, before in zip(models["half"], models["none"], strict=True)]
+    assert all(k or now == "T#n7" for k, now in zip(kept, models["half"], strict=True))
+
+
+def _swapped_dresser(catalogue: Catalogue, own_share: float, seed: int) -> str:
+    house_with_one = house(_item("d", DRESSER, [2, 0, 1.1], 17))
+    mutable = MutableHouse(house_with_one, seed, own_share=own_share)
+    swap_furniture(mutable, catalogue, style_for(mutable.rng("style"), ""), 1.0)
+    return mutable.items[0].source_class
+
+
 def test_a_thing_on_it_comes_to_stand_on_the_new_one() -> None:
     thing = solid("vase", [1.9, 0.8, 1.0], [2.1, 1.1, 1.2], 40)
     catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.edits import RemoveItems
 from pbrs_farm.core.recipe import Recipe, field_paths, with_settings
 from pbrs_farm.prepare import finished_house as finishing
@@ -101,6 +102,17 @@ def test_the_key_of_a_cache_differs_with_every_field_that_a_pass_reads() -> None
     assert set(changes) <= set(field_paths())
     for path, value in changes.items():
         assert cache_key(source, with_settings(recipe, {path: value})) != held, path
+
+
+def test_the_share_of_one_s_own_library_counts_where_there_is_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (source,) = variants(resolve("builtin"), [1])
+    recipes = [with_settings(Recipe(), {"dress.own_share": share}) for share in (0.5, 0.2)]
+    for own, n_digests in ((frozenset(), 1), (frozenset({"mine#chair"}), 2)):
+        library = replace(EMPTY, own=own)
+        monkeypatch.setattr(passes_module, "catalogue_of", lambda _fields, held=library: held)
+        assert len({str(step_depends(source, recipe)) for recipe in recipes}) == n_digests
 
 
 def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:

@@ -73,7 +73,8 @@ def catalogue_from(
         found.append(_read_furniture_library(jar, notes, JAR_FURNITURE))
         found.append(_textures(jar, notes, JAR_TEXTURES))
     found += [_read_furniture_library(path, notes, FURNITURE) for path in libraries]
-    found += [_given(path, notes, store, may_be_empty=may_be_empty) for path in given]
+    users = [_given(path, notes, store, may_be_empty=may_be_empty) for path in given]
+    found += users
     held = [f for f in found if f is not None]
     # Later libraries replace pieces of earlier ones.
     shapes = ShapeStore(store) if store is not None else None
@@ -89,6 +90,7 @@ def catalogue_from(
         digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in held]}),
         pictures=tuple({p.texture.id: p for f in held for p in f.pictures}.values()),
         notes=tuple(notes.found),
+        own=frozenset(piece.id for f in users if f is not None for piece, _ in f.pieces),
     )
 
 

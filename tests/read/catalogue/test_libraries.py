@@ -9,7 +9,7 @@ from pbrs_farm.core.catalogue import Catalogue, Shape
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import MaterialKind
 from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
-from tests.read.catalogue.small_library import WEDGE_OBJ, entry, library
+from tests.read.catalogue.small_library import WEDGE_OBJ, entry, library, library_bytes
 
 
 def _shape(catalogue: Catalogue, name: str) -> Shape:
@@ -72,6 +72,16 @@ def test_the_digest_changes_with_a_library_and_with_nothing_else(tmp_path: Path)
     assert catalogue_from([path]).digest == first
     library(tmp_path, [entry("Dresser", (81, 40, 90))])
     assert catalogue_from([path]).digest != first
+
+
+def test_what_is_the_users_own_is_known_and_a_package_s_is_not(tmp_path: Path) -> None:
+    package, own = tmp_path / "package.sh3f", tmp_path / "own.sh3f"
+    package.write_bytes(library_bytes([entry("Chest one"), entry("Chest two")]))
+    own.write_bytes(library_bytes([entry("Chest two"), entry("Chest three")]))
+    assert catalogue_from([package]).own == frozenset()
+    found = catalogue_from([package], given=[own])
+    assert {piece.split("#")[1] for piece in found.own} == {"chest-two", "chest-three"}
+    assert found.own < {piece.id for piece in found.pieces}
 
 
 def test_what_is_wrong_with_an_entry_becomes_a_note_and_the_rest_goes_on(tmp_path: Path) -> None:
