@@ -209,6 +209,16 @@ def _depth_mm(depth: NDArray[Any], scale: float, file: str, place: str) -> NDArr
         raise BadInput(file, place, str(error)) from None
 
 
+def h5py_for_mats() -> Any:
+    """The module h5py, which reads MATLAB 7.3's files; MachineFailed with what to type where it is missing."""
+    try:
+        import h5py
+    except ImportError:
+        hint = install_command("selection")
+        raise MachineFailed("h5py is needed for .mat files", hint=hint) from None
+    return h5py
+
+
 class NyuMat:
     """NYUv2's nyu_depth_v2_labeled.mat, read lazily: the file is 2.8 GB.
 
@@ -218,12 +228,7 @@ class NyuMat:
     """
 
     def __init__(self, path: Path) -> None:
-        try:
-            import h5py
-        except ImportError:
-            raise MachineFailed(
-                "h5py is needed for .mat files", hint=install_command("selection")
-            ) from None
+        h5py = h5py_for_mats()
         self.path = path
         try:
             # Refuse a pipe or a device before a library waits for it.

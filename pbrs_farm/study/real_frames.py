@@ -6,7 +6,7 @@ nine of K, beside the pictures or in a folder above. The truth of normals is pla
 
 ScanNet: <scene>/{color,depth,label}/NAME and the depth camera's 4 x 4, where its tools put it; depth
 is in mm, label NYU40's ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt, extrinsics;
-its depth has rotated bits. TUM RGB-D: <sequence>/{rgb.txt,depth.txt,groundtruth.txt,rgb,depth}; its cameras
+its depth has rotated bits, its classes are its toolbox's (sun_rgbd_labels.py). TUM RGB-D: <sequence>/{rgb.txt,depth.txt,groundtruth.txt,rgb,depth}; its cameras
 are known by the sequence's name.
 """
 
@@ -28,6 +28,7 @@ from pbrs_farm.curate import tum_frames
 from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import digest_of_regular, read_given, text_given
+from pbrs_farm.study import sun_rgbd_labels
 from pbrs_farm.study.photographs import camera_of_crop, crop_to_plan, photo_truth
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
@@ -81,14 +82,18 @@ def real_frames(folder: Path, plan: TrainingPlan) -> Iterator[RealFrame]:
 def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
     """The pairs below a folder that say something of the plan's task; BadInput where none does.
 
-    Of classes those have something to say that lie in ScanNet's layout, with labels.
+    Of classes those have something to say that lie in ScanNet's layout, with labels, and those of SUN
+    RGB-D of which its toolbox has classes.
     """
     pairs = pairs_in(folder)
     if plan.task == "segmentation":
         pairs = tuple(pair for pair in pairs if has_labels_of(pair))
     if plan.task not in ("normals", "depth", "segmentation") or not pairs:
         text = f"photographs with depth say nothing of {plan.task}: normals and depth alone"
-        raise BadInput(folder, "", text, hint="NYUv2's .mat holds classes and instances")
+        hint = "NYUv2's .mat holds classes and instances"
+        if plan.task == "segmentation":
+            hint += f", ScanNet's label/ classes, of SUN RGB-D {sun_rgbd_labels.CLASSES} beside it"
+        raise BadInput(folder, "", text, hint=hint)
     return pairs
 
 
@@ -137,8 +142,10 @@ def read_pair(pair: PhotoFiles, depth_scale: float | None) -> Photo:
 
 
 def has_labels_of(pair: PhotoFiles) -> bool:
-    """The photograph has classes where ScanNet has them."""
-    return _label_of(pair).is_file()
+    """The photograph has classes where ScanNet has them, or in SUN RGB-D's toolbox."""
+    if _label_of(pair).is_file():
+        return True
+    return _is_of_sun_rgbd(pair) and sun_rgbd_labels.has_classes(pair.rgb.parent.parent)
 
 
 def _label_of(pair: PhotoFiles) -> Path:
@@ -148,9 +155,12 @@ def _label_of(pair: PhotoFiles) -> Path:
 def nyu40_of(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
     """(H, W) NYU40 ids at the photograph's size, 0 = none; BadInput for a file of other labels."""
     file = _label_of(pair)
-    stored = array_from_png(read_given(file), str(file))
-    if stored.ndim != 2 or int(stored.max(initial=0)) > 40:
-        raise BadInput(file, "", "expected one channel of NYU40 ids, 0 to 40")
+    if file.is_file():
+        stored = array_from_png(read_given(file), str(file))
+        if stored.ndim != 2 or int(stored.max(initial=0)) > 40:
+            raise BadInput(file, "", "expected one channel of NYU40 ids, 0 to 40")
+    else:
+        stored = sun_rgbd_labels.classes_of_scene(pair.rgb.parent.parent)
     height, width = photo.rgb.shape[:2]
     return resized_nearest(stored.astype(np.uint8), width, height)
 

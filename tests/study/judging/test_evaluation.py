@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from scipy.io import savemat
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
@@ -247,6 +250,65 @@ def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
         (scene / "intrinsics.txt").write_text("80 0 45\n0 80 30\n0 0 1\n")
     views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
     assert [float(t["depth"].mean()) for t in views.truths] == pytest.approx([2.0, 2.1])
+
+
+def write_sun_scene(scene: Path) -> None:
+    """A frame of SUN RGB-D: dark on the left, bright on the right, 2 m away."""
+    for name in ("image", "depth_bfx", "extrinsics"):
+        (scene / name).mkdir(parents=True)
+    picture = np.zeros((60, 90, 3), np.uint8)
+    picture[:, 45:] = 200
+    (scene / "image/7.jpg").write_bytes(jpeg_from_array(picture))
+    (scene / "depth_bfx/7_abs.png").write_bytes(png_from_array(np.full((60, 90), 16000, np.uint16)))
+    (scene / "intrinsics.txt").write_text("80 0 45\n0 80 30\n0 0 1\n")
+
+
+def write_sun_toolbox(folder: Path, scenes: dict[str, NDArray[np.uint8]]) -> None:
+    """SUNRGBD2Dseg.mat and SUNRGBDMeta.mat with the classes of scenes, by their paths below SUNRGBD."""
+    folder.mkdir(parents=True)
+    rows = np.zeros(len(scenes), [("sensorType", object), ("rgbpath", object)])
+    rows["sensorType"] = "kv2"
+    rows["rgbpath"] = [f"/n/fs/sun3d/data/SUNRGBD/{s}//image/7.jpg" for s in scenes]
+    savemat(folder / "SUNRGBDMeta.mat", {"SUNRGBDMeta": rows})
+    with h5py.File(folder / "SUNRGBD2Dseg.mat", "w") as file:
+        refs = [
+            file.create_dataset(f"#refs#/{k}", data=c.T).ref for k, c in enumerate(scenes.values())
+        ]
+        table = file.create_dataset("SUNRGBD2Dseg/seglabel", (len(refs), 1), h5py.ref_dtype)
+        table[:, 0] = refs
+
+
+def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
+    names = ("kv2/kinect2data/a", "kv1/NYUdata/NYU0001")
+    for name in (*names, "xtion/without"):
+        write_sun_scene(tmp_path / "SUNRGBD" / name)
+    place = str(tmp_path / "SUNRGBD")
+    with pytest.raises(BadInput, match=r"normals and depth alone.*SUNRGBD2Dseg\.mat"):
+        open_judged_place(place, small_plan("segmentation"), mode="mlt_il_ol")
+    # 37 is a bag, NYU40's 37; the scenes lie in another order than the folders.
+    classes = np.full((60, 90), 37, np.uint8)
+    classes[:, 45:] = 5
+    toolbox = tmp_path / "SUNRGBDtoolbox/Metadata"
+    write_sun_toolbox(toolbox, {names[0]: classes, names[1]: np.full((60, 90), 22, np.uint8)})
+    plan = small_plan("segmentation")
+    views = open_judged_place(place, plan, mode="mlt_il_ol")
+    assert views.ids == (names[1], names[0]), "a scene without classes does not judge"
+    first, second = (truth["labels"] for truth in views.truths)
+    assert (first == 22).all()
+    middle = second.shape[1] // 2
+    assert (second[:, : middle - 1] == 37).all()
+    assert (second[:, middle + 1 :] == 5).all()
+    # What is wrong with the toolbox is one line that names the file.
+    (toolbox / "SUNRGBD2Dseg.mat").write_bytes(b"MATLAB 7.3")
+    with pytest.raises(BadInput, match=r"SUNRGBD2Dseg\.mat: seglabel, row 2: cannot be read"):
+        open_judged_place(place, plan, mode="mlt_il_ol")
+    (toolbox / "SUNRGBDMeta.mat").unlink()
+    (tmp_path / "moved").mkdir()
+    for name in ("SUNRGBD", "SUNRGBDtoolbox"):
+        (tmp_path / name).rename(tmp_path / "moved" / name)
+    place = str(tmp_path / "moved/SUNRGBD")
+    with pytest.raises(BadInput, match=r"SUNRGBDMeta\.mat: needed beside SUNRGBD2Dseg\.mat"):
+        open_judged_place(place, plan, mode="mlt_il_ol")
 
 
 def test_depth_says_nothing_of_classes(pairs: Path) -> None:
