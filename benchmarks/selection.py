@@ -27,7 +27,7 @@ from pbrs_farm.core.recipe import HistogramFields, SelectionFields
 from pbrs_farm.curate.selection_run import json_lines, select
 from pbrs_farm.curate.selection_summary import PAPER_VIEWS
 from pbrs_farm.formats.histogram_json import SceneQuality
-from pbrs_farm.selection import histogram, quality
+from pbrs_farm.selection import histogram, view_record
 from pbrs_farm.selection.binning import BINNINGS
 from pbrs_farm.selection.histogram_pack import HistogramPack, bytes_from_pack, pack_from_bytes
 from pbrs_farm.selection.histograms import normalised
@@ -168,7 +168,7 @@ def time_one_view() -> tuple[float, float]:
     place = {"house": "h", "view": "0_0_0", "room": "0_0", "room_type": "Bedroom"}
     counting = best_of(20, lambda: histogram(rgb, depth, SETTINGS))
     whole = best_of(
-        20, lambda: quality(place, {Mode.MLT_IL_OL: rgb}, depth, SCENE, SETTINGS).json_bytes()
+        20, lambda: view_record(place, {Mode.MLT_IL_OL: rgb}, depth, SCENE, SETTINGS).json_bytes()
     )
     return 1000 * counting, 1000 * whole
 
@@ -180,7 +180,7 @@ def time_one_house(n_views: int = 30) -> float:
         rgb = rng.integers(0, 256, (48, 64, 3), np.uint8)
         depth = rng.integers(500, 6000, (48, 64)).astype(np.uint16)
         place = {"house": "h", "view": f"0_{k}_0", "room": f"0_{k}", "room_type": "Bedroom"}
-        data = quality(place, {Mode.MLT_IL_OL: rgb}, depth, SCENE, SETTINGS).json_bytes()
+        data = view_record(place, {Mode.MLT_IL_OL: rgb}, depth, SCENE, SETTINGS).json_bytes()
         store.put(keys.view_key("h", place["view"], "histogram.json"), data)
 
     def once() -> None:
