@@ -101,7 +101,9 @@ def waves_room(n_triangles: int, n_lamps: int, n_in_room: int = 0) -> House:
     lamps = _bulbs(n_here, (0.0, 6.0), _LUMEN / n_here)
     if n_lamps > n_here:
         hall = rooms.shell((_HALL_M, 3.0, _HALL_M), 0, front=True)
-        surfaces += [replace(s, positions=s.positions + np.float32([7, 0, 0])) for s in hall]
+        surfaces += [
+            replace(s, positions=s.positions + np.asarray([7, 0, 0], np.float32)) for s in hall
+        ]
         lamps += _bulbs(n_lamps - n_here, (7.0, _HALL_M), _LUMEN / n_here)
     materials = [rooms.matte("wall", 0.7), rooms.matte("table", 0.4, 0.3, 0.2), rooms.BULB]
     return rooms.house(surfaces, materials, lamps=lamps)
