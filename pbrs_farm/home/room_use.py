@@ -147,21 +147,6 @@ def is_outdoors(room: Room) -> bool:
     return RoomKind.OUTDOOR in [named_kind(text) for text in (*room.types, room.name)]
 
 
-def given_room_type(source: str, name: str) -> str | None:
-    """What a vocabulary's word for a room means: a room type, "none" (no room), "by its fixtures".
-
-    None where given_rooms.csv, beside this file, has no such row; the case of letters is no matter.
-    """
-    return _given_rooms().get((source, name.lower()))
-
-
-@cache
-def _given_rooms() -> dict[tuple[str, str], str]:
-    text = files("pbrs_farm.home").joinpath("given_rooms.csv").read_text("utf-8")
-    rows = csv.DictReader(text.splitlines())
-    return {(row["source"], row["name"].lower()): row["type"] for row in rows}
-
-
 def is_lived_in(room: Room, area_m2: float) -> bool:
     """Whether people live in the room: in a balcony, terrace, garden or garage they do not.
 

@@ -22,12 +22,16 @@ from pbrs_farm.core.plugins import marks_in_digest
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
 from pbrs_farm.prepare.source import SourceRef
+from pbrs_farm.read.common.format import PLAN
 
 if TYPE_CHECKING:
     from pbrs_farm.dress.dressing import Dressed
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
 
+_PLANS_VERSION: Final = (
+    1  # of what reads floor plans, beside that of reading: other homes stay what they are
+)
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
 _FURNISH_VERSION: Final = 3  # of furnish_rooms.py, beside that of what furnishes generated homes
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about
@@ -150,6 +154,8 @@ def _float_seed(source: SourceRef, recipe: Recipe) -> int:
 
 
 def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
+    if source.kind == PLAN:
+        return [_PLANS_VERSION]
     if source.kind != "plugin":
         return []
     # Which passes the plugin's home goes through is known once it is made: any may.
@@ -328,8 +334,11 @@ STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")
 
 
 def versions_of_passes() -> dict[str, int]:
-    """Pass -> version: installations of equal versions make the same house of the same source."""
-    return {p.name: p.version for p in PASSES}
+    """Pass -> version: installations of equal versions make the same house of the same source.
+
+    What reads floor plans has a version of its own, too.
+    """
+    return {p.name: p.version for p in PASSES} | {"plans": _PLANS_VERSION}
 
 
 def cache_key(source: SourceRef, recipe: Recipe) -> str:

@@ -20,6 +20,7 @@ from pbrs_farm.generate.plans.closed_rings import closed_rings
 from pbrs_farm.generate.plans.parsed_plan import footprint, footprints
 from pbrs_farm.generate.plans.plan_files import PlanFile, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import Part, part_of
+from pbrs_farm.generate.plans.room_types import type_by_words
 from tests.inputs.plan_files import (
     HOLES,
     ROOMS,
@@ -107,6 +108,33 @@ def test_slivers_are_told_and_undefined_areas_go_by_their_fixtures(tmp_path: Pat
     assert {t.name for t in found.storeys[0].things} == {
         "KITCHEN", "SINK", "TOILET", "BATHTUB", "BUILT_IN_FURNITURE",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "bedroom", "office"),
+    [
+        ("swiss", "area,ROOM", "area,OFFICE"),
+        ("cubicasa", "Space Bedroom", "Space Office"),
+        ("zind", '"label": "bedroom"', '"label": "office"'),
+    ],
+)
+def test_an_office_of_a_plan_is_no_bedroom(
+    tmp_path: Path, name: str, bedroom: str, office: str
+) -> None:
+    path = WRITERS[name](tmp_path)
+    assert bedroom in path.read_text()
+    path.write_text(path.read_text().replace(bedroom, office))
+    types = [room.type for room in plan_from_file(path).plan.rooms]
+    assert types.count(RoomType.OFFICE) == 1
+    assert RoomType.BEDROOM not in types
+
+
+def test_a_studio_has_a_bed() -> None:
+    assert [type_by_words(name) for name in ("Studio", "Study", "Büro")] == [
+        "bedroom",
+        "office",
+        "office",
+    ]
 
 
 def test_a_column_stays_and_a_railing_inside_is_a_parapet(tmp_path: Path) -> None:

@@ -115,6 +115,19 @@ def test_the_share_of_one_s_own_library_counts_where_there_is_one(
         assert len({str(step_depends(source, recipe)) for recipe in recipes}) == n_digests
 
 
+def test_the_version_of_what_reads_plans_is_one_of_plans_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    built_in, recipe = resolve("builtin"), Recipe()
+    sources = (built_in, built_in.model_copy(update={"kind": "plan"}))
+    before = [step_depends(source, recipe) for source in sources]
+    monkeypatch.setattr(passes_module, "_PLANS_VERSION", 99)
+    assert [step_depends(s, recipe) == b for s, b in zip(sources, before, strict=True)] == [
+        True,
+        False,
+    ]
+
+
 def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:
     assert set(GROUPS) <= set(plan.PICTURE_GROUPS)
     assert set(plan.STEPS["house"].groups) <= set(GROUPS)
@@ -123,7 +136,8 @@ def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:
 def test_workers_of_other_passes_are_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
     held = work_version.__wrapped__()
     assert work_version.__wrapped__() == held
-    versions = {name: one.version for name, one in PASS.items()}
+    versions = passes_module.versions_of_passes()
+    assert set(versions) == {*PASS, "plans"}
     for name in versions:
         raised = versions | {name: versions[name] + 1}
         monkeypatch.setattr("pbrs_farm.prepare.passes.versions_of_passes", lambda r=raised: r)

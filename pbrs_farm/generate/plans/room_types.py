@@ -10,11 +10,11 @@ from shapely.geometry import Point, Polygon
 
 from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.plans.parsed_plan import LeftOut, Thing, ring_of
+from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import words_of
-from pbrs_farm.home.room_use import RoomKind, given_room_type, named_kind
+from pbrs_farm.home.room_use import RoomKind, named_kind
 
 BY_FIXTURES: Final = "by its fixtures"
-NO_ROOM: Final = "none"
 LEAST_M2: Final = 0.5
 """Of a room: what is smaller is a sliver."""
 
@@ -26,8 +26,7 @@ _SMALL_ROOM_M2: Final = 6.0  # of a room to live in with one door and a window
 _OPEN_AIR_SHARE: Final = 0.25  # of its outline that railings stand along: a balcony's
 _NEAR_RAILING_M: Final = 0.3
 _TYPES: Final = {
-    RoomKind.DINING: "living", RoomKind.OFFICE: "bedroom", RoomKind.OUTDOOR: "balcony",
-    RoomKind.OTHER: "hall",
+    RoomKind.DINING: "living", RoomKind.OUTDOOR: "balcony", RoomKind.OTHER: "hall",
 }  # fmt: skip
 _GLAZED: Final = ("window", "french_window")
 # Words of things that say what a room is for; the first row that one of them has a word of holds.
@@ -100,7 +99,7 @@ def typed_rooms(
 
 
 def _by_word(source: str, area: DrawnArea) -> str:
-    given = given_room_type(source, area.word) if area.word else None
+    given = given_room(source, area.word) if area.word else None
     if given is not None:
         # Stairs of a plan lead nowhere: a plain passage.
         return "hall" if given == "stairs" else given
@@ -108,11 +107,16 @@ def _by_word(source: str, area: DrawnArea) -> str:
 
 
 def type_by_words(name: str) -> str:
-    """The room type that the words of a name say, in any of the languages of room_words.csv."""
-    said = named_kind(name)
+    """The room type that the words of a name say, in any of the languages of room_words.csv.
+
+    A studio, an office in some languages and a home of one room in others, has a bed.
+    """
+    said, words = named_kind(name), words_of(name)
     if said is None:
         return BY_FIXTURES
-    return "wc" if {"wc", "toilet"} & words_of(name) else _TYPES.get(said, said.value)
+    if said is RoomKind.OFFICE and "studio" in words:
+        return "bedroom"
+    return "wc" if {"wc", "toilet"} & words else _TYPES.get(said, said.value)
 
 
 def _fixture(name: str) -> str:
