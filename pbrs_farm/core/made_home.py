@@ -123,9 +123,9 @@ def made_homes(word: str) -> list[MadeHome]:
         elif key == "plans":
             home = replace(home, plans=_one_of(PLANS, word, option, "no such family of plans"))
         elif key == "storeys":
-            home = replace(home, storeys=_checked_range(word, value, 99)[1])
+            home = replace(home, storeys=_checked_number(word, option))
         elif key == "offices":
-            home = replace(home, offices=_checked_range(word, value, 99)[1])
+            home = replace(home, offices=_checked_number(word, option))
         elif key == "furniture" and value == "none":
             home = replace(home, furniture=False)
         else:
@@ -194,6 +194,14 @@ def _one_of(names: tuple[str, ...], word: str, option: str, text: str) -> str:
     if value not in names:
         raise BadInput(word, option[:60], text, hint=f"one of {', '.join(names)}")
     return value
+
+
+def _checked_number(word: str, option: str) -> int:
+    key, _, value = option.partition("=")
+    low, high = _checked_range(word, value, 99)
+    if low != high:
+        raise BadInput(word, option, "is a range, expected a number", hint=f"{key}={high}")
+    return low
 
 
 def _checked_range(word: str, text: str, most: int) -> tuple[int, int]:

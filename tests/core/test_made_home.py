@@ -39,6 +39,8 @@ def test_a_word_says_all_of_its_home() -> None:
         ),
         ("made:1,offices=4", "of which one stays"),
         ("made:1,offices=x", "no number"),
+        ("made:1,offices=0..2", "offices=0..2: is a range, expected a number"),
+        ("made:1,storeys=1..2", "storeys=1..2: is a range, expected a number"),
         ("made:1..2000000", "at most"),
     ],
 )
