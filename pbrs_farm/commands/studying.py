@@ -61,7 +61,7 @@ def add_verbs(verb: Verb) -> None:
     p = verb("evaluate", _evaluate)
     p.usage = (
         "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
-        "       %(prog)s --task TASK --on PLACE --out DIR [--predictions DIR] [--views N] [--exact] [--json]"
+        "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--json]"
     )
     text = "the folder of `train --out` (none with --task)"
     p.add_argument("run", type=Path, nargs="?", metavar="RUN", help=text)
@@ -70,7 +70,8 @@ def add_verbs(verb: Verb) -> None:
     p.add_argument(
         "--out", type=Path, help="folder of table, JSON and page (default RUN/evaluation)"
     )
-    p.add_argument("--views", type=int, default=0, metavar="N", help="at most N views of a root")
+    text = "at most N views of a root (default 0 = all)"
+    p.add_argument("--views", type=int, default=0, metavar="N", help=text)
     text = (
         "what another program says of the same pictures, a column more; repeatable (docs/study.md)"
     )
@@ -278,6 +279,7 @@ def _evaluate(args: argparse.Namespace) -> int:
     from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 
+    at_least("--views", args.views, 0)
     others = [others_predictions(word) for word in args.predictions]
     folder = _judged_run(args)
     run = open_run(folder, exact=args.exact)

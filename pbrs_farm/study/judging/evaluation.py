@@ -338,13 +338,23 @@ def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
     """Everything of the table and more, as JSON values: evaluation.json.
 
     run, trained (figures at the end of training), evaluations (figures, of normals the parts, groups
-    and every view's error), the paper's row and the notes.
+    and every view's error), the paper's row and the notes. What no pixel tells is None.
     """
     paper = _paper(run)
-    return {
+    row = {
         "run": run.record,
         "trained": run.figures,
         "evaluations": [one.as_json() for one in evaluations],
         "paper": asdict(paper) if paper else None,
         "notes": notes(run, evaluations),
     }
+    return {key: _without_nan(value) for key, value in row.items()}
+
+
+def _without_nan(value: Any) -> Any:
+    """The value with None for what is not finite: JSON has no word for it."""
+    if isinstance(value, dict):
+        return {key: _without_nan(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -26,9 +26,9 @@ def title_of(figure: str) -> str:
     return _TITLES[figure]
 
 
-def shown_figure(figure: str, value: float) -> str:
+def shown_figure(figure: str, value: float | None) -> str:
     """Degrees and metres with two places, shares as per cent with one; "-" for none."""
-    if not math.isfinite(value):
+    if value is None or not math.isfinite(value):
         return "-"
     return f"{value:.2f}" if figure.endswith(_UNITS) else f"{100 * value:.1f} %"
 

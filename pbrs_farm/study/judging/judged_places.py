@@ -41,11 +41,13 @@ def open_judged_place(
 
     Of a root all views where none of its homes is in trained_on, else those of hold_out, or those
     the split by house holds out. known_held_out: homes a run says it held out. Raises BadInput
-    where a home that trained would judge.
+    for a word without a place, and where a home that trained would judge.
     """
     label, equals, rest = word.partition("=")
     label, rest = (label, rest) if equals else ("", word)
     place, _, own_mode = rest.partition("@")
+    if not place:
+        raise BadInput("--on", word, "names no place", hint="--on nyu=PLACE")
     path = Path(place)
     if path.suffix == ".mat":
         return nyu_views(path, plan, label or "NYUv2", trained_on)

@@ -17,7 +17,7 @@ from pbrs_farm.images import jpeg_from_array, png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
-from pbrs_farm.study.judging.figure_text import is_underfit, markdown, spread_text
+from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, spread_text
 from pbrs_farm.study.judging.judged_places import open_judged_place
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
@@ -481,3 +481,26 @@ def test_weights_of_the_package_are_judged_by_their_task(
     assert main(["evaluate", "--on", str(pairs)]) == 1
     assert main(["evaluate", str(out), "--task", "normals"]) == 1
     assert capsys.readouterr().err.count("either a run or a task is named") == 2
+
+
+def test_figures_of_no_pixel_are_null_in_json_and_a_dash_in_tables(
+    pairs: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (pairs / "wall_depth.png").write_bytes(png_from_array(np.zeros((60, 90), np.uint16)))
+    out = tmp_path_factory.mktemp("judged")
+    words = ["evaluate", "--task", "normals", "--on", f"dark={pairs}", "--out", str(out), "--json"]
+    assert main(words) == 0
+    for text in (capsys.readouterr().out, (out / "evaluation.json").read_text()):
+        (judged,) = json.loads(text, parse_constant=pytest.fail)["evaluations"]
+        assert judged["figures"]["network"]["mean_deg"] is None
+        assert list(judged["errors"].values()) == [None]
+    assert shown_figure("mean_deg", judged["figures"]["network"]["mean_deg"]) == "-"
+
+
+@pytest.mark.parametrize("given", [["--on", "x="], ["--on", ""], ["--on", "a", "--views", "-2"]])
+def test_what_names_no_place_or_no_number_of_views_is_one_line(
+    given: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["evaluate", "--task", "normals", *given, "--out", str(tmp_path / "e")]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "names no place" in said or "--views: -2: expected 0 or more" in said
