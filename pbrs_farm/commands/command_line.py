@@ -74,6 +74,8 @@ def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
     """
     options = [word for word in words if word.startswith("-")]
     if not options:
+        if "=" in words[0] and "--set" in parser._option_string_actions:
+            return f"unexpected word {words[0]!r}: each field has its own --set, `--set {words[0]}`"
         return f"unexpected word {words[0]!r}: name all of a kind in one place"
     name = options[0].partition("=")[0]
     offer = did_you_mean(name, parser._option_string_actions)

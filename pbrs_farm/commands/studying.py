@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 LOGGERS = ("tensorboard", "wandb")
 _ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
-_SHIPPED = "no RUN: the weights that come with the package for this task"
+_SHIPPED = "no RUN: the weights that come with the package for this task; depth has none"
 
 
 def add_verbs(verb: Verb) -> None:
@@ -72,9 +72,7 @@ def add_verbs(verb: Verb) -> None:
     )
     text = "at most N views of a root (default 0 = all)"
     p.add_argument("--views", type=int, default=0, metavar="N", help=text)
-    text = (
-        "what another program says of the same pictures, a column more; repeatable (docs/study.md)"
-    )
+    text = "what another program says of the same pictures, a column more; repeatable (docs/study/judging.md)"
     p.add_argument("--predictions", action="append", default=[], metavar="[NAME=]DIR", help=text)
     _add_exact(p)
     p.add_argument("--json", action="store_true", help="figures as JSON")

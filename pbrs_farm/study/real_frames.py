@@ -176,7 +176,7 @@ def _is_of_sun_rgbd(pair: PhotoFiles) -> bool:
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:
-    """The camera of photographs in a folder: the nearest intrinsics file from it up to top's parent.
+    """The camera of photographs in a folder: the nearest intrinsics file from it up to top.
 
     folder: where the pictures lie. Raises BadInput where there is none, or one that cannot be read.
     """

@@ -148,7 +148,7 @@ _H200: Final[dict[str, Any]] = {
     "name": "h200", "device": "cuda", "bf16": True, "checkpoint_every": 1000, "log_every": 100,
     "judge_every": 1000, "memory_gb": 32.0, "workers": 8,
 }  # fmt: skip
-# The best of sixteen trials, and longer, on homes that never trained (docs/study.md).
+# The best of sixteen trials, and longer, on homes that never trained (docs/lab/study.md).
 _TINY_NORMALS = TrainingPlan(
     "tiny", "normals", "residual", steps=4000, rate=1.5e-3, weight_decay=0.1, gain=0.3, gamma=0.3, turn_deg=6.0,
     tint=0.1, hue=1.0, judge_every=400,

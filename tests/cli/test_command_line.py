@@ -40,6 +40,11 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
         (["layers", "--jsn"], "no such option --jsn", 2),
         (["doctor", "--jsn"], "no such option --jsn, did you mean --json?", 2),
         (["recipes", "fast", "paper"], "unexpected word 'paper'", 2),
+        (
+            ["train", "normals", "homes", "--out", "run", "--set", "steps=4", "rate=1e-4"],
+            "`--set rate=1e-4`",
+            2,
+        ),
         (["cameras", "Studoi"], "did you mean Studio?", 1),
         (["cameras", "builtn"], "did you mean builtin?", 1),
         (["cameras", "builtin", "--recipe", "papr"], "did you mean paper?", 1),
