@@ -96,6 +96,6 @@ def views_of(command: str) -> list[str]:
     house, _report, _dressing = finished_house(source, recipe)
     caster = Caster(geometry_from_house(house))
     seed = camera_seed(house.id, recipe)
-    views = chosen_cameras(house, recipe.cameras, seed, caster).views
+    views = chosen_cameras(house, recipe, seed, caster).views
     rows = [(view.id, view.room_id, view.score) for view in views]
     return sorted(plan.spread(rows, args.views))
