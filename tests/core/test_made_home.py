@@ -38,6 +38,7 @@ def test_a_word_says_all_of_its_home() -> None:
             "offices: 2 of 2 bedrooms: .*of which one stays.*rooms=3..4",
         ),
         ("made:1,offices=4", "of which one stays"),
+        ("made:1,offices=3,area=20..40", "homes of 4 bedrooms have 76 to 180 m2"),
         ("made:1,offices=x", "no number"),
         ("made:1,offices=0..2", "offices=0..2: is a range, expected a number"),
         ("made:1,storeys=1..2", "storeys=1..2: is a range, expected a number"),

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
-from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place
 from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.furniture import KINDS, add_furniture
+from pbrs_farm.dress.furniture import KINDS, _from_catalogue, add_furniture
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
 from pbrs_farm.dress.style import style_for
@@ -61,6 +61,17 @@ def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwar
         for surface in shape.surfaces:
             corners = triangle_corners(surface.positions, surface.faces)
             assert signed_volume(corners, corners[0, 0]) > 0, piece.name
+
+
+def test_a_thing_of_the_catalogue_is_of_one_s_own_library_by_its_share() -> None:
+    _piece, shape = desk_chair.make(np.random.default_rng(1), STYLE, BOARDS)
+    chest, size = KINDS["chest"], (1.0, 0.4, 0.9)
+    pieces = tuple(Piece(f"T#{k}", "T", "dresser", Place.FLOOR, 17, size) for k in range(50))
+    catalogue = Catalogue(pieces, lambda _piece: shape, "test", own=frozenset({"T#7"}))
+    for share, least, most in ((1.0, 200, 200), (0.5, 70, 130), (0.0, 0, 20)):
+        drawn = [_from_catalogue(catalogue, chest, 1.0, seed, share) for seed in range(200)]
+        ids = [model[0].id for model in drawn if model is not None]
+        assert least <= ids.count("T#7") <= most, share
 
 
 def test_pieces_are_as_large_as_their_kind_says() -> None:

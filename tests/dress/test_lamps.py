@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.lighting import flux_lm
 from pbrs_farm.dress import made_lamps as made
-from pbrs_farm.dress.lamps import add_lamps
+from pbrs_farm.dress.lamps import _draw_lamp, add_lamps
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import style_for
@@ -102,6 +102,17 @@ def test_a_lamp_stands_on_the_nightstand_exactly() -> None:
                 assert item.bounds[0, 1] == pytest.approx(stand.bounds[1, 1], abs=0.0005)
                 return
     pytest.fail("no seed of eight gave the nightstand a lamp")
+
+
+def test_a_lamp_of_the_catalogue_is_of_one_s_own_library_by_its_share() -> None:
+    piece, shape = made.table_lamp(np.random.default_rng(1), STYLE)
+    pieces = tuple(replace(piece, id=f"T#{k}") for k in range(50))
+    catalogue = Catalogue(pieces, lambda _piece: shape, "test", own=frozenset({"T#7"}))
+    for share, least, most in ((1.0, 200, 200), (0.5, 70, 130), (0.0, 0, 20)):
+        mutable, rng = MutableHouse(_dark(), 1, own_share=share), np.random.default_rng(5)
+        drawn = [_draw_lamp(mutable, catalogue, "table_lamp", rng) for _ in range(400)]
+        ids = [lamp[0].id for lamp in drawn if lamp is not None][:200]
+        assert least <= ids.count("T#7") <= most, share
 
 
 def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:

@@ -7,11 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
+from pbrs_farm.core.catalogue import EMPTY, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Box, Item, ItemKind, LightPart, Material
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.recipe import DressFields
+from pbrs_farm.dress import dressing
 from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.dress.old_place import OldPlace, before_boards
 from pbrs_farm.dress.style import style_for
@@ -206,6 +208,19 @@ def test_a_library_of_one_s_own_gets_its_share_of_what_is_swapped_however_small_
     # A choice that is not the user's is the one that there was before.
     kept = [now == before for now, before in zip(models["half"], models["none"], strict=True)]
     assert all(k or now == "T#n7" for k, now in zip(kept, models["half"], strict=True))
+
+
+def test_dressing_hands_the_recipe_s_share_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    shares: list[float] = []
+
+    def seen(mutable: MutableHouse, *_others: object) -> tuple[object, object]:
+        shares.append(mutable.own_share)
+        return mutable.source, None
+
+    monkeypatch.setattr(dressing, "_dressed", seen)
+    fields = DressFields(own_share=0.3)
+    dressing.dressed_house(house(_item("d", DRESSER, [2, 0, 1.1], 17)), EMPTY, fields, 1)
+    assert shares == [0.3]
 
 
 def _swapped_dresser(catalogue: Catalogue, own_share: float, seed: int) -> str:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pbrs_farm.generate.drawn_home import DrawnHome, drawn_home
-from pbrs_farm.generate.floor_plan import PlanRoom, RoomType
+from pbrs_farm.core.catalogue import EMPTY
+from pbrs_farm.core.made_home import MadeHome
+from pbrs_farm.generate.drawn_home import DrawnHome, drawn_home, with_offices
+from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanRoom, RoomType
+from pbrs_farm.generate.furnish.gates import furnish_report
+from pbrs_farm.generate.generated_home import generate_home
 from pbrs_farm.generate.programme import Wishes
 from tests.generate.furnish.shelves import plain_catalogue
 
@@ -53,3 +57,54 @@ def test_offices_leave_the_largest_bedroom_and_have_names_of_their_own() -> None
     rooms = [room for room, _ in _rooms(home)]
     assert {r.name for r in rooms if r.type is RoomType.OFFICE} == {"Office 1", "Office 2"}
     assert [r.type for r in rooms].count(RoomType.BEDROOM) == 1
+
+
+def _row_of_rooms(*rooms: tuple[RoomType, float]) -> Plan:
+    """Rooms of these widths beside each other, 3 m deep; a bathroom is entered from the room before it."""
+    found, doors, x = [], [], 0.0
+    for number, (type_, width) in enumerate(rooms):
+        polygon = ((x, 0.0), (x + width, 0.0), (x + width, 3.0), (x, 3.0))
+        found.append(PlanRoom(type_, f"{type_.label} {number}", polygon))
+        x += width
+        if type_ is RoomType.BATHROOM:
+            door = PlanOpening(OpeningKind.DOOR, 0, 1.0, 0.8, 2.1, 0.0, number, number - 1)
+            doors.append(door)
+    return Plan(tuple(found), (), tuple(doors), 2.5)
+
+
+def _offices_of(n: int, *storeys: Plan) -> dict[tuple[int, int], str]:
+    return {
+        (storey, number): room.name
+        for storey, plan in enumerate(with_offices(storeys, n))
+        for number, room in enumerate(plan.rooms)
+        if room.type is RoomType.OFFICE
+    }
+
+
+def test_the_smallest_bedrooms_become_offices_first_those_without_a_bathroom() -> None:
+    bed, bath = RoomType.BEDROOM, RoomType.BATHROOM
+    plan = _row_of_rooms((bed, 5), (bed, 3), (bath, 2), (bed, 4))
+    assert _offices_of(0, plan) == {}
+    # The smallest has a bathroom of its own.
+    assert _offices_of(1, plan) == {(0, 3): "Office"}
+    assert _offices_of(2, plan) == {(0, 1): "Office 1", (0, 3): "Office 2"}
+    # The largest bedroom stays, also where it alone has no bathroom.
+    largest_first = _row_of_rooms((bed, 3), (bath, 2), (bed, 5))
+    assert _offices_of(1, largest_first) == {(0, 0): "Office"}
+    upstairs = _row_of_rooms((bed, 2.5), (bed, 6))
+    assert _offices_of(2, plan, upstairs) == {(0, 3): "Office 1", (1, 0): "Office 2"}
+
+
+def test_an_office_without_a_desk_breaks_a_gate() -> None:
+    home = drawn_home(np.random.default_rng(5), plain_catalogue(), wishes=Wishes((3, 3), offices=1))
+    (storey,) = home.storeys
+    without = tuple(p for p in storey.pieces if p.piece.group != "desk")
+    assert "Office: no desk" in furnish_report(storey.plan, without, plain_catalogue()).broken
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_a_home_with_an_office_has_a_bedroom_too(seed: int) -> None:
+    home = generate_home(MadeHome(seed, offices=1), EMPTY)
+    types = [room.type for storey in home.storeys for room in storey.plan.rooms]
+    assert types.count(RoomType.OFFICE) == 1
+    assert RoomType.BEDROOM in types
