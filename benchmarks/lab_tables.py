@@ -2,7 +2,7 @@
 
 A table stands in a page between `<!-- bench:NAME -->` and `<!-- /bench -->`, NAME a table of lab_rows.csv or, where rows
 need code, of light/table_rows.py. Below it stands the command that measures it; in the lab book, docs/lab, also the commit,
-the machine and its load. A table whose JSON is missing, or lacks a figure, stays as it is and is named; so are tables of
+the machine and its load. A table whose JSON is missing or damaged, or lacks a figure, stays as it is and is named; so are tables of
 different commits, and those that a program of WRITTEN_ELSEWHERE writes. Effects: writes docs/*.md.
 """
 
@@ -134,7 +134,10 @@ def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str]
     for bench in table.benches:
         if not (reports / f"{bench}.json").exists():
             return [], f"there is no {reports / bench}.json"
-        report = _report(bench, reports)
+        try:
+            report = _report(bench, reports)
+        except ValueError:
+            return [], f"{reports / bench}.json is damaged"
         figures |= report["figures"]
         makings.setdefault(_commit_and_machine(report), []).append(
             f"{report['machine']['load_1min']:.1f}"
@@ -143,6 +146,8 @@ def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str]
         lines = table.lines(figures)
     except KeyError as error:
         return [], f"{', '.join(table.benches)}: no figure {error.args[0]}"
+    except (TypeError, ValueError) as error:
+        return [], f"{', '.join(table.benches)}: a figure that does not fit its row: {error}"
     if not in_lab:
         where = "commit and machine: the [lab book](lab/light.md)"
         return [*lines, "", f"*`{table.command}`; {where}.*"], ""

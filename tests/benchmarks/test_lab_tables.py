@@ -85,6 +85,14 @@ def test_a_table_without_its_report_or_a_figure_stays_and_is_named(
     _report(tmp_path, "two", {})
     (said,) = written_tables(tmp_path / "docs", tmp_path)
     assert "no figure two.same" in said
+    # A bench that measured nothing, or was killed while it wrote, leaves the others' tables alone.
+    _report(tmp_path, "two", {"two.same": 1})
+    _report(tmp_path, "one", {"one.s": None})
+    (said,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "one, two: a figure that does not fit its row: " in said
+    (tmp_path / "one.json").write_text('{"figures": {')
+    (said,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "one.json is damaged" in said
     assert page.read_text() == before
 
 
