@@ -25,6 +25,7 @@ from pbrs_farm.study.packing.pack_shards import pack
 from pbrs_farm.study.packing.packing_plan import Packing
 from pbrs_farm.study.photographs import crop_to_plan
 from pbrs_farm.study.real_frames import camera_of
+from pbrs_farm.study.sun_rgbd_labels import classes_of_scene
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
 from pbrs_farm.views.open_views import open_views
@@ -309,6 +310,26 @@ def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
     place = str(tmp_path / "moved/SUNRGBD")
     with pytest.raises(BadInput, match=r"SUNRGBDMeta\.mat: needed beside SUNRGBD2Dseg\.mat"):
         open_judged_place(place, plan, mode="mlt_il_ol")
+
+
+@pytest.mark.parametrize(
+    "stored",
+    [
+        np.zeros((0, 0)),
+        np.full((6, 9), b"x"),
+        np.full((6, 9), 5.5),
+        np.full((6, 9), 38),
+        np.zeros((2, 6, 9)),
+    ],
+    ids=["empty", "text", "parts", "above", "cube"],
+)
+def test_labels_that_are_no_table_of_classes_are_one_line(
+    tmp_path: Path, stored: NDArray[np.uint8]
+) -> None:
+    write_sun_scene(tmp_path / "SUNRGBD/kv2/a")
+    write_sun_toolbox(tmp_path / "SUNRGBDtoolbox/Metadata", {"kv2/a": stored})
+    with pytest.raises(BadInput, match=r"seglabel, row 1: expected \(H, W\) classes 0 to 37"):
+        classes_of_scene(tmp_path / "SUNRGBD/kv2/a")
 
 
 def test_depth_says_nothing_of_classes(pairs: Path) -> None:
