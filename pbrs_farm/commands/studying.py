@@ -160,7 +160,7 @@ def _need_torch() -> None:
 
 def _train(args: argparse.Namespace) -> int:
     _need_torch()
-    from pbrs_farm.study.judging.judged_places import judge_of_places, open_judged_place
+    from pbrs_farm.study.judging.judged_places import judge_of_places, open_judged_places
     from pbrs_farm.study.judging.packed_weights import shipped_run
     from pbrs_farm.study.networks.initial_weights import credits_of_init
     from pbrs_farm.study.training.loggers import check_installed, loggers
@@ -198,13 +198,10 @@ def _train(args: argparse.Namespace) -> int:
         echo(f"{counted(len(row['pictures']), 'photograph')} of {row['name']}{share}")
     trained_on = frozenset(views.homes) | digests_of(photographs)
     held = frozenset(held_out.homes) if held_out else None
-    judged_on = [
-        open_judged_place(
-            word, plan, mode=source.modes[0], trained_on=trained_on, known_held_out=held,
-            most=plan.final_views,
-        )
-        for word in args.on
-    ]  # fmt: skip
+    judged_on = open_judged_places(
+        args.on, plan, mode=source.modes[0], trained_on=trained_on, known_held_out=held,
+        most=plan.final_views,
+    )  # fmt: skip
     credits = (*credits_of(source, views.homes), *credits_of_init(init))
     stop_on = _stop_on(args.stop_on, [on.name for on in judged_on], plan)
     job = Job(
@@ -271,7 +268,7 @@ def _print_run(out: Path) -> None:
 def _evaluate(args: argparse.Namespace) -> int:
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, evaluation_text, open_run, report
-    from pbrs_farm.study.judging.judged_places import open_judged_place
+    from pbrs_farm.study.judging.judged_places import open_judged_places
     from pbrs_farm.study.judging.others_predictions import others_predictions
     from pbrs_farm.study.training.photograph_views import digests_of
     from pbrs_farm.study.training.run_folder import make_folder
@@ -290,13 +287,10 @@ def _evaluate(args: argparse.Namespace) -> int:
     # Homes are looked at in the run's own light, photographs have none of the four.
     light = run.record["mode"].split("+")[0]
     mode = "mlt_il_ol" if light in (NYU_LIGHT, PHOTO_LIGHT) else light
-    evaluations = [
-        evaluate(run, open_judged_place(
-            word, run.plan, mode=mode, trained_on=trained_on,
-            most=args.views, known_held_out=held,
-        ))
-        for word in args.on
-    ]  # fmt: skip
+    places = open_judged_places(
+        args.on, run.plan, mode=mode, trained_on=trained_on, most=args.views, known_held_out=held
+    )
+    evaluations = [evaluate(run, place) for place in places]
     for one in others:
         evaluations = _with_column(run, evaluations, one)
     rows = report(run, evaluations)
@@ -388,7 +382,7 @@ def _ablation(args: argparse.Namespace) -> int:
         training_sets,
     )
     from pbrs_farm.study.judging.evaluation import check_exact
-    from pbrs_farm.study.judging.judged_places import homes_that_train, open_judged_place
+    from pbrs_farm.study.judging.judged_places import homes_that_train, open_judged_places
     from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import TrainingSource
 
@@ -405,12 +399,9 @@ def _ablation(args: argparse.Namespace) -> int:
         sets = (*sets, TrainingSet("objects", objects))
     # No row may be judged on homes that any of the rows trains on.
     trained_on = homes_that_train([each.source for each in sets])
-    judged_on = [
-        open_judged_place(
-            word, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out
-        )
-        for word in args.on
-    ]
+    judged_on = open_judged_places(
+        args.on, plan, mode="mlt_il_ol", trained_on=trained_on, hold_out=common.hold_out
+    )
     comparison = Comparison(sets, plan, args.out, args.seeds, exact=args.exact)
     result = compare(comparison, judged_on, echo)
     text = ablation_table(result)

@@ -170,8 +170,7 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
     stored = _stored_depth(pair.depth)
     if stored.ndim != 2:
         raise BadInput(pair.depth, "", f"expected one channel of depth, got {stored.shape}")
-    across, down = (n / m for n, m in zip(rgb.shape[1::-1], stored.shape[::-1], strict=True))
-    if stored.shape != rgb.shape[:2] and abs(across / down - 1) <= _SAME_FORM:
+    if stored.shape != rgb.shape[:2] and is_same_form(stored.shape, rgb.shape):
         rgb = resized_by_area(rgb, stored.shape[1], stored.shape[0])
     if stored.shape != rgb.shape[:2]:
         sizes = f"{stored.shape[1]}x{stored.shape[0]}, the picture {rgb.shape[1]}x{rgb.shape[0]}"
@@ -184,6 +183,17 @@ def photo_from_pair(pair: PhotoFiles, *, depth_scale: float | None, sun_rgbd: bo
     is_float = np.issubdtype(stored.dtype, np.floating)
     scale = depth_scale or pair.depth_scale or (1.0 if is_float else 1000.0)
     return Photo(pair.id, rgb, _depth_mm(stored, scale, str(pair.depth), ""))
+
+
+def is_same_form(one: tuple[int, ...], other: tuple[int, ...]) -> bool:
+    """Whether two pictures, (H, W, ...) each, are as wide for their height; by 2 % they may differ.
+
+    Example:
+        >>> is_same_form((480, 640), (968, 1296, 3))
+        True
+    """
+    across, down = one[1] * other[0], one[0] * other[1]
+    return abs(across - down) <= _SAME_FORM * down
 
 
 def _stored_depth(path: Path) -> NDArray[Any]:

@@ -25,7 +25,7 @@ from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_any, resized_nearest
 from pbrs_farm.curate import tum_frames
-from pbrs_farm.curate.photographs import Photo, PhotoFiles, pairs_in, photo_from_pair
+from pbrs_farm.curate.photographs import Photo, PhotoFiles, is_same_form, pairs_in, photo_from_pair
 from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import digest_of_regular, read_given, text_given
 from pbrs_farm.study import sun_rgbd_labels
@@ -162,6 +162,9 @@ def nyu40_of(pair: PhotoFiles, photo: Photo) -> NDArray[np.uint8]:
     else:
         stored = sun_rgbd_labels.classes_of_scene(pair.rgb.parent.parent)
     height, width = photo.rgb.shape[:2]
+    if not is_same_form(stored.shape, photo.rgb.shape):
+        sizes = f"{stored.shape[1]}x{stored.shape[0]}, of a picture {width}x{height}"
+        raise BadInput(pair.rgb, "", f"its labels have another form: {sizes}")
     return resized_nearest(stored.astype(np.uint8), width, height)
 
 

@@ -33,6 +33,28 @@ from pbrs_farm.views.open_views import open_views
 _CURVE_THRESHOLDS: Final = 9  # of lines, while a run trains
 
 
+def open_judged_places(
+    words: Sequence[str], plan: TrainingPlan, *, mode: str, trained_on: frozenset[str] = frozenset(),
+    most: int = 0, hold_out: frozenset[str] | None = None, known_held_out: frozenset[str] | None = None,
+) -> list[JudgedViews]:  # fmt: skip
+    """The views of each word, as open_judged_place opens them; BadInput where two have one name."""
+    places: list[JudgedViews] = []
+    for word in words:
+        one = open_judged_place(
+            word, plan, mode=mode, trained_on=trained_on, most=most, hold_out=hold_out,
+            known_held_out=known_held_out,
+        )  # fmt: skip
+        if one.name in {other.name for other in places}:
+            raise BadInput(
+                "--on",
+                word,
+                f"a second place named {one.name}",
+                hint=f"--on other={word.partition('=')[2] or word}",
+            )
+        places.append(one)
+    return places
+
+
 def open_judged_place(
     word: str, plan: TrainingPlan, *, mode: str, trained_on: frozenset[str] = frozenset(), most: int = 0,
     hold_out: frozenset[str] | None = None, known_held_out: frozenset[str] | None = None,
@@ -52,6 +74,8 @@ def open_judged_place(
     if path.suffix == ".mat":
         return nyu_views(path, plan, label or "NYUv2", trained_on)
     if path.is_dir() and not is_root(path):
+        if own_mode:
+            raise BadInput("--on", word, f"photographs have no light of ours, such as {own_mode}")
         return pair_views(path, plan, label or path.name, trained_on)
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)

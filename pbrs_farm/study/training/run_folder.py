@@ -60,7 +60,7 @@ class RunFolder:
         path = self.root / "run.json"
         try:
             row = json.loads(path.read_bytes())
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             raise BadInput(self.root, "", "not a run of `train`: no run.json") from None
         except (OSError, ValueError):
             raise BadInput(path, "", "not JSON: damaged") from None

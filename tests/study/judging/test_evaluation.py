@@ -18,7 +18,7 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
 from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
 from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, spread_text
-from pbrs_farm.study.judging.judged_places import open_judged_place
+from pbrs_farm.study.judging.judged_places import open_judged_place, open_judged_places
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
 from pbrs_farm.study.packing.pack_shards import pack
@@ -220,6 +220,29 @@ def test_scannets_labels_must_be_nyu40s(tmp_path: Path) -> None:
         open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
 
 
+def test_labels_of_another_form_than_their_picture_are_one_line(tmp_path: Path) -> None:
+    write_scene(tmp_path / "s", "intrinsics_depth.txt")
+    turned = np.full((640, 480), 1, np.uint8)
+    (tmp_path / "s/label/000100.png").write_bytes(png_from_array(turned))
+    with pytest.raises(BadInput, match="labels have another form: 480x640, of a picture 640x480"):
+        open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
+
+
+def test_two_places_of_one_name_and_light_of_photographs_are_one_line(pairs: Path) -> None:
+    words = [f"room={pairs}", f"room={pairs}"]
+    with pytest.raises(BadInput, match="a second place named room"):
+        open_judged_places(words, small_plan(), mode="mlt_il_ol")
+    with pytest.raises(BadInput, match="photographs have no light of ours"):
+        open_judged_place(f"{pairs}@mlt_ol", small_plan(), mode="mlt_il_ol")
+    names = [
+        one.name
+        for one in open_judged_places(
+            ["a=" + words[0][5:], words[0]], small_plan(), mode="mlt_il_ol"
+        )
+    ]
+    assert names == ["a", "room"]
+
+
 def test_sequences_of_tum_are_judged(tmp_path: Path) -> None:
     name = "rgbd_dataset_freiburg1_desk"
     write_sequence(tmp_path / name, [1.0, 1.2, 3.0], [1.01, 1.21, 3.01])
@@ -362,6 +385,13 @@ def test_a_home_that_trained_may_not_judge(root: Path) -> None:
         open_judged_place(
             str(root), plan, mode="mlt_il_ol", trained_on=trained, hold_out=frozenset({"home-2"})
         )
+
+
+def test_a_file_is_no_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "photo.jpg").write_bytes(b"no run")
+    assert main(["evaluate", str(tmp_path / "photo.jpg")]) == 1
+    (said,) = capsys.readouterr().err.splitlines()
+    assert "photo.jpg: not a run of `train`" in said
 
 
 def test_a_run_that_is_not_finished_is_not_judged(run: Path, tmp_path: Path) -> None:
