@@ -6,7 +6,6 @@ from typing import Annotated, Final, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
-from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Intrinsics
@@ -67,6 +66,9 @@ class RigCamera(FieldGroup):
         >>> RigCamera(name="right", translation_m=(0.1, 0, 0)).rig_from_camera[0].tolist()
         [1.0, 0.0, 0.0, 0.1]
         """
+        # Imported where needed: every program reads recipes, few have a rig.
+        from scipy.spatial.transform import Rotation
+
         matrix = np.eye(4)
         if self.rotation_wxyz is not None:
             w, x, y, z = self.rotation_wxyz

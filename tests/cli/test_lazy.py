@@ -76,6 +76,13 @@ print(code, sorted(set({HEAVY.split()!r}) & set(sys.modules)))
     assert done.stdout.strip() == "1 []"
 
 
+def test_recipes_and_jobs_import_no_scipy() -> None:
+    # Half a second and 30 MB of each process of a farm, the coordinator among them.
+    code = "import sys, pbrs_farm.core.recipe, workers.job; print('scipy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
 def parsers(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, Any]]:
     """A parser and all below it, by the words that lead to them."""
     yield name, parser
