@@ -29,16 +29,14 @@ SIZE = (320, 240)
 def measured(name: str, seed: int, parts: tuple[str, ...]) -> dict[str, Any]:
     """The numbers of one home and seed."""
     row: dict[str, Any] = {"home": name, "seed": seed}
-    house: House | None = None
     if "dress" in parts:
-        found, house = _dressed(name, seed)
-        row |= found
+        row |= _dressed(name, seed)
     if "views" in parts or "bits" in parts:
-        row |= repaired_home(name, seed, house, with_views="views" in parts)
+        row |= repaired_home(name, seed, with_views="views" in parts)
     return row
 
 
-def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
+def _dressed(name: str, seed: int) -> dict[str, Any]:
     """Dress on one core, look at every contact, and say what each surface is made of."""
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     from benchmarks.dress.changed import looks_of
@@ -64,7 +62,7 @@ def _dressed(name: str, seed: int) -> tuple[dict[str, Any], House]:
         "doors_blocked": blocked_doors(house, things),
         "gates": {g.name: [g.n_checked, g.n_taken_out, g.n_left] for g in report.gates},
         "added": report.added,
-    } | looks_of(house, source), house
+    } | looks_of(house, source)
 
 
 def house_as_a_run_has_it(name: str) -> House:
@@ -76,25 +74,13 @@ def house_as_a_run_has_it(name: str) -> House:
     return without_persons_and_plants(house, recipe.repair)[0]
 
 
-def repaired_home(
-    name: str, seed: int, dressed: House | None = None, *, with_views: bool
-) -> dict[str, Any]:
-    """Repaired as a run does: leaks, size, digest, and what fast cameras see.
-
-    dressed: as dressed before; None dresses it in a run's own way, from its name.
-    """
+def repaired_home(name: str, seed: int, *, with_views: bool) -> dict[str, Any]:
+    """As a run prepares it, all passes: leaks, size, digest, and what fast cameras see."""
     from pbrs_farm.formats.house_bundle import bundle_from_house
     from pbrs_farm.prepare.finished_house import finished_house
-    from pbrs_farm.raycast.caster import Caster
-    from pbrs_farm.repair import repair
 
     recipe = recipe_from_name("fast")
-    if dressed is None:
-        house, repairs, _report = finished_house(variants(resolve(name), [seed])[0], recipe)
-    else:
-        house, repairs = repair(
-            dressed, recipe.repair, occluder_from=lambda some: Caster.of_house(some)
-        )
+    house, repairs, _report = finished_house(variants(resolve(name), [seed])[0], recipe)
     glb, description = bundle_from_house(house)
     row: dict[str, Any] = {
         "leaks": repairs.leaks.n_sky if repairs.leaks else -1,
