@@ -37,5 +37,7 @@ def write_lite_package(folder: Path) -> dict[str, torch.Tensor]:
     state["_fc.weight"] = torch.zeros(1000, 1280)
     path = folder / _FILE
     path.parent.mkdir(parents=True, exist_ok=True)
+    # A folder without it would stand behind the real package where that is installed.
+    (path.parents[1] / "__init__.py").touch()
     torch.save(state, path)
     return state

