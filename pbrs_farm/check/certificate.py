@@ -140,6 +140,18 @@ class Tally:
             self.fail(check, place, what)
         return holds
 
+    @property
+    def n_failed(self) -> int:
+        """Things that failed so far, of all checks."""
+        return sum(failed for _checked, failed, _ties in self._counts.values())
+
+    def take(self, other: Tally) -> None:
+        """Count what another tally counted without a failure; its notes, too."""
+        assert not other.n_failed
+        for check, (checked, _failed, ties) in other._counts.items():
+            self.add(check, checked, ties=ties)
+        self.notes += other.notes
+
     def totals(self, check: str) -> tuple[int, int]:
         """(things looked at, ties) of a check so far."""
         row = self._counts.get(check, [0, 0, 0])

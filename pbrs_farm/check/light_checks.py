@@ -46,11 +46,30 @@ def check_developed(
     """Develop radiance.exr (its channels) again, and compare with the stored pictures of the light modes.
 
     is_halved: light that was denoised is denoised again at half its size, and its pictures are
-    compared by tiles; as it stands costs most of the time. Only where `may_be_halved` says so.
+    compared by tiles; as it stands costs most of the time. Only where `may_be_halved` says so. What
+    differs so is looked at again as it stands, and that decides: a white balance may turn on which
+    half of the pixels is lit, and half the size has others.
 
     Does nothing where the view has no picture of a light mode, no radiance.exr or no recipe:
     `methods.not_looked_at` says so. arrays has the layers by name.
     """
+    if is_halved:
+        tried = Tally()
+        _check_modes(view, channels, arrays, tried, is_halved=True)
+        if not tried.n_failed:
+            tally.take(tried)
+            return
+    _check_modes(view, channels, arrays, tally, is_halved=False)
+
+
+def _check_modes(
+    view: StoredView,
+    channels: Mapping[str, NDArray[np.float32]],
+    arrays: Mapping[str, NDArray[Any]],
+    tally: Tally,
+    *,
+    is_halved: bool,
+) -> None:
     modes = [m for m in _GROUPS if m in arrays]
     if not modes or view.recipe is None:
         return
