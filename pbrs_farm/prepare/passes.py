@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
 
-_PLANS_VERSION: Final = (
-    1  # of what reads floor plans, beside that of reading: other homes stay what they are
-)
+_PLANS_VERSION: Final = 1
+"""Of what reads floor plans, beside that of reading: raised, it makes no other homes anew."""
 _MAX_ROUNDS: Final = 3  # of repairing a dressed house and hanging anew what lost its wall
 _FURNISH_VERSION: Final = 3  # of furnish_rooms.py, beside that of what furnishes generated homes
 _DRESS_SHARE: Final = 0.7  # of the time that dressing and repair take, about

@@ -77,7 +77,7 @@ print(code, sorted(set({HEAVY.split()!r}) & set(sys.modules)))
 
 
 def test_recipes_and_jobs_import_no_scipy() -> None:
-    # Half a second and 30 MB of each process of a farm, the coordinator among them.
+    # Each process of a farm would wait for it and hold it, the coordinator among them.
     code = "import sys, pbrs_farm.core.recipe, workers.job; print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

@@ -45,12 +45,8 @@ def open_judged_places(
             known_held_out=known_held_out,
         )  # fmt: skip
         if one.name in {other.name for other in places}:
-            raise BadInput(
-                "--on",
-                word,
-                f"a second place named {one.name}",
-                hint=f"--on other={word.partition('=')[2] or word}",
-            )
+            hint = f"--on other={word.partition('=')[2] or word}"
+            raise BadInput("--on", word, f"a second place named {one.name}", hint=hint)
         places.append(one)
     return places
 
@@ -71,11 +67,12 @@ def open_judged_place(
     if not place:
         raise BadInput("--on", word, "names no place", hint="--on nyu=PLACE")
     path = Path(place)
-    if path.suffix == ".mat":
+    is_nyu, is_folder = path.suffix == ".mat", path.is_dir() and not is_root(path)
+    if own_mode and (is_nyu or is_folder):
+        raise BadInput("--on", word, f"photographs have no light of ours, such as {own_mode}")
+    if is_nyu:
         return nyu_views(path, plan, label or "NYUv2", trained_on)
-    if path.is_dir() and not is_root(path):
-        if own_mode:
-            raise BadInput("--on", word, f"photographs have no light of ours, such as {own_mode}")
+    if is_folder:
         return pair_views(path, plan, label or path.name, trained_on)
     if hold_out is None and known_held_out:
         hold_out = frozenset(home_of(house) for house in known_held_out)

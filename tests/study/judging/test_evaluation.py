@@ -232,8 +232,9 @@ def test_two_places_of_one_name_and_light_of_photographs_are_one_line(pairs: Pat
     words = [f"room={pairs}", f"room={pairs}"]
     with pytest.raises(BadInput, match="a second place named room"):
         open_judged_places(words, small_plan(), mode="mlt_il_ol")
-    with pytest.raises(BadInput, match="photographs have no light of ours"):
-        open_judged_place(f"{pairs}@mlt_ol", small_plan(), mode="mlt_il_ol")
+    for photographs in (str(pairs), "nyu_depth_v2_labeled.mat"):
+        with pytest.raises(BadInput, match="photographs have no light of ours"):
+            open_judged_place(f"{photographs}@mlt_ol", small_plan(), mode="mlt_il_ol")
     names = [
         one.name
         for one in open_judged_places(
